@@ -1,0 +1,1 @@
+//! How a robot of a Gestalt swarm sees, talks, and gets run.

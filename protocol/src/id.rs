@@ -1,0 +1,161 @@
+//! Who, what and when: one type per meaning.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A text that is no valid identifier.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum IdError {
+    /// Not a decimal number within the range of the identifier.
+    #[error("'{0}' is not a whole number from 0 to {max}", max = u32::MAX)]
+    NotANumber(String),
+    /// An instructor's name that could not stand in a key expression.
+    #[error("'{0}' is no instructor name: 1 to 32 of the characters A-Z a-z 0-9 _ -")]
+    NotAName(String),
+}
+
+/// A robot, unique in its swarm. Small numbers travel in fewer bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RobotId(pub u32);
+
+impl fmt::Display for RobotId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl FromStr for RobotId {
+    type Err = IdError;
+
+    fn from_str(text: &str) -> Result<Self, IdError> {
+        // One spelling per robot: "+7" and "007" would be second names for the same key.
+        let number: u32 = text.parse().map_err(|_| IdError::NotANumber(text.to_owned()))?;
+        if number.to_string() == text { Ok(Self(number)) } else { Err(IdError::NotANumber(text.to_owned())) }
+    }
+}
+
+/// A human who opens rounds and gives feedback: 1 to 32 of the characters `A-Z a-z 0-9 _ -`.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct InstructorId(String);
+
+impl fmt::Display for InstructorId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl FromStr for InstructorId {
+    type Err = IdError;
+
+    fn from_str(text: &str) -> Result<Self, IdError> {
+        let fits = (1..=32).contains(&text.len())
+            && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+        if fits { Ok(Self(text.to_owned())) } else { Err(IdError::NotAName(text.chars().take(40).collect())) }
+    }
+}
+
+impl TryFrom<String> for InstructorId {
+    type Error = IdError;
+
+    fn try_from(text: String) -> Result<Self, IdError> {
+        text.parse()
+    }
+}
+
+impl From<InstructorId> for String {
+    fn from(id: InstructorId) -> String {
+        id.0
+    }
+}
+
+/// A gesture, as an index into the swarm's vocabulary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct ClassId(pub u8);
+
+impl ClassId {
+    /// The position of this class in a vector with one element per class.
+    #[must_use]
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+impl fmt::Display for ClassId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// One showing of a gesture: the count of rounds so far, and the robot that opened it.
+///
+/// Robots that open at the same time choose the same counter; such rounds merge on the smaller opener.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct RoundId {
+    /// Highest counter seen, plus one.
+    pub counter: u32,
+    /// Who opened it.
+    pub opener: RobotId,
+}
+
+impl fmt::Display for RoundId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}@{}", self.counter, self.opener)
+    }
+}
+
+/// Orders the messages of one author, also across its restarts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Stamp {
+    /// Grows at every start of the author.
+    pub boot: u32,
+    /// Grows with every message of that boot.
+    pub sequence: u32,
+}
+
+/// Names a list of gestures: votes are fused only with votes over the same list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct VocabularyId(pub u32);
+
+/// Names what the components of a feature vector mean: the list of features, their scaling and their reduction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct FeatureSpaceId(pub u64);
+
+impl fmt::Display for FeatureSpaceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_has_one_spelling() {
+        assert_eq!("7".parse(), Ok(RobotId(7)));
+        for other in ["+7", "007", " 7", "", "-1", "4294967296"] {
+            assert!(other.parse::<RobotId>().is_err(), "{other}");
+        }
+    }
+
+    #[test]
+    fn an_instructor_name_can_stand_in_a_key() {
+        assert!("ada-2_B".parse::<InstructorId>().is_ok());
+        for bad in ["", "a/b", "**", "naïve", &"x".repeat(33)] {
+            assert!(bad.parse::<InstructorId>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_restart_outranks_any_sequence() {
+        assert!(Stamp { boot: 2, sequence: 0 } > Stamp { boot: 1, sequence: u32::MAX });
+    }
+}

@@ -1,0 +1,148 @@
+//! Where things are said: the key expressions of a swarm.
+
+use thiserror::Error;
+
+use crate::{InstructorId, RobotId};
+
+/// A swarm name that could not stand in a key expression.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("'{0}' is no swarm name: 1 to 64 of the characters A-Z a-z 0-9 _ -")]
+pub struct SwarmNameError(String);
+
+/// Builds and parses the keys of one swarm, all under `gestalt/<swarm>/`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Keys {
+    prefix: String,
+}
+
+/// What a key is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Topic {
+    /// `robot/<id>/vote`: the robot's latest vote, a postcard [`Envelope`](crate::Envelope).
+    Vote(RobotId),
+    /// `robot/<id>/repair`: what neighbours tell that robot alone, a postcard [`Envelope`](crate::Envelope).
+    Repair(RobotId),
+    /// `robot/<id>/decision`: the decision that robot holds, JSON.
+    RobotDecision(RobotId),
+    /// `robot/<id>/status`: a queryable, JSON [`Status`](crate::Status).
+    Status(RobotId),
+    /// `robot/<id>/alive`: a liveliness token.
+    Alive(RobotId),
+    /// `decision`: the swarm's decision, one message each, JSON; also a queryable for the last one.
+    Decision,
+    /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON.
+    Feedback(InstructorId),
+}
+
+impl Keys {
+    /// The keys of the swarm of that name.
+    ///
+    /// # Errors
+    /// [`SwarmNameError`] for a name that is empty, longer than 64 bytes, or has other characters than
+    /// `A-Z a-z 0-9 _ -`.
+    pub fn new(swarm: &str) -> Result<Self, SwarmNameError> {
+        let fits = (1..=64).contains(&swarm.len())
+            && swarm.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
+        if fits {
+            Ok(Self { prefix: format!("gestalt/{swarm}/") })
+        } else {
+            Err(SwarmNameError(swarm.chars().take(80).collect()))
+        }
+    }
+
+    /// The key of a topic.
+    #[must_use]
+    pub fn key(&self, topic: &Topic) -> String {
+        let prefix = &self.prefix;
+        match topic {
+            Topic::Vote(id) => format!("{prefix}robot/{id}/vote"),
+            Topic::Repair(id) => format!("{prefix}robot/{id}/repair"),
+            Topic::RobotDecision(id) => format!("{prefix}robot/{id}/decision"),
+            Topic::Status(id) => format!("{prefix}robot/{id}/status"),
+            Topic::Alive(id) => format!("{prefix}robot/{id}/alive"),
+            Topic::Decision => format!("{prefix}decision"),
+            Topic::Feedback(id) => format!("{prefix}instructor/{id}/feedback"),
+        }
+    }
+
+    /// The key expression for one kind of thing from every robot: `robot/*/<what>`.
+    #[must_use]
+    pub fn every_robot(&self, what: &str) -> String {
+        format!("{}robot/*/{what}", self.prefix)
+    }
+
+    /// The key expression for the feedback of every instructor.
+    #[must_use]
+    pub fn every_instructor(&self) -> String {
+        format!("{}instructor/*/feedback", self.prefix)
+    }
+
+    /// What a key is about; `None` for a key of another swarm or of no known form.
+    #[must_use]
+    pub fn parse(&self, key: &str) -> Option<Topic> {
+        let mut chunks = key.strip_prefix(&self.prefix)?.split('/');
+        let topic = match (chunks.next()?, chunks.next(), chunks.next()) {
+            ("decision", None, None) => Topic::Decision,
+            ("robot", Some(id), Some(what)) => {
+                let id = id.parse().ok()?;
+                match what {
+                    "vote" => Topic::Vote(id),
+                    "repair" => Topic::Repair(id),
+                    "decision" => Topic::RobotDecision(id),
+                    "status" => Topic::Status(id),
+                    "alive" => Topic::Alive(id),
+                    _ => return None,
+                }
+            }
+            ("instructor", Some(id), Some("feedback")) => Topic::Feedback(id.parse().ok()?),
+            _ => return None,
+        };
+        chunks.next().is_none().then_some(topic)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_topic_comes_back_from_its_key() {
+        let keys = Keys::new("demo").unwrap();
+        let topics = [
+            Topic::Vote(RobotId(1)),
+            Topic::Repair(RobotId(2)),
+            Topic::RobotDecision(RobotId(3)),
+            Topic::Status(RobotId(4)),
+            Topic::Alive(RobotId(u32::MAX)),
+            Topic::Decision,
+            Topic::Feedback("ada".parse().unwrap()),
+        ];
+        for topic in topics {
+            assert_eq!(keys.parse(&keys.key(&topic)), Some(topic));
+        }
+    }
+
+    #[test]
+    fn keys_of_others_are_not_ours() {
+        let keys = Keys::new("demo").unwrap();
+        for key in [
+            "gestalt/other/decision",
+            "gestalt/demo",
+            "gestalt/demo/",
+            "gestalt/demo/decision/x",
+            "gestalt/demo/robot/1/vote/x",
+            "gestalt/demo/robot/01/vote",
+            "gestalt/demo/robot/*/vote",
+            "gestalt/demo/robot/1/frame",
+        ] {
+            assert_eq!(keys.parse(key), None, "{key}");
+        }
+    }
+
+    #[test]
+    fn a_swarm_name_is_one_key_chunk() {
+        for bad in ["", "a/b", "a*", "$", &"x".repeat(65)] {
+            assert!(Keys::new(bad).is_err(), "{bad}");
+        }
+    }
+}

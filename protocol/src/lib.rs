@@ -1,0 +1,30 @@
+//! What the robots of a Gestalt swarm say to each other, and where.
+//!
+//! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Decision`],
+//! [`Status`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
+//! of it travels.
+//!
+//! This crate holds no behaviour: when to speak, and what to make of what is heard, is `gestalt-strategies`;
+//! how bytes get from robot to robot is `gestalt-peer`.
+//!
+//! Decoding is total and bounded: any bytes give a value or a [`DecodeError`], never a panic, and never an
+//! allocation above [`MAX_ALLOCATION`] bytes.
+
+mod bounded;
+mod decision;
+mod envelope;
+mod id;
+mod instruction;
+mod key;
+mod message;
+mod status;
+
+pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
+pub use envelope::{
+    DecodeError, Envelope, MAX_ALLOCATION, MAX_JSON, MAX_MESSAGE, PROTOCOL_VERSION, decode_json,
+};
+pub use id::{ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, Stamp, VocabularyId};
+pub use instruction::Instruction;
+pub use key::{Keys, SwarmNameError, Topic};
+pub use message::{Give, Have, HeldVote, MAX_CLASSES, MAX_ROBOTS, Message, Vote};
+pub use status::{Reported, Status};

@@ -1,0 +1,74 @@
+//! What robots say to robots.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Decision, Rank, RobotId, RoundId, Stamp, VocabularyId, bounded};
+
+/// The largest vocabulary: more classes than this are refused at both ends.
+pub const MAX_CLASSES: usize = 64;
+
+/// The largest swarm one ballot can hold.
+pub const MAX_ROBOTS: usize = 4096;
+
+/// Everything a robot says to other robots. The variants' order is part of the wire format.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Message {
+    /// To all: the author's evidence in a round.
+    Vote(Vote),
+    /// To one neighbour: what the author has of the newest round, so that each can give the other what it lacks.
+    Have(Have),
+    /// To one neighbour: what it was found to lack.
+    Give(Give),
+}
+
+/// One robot's evidence in one round: the whole sum so far, so that the latest replaces all earlier ones and
+/// loss, repetition and reordering cost freshness, never correctness.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Vote {
+    /// The round this is evidence for.
+    pub round: RoundId,
+    /// The list of gestures the components of `evidence` stand for.
+    pub vocabulary: VocabularyId,
+    /// Centred log-evidence per class (natural logarithm, sums to 0, clipped by the author's ±c); empty when
+    /// the author takes part but has seen nothing.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
+    pub evidence: Vec<f32>,
+    /// The sum of the frames' weights behind the evidence: the number of independent looks, `0.0..`.
+    pub looks: f32,
+}
+
+/// What a robot holds of the newest round it knows, in short.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Have {
+    /// The newest round the author knows; `None` before the first.
+    pub round: Option<RoundId>,
+    /// The rank of the decision the author holds for that round.
+    pub decision: Option<Rank>,
+    /// Which votes of that round the author holds; empty once the round is over.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub votes: Vec<(RobotId, Stamp)>,
+    /// Whether this is itself an answer to a [`Have`]; such a one is answered with a [`Give`] only, so that two
+    /// robots never talk in circles.
+    pub answer: bool,
+}
+
+/// A vote as its author stamped it, passed on by another robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldVote {
+    /// Who cast it.
+    pub robot: RobotId,
+    /// The author's stamp on it.
+    pub stamp: Stamp,
+    /// The vote itself.
+    pub vote: Vote,
+}
+
+/// What a neighbour was found to lack.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Give {
+    /// The greatest decision the author holds for the newest round.
+    pub decision: Option<Decision>,
+    /// Votes the neighbour lacks or has only older versions of.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub votes: Vec<HeldVote>,
+}

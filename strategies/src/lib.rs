@@ -1,0 +1,18 @@
+//! How a robot of a Gestalt swarm decides and learns.
+//!
+//! Pure: no clock, no entropy, no socket, no file, no camera. Time and random generators are arguments, so the
+//! same inputs give the same outputs on every machine, byte for byte. The entry type is `Mind`: a state machine
+//! with one verb, `handle(now, input) -> outputs`, which a host (real Zenoh or an emulated network, both in
+//! `gestalt-peer`) feeds and obeys.
+//!
+//! ```text
+//! Observation ─► Classifier ─► opinion ─► Round (evidence) ─► my Vote ─► Ballot ─► fusion ─► Decision
+//!                                                      votes of others ──┘                     │
+//!                                                      decisions of others ─── the greatest wins ┘
+//! ```
+
+mod observation;
+mod vocabulary;
+
+pub use observation::Observation;
+pub use vocabulary::{Vocabulary, VocabularyError};
