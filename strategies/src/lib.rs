@@ -11,6 +11,7 @@
 //!                                                      decisions of others ─── the greatest wins ┘
 //! ```
 
+pub mod mind;
 mod observation;
 mod vocabulary;
 
