@@ -11,9 +11,12 @@
 //!                                                      decisions of others ─── the greatest wins ┘
 //! ```
 
+mod classify;
 pub mod mind;
 mod observation;
 mod vocabulary;
 
+pub use classify::{Classify, ClassifyError};
+pub use mind::{Input, MindConfig, Output};
 pub use observation::Observation;
 pub use vocabulary::{Vocabulary, VocabularyError};

@@ -4,13 +4,12 @@ mod config;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::Duration;
 
 use gestalt_protocol::{Decision, Envelope, Instruction, RobotId, RoundId};
 
 pub use config::MindConfig;
 
-use crate::{Classifier, Observation};
+use crate::{Classify, Observation};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -34,7 +33,7 @@ pub enum Input {
     /// The robots this one is directly linked to now.
     Neighbours(BTreeSet<RobotId>),
     /// A new classifier takes the place of the old one.
-    Learned(Arc<Classifier>),
+    Learned(Arc<dyn Classify>),
 }
 
 /// What the mind wants done. The host carries out all of them, in order.
