@@ -1,0 +1,43 @@
+# `make demo` and `make test` need Rust and git; everything else they install themselves.
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.PHONY: demo test bench lint packages
+
+# OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
+PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
+            libclang1-14 clang pkg-config
+TEST_PACKAGES := iproute2 libsvm-tools
+
+# $(call install,PACKAGES): those of them that are missing.
+define install
+missing=(); for package in $(1); do \
+  dpkg-query -W -f='$${Status}' "$$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$$package"); done; \
+if (($${#missing[@]})); then \
+  as_root=(); ((EUID == 0)) || as_root=(sudo); \
+  echo "installing $${missing[*]}"; \
+  "$${as_root[@]}" apt-get update -qq; \
+  "$${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$${missing[@]}" >/dev/null; \
+fi
+endef
+
+packages:
+	@$(call install,$(PACKAGES))
+
+# A heterogeneous swarm of real Zenoh peers looks at gestures and decides. Leaves its pictures in out/.
+demo: packages
+	cargo build --release -p gestalt-peer
+	target/release/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 12 --picture out/round.png
+
+# Fast tests beside the code first, then whole swarms, one after the other: they measure time and share two cores.
+test: packages
+	@$(call install,$(TEST_PACKAGES))
+	cargo test --workspace --exclude gestalt-tests
+	cargo test -p gestalt-tests -- --test-threads=1
+
+# Every speed the README states, with its yardstick in the same run.
+bench: packages
+	cargo bench --workspace
+
+lint: packages
+	cargo fmt --check
+	cargo clippy --workspace --all-targets -- -D warnings
