@@ -1,7 +1,7 @@
 //! How a robot of a Gestalt swarm decides and learns.
 //!
 //! Pure: no clock, no entropy, no socket, no file, no camera. Time and random generators are arguments, so the
-//! same inputs give the same outputs on every machine, byte for byte. The entry type is `Mind`: a state machine
+//! same inputs give the same outputs on every machine, byte for byte. The entry type is [`Mind`]: a state machine
 //! with one verb, `handle(now, input) -> outputs`, which a host (real Zenoh or an emulated network, both in
 //! `gestalt-peer`) feeds and obeys.
 //!
@@ -11,12 +11,19 @@
 //!                                                      decisions of others ─── the greatest wins ┘
 //! ```
 
+mod agreement;
+pub mod ballot;
 mod classify;
+mod evidence;
+pub mod fusion;
 pub mod mind;
 mod observation;
+mod round;
 mod vocabulary;
 
+pub use ballot::Ballot;
 pub use classify::{Classify, ClassifyError};
-pub use mind::{Input, MindConfig, Output};
+pub use evidence::Evidence;
+pub use mind::{Input, Mind, MindConfig, MindConfigError, Output, Refusal, Refusals};
 pub use observation::Observation;
 pub use vocabulary::{Vocabulary, VocabularyError};

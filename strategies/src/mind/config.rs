@@ -2,7 +2,36 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::FusionRule;
+use gestalt_protocol::{FusionRule, MAX_ROBOTS};
+use thiserror::Error;
+
+/// Parameters no mind can work with; each names the field and the mend.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum MindConfigError {
+    /// α outside its range.
+    #[error("alpha is {0}: choose it above 0 and below 0.5, for example 0.05")]
+    Alpha(f64),
+    /// A quorum that is always or never met.
+    #[error("quorum is {0}: choose from 1 to {MAX_ROBOTS} robots")]
+    Quorum(u32),
+    /// A bound on the evidence that bounds nothing or leaves none.
+    #[error("clip is {0}: choose it above 0 and at most 1000 nats, for example 6")]
+    Clip(f64),
+    /// A period of no length.
+    #[error("{0} is zero: choose a duration above 0, for example 500ms")]
+    Zero(&'static str),
+    /// A duration so long that adding it up could overflow.
+    #[error("{0} is longer than a day: choose a shorter duration")]
+    TooLong(&'static str),
+    /// Two durations in the wrong order.
+    #[error("{longer} is shorter than {shorter}: make {longer} at least as long")]
+    Order {
+        /// The field that must not be the longer one.
+        shorter: &'static str,
+        /// The field that must not be the shorter one.
+        longer: &'static str,
+    },
+}
 
 /// How a robot takes part in rounds. All robots of a swarm should share these.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +42,8 @@ pub struct MindConfig {
     pub alpha: f64,
     /// q: how many robots must have contributed evidence. At least 1.
     pub quorum: u32,
-    /// f: how many lying robots a decision must withstand; the margin top − second must exceed 2·f·c.
+    /// f: how many lying robots a decision must withstand. The margin top − second must exceed what f robots can
+    /// add to it (2·f·c for the log pools), and a decision heard is believed once f + 1 robots hold its class.
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
@@ -23,6 +53,9 @@ pub struct MindConfig {
     pub patience: Duration,
     /// When a round ends undecided, from its opening.
     pub deadline: Duration,
+    /// After hearing of a round, requests to open another have no effect for this long: a copy of the request
+    /// for this one may still be on its way.
+    pub refractory: Duration,
     /// The least time between two votes of one robot.
     pub vote_interval: Duration,
     /// A vote is said again after this long, while the round is open.
@@ -48,12 +81,86 @@ impl Default for MindConfig {
             decorrelation: Duration::from_millis(500),
             patience: Duration::from_millis(1000),
             deadline: Duration::from_secs(5),
+            refractory: Duration::from_millis(500),
             vote_interval: Duration::from_millis(250),
             vote_repeat: Duration::from_secs(1),
             settle: Duration::from_millis(200),
             takeover: Duration::from_millis(400),
             repair_busy: Duration::from_millis(500),
             repair_idle: Duration::from_secs(2),
+        }
+    }
+}
+
+impl MindConfig {
+    /// Whether a mind can work with these parameters.
+    ///
+    /// # Errors
+    /// The first [`MindConfigError`] found.
+    pub fn validate(&self) -> Result<(), MindConfigError> {
+        if !(self.alpha > 0.0 && self.alpha < 0.5) {
+            return Err(MindConfigError::Alpha(self.alpha));
+        }
+        if !(1..=MAX_ROBOTS).contains(&(self.quorum as usize)) {
+            return Err(MindConfigError::Quorum(self.quorum));
+        }
+        if !(self.clip > 0.0 && self.clip <= 1000.0) {
+            return Err(MindConfigError::Clip(self.clip));
+        }
+        let above_zero = [
+            ("decorrelation", self.decorrelation),
+            ("deadline", self.deadline),
+            ("vote_interval", self.vote_interval),
+            ("vote_repeat", self.vote_repeat),
+            ("takeover", self.takeover),
+            ("repair_busy", self.repair_busy),
+            ("repair_idle", self.repair_idle),
+        ];
+        if let Some((field, _)) = above_zero.iter().find(|(_, duration)| duration.is_zero()) {
+            return Err(MindConfigError::Zero(field));
+        }
+        let any = [("patience", self.patience), ("refractory", self.refractory), ("settle", self.settle)];
+        let day = Duration::from_secs(24 * 60 * 60);
+        if let Some((field, _)) = above_zero.iter().chain(&any).find(|(_, duration)| *duration > day) {
+            return Err(MindConfigError::TooLong(field));
+        }
+        let ordered = [
+            ("patience", self.patience, "deadline", self.deadline),
+            ("vote_interval", self.vote_interval, "vote_repeat", self.vote_repeat),
+            ("repair_busy", self.repair_busy, "repair_idle", self.repair_idle),
+        ];
+        match ordered.iter().find(|(_, less, _, more)| less > more) {
+            Some(&(shorter, _, longer, _)) => Err(MindConfigError::Order { shorter, longer }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_valid() {
+        assert_eq!(MindConfig::default().validate(), Ok(()));
+    }
+
+    #[test]
+    fn what_no_mind_can_work_with_is_named() {
+        let default = MindConfig::default;
+        let ms = Duration::from_millis;
+        for (config, field) in [
+            (MindConfig { alpha: 0.5, ..default() }, "alpha"),
+            (MindConfig { alpha: f64::NAN, ..default() }, "alpha"),
+            (MindConfig { quorum: 0, ..default() }, "quorum"),
+            (MindConfig { clip: f64::INFINITY, ..default() }, "clip"),
+            (MindConfig { repair_busy: ms(0), ..default() }, "repair_busy"),
+            (MindConfig { settle: Duration::MAX, ..default() }, "settle"),
+            (MindConfig { patience: ms(6000), ..default() }, "patience"),
+            (MindConfig { vote_repeat: ms(100), ..default() }, "vote_repeat"),
+        ] {
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
         }
     }
 }

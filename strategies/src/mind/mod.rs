@@ -1,15 +1,25 @@
 //! The robot's mind: a state machine that turns what a robot sees and hears into votes and decisions.
 
 mod config;
+mod refusal;
+mod repair;
 
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Instruction, RobotId, RoundId};
+use gestalt_protocol::{
+    Decision, Envelope, Instruction, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+};
 
-pub use config::MindConfig;
+pub use config::{MindConfig, MindConfigError};
+pub use refusal::{Refusal, Refusals};
+use repair::Repair;
 
-use crate::{Classify, Observation};
+use crate::ballot::{Ballot, Cast, Scale};
+use crate::round::Round;
+use crate::{Classify, Observation, Vocabulary};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -52,3 +62,391 @@ pub enum Output {
     /// That round is over for this robot: no further looking.
     Closed(RoundId),
 }
+
+/// A round this many counters ahead of the newest known is refused: nobody shows a million gestures unnoticed.
+const FAR_AHEAD: u32 = 1_000_000;
+
+/// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
+///
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
+/// inputs at the same times give the same outputs.
+#[derive(Debug)]
+pub struct Mind {
+    me: RobotId,
+    config: MindConfig,
+    classifier: Option<Arc<dyn Classify>>,
+    /// The stamp of the last message said.
+    stamp: Stamp,
+    now: Duration,
+    /// The newest round known.
+    round: Option<Round>,
+    /// The highest counter heard of, also of a round about which nothing else is known yet.
+    highest: Option<u32>,
+    /// The other robots alive.
+    alive: BTreeSet<RobotId>,
+    repair: Repair,
+    refusals: Refusals,
+    duplicate: Option<Stamp>,
+}
+
+impl Mind {
+    /// The mind of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
+    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
+    /// but gives no evidence.
+    ///
+    /// # Errors
+    /// [`MindConfigError`] for a configuration that [`MindConfig::validate`] refuses.
+    pub fn new(me: RobotId, boot: u32, config: MindConfig) -> Result<Self, MindConfigError> {
+        config.validate()?;
+        Ok(Self {
+            me,
+            classifier: None,
+            stamp: Stamp { boot, sequence: 0 },
+            now: Duration::ZERO,
+            round: None,
+            highest: None,
+            alive: BTreeSet::new(),
+            repair: Repair::new(config.repair_idle),
+            config,
+            refusals: Refusals::default(),
+            duplicate: None,
+        })
+    }
+
+    /// Takes in one input at the time `now` and says what is to be done.
+    pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        let mut out = Vec::new();
+        self.now = now.max(self.now);
+        match input {
+            Input::Tick => {}
+            Input::Open | Input::Instructed(Instruction::Open) => self.on_open(&mut out),
+            Input::Observed(observation) => self.on_observed(&observation),
+            Input::Received(envelope) => self.on_received(envelope, &mut out),
+            Input::Heard(robot, decision) => self.on_heard(robot, decision, &mut out),
+            Input::Announced(decision) => self.on_announced(decision, &mut out),
+            Input::Alive(robots) => self.on_alive(robots),
+            Input::Neighbours(robots) => self.on_neighbours(robots, &mut out),
+            Input::Learned(classifier) => self.on_learned(classifier),
+        }
+        self.advance(&mut out);
+        out
+    }
+
+    /// When the mind wants its next [`Input::Tick`], if nothing else comes before.
+    #[must_use]
+    pub fn next_wake(&self) -> Option<Duration> {
+        let round = self.round.as_ref();
+        let (patience, deadline) = round
+            .filter(|round| round.open && round.agreement.held().is_none())
+            .map(|round| round.patience_and_deadline(&self.config))
+            .unzip();
+        [
+            round.and_then(|round| round.vote_due(&self.config)),
+            patience.filter(|patience| *patience > self.now),
+            deadline,
+            self.closing(),
+            self.announcement(),
+            self.repair.due(&self.alive),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    fn on_open(&mut self, out: &mut Vec<Output>) {
+        let settled = |round: &Round| !round.open && self.now >= round.since + self.config.refractory;
+        if !self.round.as_ref().is_none_or(settled) {
+            return;
+        }
+        match self.highest.map_or(Some(1), |highest| highest.checked_add(1)) {
+            Some(counter) => self.join(RoundId { counter, opener: self.me }, out),
+            None => self.refusals.add(Refusal::CountersUsedUp),
+        }
+    }
+
+    fn on_observed(&mut self, observation: &Observation) {
+        let Some(round) = self.round.as_mut().filter(|round| round.open) else { return };
+        let Some(classifier) = &self.classifier else { return self.refusals.add(Refusal::NoClassifier) };
+        let classes = classifier.vocabulary().classes();
+        match classifier.probabilities(&observation.features) {
+            Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
+                let quality = f64::from(observation.quality.clamp(0.0, 1.0));
+                round.look(self.now, &p, quality, &self.config);
+            }
+            Ok(_) | Err(_) => self.refusals.add(Refusal::Unclassified),
+        }
+    }
+
+    fn on_received(&mut self, envelope: Envelope, out: &mut Vec<Output>) {
+        let Envelope { author, stamp, message } = envelope;
+        if author == self.me {
+            // The own words may come back; words never said are another's.
+            if stamp.boot != self.stamp.boot || stamp > self.stamp {
+                self.meet_duplicate(stamp);
+            }
+            return;
+        }
+        match message {
+            Message::Vote(vote) => {
+                self.hear_vote(author, stamp, vote, out);
+            }
+            Message::Have(have) => self.on_have(author, &have, out),
+            Message::Give(give) => self.on_give(author, give, out),
+        }
+    }
+
+    fn on_heard(&mut self, robot: RobotId, decision: Decision, out: &mut Vec<Output>) {
+        if robot != self.me {
+            self.hear_decision(Some(robot), decision, out);
+        }
+    }
+
+    fn on_announced(&mut self, decision: Decision, out: &mut Vec<Output>) {
+        let (counter, class) = (decision.round.counter, decision.class);
+        self.hear_decision(None, decision, out);
+        if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == counter) {
+            round.agreement.note_announced(self.now, class);
+        }
+    }
+
+    fn on_alive(&mut self, mut robots: BTreeSet<RobotId>) {
+        robots.remove(&self.me);
+        self.alive = robots;
+    }
+
+    fn on_learned(&mut self, classifier: Arc<dyn Classify>) {
+        let before = self.classifier.as_ref().map(|old| old.vocabulary().id());
+        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary().id())) {
+            round.look_afresh();
+        }
+        self.classifier = Some(classifier);
+    }
+
+    /// Does whatever is due.
+    fn advance(&mut self, out: &mut Vec<Output>) {
+        self.speak(out);
+        self.decide(out);
+        if self.closing().is_some_and(|due| self.now >= due) {
+            self.close(out);
+        }
+        if self.announcement().is_some_and(|due| self.now >= due) {
+            self.announce(out);
+        }
+        self.repair_when_due(out);
+    }
+
+    /// Says this robot's vote when it is due.
+    fn speak(&mut self, out: &mut Vec<Output>) {
+        let Some(round) = self.round.as_mut() else { return };
+        if round.vote_due(&self.config).is_none_or(|due| self.now < due) {
+            return;
+        }
+        if let Some(repeated) = round.repeat(self.now) {
+            out.push(Output::Broadcast(repeated));
+            return;
+        }
+        let vocabulary = self.classifier.as_ref().map_or(VocabularyId(0), |c| c.vocabulary().id());
+        let vote = round.vote(vocabulary, self.config.clip);
+        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+        round.ballot.cast(self.me, self.stamp, vote.clone());
+        let envelope = Envelope { author: self.me, stamp: self.stamp, message: Message::Vote(vote) };
+        round.note_said(self.now, envelope.clone());
+        out.push(Output::Broadcast(envelope));
+    }
+
+    /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
+    fn decide(&mut self, out: &mut Vec<Output>) {
+        let own_scale = self.own_scale();
+        let Some(round) = self.round.as_mut() else { return };
+        let scale = own_scale.or_else(|| round.ballot.prevailing_scale());
+        round.conclude(self.now, self.me, &self.alive, scale, &self.config);
+        // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
+        let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
+        if let Some(decision) = round.agreement.settle(self.now, or_none) {
+            out.push(Output::Hold(decision.clone()));
+        }
+    }
+
+    /// When the open round closes: what is decided is left a while to meet what others decided.
+    fn closing(&self) -> Option<Duration> {
+        let round = self.round.as_ref().filter(|round| round.open)?;
+        Some(round.agreement.held_since()? + self.config.settle)
+    }
+
+    fn close(&mut self, out: &mut Vec<Output>) {
+        if let Some(round) = self.round.as_mut().filter(|round| round.open) {
+            round.open = false;
+            out.push(Output::Closed(round.id));
+        }
+    }
+
+    /// When this robot is to announce the decision it holds: the live robot of the smallest id is the
+    /// spokesrobot, each next one waits a while longer for the one before.
+    fn announcement(&self) -> Option<Duration> {
+        let before_me = self.alive.range(..self.me).count();
+        let rank = u32::try_from(before_me).unwrap_or(u32::MAX);
+        let wait = self.config.settle.saturating_add(self.config.takeover.saturating_mul(rank));
+        self.round.as_ref()?.agreement.announcement(wait)
+    }
+
+    fn announce(&mut self, out: &mut Vec<Output>) {
+        let Some(agreement) = self.round.as_mut().map(|round| &mut round.agreement) else { return };
+        if let Some(decision) = agreement.held().cloned() {
+            agreement.note_announced(self.now, decision.class);
+            out.push(Output::Announce(decision));
+        }
+    }
+
+    /// Takes part in a round from now on; an older one that is still open is over.
+    fn join(&mut self, id: RoundId, out: &mut Vec<Output>) {
+        self.enter(id, true, out);
+        out.push(Output::Opened(id));
+        self.repair.hurry(self.now, &self.config);
+        self.speak(out);
+    }
+
+    /// Makes this the newest round known, with or without taking part in it.
+    fn enter(&mut self, id: RoundId, open: bool, out: &mut Vec<Output>) {
+        self.close(out);
+        self.highest = self.highest.max(Some(id.counter));
+        self.round = Some(Round::new(id, self.now, open));
+    }
+
+    /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Equal counters
+    /// merge here, on the smaller opener.
+    fn place(&mut self, id: RoundId) -> Option<Ordering> {
+        if self.highest.is_some_and(|highest| id.counter > highest.saturating_add(FAR_AHEAD)) {
+            self.refusals.add(Refusal::FarAhead);
+            return None;
+        }
+        self.highest = self.highest.max(Some(id.counter));
+        let Some(round) = &mut self.round else { return Some(Ordering::Greater) };
+        let order = id.counter.cmp(&round.id.counter);
+        if order.is_eq() {
+            round.id.opener = round.id.opener.min(id.opener);
+        }
+        Some(order)
+    }
+
+    /// Counts a robot's vote, by whichever way it came. Says whether it was news.
+    fn hear_vote(&mut self, robot: RobotId, stamp: Stamp, vote: Vote, out: &mut Vec<Output>) -> bool {
+        if robot == self.me {
+            // From an earlier life it is merely old.
+            if stamp > self.stamp {
+                self.meet_duplicate(stamp);
+            }
+            return false;
+        }
+        if vote.check().is_err() {
+            self.refusals.add(Refusal::Impossible);
+            return false;
+        }
+        let scale = Scale { vocabulary: vote.vocabulary, classes: vote.evidence.len() };
+        if !vote.evidence.is_empty() && self.own_scale().is_some_and(|own| own != scale) {
+            self.refusals.add(Refusal::Vocabulary);
+            return false;
+        }
+        match self.place(vote.round) {
+            None | Some(Ordering::Less) => return false,
+            Some(Ordering::Greater) => self.join(vote.round, out),
+            Some(Ordering::Equal) => {}
+        }
+        let Some(round) = self.round.as_mut() else { return false };
+        match round.ballot.cast(robot, stamp, vote) {
+            Cast::Counted => true,
+            Cast::Known => false,
+            Cast::Full => {
+                self.refusals.add(Refusal::BallotFull);
+                false
+            }
+        }
+    }
+
+    /// Takes in a decision, by whichever way it came. Says whether it was news.
+    fn hear_decision(&mut self, holder: Option<RobotId>, decision: Decision, out: &mut Vec<Output>) -> bool {
+        if decision.check().is_err() {
+            self.refusals.add(Refusal::Impossible);
+            return false;
+        }
+        match self.place(decision.round) {
+            None | Some(Ordering::Less) => return false,
+            // What is decided elsewhere needs no looking; unless it cannot be believed on one robot's word.
+            Some(Ordering::Greater) if self.config.liars == 0 => self.enter(decision.round, false, out),
+            Some(Ordering::Greater) => self.join(decision.round, out),
+            Some(Ordering::Equal) => {}
+        }
+        let Some(round) = self.round.as_mut() else { return false };
+        round.agreement.hear(holder, decision, self.config.liars)
+    }
+
+    fn meet_duplicate(&mut self, stamp: Stamp) {
+        self.refusals.add(Refusal::DuplicateId);
+        self.duplicate = Some(stamp);
+    }
+
+    fn own_scale(&self) -> Option<Scale> {
+        let vocabulary = self.classifier.as_ref()?.vocabulary();
+        Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.classes() })
+    }
+}
+
+/// What a host may want to show.
+impl Mind {
+    /// Whose mind it is.
+    #[must_use]
+    pub fn me(&self) -> RobotId {
+        self.me
+    }
+
+    /// Its parameters.
+    #[must_use]
+    pub fn config(&self) -> &MindConfig {
+        &self.config
+    }
+
+    /// The newest round known.
+    #[must_use]
+    pub fn round(&self) -> Option<RoundId> {
+        self.round.as_ref().map(|round| round.id)
+    }
+
+    /// Whether this robot takes part in that round by looking and voting.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.round.as_ref().is_some_and(|round| round.open)
+    }
+
+    /// The decision held for that round.
+    #[must_use]
+    pub fn held(&self) -> Option<&Decision> {
+        self.round.as_ref()?.agreement.held()
+    }
+
+    /// The votes known in that round.
+    #[must_use]
+    pub fn ballot(&self) -> Option<&Ballot> {
+        self.round.as_ref().map(|round| &round.ballot)
+    }
+
+    /// The vocabulary of its classifier.
+    #[must_use]
+    pub fn vocabulary(&self) -> Option<&Vocabulary> {
+        self.classifier.as_ref().map(|classifier| classifier.vocabulary())
+    }
+
+    /// What it refused so far, by cause.
+    #[must_use]
+    pub fn refusals(&self) -> &Refusals {
+        &self.refusals
+    }
+
+    /// The stamp on the latest message that another robot said under this robot's id: give one of the two
+    /// another id.
+    #[must_use]
+    pub fn duplicate(&self) -> Option<Stamp> {
+        self.duplicate
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,249 @@
+//! The latest vote of each robot in one round.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use gestalt_protocol::{CountedVote, FusionRule, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
+
+use crate::fusion::{self, Fusion};
+
+/// What became of a vote put into a [`Ballot`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cast {
+    /// It is the latest of its robot: it counts now.
+    Counted,
+    /// The ballot holds that vote already, or a later one: nothing changed.
+    Known,
+    /// The ballot holds votes of [`MAX_ROBOTS`] other robots: refused.
+    Full,
+}
+
+/// The list of gestures a ballot is counted over, and how many there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scale {
+    /// The list.
+    pub vocabulary: VocabularyId,
+    /// How many gestures are on it.
+    pub classes: usize,
+}
+
+/// The latest vote of each robot. Putting votes in commutes and repeats harmlessly: whatever the order and the
+/// number of copies, the same votes make the same ballot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ballot {
+    votes: BTreeMap<RobotId, (Stamp, Vote)>,
+}
+
+impl Ballot {
+    /// Puts a vote in, if it is the latest of its robot.
+    pub fn cast(&mut self, robot: RobotId, stamp: Stamp, vote: Vote) -> Cast {
+        let full = self.votes.len() >= MAX_ROBOTS;
+        match self.votes.entry(robot) {
+            Entry::Occupied(held) if held.get().0 >= stamp => Cast::Known,
+            Entry::Occupied(mut held) => {
+                held.insert((stamp, vote));
+                Cast::Counted
+            }
+            Entry::Vacant(_) if full => Cast::Full,
+            Entry::Vacant(place) => {
+                place.insert((stamp, vote));
+                Cast::Counted
+            }
+        }
+    }
+
+    /// How many robots take part, seeing or not.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.votes.len()
+    }
+
+    /// Whether no robot takes part.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.votes.is_empty()
+    }
+
+    /// Whether that robot takes part, seeing or not.
+    #[must_use]
+    pub fn contains(&self, robot: RobotId) -> bool {
+        self.votes.contains_key(&robot)
+    }
+
+    /// Which vote of that robot is held.
+    #[must_use]
+    pub fn stamp(&self, robot: RobotId) -> Option<Stamp> {
+        self.votes.get(&robot).map(|(stamp, _)| *stamp)
+    }
+
+    /// Which votes are held, by robot.
+    pub fn stamps(&self) -> impl Iterator<Item = (RobotId, Stamp)> + '_ {
+        self.votes.iter().map(|(robot, (stamp, _))| (*robot, *stamp))
+    }
+
+    /// The votes that one who holds `known` lacks or has only older versions of, by robot.
+    pub fn lacking<'a>(&'a self, known: &'a BTreeMap<RobotId, Stamp>) -> impl Iterator<Item = HeldVote> + 'a {
+        self.votes
+            .iter()
+            .filter(|(robot, (stamp, _))| known.get(robot).is_none_or(|theirs| theirs < stamp))
+            .map(|(robot, (stamp, vote))| HeldVote { robot: *robot, stamp: *stamp, vote: vote.clone() })
+    }
+
+    /// The scale most votes with evidence are on; of equals the one of the smaller vocabulary, then of fewer classes.
+    #[must_use]
+    pub fn prevailing_scale(&self) -> Option<Scale> {
+        let mut scales = BTreeMap::<(u32, usize), usize>::new();
+        for (_, vote) in self.votes.values().filter(|(_, vote)| !vote.evidence.is_empty()) {
+            *scales.entry((vote.vocabulary.0, vote.evidence.len())).or_default() += 1;
+        }
+        // Reversed, because of equal maxima the last one is returned.
+        let ((vocabulary, classes), _) = scales.into_iter().rev().max_by_key(|(_, votes)| *votes)?;
+        Some(Scale { vocabulary: VocabularyId(vocabulary), classes })
+    }
+
+    /// How many robots gave evidence on that scale.
+    #[must_use]
+    pub fn contributors(&self, scale: Scale) -> usize {
+        self.on(scale).count()
+    }
+
+    /// All evidence on that scale as one distribution; `None` when there is none.
+    #[must_use]
+    pub fn fuse(&self, rule: FusionRule, clip: f64, scale: Scale) -> Option<Fusion> {
+        fusion::fuse(rule, clip, scale.classes, self.on(scale).map(|(_, _, vote)| vote.evidence.as_slice()))
+    }
+
+    /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
+    #[must_use]
+    pub fn counted(&self, rule: FusionRule, clip: f64, scale: Scale) -> Vec<CountedVote> {
+        self.on(scale)
+            .map(|(robot, stamp, vote)| CountedVote {
+                robot,
+                stamp,
+                class: fusion::top_of(&vote.evidence),
+                weight: fusion::weight(rule, clip, &vote.evidence) as f32,
+            })
+            .collect()
+    }
+
+    fn on(&self, scale: Scale) -> impl Iterator<Item = (RobotId, Stamp, &Vote)> {
+        self.votes
+            .iter()
+            .filter(move |(_, (_, vote))| {
+                vote.evidence.len() == scale.classes && vote.vocabulary == scale.vocabulary
+            })
+            .map(|(robot, (stamp, vote))| (*robot, *stamp, vote))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::RoundId;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const SCALE: Scale = Scale { vocabulary: VocabularyId(9), classes: 3 };
+
+    fn vote(evidence: &[f32]) -> Vote {
+        Vote {
+            round: RoundId { counter: 1, opener: RobotId(1) },
+            vocabulary: SCALE.vocabulary,
+            evidence: evidence.to_vec(),
+            looks: 1.0,
+        }
+    }
+
+    fn stamp(boot: u32, sequence: u32) -> Stamp {
+        Stamp { boot, sequence }
+    }
+
+    #[test]
+    fn the_latest_vote_replaces_the_earlier() {
+        let mut ballot = Ballot::default();
+        assert_eq!(ballot.cast(RobotId(1), stamp(1, 5), vote(&[3.0, 0.0, 0.0])), Cast::Counted);
+        assert_eq!(ballot.cast(RobotId(1), stamp(1, 4), vote(&[0.0, 3.0, 0.0])), Cast::Known);
+        assert_eq!(ballot.fuse(FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 0);
+        assert_eq!(ballot.cast(RobotId(1), stamp(2, 0), vote(&[0.0, 0.0, 3.0])), Cast::Counted);
+        assert_eq!(ballot.fuse(FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 2);
+        assert_eq!(ballot.len(), 1);
+    }
+
+    #[test]
+    fn a_null_vote_takes_part_without_counting() {
+        let mut ballot = Ballot::default();
+        ballot.cast(RobotId(1), stamp(1, 1), vote(&[]));
+        assert!(ballot.contains(RobotId(1)));
+        assert_eq!(ballot.contributors(SCALE), 0);
+        assert_eq!(ballot.prevailing_scale(), None);
+        assert_eq!(ballot.fuse(FusionRule::Majority, 6.0, SCALE), None);
+    }
+
+    #[test]
+    fn only_votes_on_one_scale_are_fused() {
+        let mut ballot = Ballot::default();
+        for robot in 1..=2 {
+            ballot.cast(RobotId(robot), stamp(1, 1), vote(&[3.0, 0.0, 0.0]));
+        }
+        ballot.cast(RobotId(3), stamp(1, 1), Vote { vocabulary: VocabularyId(8), ..vote(&[0.0, 6.0, 0.0]) });
+        ballot.cast(RobotId(4), stamp(1, 1), vote(&[0.0, 6.0]));
+        assert_eq!(ballot.prevailing_scale(), Some(SCALE));
+        assert_eq!(ballot.contributors(SCALE), 2);
+        let counted: Vec<_> = ballot.counted(FusionRule::LogPool, 6.0, SCALE);
+        assert_eq!(
+            counted.iter().map(|v| (v.robot.0, v.class.0, v.weight)).collect::<Vec<_>>(),
+            [(1, 0, 1.0), (2, 0, 1.0)]
+        );
+    }
+
+    #[test]
+    fn a_ballot_never_outgrows_the_largest_swarm() {
+        let mut ballot = Ballot::default();
+        for robot in 0..MAX_ROBOTS as u32 {
+            assert_eq!(ballot.cast(RobotId(robot), stamp(1, 1), vote(&[])), Cast::Counted);
+        }
+        assert_eq!(ballot.cast(RobotId(u32::MAX), stamp(1, 1), vote(&[])), Cast::Full);
+        assert_eq!(ballot.cast(RobotId(0), stamp(1, 2), vote(&[])), Cast::Counted);
+        assert_eq!(ballot.len(), MAX_ROBOTS);
+    }
+
+    /// Votes as the authors say them: what carries one stamp is one vote.
+    fn said() -> impl Strategy<Value = Vec<(RobotId, Stamp, Vote)>> {
+        prop::collection::vec((0..6u32, 0..2u32, 0..4u32), 1..30).prop_map(|keys| {
+            keys.into_iter()
+                .map(|(robot, boot, sequence)| {
+                    let k = (7 * robot + 5 * boot + 3 * sequence) as f32;
+                    (RobotId(robot), stamp(boot, sequence), vote(&[k.sin() * 9.0, k.cos(), -k.sin()]))
+                })
+                .collect()
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn order_and_repetition_make_no_difference(
+            (votes, shuffled) in said().prop_flat_map(|votes| {
+                let twice: Vec<_> = votes.iter().chain(&votes).cloned().collect();
+                (Just(votes), Just(twice).prop_shuffle())
+            })
+        ) {
+            let count = |votes: &[(RobotId, Stamp, Vote)]| {
+                let mut ballot = Ballot::default();
+                for (robot, stamp, vote) in votes {
+                    ballot.cast(*robot, *stamp, vote.clone());
+                }
+                ballot
+            };
+            let (once, again) = (count(&votes), count(&shuffled));
+            prop_assert_eq!(&once, &again);
+            for rule in [
+                FusionRule::Majority,
+                FusionRule::MeanProbability,
+                FusionRule::LogPool,
+                FusionRule::ConfidenceWeighted,
+            ] {
+                prop_assert_eq!(once.fuse(rule, 6.0, SCALE), again.fuse(rule, 6.0, SCALE));
+            }
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! From the evidence of many robots to one distribution over the gestures.
+//!
+//! All sums run in the order given (a ballot gives [`RobotId`](gestalt_protocol::RobotId) order) in `f64`, and ties
+//! go to the smaller class, so that every robot with the same votes gets the same bits.
+
+use gestalt_protocol::{ClassId, FusionRule};
+
+/// What a set of votes amounts to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fusion {
+    /// The fused probability of each class, each in `0.0..=1.0`, summing to 1.
+    pub probabilities: Vec<f64>,
+    /// The likeliest class; of equals the smaller.
+    pub top: ClassId,
+    /// By how much the top class leads the second, in units of the most that one robot can add to that lead
+    /// (`2c` for the log pools, one vote for majority, one probability for the mean). A margin above `f` stands
+    /// whatever `f` of the robots said.
+    pub margin: f64,
+}
+
+/// Fuses one row of centred log-evidence per robot, each of `classes` values, after clipping it to ±`clip`.
+///
+/// With ℓ the clipped evidence of a robot, p its softmax and H the entropy, the total of class k is
+/// - majority: the number of robots with arg max ℓ = k; P is the share of the robots;
+/// - mean of probabilities: Σ p(k); P is the mean (the linear opinion pool);
+/// - log pool: Σ ℓ(k); P is the softmax (Genest & Zidek 1986, external Bayes, equal weights of 1);
+/// - confidence-weighted: Σ (1 − H(p) / ln K) ℓ(k); P is the softmax.
+///
+/// `None` when there is no row. A row of another length is a mistake of the caller; its excess or lack is ignored.
+pub fn fuse<'a>(
+    rule: FusionRule,
+    clip: f64,
+    classes: usize,
+    rows: impl IntoIterator<Item = &'a [f32]>,
+) -> Option<Fusion> {
+    let mut totals = vec![0.0; classes];
+    let mut row = vec![0.0; classes];
+    let mut scratch = vec![0.0; classes];
+    let mut robots = 0.0;
+    for evidence in rows {
+        robots += 1.0;
+        clip_into(&mut row, evidence, clip);
+        match rule {
+            FusionRule::Majority => {
+                if let Some(total) = totals.get_mut(top_of(&row).index()) {
+                    *total += 1.0;
+                }
+            }
+            FusionRule::MeanProbability => {
+                softmax(&mut row);
+                add(&mut totals, &row, 1.0);
+            }
+            FusionRule::LogPool => add(&mut totals, &row, 1.0),
+            FusionRule::ConfidenceWeighted => {
+                scratch.copy_from_slice(&row);
+                add(&mut totals, &row, certainty(&mut scratch));
+            }
+        }
+    }
+    if robots == 0.0 || classes < 2 {
+        return None;
+    }
+
+    let top = top_of(&totals);
+    let lead = totals[top.index()]
+        - totals
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| *k != top.index())
+            .map(|(_, total)| *total)
+            .fold(f64::NEG_INFINITY, f64::max);
+    let one_robot = match rule {
+        FusionRule::Majority | FusionRule::MeanProbability => 1.0,
+        FusionRule::LogPool | FusionRule::ConfidenceWeighted => 2.0 * clip,
+    };
+    match rule {
+        FusionRule::Majority | FusionRule::MeanProbability => totals.iter_mut().for_each(|t| *t /= robots),
+        FusionRule::LogPool | FusionRule::ConfidenceWeighted => softmax(&mut totals),
+    }
+    Some(Fusion { probabilities: totals, top, margin: lead / one_robot })
+}
+
+/// What one robot's row counts in [`fuse`], `0.0..=1.0`: its certainty in a confidence-weighted pool, else 1.
+#[must_use]
+pub fn weight(rule: FusionRule, clip: f64, evidence: &[f32]) -> f64 {
+    match rule {
+        FusionRule::Majority | FusionRule::MeanProbability | FusionRule::LogPool => 1.0,
+        FusionRule::ConfidenceWeighted => {
+            let mut row = vec![0.0; evidence.len()];
+            clip_into(&mut row, evidence, clip);
+            certainty(&mut row)
+        }
+    }
+}
+
+/// The index of the greatest value; of equals the smaller index.
+pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
+    let mut top = 0;
+    for (k, value) in values.iter().enumerate() {
+        if *value > values[top] {
+            top = k;
+        }
+    }
+    // A vote carries at most MAX_CLASSES = 64 values.
+    ClassId(u8::try_from(top).unwrap_or(u8::MAX))
+}
+
+fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {
+    for (value, said) in row.iter_mut().zip(evidence) {
+        *value = f64::from(*said).min(clip).max(-clip);
+    }
+}
+
+fn add(totals: &mut [f64], row: &[f64], weight: f64) {
+    for (total, value) in totals.iter_mut().zip(row) {
+        *total += weight * value;
+    }
+}
+
+fn softmax(row: &mut [f64]) {
+    let greatest = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    row.iter_mut().for_each(|value| *value = (*value - greatest).exp());
+    let sum: f64 = row.iter().sum();
+    row.iter_mut().for_each(|value| *value /= sum);
+}
+
+/// 1 − H(softmax) / ln K: 0 for "no idea", 1 for "certain". The row is used up.
+fn certainty(row: &mut [f64]) -> f64 {
+    softmax(row);
+    let entropy: f64 = row.iter().filter(|p| **p > 0.0).map(|p| -p * p.ln()).sum();
+    (1.0 - entropy / (row.len() as f64).ln()).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RULES: [FusionRule; 4] = [
+        FusionRule::Majority,
+        FusionRule::MeanProbability,
+        FusionRule::LogPool,
+        FusionRule::ConfidenceWeighted,
+    ];
+
+    fn fused(rule: FusionRule, rows: &[&[f32]]) -> Fusion {
+        fuse(rule, 6.0, rows[0].len(), rows.iter().copied()).unwrap()
+    }
+
+    fn close(found: &[f64], expected: &[f64]) {
+        assert_eq!(found.len(), expected.len());
+        for (a, b) in found.iter().zip(expected) {
+            assert!((a - b).abs() < 1e-6, "{found:?} is not {expected:?}");
+        }
+    }
+
+    /// ln 2 for one class against two: the softmax of (ln 2, 0, 0) is (1/2, 1/4, 1/4).
+    const HALF: [f32; 3] = [std::f32::consts::LN_2, 0.0, 0.0];
+    const OTHER: [f32; 3] = [0.0, std::f32::consts::LN_2, 0.0];
+
+    #[test]
+    fn majority_counts_each_robot_once_for_its_top_class() {
+        let fusion = fused(FusionRule::Majority, &[&HALF, &HALF, &[0.0, 6.0, -6.0]]);
+        close(&fusion.probabilities, &[2.0 / 3.0, 1.0 / 3.0, 0.0]);
+        assert_eq!((fusion.top, fusion.margin), (ClassId(0), 1.0));
+    }
+
+    #[test]
+    fn the_mean_averages_probabilities() {
+        let fusion = fused(FusionRule::MeanProbability, &[&HALF, &HALF, &OTHER]);
+        close(&fusion.probabilities, &[5.0 / 12.0, 4.0 / 12.0, 3.0 / 12.0]);
+        close(&[fusion.margin], &[0.25]);
+    }
+
+    #[test]
+    fn the_log_pool_multiplies_odds() {
+        let fusion = fused(FusionRule::LogPool, &[&HALF, &HALF, &OTHER]);
+        close(&fusion.probabilities, &[4.0 / 7.0, 2.0 / 7.0, 1.0 / 7.0]);
+        close(&[fusion.margin], &[std::f64::consts::LN_2 / 12.0]);
+    }
+
+    #[test]
+    fn the_confident_weigh_more_and_the_clueless_nothing() {
+        // H(1/2, 1/4, 1/4) = 1.5 ln 2, so the certainty of HALF is 1 − 1.5 ln 2 / ln 3.
+        let certainty = 1.0 - 1.5 * 2f64.ln() / 3f64.ln();
+        close(&[weight(FusionRule::ConfidenceWeighted, 6.0, &HALF)], &[certainty]);
+        close(&[weight(FusionRule::ConfidenceWeighted, 6.0, &[0.0; 3])], &[0.0]);
+        let fusion = fused(FusionRule::ConfidenceWeighted, &[&HALF, &[0.0; 3]]);
+        let odds = 2f64.powf(certainty);
+        close(&fusion.probabilities, &[odds / (odds + 2.0), 1.0 / (odds + 2.0), 1.0 / (odds + 2.0)]);
+    }
+
+    #[test]
+    fn of_equals_the_smaller_class_wins_with_no_margin() {
+        for rule in RULES {
+            let fusion = fused(rule, &[&OTHER, &HALF]);
+            assert_eq!((fusion.top, fusion.margin), (ClassId(0), 0.0), "{rule:?}");
+        }
+    }
+
+    #[test]
+    fn one_loud_robot_weighs_no_more_than_the_clip() {
+        for rule in RULES {
+            let loud = fused(rule, &[&[1e30, -1e30, 0.0], &OTHER]);
+            let clipped = fused(rule, &[&[6.0, -6.0, 0.0], &OTHER]);
+            assert_eq!(loud, clipped, "{rule:?}");
+            assert!(loud.margin <= 1.0);
+        }
+    }
+
+    #[test]
+    fn a_margin_above_f_stands_whatever_f_robots_say() {
+        for rule in RULES {
+            let honest: [f32; 3] = [5.0, -5.0, -5.0];
+            let rows: Vec<&[f32]> = vec![&honest; 4];
+            let fusion = fused(rule, &rows);
+            assert!(fusion.margin > 1.0, "{rule:?}: {}", fusion.margin);
+            let mut lied = rows.clone();
+            lied.push(&[-1e9, 1e9, -1e9]);
+            assert_eq!(fused(rule, &lied).top, ClassId(0), "{rule:?}");
+        }
+    }
+
+    #[test]
+    fn no_votes_are_no_opinion() {
+        assert_eq!(fuse(FusionRule::LogPool, 6.0, 3, []), None);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn every_rule_gives_a_distribution(
+            rows in proptest::collection::vec(proptest::collection::vec(-1e6f32..1e6, 5), 1..20)
+        ) {
+            for rule in RULES {
+                let fusion = fuse(rule, 6.0, 5, rows.iter().map(Vec::as_slice)).unwrap();
+                let sum: f64 = fusion.probabilities.iter().sum();
+                proptest::prop_assert!((sum - 1.0).abs() < 1e-9);
+                proptest::prop_assert!(fusion.probabilities.iter().all(|p| (0.0..=1.0).contains(p)));
+                proptest::prop_assert!(fusion.margin >= 0.0);
+                proptest::prop_assert_eq!(fusion.top, top_of(&fusion.probabilities));
+            }
+        }
+    }
+}

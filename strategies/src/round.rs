@@ -1,0 +1,157 @@
+//! One showing of a gesture, as one robot lives through it.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use gestalt_protocol::{Certificate, Decision, Envelope, RobotId, RoundId, VocabularyId, Vote};
+
+use crate::agreement::Agreement;
+use crate::ballot::{Ballot, Scale};
+use crate::evidence::Evidence;
+use crate::mind::MindConfig;
+
+/// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
+#[derive(Clone, Debug)]
+pub(crate) struct Round {
+    pub id: RoundId,
+    /// When this robot first heard of it.
+    pub since: Duration,
+    /// Whether this robot still takes part by looking and voting.
+    pub open: bool,
+    pub ballot: Ballot,
+    pub agreement: Agreement,
+    evidence: Option<Evidence>,
+    said: Option<Said>,
+    concluded: bool,
+}
+
+/// This robot's vote as it was last said.
+#[derive(Clone, Debug)]
+struct Said {
+    at: Duration,
+    envelope: Envelope,
+    /// Whether there is newer evidence.
+    outdated: bool,
+}
+
+impl Round {
+    pub fn new(id: RoundId, since: Duration, open: bool) -> Self {
+        Self {
+            id,
+            since,
+            open,
+            ballot: Ballot::default(),
+            agreement: Agreement::default(),
+            evidence: None,
+            said: None,
+            concluded: false,
+        }
+    }
+
+    /// Counts a frame with these class probabilities.
+    pub fn look(&mut self, now: Duration, probabilities: &[f64], quality: f64, config: &MindConfig) {
+        let evidence = self.evidence.get_or_insert_with(|| Evidence::new(probabilities.len()));
+        if evidence.classes() != probabilities.len() {
+            *evidence = Evidence::new(probabilities.len());
+        }
+        if evidence.add(now, probabilities, quality, config.decorrelation)
+            && let Some(said) = &mut self.said
+        {
+            said.outdated = true;
+        }
+    }
+
+    /// Forgets what was seen so far: it was judged by another vocabulary.
+    pub fn look_afresh(&mut self) {
+        self.evidence = None;
+    }
+
+    /// This robot's evidence as a vote.
+    pub fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
+        let (evidence, looks) = match &self.evidence {
+            Some(evidence) => (evidence.clipped(clip), evidence.looks() as f32),
+            None => (Vec::new(), 0.0),
+        };
+        Vote { round: self.id, vocabulary, evidence, looks }
+    }
+
+    /// When this robot's vote is to be said (again).
+    pub fn vote_due(&self, config: &MindConfig) -> Option<Duration> {
+        match &self.said {
+            _ if !self.open => None,
+            None => Some(self.since),
+            Some(said) if said.outdated => Some(said.at + config.vote_interval),
+            Some(said) => Some(said.at + config.vote_repeat),
+        }
+    }
+
+    /// What to say again: the vote said last, when nothing was seen since.
+    pub fn repeat(&mut self, now: Duration) -> Option<Envelope> {
+        let said = self.said.as_mut().filter(|said| !said.outdated)?;
+        said.at = now;
+        Some(said.envelope.clone())
+    }
+
+    /// Notes that this vote was said.
+    pub fn note_said(&mut self, now: Duration, envelope: Envelope) {
+        self.said = Some(Said { at: now, envelope, outdated: false });
+    }
+
+    /// When this robot stops waiting for live robots that have not voted, and when it gives up.
+    pub fn patience_and_deadline(&self, config: &MindConfig) -> (Duration, Duration) {
+        (self.since + config.patience, self.since + config.deadline)
+    }
+
+    /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline.
+    pub fn conclude(
+        &mut self,
+        now: Duration,
+        me: RobotId,
+        alive: &BTreeSet<RobotId>,
+        scale: Option<Scale>,
+        config: &MindConfig,
+    ) {
+        let held = self.agreement.held().is_some();
+        if !self.open || self.concluded || held {
+            return;
+        }
+        let (patience, deadline) = self.patience_and_deadline(config);
+        let late = now >= deadline;
+        let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
+        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.contains(*robot));
+        if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
+            return;
+        }
+        let fusion = scale.and_then(|scale| self.ballot.fuse(config.rule, config.clip, scale));
+        let class = fusion
+            .as_ref()
+            .filter(|fusion| {
+                contributors >= config.quorum as usize
+                    && fusion.probabilities[fusion.top.index()] >= 1.0 - config.alpha
+                    && fusion.margin > f64::from(config.liars)
+            })
+            .map(|fusion| fusion.top);
+        if class.is_none() && !late {
+            return;
+        }
+        let (probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
+            let confidence = fusion.probabilities[fusion.top.index()];
+            (fusion.probabilities, confidence)
+        });
+        let votes = scale.map_or(Vec::new(), |s| self.ballot.counted(config.rule, config.clip, s));
+        self.concluded = true;
+        self.agreement.believe(Decision {
+            round: self.id,
+            class,
+            confidence,
+            author: me,
+            certificate: Certificate {
+                vocabulary: scale.map_or(VocabularyId(0), |scale| scale.vocabulary),
+                rule: config.rule,
+                probabilities,
+                votes,
+                elapsed_ms: u32::try_from(now.saturating_sub(self.since).as_millis()).unwrap_or(u32::MAX),
+            },
+        });
+    }
+}
