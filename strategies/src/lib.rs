@@ -13,17 +13,29 @@
 
 mod agreement;
 pub mod ballot;
+mod classifier;
 mod classify;
+mod evaluation;
 mod evidence;
+mod folds;
 pub mod fusion;
 pub mod mind;
 mod observation;
+mod reduction;
 mod round;
+mod scaling;
+mod training;
 mod vocabulary;
 
 pub use ballot::Ballot;
+pub use classifier::{Classifier, MAX_MODEL, ModelError, Sigmoid};
 pub use classify::{Classify, ClassifyError};
+pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
 pub use evidence::Evidence;
+pub use folds::Folding;
 pub use mind::{Input, Mind, MindConfig, MindConfigError, Output, Refusal, Refusals};
 pub use observation::Observation;
+pub use reduction::{Components, Pca};
+pub use scaling::{Scaling, ScalingMethod};
+pub use training::{MIN_SAMPLES, Progress, Sample, TrainError, TrainOptions, Trained, train};
 pub use vocabulary::{Vocabulary, VocabularyError};

@@ -1,0 +1,128 @@
+//! A classifier as bytes.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{Classifier, Machine, Sigmoid, Space, pairs};
+use crate::Vocabulary;
+
+/// Longest encoding that is read, in bytes.
+pub const MAX_MODEL: usize = 64 * 1024 * 1024;
+/// Most raw features a classifier may take.
+const MAX_FEATURES: usize = 65_536;
+/// The layout below; another layout gets another number.
+const VERSION: u8 = 1;
+
+/// Bytes that are no classifier.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ModelError {
+    /// More than [`MAX_MODEL`] bytes.
+    #[error("{0} bytes are more than a classifier takes ({MAX_MODEL})")]
+    TooLarge(usize),
+    /// Written by another version of the program.
+    #[error("the classifier has layout {0}, this program reads layout {VERSION}: train it anew")]
+    Version(u8),
+    /// Cut short, or not a classifier at all.
+    #[error("the classifier is cut short or damaged")]
+    Malformed,
+    /// Well-formed, but its parts do not fit each other or hold impossible numbers.
+    #[error("the classifier is damaged: {0}")]
+    Inconsistent(&'static str),
+}
+
+#[derive(Serialize, Deserialize)]
+struct Parts {
+    feature_set: String,
+    vocabulary: Vocabulary,
+    space: Space,
+    machine: Machine,
+    sigmoids: Vec<Sigmoid>,
+}
+
+impl Classifier {
+    /// The classifier as bytes: a layout number, then its parts in postcard.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        let parts = Parts {
+            feature_set: self.feature_set.clone(),
+            vocabulary: self.vocabulary.clone(),
+            space: self.space.clone(),
+            machine: self.machine.clone(),
+            sigmoids: self.sigmoids.clone(),
+        };
+        postcard::to_extend(&parts, vec![VERSION])
+            .expect("postcard writes every value of known length into a vector")
+    }
+
+    /// Reads a classifier. Any bytes give a classifier whose answers are finite, or an error; memory stays
+    /// within a small multiple of the bytes.
+    ///
+    /// # Errors
+    /// See [`ModelError`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, ModelError> {
+        if bytes.len() > MAX_MODEL {
+            return Err(ModelError::TooLarge(bytes.len()));
+        }
+        let (&version, body) = bytes.split_first().ok_or(ModelError::Malformed)?;
+        if version != VERSION {
+            return Err(ModelError::Version(version));
+        }
+        let (parts, rest) = postcard::take_from_bytes::<Parts>(body).map_err(|_| ModelError::Malformed)?;
+        if !rest.is_empty() {
+            return Err(ModelError::Inconsistent("bytes after its end"));
+        }
+        parts.check().map_err(ModelError::Inconsistent)?;
+        Ok(Self::new(parts.feature_set, parts.vocabulary, parts.space, parts.machine, parts.sigmoids))
+    }
+}
+
+impl Parts {
+    /// Whether all dimensions agree, and all numbers lie where sums of them stay finite.
+    fn check(&self) -> Result<(), &'static str> {
+        let classes = self.vocabulary.classes();
+        let pairs = pairs(classes).count();
+        let Space { scaling, pca } = &self.space;
+        let machine = &self.machine;
+        let all_within = |values: &[f32], limit: f32| values.iter().all(|v| v.abs() <= limit);
+
+        if !(1..=64).contains(&self.feature_set.len()) {
+            return Err("the name of the feature set is not 1 to 64 bytes");
+        }
+        if !(1..=MAX_FEATURES).contains(&pca.width)
+            || scaling.mean.len() != pca.width
+            || scaling.factor.len() != pca.width
+        {
+            return Err("scaling and principal components take different numbers of features");
+        }
+        if !all_within(&scaling.mean, f32::MAX) || !all_within(&scaling.factor, f32::MAX) {
+            return Err("a scaling that is not finite");
+        }
+        if pca.basis.is_empty() || pca.basis.len() % pca.width != 0 || pca.kept() > pca.width {
+            return Err("principal components of uneven length");
+        }
+        if !all_within(&pca.basis, 1.001) || !(0.0..=1.0).contains(&pca.explained) {
+            return Err("principal components that are no directions");
+        }
+        if machine.width != pca.kept() || machine.counts.len() != classes {
+            return Err("machines for another space or vocabulary");
+        }
+        let vectors = machine.counts.iter().try_fold(0_usize, |sum, &count| sum.checked_add(count));
+        let vectors = vectors.filter(|&n| n <= MAX_MODEL).ok_or("too many support vectors")?;
+        if machine.vectors.len() != vectors * machine.width
+            || machine.weights.len() != vectors * (classes - 1)
+            || machine.offsets.len() != pairs
+            || self.sigmoids.len() != pairs
+        {
+            return Err("support vectors, weights and pairs that do not match");
+        }
+        if !(machine.gamma > 0.0 && machine.gamma.is_finite())
+            || !all_within(&machine.vectors, 1e6)
+            || !all_within(&machine.weights, 1e9)
+            || !machine.offsets.iter().all(|v| v.abs() <= 1e12)
+            || !self.sigmoids.iter().all(|s| s.a.abs() <= 1e12 && s.b.abs() <= 1e12)
+        {
+            return Err("numbers out of range in the machines");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,126 @@
+//! One-vs-one support vector machines with an RBF kernel.
+
+use linfa::DatasetBase;
+use linfa::traits::Fit;
+use linfa_svm::{Svm, SvmError};
+use ndarray::{Array1, Array2};
+use serde::{Deserialize, Serialize};
+
+use super::kernel::squared_distance;
+
+/// A soft-margin machine for every pair of classes, over K(x, y) = exp(−γ·|x − y|²).
+///
+/// A support vector serves all pairs of its class, so its kernel value is computed once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Machine {
+    /// γ.
+    pub gamma: f32,
+    /// Components of a support vector.
+    pub width: usize,
+    /// The support vectors, `width` components each, by class.
+    pub vectors: Vec<f32>,
+    /// How many support vectors each class has.
+    pub counts: Vec<usize>,
+    /// For each pair (i < j): a weight for every support vector of i, then of j.
+    pub weights: Vec<f32>,
+    /// For each pair the offset ρ: the decision is Σ weight·K − ρ, positive for the first class.
+    pub offsets: Vec<f64>,
+}
+
+/// LIBSVM's stopping tolerance.
+const TOLERANCE: f64 = 1e-3;
+
+/// The pairs (i < j) of so many classes, in the order used everywhere.
+pub(crate) fn pairs(classes: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..classes).flat_map(move |i| (i + 1..classes).map(move |j| (i, j)))
+}
+
+impl Machine {
+    /// Fits a machine to each pair. `members[k]` are the samples of class k, all `width` long, none empty.
+    pub fn fit(members: &[Vec<&[f32]>], width: usize, cost: f64, gamma: f64) -> Result<Self, SvmError> {
+        // What each sample weighs in each pair; samples that weigh nothing anywhere are no support vectors.
+        let mut used: Vec<Vec<bool>> = members.iter().map(|samples| vec![false; samples.len()]).collect();
+        let mut solutions = Vec::new();
+        for (i, j) in pairs(members.len()) {
+            let solution = fit_pair(&members[i], &members[j], width, cost, gamma)?;
+            let (first, second) = solution.alpha.split_at(members[i].len());
+            for (class, weights) in [(i, first), (j, second)] {
+                for (used, weight) in used[class].iter_mut().zip(weights) {
+                    *used |= *weight as f32 != 0.0;
+                }
+            }
+            solutions.push(solution);
+        }
+
+        let mut weights = Vec::new();
+        for ((i, j), solution) in pairs(members.len()).zip(&solutions) {
+            let (first, second) = solution.alpha.split_at(members[i].len());
+            for (class, alpha) in [(i, first), (j, second)] {
+                let kept = alpha.iter().zip(&used[class]).filter(|(_, used)| **used);
+                weights.extend(kept.map(|(&alpha, _)| alpha as f32));
+            }
+        }
+        let kept = members.iter().zip(&used);
+        let kept = kept.flat_map(|(samples, used)| samples.iter().zip(used).filter(|(_, used)| **used));
+        Ok(Self {
+            gamma: gamma as f32,
+            width,
+            vectors: kept.flat_map(|(sample, _)| sample.iter().copied()).collect(),
+            counts: used.iter().map(|used| used.iter().filter(|used| **used).count()).collect(),
+            weights,
+            offsets: solutions.iter().map(|solution| solution.rho).collect(),
+        })
+    }
+
+    /// Writes the decision value of each pair for `x` over `decisions`.
+    pub fn decide(&self, x: &[f32], decisions: &mut Vec<f64>) {
+        let vectors = self.vectors.chunks_exact(self.width);
+        let kernel: Vec<f32> = vectors.map(|v| (-self.gamma * squared_distance(v, x)).exp()).collect();
+        let mut start = 0;
+        let of_class: Vec<&[f32]> = self
+            .counts
+            .iter()
+            .map(|&count| {
+                start += count;
+                &kernel[start - count..start]
+            })
+            .collect();
+
+        decisions.clear();
+        let mut rest = self.weights.as_slice();
+        for ((i, j), offset) in pairs(self.counts.len()).zip(&self.offsets) {
+            let mut sum = -offset;
+            for kernel in [of_class[i], of_class[j]] {
+                let (weights, tail) = rest.split_at(kernel.len());
+                rest = tail;
+                sum += weights.iter().zip(kernel).map(|(&w, &k)| f64::from(w * k)).sum::<f64>();
+            }
+            decisions.push(sum);
+        }
+    }
+}
+
+fn fit_pair(
+    first: &[&[f32]],
+    second: &[&[f32]],
+    width: usize,
+    cost: f64,
+    gamma: f64,
+) -> Result<Svm<f64, bool>, SvmError> {
+    let rows = first.iter().chain(second);
+    let records = Array2::from_shape_vec(
+        (first.len() + second.len(), width),
+        rows.flat_map(|row| row.iter().map(|&x| f64::from(x))).collect(),
+    )
+    .expect("each sample has `width` components");
+    let targets: Array1<bool> = (0..first.len() + second.len()).map(|i| i < first.len()).collect();
+    Svm::<f64, bool>::params()
+        .pos_neg_weights(cost, cost)
+        // linfa writes the kernel as exp(−|x − y|² / ε).
+        .gaussian_kernel(1.0 / gamma)
+        // Its default of 1e-7 costs several times the iterations for the same predictions.
+        .eps(TOLERANCE)
+        // Shrinking panics or worsens the solution in linfa-svm 0.8.
+        .shrinking(false)
+        .fit(&DatasetBase::new(records, targets))
+}
