@@ -1,0 +1,275 @@
+//! How a robot sees: from a camera frame to the feature vector of the hand in it.
+//!
+//! ```text
+//! BGR frame, any size ─► canvas ─► hand-coloured pixels ─► blob ─► palm, wrist ─► hand ─┬─► 110 shape features
+//!        (frame)         (colour)                          (hand)                       └─► canonical crop ─► HOG
+//! ```
+//!
+//! The same hand gives nearly the same features whatever the camera: the canvas makes resolutions comparable, colours
+//! are judged relative to the background of the same frame, and every feature is a ratio, an angle or a count.
+
+mod canonical;
+mod colour;
+mod features;
+mod frame;
+mod hand;
+mod hog;
+
+use std::str::FromStr;
+
+use gestalt_strategies::Observation;
+use opencv::core::{Mat, Vector};
+use opencv::objdetect::HOGDescriptor;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use canonical::Canonical;
+use colour::ColourModel;
+pub use features::{FEATURES, Feature, features};
+use frame::Canvas;
+use hand::HandFinder;
+
+/// Which feature vector perception computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FeatureSet {
+    /// The 110 hand-crafted features of [`features()`].
+    Shape,
+    /// The histogram of oriented gradients of the canonical crop, 1,764 values.
+    Hog,
+}
+
+impl FeatureSet {
+    /// Both sets.
+    pub const ALL: [Self; 2] = [Self::Shape, Self::Hog];
+
+    /// Names the set and its version: vectors of sets with different names never mix.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shape => "shape-1",
+            Self::Hog => "hog-1",
+        }
+    }
+
+    /// How many values a feature vector of this set has.
+    #[must_use]
+    pub fn length(self) -> usize {
+        match self {
+            Self::Shape => FEATURES,
+            Self::Hog => hog::LENGTH,
+        }
+    }
+}
+
+/// A text that names no feature set.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("'{0}' is no feature set: say 'shape' or 'hog'")]
+pub struct FeatureSetError(String);
+
+impl FromStr for FeatureSet {
+    type Err = FeatureSetError;
+
+    /// Reads `shape` or `hog`, or the full name with its version as [`FeatureSet::name`] gives it.
+    fn from_str(text: &str) -> Result<Self, FeatureSetError> {
+        let bare = |set: Self| set.name().split('-').next().unwrap_or_default();
+        Self::ALL
+            .into_iter()
+            .find(|&set| text == set.name() || text == bare(set))
+            .ok_or_else(|| FeatureSetError(text.to_owned()))
+    }
+}
+
+/// What counts as a hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HandConfig {
+    /// How much the hand's colour must differ from the background's, in nats of log chromaticity; `0.01..=2.0`.
+    /// An empty wall has 0.04, skin before a grey wall 0.3 to 0.7, a coloured glove 1 and more.
+    pub minimum_contrast: f32,
+    /// The smallest share of the frame that a hand covers, `0.0005..=0.5`: below it, fingers are a pixel or two wide.
+    pub minimum_area: f32,
+    /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to judge by.
+    pub maximum_area: f32,
+}
+
+impl Default for HandConfig {
+    fn default() -> Self {
+        Self { minimum_contrast: 0.12, minimum_area: 0.004, maximum_area: 0.7 }
+    }
+}
+
+impl HandConfig {
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Range`] for the first field outside its range.
+    pub fn validate(&self) -> Result<(), PerceptionError> {
+        let fields = [
+            ("minimum_contrast", self.minimum_contrast, 0.01, 2.0),
+            ("minimum_area", self.minimum_area, 0.0005, 0.5),
+            ("maximum_area", self.maximum_area, 0.1, 1.0),
+        ];
+        for (field, value, low, high) in fields {
+            if !(low..=high).contains(&value) {
+                return Err(PerceptionError::Range { field, value, low, high });
+            }
+        }
+        if self.minimum_area >= self.maximum_area {
+            return Err(PerceptionError::Areas);
+        }
+        Ok(())
+    }
+}
+
+/// Why perception cannot start.
+#[derive(Debug, Error)]
+pub enum PerceptionError {
+    /// A field of [`HandConfig`] is outside its range.
+    #[error("{field} is {value}: set it within {low}..={high}")]
+    Range {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f32,
+        /// The smallest value allowed.
+        low: f32,
+        /// The largest value allowed.
+        high: f32,
+    },
+    /// No area is both large and small enough for a hand.
+    #[error("minimum_area must be smaller than maximum_area")]
+    Areas,
+    /// OpenCV failed.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// Why a frame gave no observation. It never becomes a vote; perception is ready for the next frame.
+#[derive(Debug, Error)]
+pub enum NoObservation {
+    /// The frame has no pixels.
+    #[error("the frame is empty: the source delivered no image")]
+    EmptyFrame,
+    /// The frame is not 8-bit BGR.
+    #[error(
+        "the frame has {channels} channels of OpenCV depth {depth}, not 3 of depth 0: convert it to 8-bit BGR"
+    )]
+    Format {
+        /// Its channels.
+        channels: i32,
+        /// Its depth, as OpenCV numbers them (0 is 8-bit unsigned).
+        depth: i32,
+    },
+    /// The frame is so long and narrow that nothing is left of its shorter side on the canvas.
+    #[error("a frame of {width}×{height} pixels is too narrow to show a hand")]
+    TooNarrow {
+        /// Columns.
+        width: i32,
+        /// Rows.
+        height: i32,
+    },
+    /// The frame shows no hand.
+    #[error("no hand: {0}")]
+    NoHand(#[from] NoHand),
+    /// OpenCV failed.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// Why a frame shows no hand.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum NoHand {
+    /// Nothing differs from the background in colour, or what does is not of one colour.
+    #[error("nothing stands out from the background (colour contrast {contrast:.2})")]
+    NothingStandsOut {
+        /// The contrast found, nats.
+        contrast: f32,
+    },
+    /// The largest blob is smaller than [`HandConfig::minimum_area`].
+    #[error("the largest hand-coloured blob covers {share:.4} of the frame: too small")]
+    TooSmall {
+        /// Its share of the frame, `0.0..=1.0`.
+        share: f32,
+    },
+    /// The largest blob is larger than [`HandConfig::maximum_area`].
+    #[error("the largest hand-coloured blob covers {share:.2} of the frame: too large to be one hand")]
+    TooLarge {
+        /// Its share of the frame, `0.0..=1.0`.
+        share: f32,
+    },
+    /// The blob runs along most of the frame's edge: a hand comes in from one side.
+    #[error("the largest hand-coloured blob covers {share:.2} of the frame's edge: a background, not a hand")]
+    AlongTheEdge {
+        /// The covered share of the frame's edge, `0.0..=1.0`.
+        share: f32,
+    },
+}
+
+/// Sees hands. Owns every buffer it needs, so that a frame allocates next to nothing.
+pub struct Perception {
+    set: FeatureSet,
+    canvas: Canvas,
+    colours: ColourModel,
+    finder: HandFinder,
+    canonical: Canonical,
+    hog: HOGDescriptor,
+    descriptors: Vector<f32>,
+}
+
+impl Perception {
+    /// Eyes that compute this feature set.
+    ///
+    /// # Errors
+    /// See [`PerceptionError`].
+    pub fn new(set: FeatureSet, config: HandConfig) -> Result<Self, PerceptionError> {
+        config.validate()?;
+        Ok(Self {
+            set,
+            canvas: Canvas::default(),
+            colours: ColourModel::new(config.minimum_contrast),
+            finder: HandFinder::new(config),
+            canonical: Canonical::default(),
+            hog: hog::descriptor()?,
+            descriptors: Vector::new(),
+        })
+    }
+
+    /// Which feature set this computes.
+    #[must_use]
+    pub fn feature_set(&self) -> FeatureSet {
+        self.set
+    }
+
+    /// Looks at one frame: 8-bit BGR of any size.
+    ///
+    /// # Errors
+    /// See [`NoObservation`]; a frame without a hand is [`NoObservation::NoHand`].
+    pub fn observe(&mut self, bgr: &Mat) -> Result<Observation, NoObservation> {
+        let canvas = self.canvas.fit(bgr)?;
+        let candidates = self.colours.segment(canvas)?;
+        let hand = self.finder.find(candidates)?;
+        self.canonical.crop(canvas, &hand)?;
+        let features = match self.set {
+            FeatureSet::Shape => features::measure(&hand)?,
+            FeatureSet::Hog => {
+                hog::compute(&self.hog, self.canonical.crop_image(), &mut self.descriptors)?;
+                self.descriptors.as_slice().to_vec()
+            }
+        };
+        Ok(Observation { features, quality: hand.quality(self.colours.separation()) })
+    }
+
+    /// The hand's pixels in the last frame observed (255; elsewhere 0), on a canvas of at most 320×240 with a margin
+    /// of one pixel. Empty before the first hand.
+    #[must_use]
+    pub fn mask(&self) -> &Mat {
+        self.finder.mask()
+    }
+
+    /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the first.
+    #[must_use]
+    pub fn crop(&self) -> &Mat {
+        self.canonical.crop_image()
+    }
+}
