@@ -1,0 +1,133 @@
+//! What the cameras of a heterogeneous swarm do to a picture.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+/// A camera: its geometry and its faults.
+///
+/// The presets are typical values, not measurements of one device; a configuration may change any of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraModel {
+    /// Its name for people.
+    pub name: String,
+    /// Width of the image, in pixels. Range 16..=4096.
+    pub width_px: i32,
+    /// Height of the image, in pixels. Range 16..=4096.
+    pub height_px: i32,
+    /// Frames per second. Range 0.1..=240.
+    pub fps: f64,
+    /// Horizontal field of view, in degrees. Range 10..=150.
+    pub horizontal_fov_deg: f64,
+    /// Standard deviation of the sensor's noise, in grey levels of 255. Range 0..=64.
+    pub noise_sigma: f64,
+    /// Standard deviation of the optics' Gaussian blur, in pixels; 0 is sharp. Range 0..=16.
+    pub blur_sigma_px: f64,
+    /// Factor on all channels: under 1 is under-exposed. Range 0.1..=4.
+    pub gain: f64,
+    /// Factors on the blue, green and red channel: what white balance left undone. Range 0.1..=4 each.
+    pub cast_bgr: [f64; 3],
+    /// How much darker the corners are than the centre, `0.0..=1.0`.
+    pub vignetting: f64,
+}
+
+impl CameraModel {
+    /// The Foot-bot's camera: 384×288, 4:3, 2 frames per second, dim, with a blue cast.
+    #[must_use]
+    pub fn footbot() -> Self {
+        Self {
+            name: "footbot".into(),
+            width_px: 384,
+            height_px: 288,
+            fps: 2.0,
+            horizontal_fov_deg: 56.0,
+            noise_sigma: 5.0,
+            blur_sigma_px: 0.9,
+            gain: 0.82,
+            cast_bgr: [1.18, 1.0, 0.78],
+            vignetting: 0.35,
+        }
+    }
+
+    /// The Parrot's front camera: 640×360, 16:9, 30 frames per second, wide.
+    #[must_use]
+    pub fn parrot() -> Self {
+        Self {
+            name: "parrot".into(),
+            width_px: 640,
+            height_px: 360,
+            fps: 30.0,
+            horizontal_fov_deg: 76.0,
+            noise_sigma: 3.0,
+            blur_sigma_px: 0.8,
+            gain: 1.08,
+            cast_bgr: [0.95, 1.02, 1.04],
+            vignetting: 0.2,
+        }
+    }
+
+    /// A laptop's webcam: 640×480, 15 frames per second, a little warm.
+    #[must_use]
+    pub fn laptop() -> Self {
+        Self {
+            name: "laptop".into(),
+            width_px: 640,
+            height_px: 480,
+            fps: 15.0,
+            horizontal_fov_deg: 62.0,
+            noise_sigma: 2.5,
+            blur_sigma_px: 0.6,
+            gain: 1.0,
+            cast_bgr: [0.94, 1.0, 1.05],
+            vignetting: 0.15,
+        }
+    }
+
+    /// All presets.
+    #[must_use]
+    pub fn presets() -> [Self; 3] {
+        [Self::footbot(), Self::parrot(), Self::laptop()]
+    }
+
+    /// The preset of that name: `footbot`, `parrot` or `laptop`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::presets().into_iter().find(|model| model.name == name)
+    }
+
+    /// The time between two frames.
+    #[must_use]
+    pub fn period(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.fps.clamp(0.1, 240.0))
+    }
+
+    /// The focal length of the pinhole, in pixels: w / (2 tan(fov / 2)).
+    #[must_use]
+    pub fn focal_px(&self) -> f64 {
+        f64::from(self.width_px)
+            / (2.0 * (self.horizontal_fov_deg.clamp(10.0, 150.0).to_radians() / 2.0).tan())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_field_of_view_spans_the_width() {
+        for camera in CameraModel::presets() {
+            let half_width_at_1_m = (camera.horizontal_fov_deg.to_radians() / 2.0).tan();
+            let edge_px = camera.focal_px() * half_width_at_1_m;
+            assert!((edge_px - f64::from(camera.width_px) / 2.0).abs() < 1e-9, "{}", camera.name);
+        }
+    }
+
+    #[test]
+    fn a_preset_is_found_by_its_name() {
+        for camera in CameraModel::presets() {
+            assert_eq!(CameraModel::named(&camera.name), Some(camera));
+        }
+        assert_eq!(CameraModel::named("hubble"), None);
+    }
+}

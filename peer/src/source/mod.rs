@@ -1,0 +1,115 @@
+//! Where frames come from: drawn, read from a folder, or played from a video.
+
+pub mod rendered;
+mod sensor;
+
+use std::io;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use opencv::core::Mat;
+use thiserror::Error;
+
+pub use rendered::{Glove, Pose, RenderedSource, place};
+pub use sensor::Sensor;
+
+/// One picture of a camera.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The picture: blue, green, red, 8 bits each.
+    pub image: Mat,
+    /// When it was taken, since the host's start.
+    pub at: Duration,
+}
+
+/// What the human shows at the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Scene {
+    /// How many fingers are raised, 0 to 5; `None`: no hand is in view.
+    pub gesture: Option<u8>,
+    /// Varies the person from round to round: hand, glove, light and background.
+    pub seed: u64,
+}
+
+/// A stream of frames.
+pub trait Source: Send {
+    /// What it is, in words: `rendered`, `video hand.mp4`, `images DIR`.
+    fn describe(&self) -> String;
+
+    /// The time between two frames.
+    fn period(&self) -> Duration;
+
+    /// The next frame, taken at `now`. Only the rendered source looks at the scene.
+    ///
+    /// # Errors
+    /// See [`SourceError`]. After an error about one image, the next call goes on with the next image.
+    fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<Frame, SourceError>;
+}
+
+/// Why there is no frame.
+#[derive(Debug, Error)]
+pub enum SourceError {
+    /// The last frame was given; the source does not start again.
+    #[error("{0} has ended: set it to loop to start again")]
+    Ended(String),
+    /// The file or folder is not there.
+    #[error("{} does not exist: check the path", .0.display())]
+    Missing(PathBuf),
+    /// The file or folder may not be read.
+    #[error("no permission to read {}: grant it with chmod or choose another file", .0.display())]
+    Permission(PathBuf),
+    /// The operating system cannot read it.
+    #[error("cannot read {}: {cause}", path.display())]
+    Unreadable {
+        /// Which file or folder.
+        path: PathBuf,
+        /// What the operating system says.
+        cause: io::Error,
+    },
+    /// Zero bytes.
+    #[error("{} is empty (0 bytes): record or copy it again", .0.display())]
+    Empty(PathBuf),
+    /// The end of the image is missing. (A decoder would fill the rest with grey and say nothing.)
+    #[error("{} is cut short: its end is missing; copy it again", .0.display())]
+    Truncated(PathBuf),
+    /// Not a JPEG, PNG, BMP, PNM or WebP image, or a damaged one.
+    #[error("{} is no image that can be decoded: give a JPEG, PNG, BMP, PNM or WebP file", .0.display())]
+    NotAnImage(PathBuf),
+    /// Not a video that FFmpeg can decode, or one without a single whole frame.
+    #[error("{} is no video that FFmpeg can decode: give an mp4, mkv or avi file", .0.display())]
+    NotAVideo(PathBuf),
+    /// More pixels or bytes than a frame may have.
+    #[error("{} is too large ({size}): the limit is {limit}; scale it down", path.display())]
+    TooLarge {
+        /// Which file.
+        path: PathBuf,
+        /// How large it is.
+        size: String,
+        /// How large it may be.
+        limit: String,
+    },
+    /// A folder with nothing to show.
+    #[error("the folder {} holds no images (jpg, jpeg, png, bmp, ppm, pgm, webp)", .0.display())]
+    NoImages(PathBuf),
+    /// More fingers than a hand has.
+    #[error("a hand cannot raise {0} fingers: 0 to 5")]
+    Gesture(u8),
+    /// A camera model that cannot take a picture.
+    #[error("camera '{0}': the image must be 16 to 4096 pixels wide and high")]
+    Camera(String),
+    /// OpenCV failed where it should not.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+impl SourceError {
+    /// The error of the operating system, told apart by its mend.
+    pub(crate) fn io(path: impl Into<PathBuf>, cause: io::Error) -> Self {
+        let path = path.into();
+        match cause.kind() {
+            io::ErrorKind::NotFound => Self::Missing(path),
+            io::ErrorKind::PermissionDenied => Self::Permission(path),
+            _ => Self::Unreadable { path, cause },
+        }
+    }
+}

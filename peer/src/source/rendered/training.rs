@@ -1,0 +1,81 @@
+//! Labelled frames without end, to train the embedded classifier.
+
+use std::time::Duration;
+
+use opencv::core::Mat;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Glove, Pose, RenderedSource};
+use crate::camera_model::CameraModel;
+use crate::source::{Scene, Source, SourceError};
+
+/// A frame whose gesture is known.
+#[derive(Clone, Debug)]
+pub struct LabelledFrame {
+    /// The picture (BGR, 8 bits).
+    pub image: Mat,
+    /// How many fingers are raised: 0 to 5.
+    pub class: u8,
+    /// The person: frames of one person belong to the same side of a train/test split.
+    pub group: u32,
+    /// Which camera took it.
+    pub camera: String,
+    /// From where.
+    pub pose: Pose,
+}
+
+/// An endless iterator of labelled frames: each person shows 0 to 5 in turn, each from a pose of its own, to the
+/// cameras in turn. The same seed gives the same frames.
+///
+/// Poses cover what robots meet: bearing within ±`max_bearing_deg`, elevation −30° to 20°, 0.5 to 1.8 m.
+pub struct TrainingFrames {
+    cameras: Vec<CameraModel>,
+    glove: Glove,
+    max_bearing_deg: f64,
+    seed: u64,
+    rng: ChaCha8Rng,
+    next: u64,
+}
+
+impl TrainingFrames {
+    /// Frames of these cameras (all presets when there are none) up to that bearing.
+    #[must_use]
+    pub fn new(cameras: Vec<CameraModel>, glove: Glove, max_bearing_deg: f64, seed: u64) -> Self {
+        let cameras = if cameras.is_empty() { CameraModel::presets().to_vec() } else { cameras };
+        Self {
+            cameras,
+            glove,
+            max_bearing_deg: max_bearing_deg.clamp(1.0, 90.0),
+            seed,
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            next: 0,
+        }
+    }
+}
+
+impl Iterator for TrainingFrames {
+    type Item = Result<LabelledFrame, SourceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (person, class) = (self.next / 6, (self.next % 6) as u8);
+        let camera = &self.cameras[(self.next / 6 % self.cameras.len() as u64) as usize];
+        self.next += 1;
+        let rng = &mut self.rng;
+        let pose = Pose {
+            bearing_deg: rng.random_range(-self.max_bearing_deg..self.max_bearing_deg),
+            elevation_deg: rng.random_range(-30.0..20.0),
+            distance_m: rng.random_range(0.5..1.8),
+        };
+        let scene = Scene { gesture: Some(class), seed: self.seed.rotate_left(24) ^ person };
+        let taken = RenderedSource::new(camera.clone(), pose, self.glove, rng.random())
+            .and_then(|mut source| source.next_frame(Duration::ZERO, &scene));
+        Some(taken.map(|frame| LabelledFrame {
+            image: frame.image,
+            class,
+            group: person as u32,
+            camera: camera.name.clone(),
+            pose,
+        }))
+    }
+}
