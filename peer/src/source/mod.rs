@@ -1,7 +1,11 @@
 //! Where frames come from: drawn, read from a folder, or played from a video.
 
+mod emulated_view;
+mod folder;
+mod image_file;
 pub mod rendered;
 mod sensor;
+mod video;
 
 use std::io;
 use std::path::PathBuf;
@@ -10,8 +14,12 @@ use std::time::Duration;
 use opencv::core::Mat;
 use thiserror::Error;
 
+pub use emulated_view::EmulatedView;
+pub use folder::ImageFolder;
+pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image};
 pub use rendered::{Glove, Pose, RenderedSource, place};
 pub use sensor::Sensor;
+pub use video::Video;
 
 /// One picture of a camera.
 #[derive(Clone, Debug)]
@@ -72,8 +80,8 @@ pub enum SourceError {
     /// The end of the image is missing. (A decoder would fill the rest with grey and say nothing.)
     #[error("{} is cut short: its end is missing; copy it again", .0.display())]
     Truncated(PathBuf),
-    /// Not a JPEG, PNG, BMP, PNM or WebP image, or a damaged one.
-    #[error("{} is no image that can be decoded: give a JPEG, PNG, BMP, PNM or WebP file", .0.display())]
+    /// Not a JPEG or PNG image, or a damaged one.
+    #[error("{} is no image that can be decoded: give a JPEG or PNG file", .0.display())]
     NotAnImage(PathBuf),
     /// Not a video that FFmpeg can decode, or one without a single whole frame.
     #[error("{} is no video that FFmpeg can decode: give an mp4, mkv or avi file", .0.display())]
@@ -89,7 +97,7 @@ pub enum SourceError {
         limit: String,
     },
     /// A folder with nothing to show.
-    #[error("the folder {} holds no images (jpg, jpeg, png, bmp, ppm, pgm, webp)", .0.display())]
+    #[error("the folder {} holds no images (*.jpg, *.jpeg, *.png)", .0.display())]
     NoImages(PathBuf),
     /// More fingers than a hand has.
     #[error("a hand cannot raise {0} fingers: 0 to 5")]
@@ -111,5 +119,21 @@ impl SourceError {
             io::ErrorKind::PermissionDenied => Self::Permission(path),
             _ => Self::Unreadable { path, cause },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_of_the_system_names_the_path_and_the_mend() {
+        let message = |kind: io::ErrorKind| SourceError::io("/robot/video.mp4", kind.into()).to_string();
+        assert_eq!(
+            message(io::ErrorKind::PermissionDenied),
+            "no permission to read /robot/video.mp4: grant it with chmod or choose another file"
+        );
+        assert_eq!(message(io::ErrorKind::NotFound), "/robot/video.mp4 does not exist: check the path");
+        assert!(message(io::ErrorKind::Other).contains("/robot/video.mp4"));
     }
 }

@@ -18,11 +18,11 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 pub use hand::Glove;
+pub(super) use pose::Pinhole;
 pub use pose::{Pose, place};
 pub use training::{LabelledFrame, TrainingFrames};
 
 use hand::Hand;
-use pose::Pinhole;
 use raster::{Light, Rasterizer};
 
 use super::{Frame, Scene, Sensor, Source, SourceError};

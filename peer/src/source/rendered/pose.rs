@@ -53,7 +53,7 @@ pub fn place(robots: usize, seed: u64) -> Vec<Pose> {
 }
 
 /// A pinhole camera in the hand's space.
-pub(super) struct Pinhole {
+pub(in crate::source) struct Pinhole {
     position: Point3<f32>,
     right: Vector3<f32>,
     up: Vector3<f32>,
@@ -64,7 +64,7 @@ pub(super) struct Pinhole {
 
 /// A point of space as the camera has it: place in the image and depth along the optical axis.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Projected {
+pub(in crate::source) struct Projected {
     /// Pixels from the left.
     pub x: f32,
     /// Pixels from the top.
