@@ -186,9 +186,10 @@ mod tests {
         for extension in [".jpg", ".png"] {
             let whole = encoded(extension, 40, 30);
             for length in 12..whole.len() {
-                let result = read(&whole[..length]);
-                assert!(matches!(result, Err(SourceError::Truncated(_))), "{extension} {length}: {result:?}");
+                assert_eq!(inspect(&whole[..length]), Err(Flaw::Truncated), "{extension} {length}");
             }
+            let half = read(&whole[..whole.len() / 2]);
+            assert!(matches!(&half, Err(SourceError::Truncated(_))), "{extension}: {half:?}");
         }
     }
 
