@@ -64,6 +64,8 @@ pub(super) struct Hand {
     turn: f32,
     hand_colour: [f32; 3],
     sleeve_colour: [f32; 3],
+    /// Lightness of the head's cover, in grey levels.
+    head: f32,
     /// Phases of the tremble.
     phases: [f32; 6],
 }
@@ -89,6 +91,7 @@ impl Hand {
             phases: std::array::from_fn(|_| between(0.0, std::f32::consts::TAU)),
             hand_colour,
             sleeve_colour,
+            head: rng.random_range(60.0..170.0),
             raised: raised(count, rng),
         }
     }
@@ -152,6 +155,33 @@ impl Hand {
             colour: self.sleeve_colour,
         });
         hand
+    }
+
+    /// The person behind the hand: upper arm, trunk, and a head in a grey hood, so that the hand is the one thing of
+    /// its colour.
+    pub fn body(&self) -> Vec<Capsule> {
+        let mirror = if self.left { -1.0 } else { 1.0 };
+        let part = |from: [f32; 3], to: [f32; 3], from_radius, to_radius, colour| Capsule {
+            from: Point3::new(mirror * from[0], from[1], from[2]),
+            to: Point3::new(mirror * to[0], to[1], to[2]),
+            from_radius,
+            to_radius,
+            colour,
+        };
+        let cloth = self.sleeve_colour.map(|channel| channel * 0.9);
+        let hood = [self.head; 3];
+        let mut body = vec![
+            part([0.20, -0.36, -0.34], [0.52, -0.36, -0.34], 0.075, 0.075, cloth),
+            part([0.36, -0.40, -0.35], [0.36, -1.60, -0.35], 0.150, 0.130, cloth),
+            part([0.36, -0.26, -0.36], [0.36, -0.14, -0.34], 0.055, 0.055, hood),
+            part([0.36, -0.10, -0.33], [0.36, -0.01, -0.34], 0.078, 0.092, hood),
+        ];
+        if let Some(forearm) = self.capsules(0.0).last() {
+            let shoulder = Point3::new(mirror * 0.20, -0.36, -0.34);
+            let (from_radius, to_radius) = (forearm.to_radius, 0.070);
+            body.push(Capsule { from: forearm.to, to: shoulder, from_radius, to_radius, colour: cloth });
+        }
+        body
     }
 
     fn bone(&self, from: Vector3<f32>, to: Vector3<f32>, from_radius: f32, to_radius: f32) -> Capsule {
@@ -260,7 +290,7 @@ fn hand_colour(glove: Glove, rng: &mut impl Rng) -> [f32; 3] {
 /// Everyday cloth: dark to medium, hardly saturated.
 fn sleeve_colour(rng: &mut impl Rng) -> [f32; 3] {
     let lightness = rng.random_range(45.0..150.0);
-    std::array::from_fn(|_| lightness * rng.random_range(0.85_f32..1.15))
+    std::array::from_fn(|_| lightness * rng.random_range(0.92_f32..1.08))
 }
 
 #[cfg(test)]

@@ -34,6 +34,8 @@ pub struct RenderedSource {
     pose: Pose,
     glove: Glove,
     seed: u64,
+    /// What stands behind the human, as long as the robot stands still.
+    room: Mat,
     sensor: Sensor,
     rasterizer: Rasterizer,
     stage: Option<Stage>,
@@ -57,8 +59,11 @@ impl RenderedSource {
     /// # Errors
     /// [`SourceError::Camera`] when the camera's image has an impossible size.
     pub fn new(camera: CameraModel, pose: Pose, glove: Glove, seed: u64) -> Result<Self, SourceError> {
-        let sensor = Sensor::new(&camera, &mut stream(seed, 0))?;
+        let rng = &mut stream(seed, 0);
+        let sensor = Sensor::new(&camera, rng)?;
+        let room = backdrop::paint(&camera, rng)?;
         Ok(Self {
+            room,
             camera,
             pose,
             glove,
@@ -82,22 +87,23 @@ impl RenderedSource {
         self.stage = None;
     }
 
-    fn stage(&self, scene: &Scene) -> Result<Stage, SourceError> {
+    fn stage(&mut self, scene: &Scene) -> Result<Stage, SourceError> {
         if let Some(count @ 6..) = scene.gesture {
             return Err(SourceError::Gesture(count));
         }
-        // The light belongs to the scene, the background and the aim to the robot in it.
+        // The light belongs to the scene, the aim to the robot in it.
         let light = light(&mut stream(scene.seed, 1));
         let rng = &mut stream(self.seed ^ scene.seed.rotate_left(32), 2);
         let off = 0.12 * self.pose.distance_m as f32;
-        Ok(Stage {
-            scene: *scene,
-            hand: scene.gesture.map(|count| Hand::new(count, scene.seed, self.glove)),
-            backdrop: backdrop::paint(&self.camera, rng)?,
-            light,
-            aim: Point3::new(rng.random_range(-off..off), rng.random_range(-off..off) - 0.03, 0.0),
-            roll: rng.random_range(-4.0_f32..4.0).to_radians(),
-        })
+        let aim = Point3::new(rng.random_range(-off..off), rng.random_range(-off..off) - 0.03, 0.0);
+        let roll = rng.random_range(-4.0_f32..4.0).to_radians();
+        let hand = scene.gesture.map(|count| Hand::new(count, scene.seed, self.glove));
+        let mut backdrop = self.room.clone();
+        if let Some(hand) = &hand {
+            let pinhole = Pinhole::new(&self.pose, &self.camera, aim, roll);
+            self.rasterizer.draw(&mut backdrop, &hand.body(), &pinhole, &light)?;
+        }
+        Ok(Stage { scene: *scene, hand, backdrop, light, aim, roll })
     }
 }
 
