@@ -4,4 +4,6 @@ pub mod camera_model;
 #[cfg(feature = "opencv")]
 pub mod perception;
 #[cfg(feature = "opencv")]
+pub mod picture;
+#[cfg(feature = "opencv")]
 pub mod source;

@@ -94,8 +94,8 @@ impl RenderedSource {
         // The light belongs to the scene, the aim to the robot in it.
         let light = light(&mut stream(scene.seed, 1));
         let rng = &mut stream(self.seed ^ scene.seed.rotate_left(32), 2);
-        let off = 0.12 * self.pose.distance_m as f32;
-        let aim = Point3::new(rng.random_range(-off..off), rng.random_range(-off..off) - 0.03, 0.0);
+        let off = 0.09 * self.pose.distance_m as f32;
+        let aim = Point3::new(rng.random_range(-off..off), rng.random_range(-off..off) + 0.02, 0.0);
         let roll = rng.random_range(-4.0_f32..4.0).to_radians();
         let hand = scene.gesture.map(|count| Hand::new(count, scene.seed, self.glove));
         let mut backdrop = self.room.clone();
