@@ -1,0 +1,159 @@
+//! What a robot can tell of itself: counters, latest errors, and where it stands.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use gestalt_protocol::{DecodeError, Reported, Status};
+
+const MAX_ERRORS: usize = 16;
+const MAX_ERROR_LENGTH: usize = 400;
+
+/// The status of a robot, kept up to date from several threads.
+#[derive(Debug)]
+pub(super) struct Account {
+    started: Instant,
+    status: Mutex<Status>,
+}
+
+impl Account {
+    pub(super) fn new(status: Status, started: Instant) -> Self {
+        Self { started, status: Mutex::new(status) }
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Status> {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn sent(&self, kind: &str, bytes: usize) {
+        self.message("sent", kind, bytes);
+    }
+
+    pub(super) fn received(&self, kind: &str, bytes: usize) {
+        self.message("received", kind, bytes);
+    }
+
+    fn message(&self, verb: &str, kind: &str, bytes: usize) {
+        let mut status = self.lock();
+        add(&mut status.counters, format!("{verb}_{kind}"), 1);
+        add(&mut status.counters, format!("{verb}_{kind}_bytes"), bytes as u64);
+    }
+
+    pub(super) fn count(&self, name: &str) {
+        add(&mut self.lock().counters, name.to_owned(), 1);
+    }
+
+    /// Counts something that was refused, by cause, and names it among the latest errors.
+    pub(super) fn refused(&self, kind: &str, key: &str, bytes: usize, cause: &Refusal) {
+        self.count(&format!("refused_{kind}_{}", cause.name()));
+        self.error(&format!("refused {bytes} bytes on {key}: {cause}"));
+    }
+
+    /// Puts an error among the latest; one that stands there already moves to the end.
+    pub(super) fn error(&self, what: &str) {
+        let what: String = what.chars().take(MAX_ERROR_LENGTH).collect();
+        let at_ms = u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX);
+        let mut status = self.lock();
+        let known = status.errors.iter().position(|error| error.what == what);
+        if let Some(known) = known {
+            status.errors.remove(known);
+        } else {
+            tracing::warn!(robot = status.robot.0, "{what}");
+        }
+        if status.errors.len() == MAX_ERRORS {
+            status.errors.remove(0);
+        }
+        status.errors.push(Reported { at_ms, what });
+    }
+}
+
+fn add(counters: &mut BTreeMap<String, u64>, name: String, amount: u64) {
+    let counter = counters.entry(name).or_default();
+    *counter = counter.saturating_add(amount);
+}
+
+/// Why something that arrived goes no further.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Refusal {
+    #[error(transparent)]
+    Bytes(#[from] DecodeError),
+    #[error("a key that is none of this swarm's")]
+    Key,
+    #[error("the author is not the robot in the key")]
+    Author,
+    #[error("a message that does not belong on this key")]
+    Kind,
+    #[error("the queue is full; neighbours will repeat what matters")]
+    Full,
+    #[error("another robot of the swarm has this robot's id: give each its own, then restart one")]
+    Twin,
+}
+
+impl Refusal {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Bytes(DecodeError::Empty) => "empty",
+            Self::Bytes(DecodeError::TooLong { .. }) => "too_long",
+            Self::Bytes(DecodeError::Version { .. }) => "version",
+            Self::Bytes(DecodeError::Malformed(_)) => "malformed",
+            Self::Bytes(DecodeError::Trailing(_)) => "trailing",
+            Self::Bytes(DecodeError::Impossible(_)) => "impossible",
+            Self::Key => "key",
+            Self::Author => "author",
+            Self::Kind => "kind",
+            Self::Full => "full",
+            Self::Twin => "twin",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::RobotId;
+
+    use super::*;
+
+    fn account() -> Account {
+        let status = Status {
+            robot: RobotId(1),
+            name: "one".to_owned(),
+            boot: 1,
+            camera: "none".to_owned(),
+            model: "none".to_owned(),
+            vocabulary: Vec::new(),
+            neighbours: Vec::new(),
+            alive: Vec::new(),
+            round: None,
+            open: false,
+            counters: BTreeMap::new(),
+            errors: Vec::new(),
+        };
+        Account::new(status, Instant::now())
+    }
+
+    #[test]
+    fn the_errors_kept_are_the_latest_and_differ() {
+        let account = account();
+        for i in 0..40 {
+            account.error(&format!("error {}", i % 20));
+        }
+        let status = account.lock();
+        assert_eq!(status.errors.len(), MAX_ERRORS);
+        assert_eq!(status.errors.last().unwrap().what, "error 19");
+        account_is_distinct(&status);
+    }
+
+    fn account_is_distinct(status: &Status) {
+        for (i, error) in status.errors.iter().enumerate() {
+            assert!(!status.errors[..i].iter().any(|other| other.what == error.what));
+        }
+    }
+
+    #[test]
+    fn a_refusal_is_counted_by_its_cause() {
+        let account = account();
+        account.refused("vote", "k", 3, &Refusal::Bytes(DecodeError::Version { found: 9 }));
+        account.refused("vote", "k", 3, &Refusal::Bytes(DecodeError::Version { found: 9 }));
+        assert_eq!(account.lock().counters["refused_vote_version"], 2);
+    }
+}

@@ -1,0 +1,171 @@
+//! How a robot is linked to others, as the user says it and as Zenoh takes it.
+
+use gestalt_protocol::RobotId;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::LinkError;
+use super::identity::zenoh_id;
+
+/// How a robot is linked to others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LinkConfig {
+    /// Zenoh endpoints to listen on, such as `tcp/0.0.0.0:7447`; port 0 takes a free one. Default: any free TCP
+    /// port.
+    pub listen: Vec<String>,
+    /// Zenoh endpoints of other robots to link to, tried for ever. Name a link at one of its two ends only:
+    /// linked from both ends, Zenoh may stop receiving.
+    pub connect: Vec<String>,
+    /// Finds other robots by multicast and links to some of them; `None`: explicit endpoints only.
+    pub scouting: Option<Scouting>,
+    /// The number of links to robots that scouting builds up to, at least 2. Explicit endpoints and clients are
+    /// not counted.
+    pub max_links: usize,
+    /// Anything Zenoh's own configuration offers, verbatim; it has the last word, except for `id`.
+    pub zenoh: serde_json::Map<String, Value>,
+}
+
+/// Where robots find each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Scouting {
+    /// The multicast group and port.
+    pub address: String,
+    /// The network interface, or `auto`.
+    pub interface: String,
+}
+
+impl Default for Scouting {
+    fn default() -> Self {
+        Self { address: "224.0.0.224:7446".to_owned(), interface: "auto".to_owned() }
+    }
+}
+
+impl Default for LinkConfig {
+    fn default() -> Self {
+        Self {
+            listen: vec!["tcp/0.0.0.0:0".to_owned()],
+            connect: Vec::new(),
+            scouting: None,
+            max_links: 4,
+            zenoh: serde_json::Map::new(),
+        }
+    }
+}
+
+impl LinkConfig {
+    /// Zenoh's configuration for that robot.
+    ///
+    /// The values ahead of the user's own are those a swarm was measured to need: sessions in router mode relay
+    /// for each other (peers do not); a lease of one second routes around a silently lost relay in about that
+    /// time; an attempt to connect into a cut link gives up as fast, so that a healed one is found.
+    pub(super) fn to_zenoh(
+        &self,
+        robot: RobotId,
+        swarm: &str,
+        nonce: u64,
+    ) -> Result<zenoh::Config, LinkError> {
+        if self.max_links < 2 {
+            return Err(LinkError::Config {
+                key: "max_links".to_owned(),
+                cause: format!("{} links connect no swarm: take 2 or more", self.max_links),
+            });
+        }
+        let mut config = zenoh::Config::default();
+        let scouting = self.scouting.as_ref();
+        let ours = serde_json::json!({
+            "id": zenoh_id(robot, swarm, nonce),
+            "mode": "router",
+            "listen/endpoints": self.listen,
+            "connect/endpoints": self.connect,
+            "connect/timeout_ms": -1,
+            "connect/exit_on_failure": false,
+            "connect/retry": { "period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2 },
+            "scouting/delay": 0,
+            "scouting/multicast/enabled": scouting.is_some(),
+            "scouting/multicast/address": scouting.map_or_else(|| Scouting::default().address, |s| s.address.clone()),
+            "scouting/multicast/interface": scouting.map_or("auto", |s| &s.interface),
+            "scouting/multicast/autoconnect": { "router": [], "peer": [], "client": ["router"] },
+            "scouting/gossip/autoconnect": { "router": [], "peer": [], "client": [] },
+            "timestamping/enabled": true,
+            "adminspace/enabled": false,
+            "transport/unicast/open_timeout": 1000,
+            "transport/unicast/accept_timeout": 1000,
+            "transport/unicast/max_links": 1,
+            "transport/link/tx/lease": 1000,
+            "transport/link/tx/keep_alive": 4,
+        });
+        let ours = ours.as_object().expect("it is written as an object");
+        for (path, value) in ours {
+            config
+                .insert_json5(path, &value.to_string())
+                .map_err(|error| LinkError::config(path, &*error))?;
+        }
+        for (key, value) in &self.zenoh {
+            if key == "id" {
+                return Err(LinkError::Config {
+                    key: "zenoh.id".to_owned(),
+                    cause: "the Zenoh id names the robot and its swarm; leave it out and set the robot's id"
+                        .to_owned(),
+                });
+            }
+            merge(&mut config, key, value)?;
+        }
+        Ok(config)
+    }
+}
+
+/// Sets what `value` mentions and leaves its siblings as they are.
+fn merge(config: &mut zenoh::Config, path: &str, value: &Value) -> Result<(), LinkError> {
+    let Value::Object(children) = value else {
+        return config
+            .insert_json5(path, &value.to_string())
+            .map_err(|error| LinkError::config(path, &*error));
+    };
+    let one_by_one =
+        children.iter().try_for_each(|(key, child)| merge(config, &format!("{path}/{key}"), child));
+    // Some objects, such as values by mode, can only be set as a whole.
+    one_by_one.or_else(|error| config.insert_json5(path, &value.to_string()).map_err(|_| error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(zenoh: Value) -> Result<zenoh::Config, LinkError> {
+        let zenoh = zenoh.as_object().unwrap().clone();
+        LinkConfig { zenoh, ..LinkConfig::default() }.to_zenoh(RobotId(7), "demo", 1)
+    }
+
+    #[test]
+    fn the_users_own_value_stands_beside_ours() {
+        let config = with(serde_json::json!({"transport": {"link": {"tx": {"lease": 2500}}}})).unwrap();
+        assert_eq!(config.get_json("transport/link/tx/lease").unwrap(), "2500");
+        assert_eq!(config.get_json("transport/link/tx/keep_alive").unwrap(), "4");
+        assert_eq!(config.get_json("mode").unwrap(), "\"router\"");
+    }
+
+    #[test]
+    fn values_by_mode_are_taken_whole() {
+        let config = with(serde_json::json!({
+            "mode": "client",
+            "connect": {"endpoints": {"client": ["tcp/127.0.0.1:1"]}}
+        }))
+        .unwrap();
+        assert_eq!(config.get_json("mode").unwrap(), "\"client\"");
+        assert!(config.get_json("connect/endpoints").unwrap().contains("tcp/127.0.0.1:1"));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named() {
+        let error = with(serde_json::json!({"transport": {"lnik": {"tx": 1}}})).unwrap_err();
+        assert!(error.to_string().contains("zenoh.transport.lnik"), "{error}");
+    }
+
+    #[test]
+    fn the_zenoh_id_is_the_robots_own_business() {
+        let error = with(serde_json::json!({"id": "abc"})).unwrap_err();
+        assert!(error.to_string().contains("zenoh.id"), "{error}");
+    }
+}

@@ -1,0 +1,54 @@
+//! What can go wrong when a robot is linked to others.
+
+use gestalt_protocol::SwarmNameError;
+use thiserror::Error;
+
+/// A robot that could not be linked. Nothing is left running.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// The configuration holds something that Zenoh or a swarm cannot take.
+    #[error("{key}: {cause}")]
+    Config {
+        /// The key, dotted, as the user wrote it.
+        key: String,
+        /// What is wrong with it, and the mend.
+        cause: String,
+    },
+    /// The name of the swarm cannot stand in a key.
+    #[error(transparent)]
+    Swarm(#[from] SwarmNameError),
+    /// Zenoh cannot run on a runtime with one thread.
+    #[error(
+        "Zenoh needs Tokio's multi-thread runtime: start the robot from #[tokio::main] or a multi_thread test"
+    )]
+    Runtime,
+    /// The session could not start: most often an endpoint that another process holds.
+    #[error(
+        "cannot listen on {listen}: {cause}: free the port, choose another, or take port 0 for a free one"
+    )]
+    Start {
+        /// The endpoints it should have listened on.
+        listen: String,
+        /// Zenoh's reason.
+        cause: String,
+    },
+    /// Zenoh refused to build the session or one of its subscriptions.
+    #[error("cannot open the Zenoh session: {0}")]
+    Open(String),
+    /// No answer from a robot in time.
+    #[error("no robot of the swarm answered: {0}")]
+    Silent(String),
+}
+
+impl LinkError {
+    pub(super) fn config(path: &str, cause: &(dyn std::error::Error + Send + Sync)) -> Self {
+        Self::Config {
+            key: format!("zenoh.{}", path.replace('/', ".")),
+            cause: format!("{cause}: see Zenoh's DEFAULT_CONFIG.json5 for the keys and their values"),
+        }
+    }
+
+    pub(super) fn open(cause: &(dyn std::error::Error + Send + Sync)) -> Self {
+        Self::Open(cause.to_string())
+    }
+}

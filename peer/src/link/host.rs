@@ -1,0 +1,306 @@
+//! The one task that owns a robot's mind: what arrives goes in, what comes out is carried out.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::{Decision, Envelope, Keys, Message, RobotId, Topic};
+use gestalt_strategies::mind::Mind;
+use gestalt_strategies::{Input, Output, Vocabulary};
+use tokio::sync::{broadcast, mpsc};
+use zenoh::bytes::Encoding;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Query;
+use zenoh::sample::Locality;
+use zenoh::time::Timestamp;
+use zenoh::Wait;
+
+use super::account::{Account, Refusal};
+use super::inbox::Inbox;
+use super::keeper::Keeper;
+use super::session::Node;
+use super::{Announcement, Event, LinkError};
+
+/// When a new robot asks whether its id is taken: late enough that its links stand.
+const TWIN_CHECK: Duration = Duration::from_secs(3);
+
+/// Everything the task needs; [`Host::declare`] makes it known to the swarm.
+pub(super) struct Host {
+    pub(super) me: RobotId,
+    pub(super) mind: Mind,
+    pub(super) started: Instant,
+    pub(super) node: Node,
+    pub(super) keys: Keys,
+    pub(super) inbox: Arc<Inbox>,
+    pub(super) account: Arc<Account>,
+    pub(super) commands: mpsc::Receiver<Input>,
+    pub(super) events: broadcast::Sender<Event>,
+    pub(super) vocabulary: Option<Vocabulary>,
+}
+
+/// A host with its keys declared.
+pub(super) struct Declared {
+    host: Host,
+    vote: Publisher<'static>,
+    held: Publisher<'static>,
+    swarm: Publisher<'static>,
+    last: Arc<Last>,
+    alive: LivelinessToken,
+}
+
+/// The decision this robot holds, as the queryable on `decision` gives it.
+#[derive(Default)]
+struct Last(Mutex<Option<(String, Option<Timestamp>)>>);
+
+impl Host {
+    pub(super) async fn declare(self) -> Result<Declared, LinkError> {
+        let last = Arc::new(Last::default());
+        self.listen(&last).await.map_err(|error| LinkError::open(&*error))?;
+        self.announce_itself(last).await.map_err(|error| LinkError::open(&*error))
+    }
+
+    async fn listen(&self, last: &Arc<Last>) -> zenoh::Result<()> {
+        let session = self.node.session();
+        let of_interest = [
+            self.keys.every_robot("vote"),
+            self.keys.key(&Topic::Repair(self.me)),
+            self.keys.every_robot("decision"),
+            self.keys.key(&Topic::Decision),
+            self.keys.every_instructor(),
+        ];
+        for key in of_interest {
+            let inbox = self.inbox.clone();
+            session
+                .declare_subscriber(key)
+                .allowed_origin(Locality::Remote)
+                .callback(move |sample| inbox.on_sample(&sample))
+                .background()
+                .await?;
+        }
+        let inbox = self.inbox.clone();
+        session
+            .liveliness()
+            .declare_subscriber(self.keys.every_robot("alive"))
+            .history(true)
+            .callback(move |sample| inbox.on_liveliness(&sample))
+            .background()
+            .await?;
+        let (account, me) = (self.account.clone(), self.node.id().to_string());
+        session
+            .declare_queryable(self.keys.key(&Topic::Status(self.me)))
+            .callback(move |query| on_status(&account, &me, &query))
+            .background()
+            .await?;
+        let last = last.clone();
+        session
+            .declare_queryable(self.keys.key(&Topic::Decision))
+            .callback(move |query| last.on_query(&query))
+            .background()
+            .await?;
+        Ok(())
+    }
+
+    async fn announce_itself(self, last: Arc<Last>) -> zenoh::Result<Declared> {
+        let session = self.node.session();
+        let vote = session
+            .declare_publisher(self.keys.key(&Topic::Vote(self.me)))
+            .priority(Priority::DataHigh)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .await?;
+        let decision = |topic| {
+            session
+                .declare_publisher(self.keys.key(&topic))
+                .encoding(Encoding::APPLICATION_JSON)
+                .priority(Priority::InteractiveHigh)
+                .congestion_control(CongestionControl::Block)
+                .express(true)
+        };
+        let held = decision(Topic::RobotDecision(self.me)).await?;
+        let swarm = decision(Topic::Decision).await?;
+        let alive = session.liveliness().declare_token(self.keys.key(&Topic::Alive(self.me))).await?;
+        Ok(Declared { host: self, vote, held, swarm, last, alive })
+    }
+}
+
+impl Declared {
+    /// Serves the mind until the robot's handle is gone, then leaves the swarm.
+    pub(super) async fn run(mut self, keeper: Option<Keeper>) {
+        let keeper = keeper.map(|keeper| tokio::spawn(keeper.run()));
+        let twin_check = tokio::spawn(ask_for_twin(
+            self.host.node.clone(),
+            self.host.keys.key(&Topic::Status(self.host.me)),
+            self.host.account.clone(),
+        ));
+        let inbox = self.host.inbox.clone();
+        loop {
+            let wake = self.host.mind.next_wake().map(|wake| self.host.started + wake);
+            tokio::select! {
+                () = inbox.ready() => {
+                    for input in inbox.take() {
+                        self.step(input);
+                    }
+                }
+                command = self.host.commands.recv() => match command {
+                    Some(input) => self.step(input),
+                    None => break,
+                },
+                () = sleep_until(wake) => self.step(Input::Tick),
+            }
+        }
+        twin_check.abort();
+        if let Some(keeper) = keeper {
+            keeper.abort();
+        }
+        if let Err(error) = self.alive.undeclare().await {
+            tracing::debug!("withdrawing the liveliness token: {error}");
+        }
+        self.host.node.close().await;
+    }
+
+    fn step(&mut self, input: Input) {
+        match &input {
+            Input::Alive(alive) => {
+                self.host.account.lock().alive =
+                    alive.iter().copied().filter(|id| *id != self.host.me).chain([self.host.me]).collect();
+                self.tell(Event::Alive(alive.clone()));
+            }
+            Input::Neighbours(neighbours) => {
+                self.host.account.lock().neighbours = neighbours.iter().copied().collect();
+                self.tell(Event::Neighbours(neighbours.clone()));
+            }
+            Input::Announced(decision) => self.tell(Event::Announced(self.announcement(decision))),
+            Input::Learned(classifier) => self.host.vocabulary = Some(classifier.vocabulary().clone()),
+            _ => {}
+        }
+        let now = self.host.started.elapsed();
+        for output in self.host.mind.handle(now, input) {
+            self.carry_out(output);
+        }
+    }
+
+    fn carry_out(&mut self, output: Output) {
+        match output {
+            Output::Broadcast(envelope) => {
+                let bytes = envelope.encode();
+                self.host.inbox.said(&bytes);
+                self.host.account.sent("vote", bytes.len());
+                self.check(self.vote.put(bytes).wait());
+            }
+            Output::Tell(neighbour, envelope) => self.repair(neighbour, &envelope),
+            Output::Hold(decision) => {
+                let announcement = self.announcement(&decision);
+                let json = self.publish("robot_decision", &self.held, &announcement);
+                self.last.set(json, self.host.node.session().new_timestamp());
+                let mut status = self.host.account.lock();
+                status.round = status.round.max(Some(decision.round));
+                drop(status);
+                self.tell(Event::Held(decision));
+            }
+            Output::Announce(decision) => {
+                let announcement = self.announcement(&decision);
+                self.publish("decision", &self.swarm, &announcement);
+                self.tell(Event::Announced(announcement));
+            }
+            Output::Opened(round) => {
+                let mut status = self.host.account.lock();
+                (status.round, status.open) = (Some(round), true);
+                drop(status);
+                self.tell(Event::Opened(round));
+            }
+            Output::Closed(round) => {
+                self.host.account.lock().open = false;
+                self.tell(Event::Closed(round));
+            }
+        }
+    }
+
+    fn repair(&self, neighbour: RobotId, envelope: &Envelope) {
+        let bytes = envelope.encode();
+        let kind = if matches!(envelope.message, Message::Have(_)) { "have" } else { "give" };
+        self.host.account.sent(kind, bytes.len());
+        let key = self.host.keys.key(&Topic::Repair(neighbour));
+        let put = self
+            .host
+            .node
+            .session()
+            .put(key, bytes)
+            .priority(Priority::Data)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .wait();
+        self.check(put);
+    }
+
+    fn publish(&self, kind: &str, publisher: &Publisher<'_>, announcement: &Announcement) -> String {
+        let json = serde_json::to_string(announcement)
+            .expect("every field of a decision, with string keys and finite numbers, has a place in JSON");
+        self.host.account.sent(kind, json.len());
+        self.check(publisher.put(json.as_str()).wait());
+        json
+    }
+
+    fn announcement(&self, decision: &Decision) -> Announcement {
+        let vocabulary =
+            self.host.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
+        let label = decision.class.and_then(|class| vocabulary?.label(class)).map(str::to_owned);
+        Announcement { decision: decision.clone(), label }
+    }
+
+    fn check(&self, put: zenoh::Result<()>) {
+        if let Err(error) = put {
+            self.host.account.error(&format!("Zenoh refused to send: {error}"));
+        }
+    }
+
+    fn tell(&self, event: Event) {
+        // An error says that nobody listens, which is fine.
+        let _ = self.host.events.send(event);
+    }
+}
+
+async fn sleep_until(wake: Option<Instant>) {
+    match wake {
+        Some(wake) => tokio::time::sleep_until(wake.into()).await,
+        None => std::future::pending().await,
+    }
+}
+
+impl Last {
+    fn set(&self, json: String, at: Timestamp) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((json, Some(at)));
+    }
+
+    fn on_query(&self, query: &Query) {
+        let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((json, at)) = last {
+            let key = query.key_expr().clone();
+            // A client that has gone meanwhile is no error of this robot's.
+            let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(at).wait();
+        }
+    }
+}
+
+/// Answers a query for the status; one that a robot of the same id sends is a twin's.
+fn on_status(account: &Account, me: &str, query: &Query) {
+    if query.parameters().get("from").is_some_and(|from| from != me) {
+        account.error(&Refusal::Twin.to_string());
+    }
+    let json = serde_json::to_string(&*account.lock())
+        .expect("every field of a status, with string keys and finite numbers, has a place in JSON");
+    account.sent("status", json.len());
+    let _ = query.reply(query.key_expr().clone(), json).encoding(Encoding::APPLICATION_JSON).wait();
+}
+
+/// Asks once whether anyone else answers to this robot's id.
+async fn ask_for_twin(node: Node, status_key: String, account: Arc<Account>) {
+    tokio::time::sleep(TWIN_CHECK).await;
+    let query = format!("{status_key}?from={}", node.id());
+    let Ok(replies) = node.session().get(query).allowed_destination(Locality::Remote).await else { return };
+    while let Ok(reply) = replies.recv_async().await {
+        if reply.result().is_ok() {
+            account.error(&Refusal::Twin.to_string());
+        }
+    }
+}

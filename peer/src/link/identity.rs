@@ -1,0 +1,54 @@
+//! Zenoh ids that say which robot a session belongs to, so that neighbours can be told apart.
+//!
+//! Sixteen bytes, little-endian: robot id (4), checksum of the swarm's name (4), a number that differs at every
+//! start (8, its highest bit set: Zenoh wants no leading zeros).
+
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+
+use gestalt_protocol::RobotId;
+use zenoh::session::ZenohId;
+
+const HIGHEST: u64 = 1 << 63;
+
+/// A number that no earlier start had, from the operating system's entropy.
+#[must_use]
+pub fn fresh_nonce() -> u64 {
+    RandomState::new().build_hasher().finish()
+}
+
+/// The checksum that stands for a swarm's name in a Zenoh id.
+pub(super) fn swarm_checksum(swarm: &str) -> u32 {
+    crc32fast::hash(swarm.as_bytes())
+}
+
+/// The Zenoh id of a robot's session, in the hexadecimal that a Zenoh configuration takes.
+pub(super) fn zenoh_id(robot: RobotId, swarm: &str, nonce: u64) -> String {
+    format!("{:016x}{:08x}{:08x}", nonce | HIGHEST, swarm_checksum(swarm), robot.0)
+}
+
+/// The robot behind a Zenoh id; `None` for clients, routers of other kinds and other swarms.
+pub(super) fn robot_of(id: ZenohId, swarm: u32) -> Option<RobotId> {
+    let bytes = id.to_le_bytes();
+    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+    (word(4) == swarm && word(12) >> 31 == 1).then(|| RobotId(word(0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_is_recognised_by_its_own_swarm_alone() {
+        for robot in [0, 7, u32::MAX] {
+            let id: ZenohId = zenoh_id(RobotId(robot), "demo", 0).parse().unwrap();
+            assert_eq!(robot_of(id, swarm_checksum("demo")), Some(RobotId(robot)));
+            assert_eq!(robot_of(id, swarm_checksum("other")), None);
+        }
+    }
+
+    #[test]
+    fn two_starts_have_two_ids() {
+        assert_ne!(zenoh_id(RobotId(1), "demo", fresh_nonce()), zenoh_id(RobotId(1), "demo", fresh_nonce()));
+    }
+}

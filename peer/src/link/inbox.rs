@@ -1,0 +1,223 @@
+//! Between Zenoh's threads, which must never wait, and the one task that owns the mind.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use gestalt_protocol::{
+    Decision, Envelope, Instruction, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId, Topic,
+    decode_json,
+};
+use gestalt_strategies::Input;
+use tokio::sync::Notify;
+use zenoh::sample::{Sample, SampleKind};
+use zenoh::session::ZenohId;
+
+use super::account::{Account, Refusal};
+use super::announcement::Announcement;
+use super::identity::robot_of;
+
+/// The most messages that wait for the mind, votes apart.
+const MAX_QUEUE: usize = 8192;
+
+/// How many of its own latest votes a robot recognises when they come back to it.
+const OWN_VOTES: usize = 64;
+
+/// Everything that arrives, checked, until the mind's task takes it.
+///
+/// Votes wait in a ring of one per robot: the latest replaces the earlier. Everything else waits in a queue that
+/// loses nothing short of its bound; what exceeds it is refused and counted, and repair brings it again.
+#[derive(Debug)]
+pub(super) struct Inbox {
+    me: RobotId,
+    swarm: u32,
+    keys: Keys,
+    account: Arc<Account>,
+    state: Mutex<State>,
+    ready: Notify,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    votes: BTreeMap<RobotId, Envelope>,
+    queue: VecDeque<Input>,
+    own_votes: VecDeque<u32>,
+    links: BTreeMap<ZenohId, RobotId>,
+    alive: BTreeSet<RobotId>,
+    links_changed: bool,
+    alive_changed: bool,
+}
+
+impl Inbox {
+    pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>) -> Self {
+        let state = Mutex::new(State::default());
+        Self { me, swarm, keys, account, state, ready: Notify::new() }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until there is something to take.
+    pub(super) async fn ready(&self) {
+        self.ready.notified().await;
+    }
+
+    /// Takes everything that has arrived, changes of the neighbourhood first.
+    pub(super) fn take(&self) -> Vec<Input> {
+        let mut state = self.lock();
+        let state = &mut *state;
+        let mut inputs = Vec::with_capacity(state.queue.len() + state.votes.len() + 2);
+        if std::mem::take(&mut state.alive_changed) {
+            inputs.push(Input::Alive(state.alive.clone()));
+        }
+        if std::mem::take(&mut state.links_changed) {
+            inputs.push(Input::Neighbours(state.links.values().copied().collect()));
+        }
+        inputs.extend(state.queue.drain(..));
+        inputs.extend(std::mem::take(&mut state.votes).into_values().map(Input::Received));
+        inputs
+    }
+
+    /// Remembers a vote of this robot's own, so that an echo of it is told from a twin's vote.
+    pub(super) fn said(&self, vote: &[u8]) {
+        let mut state = self.lock();
+        if state.own_votes.len() == OWN_VOTES {
+            state.own_votes.pop_front();
+        }
+        state.own_votes.push_back(crc32fast::hash(vote));
+    }
+
+    /// Whatever arrives under a key of the swarm.
+    pub(super) fn on_sample(&self, sample: &Sample) {
+        if sample.kind() != SampleKind::Put {
+            return;
+        }
+        let key = sample.key_expr().as_str();
+        let (kind, taken) = match self.keys.parse(key) {
+            Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample)),
+            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
+            Some(Topic::RobotDecision(id)) => {
+                ("robot_decision", self.on_decision(sample, |decision| Input::Heard(id, decision)))
+            }
+            Some(Topic::Decision) => ("decision", self.on_decision(sample, Input::Announced)),
+            Some(Topic::Feedback(_)) => ("feedback", self.on_feedback(sample)),
+            _ => ("other", Err(Refusal::Key)),
+        };
+        let bytes = sample.payload().len();
+        match taken {
+            Ok(()) => {
+                self.account.received(kind, bytes);
+                self.ready.notify_one();
+            }
+            Err(cause) => self.account.refused(kind, key, bytes, &cause),
+        }
+    }
+
+    fn on_vote(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+        let bytes = payload(sample, MAX_MESSAGE)?;
+        let envelope = Envelope::decode(&bytes)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        if !matches!(envelope.message, Message::Vote(_)) {
+            return Err(Refusal::Kind);
+        }
+        let mut state = self.lock();
+        if id == self.me {
+            // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
+            let echo = state.own_votes.contains(&crc32fast::hash(&bytes));
+            return if echo { Ok(()) } else { Err(Refusal::Twin) };
+        }
+        if state.votes.len() >= MAX_ROBOTS && !state.votes.contains_key(&id) {
+            return Err(Refusal::Full);
+        }
+        let newer = state.votes.get(&id).is_none_or(|waiting| waiting.stamp < envelope.stamp);
+        if newer {
+            state.votes.insert(id, envelope);
+        }
+        Ok(())
+    }
+
+    fn on_repair(&self, sample: &Sample) -> Result<(), Refusal> {
+        let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
+        if envelope.author == self.me {
+            return Err(Refusal::Twin);
+        }
+        if matches!(envelope.message, Message::Vote(_)) {
+            return Err(Refusal::Kind);
+        }
+        self.queue(Input::Received(envelope))
+    }
+
+    fn on_decision(&self, sample: &Sample, input: impl FnOnce(Decision) -> Input) -> Result<(), Refusal> {
+        let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
+        announcement.decision.check()?;
+        self.queue(input(announcement.decision))
+    }
+
+    fn on_feedback(&self, sample: &Sample) -> Result<(), Refusal> {
+        let instruction: Instruction = decode_json(&payload(sample, MAX_JSON)?)?;
+        self.queue(Input::Instructed(instruction))
+    }
+
+    fn queue(&self, input: Input) -> Result<(), Refusal> {
+        let mut state = self.lock();
+        if state.queue.len() >= MAX_QUEUE {
+            return Err(Refusal::Full);
+        }
+        state.queue.push_back(input);
+        Ok(())
+    }
+
+    /// A robot's liveliness token came or went.
+    pub(super) fn on_liveliness(&self, sample: &Sample) {
+        let Some(Topic::Alive(id)) = self.keys.parse(sample.key_expr().as_str()) else {
+            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Key);
+        };
+        let mut state = self.lock();
+        let changed = match sample.kind() {
+            SampleKind::Put => state.alive.len() < MAX_ROBOTS && state.alive.insert(id),
+            SampleKind::Delete => state.alive.remove(&id),
+        };
+        if changed {
+            state.alive_changed = true;
+            self.ready.notify_one();
+        }
+    }
+
+    /// A link to another session came or went.
+    pub(super) fn on_link(&self, id: ZenohId, up: bool) {
+        let Some(robot) = robot_of(id, self.swarm) else { return };
+        if robot == self.me {
+            return self.account.error(&Refusal::Twin.to_string());
+        }
+        let mut state = self.lock();
+        if up {
+            state.links.insert(id, robot);
+        } else {
+            state.links.remove(&id);
+        }
+        state.links_changed = true;
+        self.ready.notify_one();
+    }
+
+    /// The sessions of robots that this one is linked to now.
+    pub(super) fn links(&self) -> BTreeMap<ZenohId, RobotId> {
+        self.lock().links.clone()
+    }
+
+    /// The robots alive by liveliness, or because they are linked to this one.
+    pub(super) fn alive(&self) -> BTreeSet<RobotId> {
+        let state = self.lock();
+        state.alive.iter().chain(state.links.values()).copied().collect()
+    }
+}
+
+/// The bytes of a payload, looked into only if they are few enough.
+fn payload(sample: &Sample, limit: usize) -> Result<std::borrow::Cow<'_, [u8]>, Refusal> {
+    let length = sample.payload().len();
+    if length > limit {
+        return Err(gestalt_protocol::DecodeError::TooLong { length, limit }.into());
+    }
+    Ok(sample.payload().to_bytes())
+}

@@ -1,0 +1,205 @@
+//! A robot of a swarm, as the program around it holds it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Instant;
+
+use gestalt_protocol::{Decision, Keys, RobotId, RoundId, Status};
+use gestalt_strategies::mind::Mind;
+use gestalt_strategies::{Classify, Input, MindConfig, Observation, Vocabulary};
+use tokio::runtime::{Handle, RuntimeFlavor};
+use tokio::sync::{broadcast, mpsc};
+use tokio::task::JoinHandle;
+
+use super::account::Account;
+use super::host::Host;
+use super::inbox::Inbox;
+use super::keeper::Keeper;
+use super::identity::swarm_checksum;
+use super::session::Node;
+use super::{Announcement, LinkConfig, LinkError};
+
+/// How many observations and instructions of the program may wait for the robot's task.
+const MAX_COMMANDS: usize = 1024;
+
+/// How many events a receiver may lag behind before it misses some.
+const MAX_EVENTS: usize = 1024;
+
+/// Everything a robot needs to take part in a swarm.
+#[derive(Clone, Debug)]
+pub struct RobotConfig {
+    /// Which robot; no two robots of a swarm share an id.
+    pub id: RobotId,
+    /// Its name for people.
+    pub name: String,
+    /// Grows at every start of this robot, so that what it says outranks what it said before.
+    pub boot: u32,
+    /// The swarm's name: 1 to 64 of the characters `A-Z a-z 0-9 _ -`.
+    pub swarm: String,
+    /// How it takes part in rounds.
+    pub mind: MindConfig,
+    /// How it is linked to others.
+    pub link: LinkConfig,
+    /// The gestures' labels, for a robot that announces decisions without a classifier of its own.
+    pub vocabulary: Option<Vocabulary>,
+    /// The seed of the mind's random choices.
+    pub seed: u64,
+    /// Differs at every start, see [`fresh_nonce`](super::fresh_nonce).
+    pub nonce: u64,
+}
+
+/// What a robot lets the program around it know.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// It takes part in that round: show it frames.
+    Opened(RoundId),
+    /// That round is over for it.
+    Closed(RoundId),
+    /// It now holds that decision.
+    Held(Decision),
+    /// That decision was announced for the swarm, by this robot or another.
+    Announced(Announcement),
+    /// The robots it is linked to now.
+    Neighbours(BTreeSet<RobotId>),
+    /// The robots alive now, itself aside.
+    Alive(BTreeSet<RobotId>),
+}
+
+/// A running robot. Dropping it ends it without waiting; [`Robot::stop`] waits until its session is closed.
+#[derive(Debug)]
+pub struct Robot {
+    account: Arc<Account>,
+    commands: mpsc::Sender<Input>,
+    events: broadcast::Sender<Event>,
+    locators: Vec<String>,
+    host: JoinHandle<()>,
+}
+
+impl Robot {
+    /// Starts a robot: opens its Zenoh session and takes part in the swarm from then on.
+    ///
+    /// # Errors
+    /// See [`LinkError`]. Links that cannot be made yet are no error: they are tried for ever.
+    pub async fn start(config: RobotConfig) -> Result<Self, LinkError> {
+        if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
+            return Err(LinkError::Runtime);
+        }
+        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, seed, nonce } = config;
+        let keys = Keys::new(&swarm)?;
+        let zenoh = link.to_zenoh(id, &swarm, nonce)?;
+        let started = Instant::now();
+        let status = Status {
+            robot: id,
+            name,
+            boot,
+            camera: "none".to_owned(),
+            model: "none".to_owned(),
+            vocabulary: vocabulary.as_ref().map(|v| v.labels().to_vec()).unwrap_or_default(),
+            neighbours: Vec::new(),
+            alive: vec![id],
+            round: None,
+            open: false,
+            counters: BTreeMap::new(),
+            errors: Vec::new(),
+        };
+        let account = Arc::new(Account::new(status, started));
+        let inbox = Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone()));
+        let on_link = {
+            let inbox = inbox.clone();
+            move |id, up| inbox.on_link(id, up)
+        };
+        let node = Node::open(zenoh.clone(), on_link).await?;
+        let locators = node.locators();
+        let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
+        let (events, _) = broadcast::channel(MAX_EVENTS);
+        let keeper = link.scouting.is_some().then(|| {
+            Keeper::new(id, &swarm, link.max_links, node.clone(), inbox.clone(), account.clone(), zenoh)
+        });
+        let host = Host {
+            me: id,
+            mind: Mind::new(id, boot, mind, seed),
+            started,
+            node: node.clone(),
+            keys,
+            inbox,
+            account: account.clone(),
+            commands: command_queue,
+            events: events.clone(),
+            vocabulary,
+        };
+        let host = match host.declare().await {
+            Ok(declared) => tokio::spawn(declared.run(keeper)),
+            Err(error) => {
+                node.close().await;
+                return Err(error);
+            }
+        };
+        Ok(Self { account, commands, events, locators, host })
+    }
+
+    /// Says: a gesture is being shown now.
+    pub fn open_round(&self) {
+        self.tell(Input::Open);
+    }
+
+    /// Hands over what a frame showed.
+    pub fn observe(&self, observation: Observation) {
+        self.tell(Input::Observed(observation));
+    }
+
+    /// Puts a new classifier in the place of the old one. `model` is its name for people.
+    pub fn learned(&self, classifier: Arc<dyn Classify>, model: &str) {
+        let mut status = self.account.lock();
+        status.vocabulary = classifier.vocabulary().labels().to_vec();
+        model.clone_into(&mut status.model);
+        drop(status);
+        self.tell(Input::Learned(classifier));
+    }
+
+    fn tell(&self, input: Input) {
+        if self.commands.try_send(input).is_err() {
+            self.account.count("refused_command_full");
+        }
+    }
+
+    /// What happens to it from now on. A receiver that lags by more than 1,024 events is told how many it missed.
+    #[must_use]
+    pub fn events(&self) -> broadcast::Receiver<Event> {
+        self.events.subscribe()
+    }
+
+    /// Its account of itself, as the query on `robot/<id>/status` gives it.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        self.account.lock().clone()
+    }
+
+    /// Says in the status what camera it has, or what is wrong with it.
+    pub fn set_camera(&self, camera: String) {
+        self.account.lock().camera = camera;
+    }
+
+    /// Puts an error of the program around it into its status.
+    pub fn report_error(&self, what: &str) {
+        self.account.error(what);
+    }
+
+    /// Adds to a counter of its status, by name.
+    pub fn count(&self, name: &str) {
+        self.account.count(name);
+    }
+
+    /// The endpoints it listens on, with the ports it was given.
+    #[must_use]
+    pub fn locators(&self) -> &[String] {
+        &self.locators
+    }
+
+    /// Leaves the swarm and waits until its session is closed.
+    pub async fn stop(self) {
+        drop(self.commands);
+        if let Err(error) = self.host.await {
+            tracing::error!("the robot's task ended badly: {error}");
+        }
+    }
+}

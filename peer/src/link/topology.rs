@@ -1,0 +1,402 @@
+//! Which robots a robot should be linked to: few of them, and yet all of the swarm one connected whole.
+//!
+//! All robots stand in a ring, ordered by a hash of their ids, and each is linked to the one before and the one
+//! after it; a second ring, by another hash, gives short paths and a way around any robot that fails. `max_links / 2`
+//! rings keep the bound by construction, and robots that hear the same ones agree without a word. Of a pair, the
+//! robot with the smaller id dials, since Zenoh may stop receiving where both do.
+//!
+//! Robots that do not all hear each other can differ in what rings they see. So whoever is heard but cannot be
+//! reached is linked to as well, and such a bridge is kept even above the bound: the swarm comes first.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+
+/// How long a robot that was heard is thought to be there without a sign of life.
+const FRESH: Duration = Duration::from_secs(5);
+
+/// How long the smaller id of a pair is left to dial before the other does.
+const COURTESY: Duration = Duration::from_secs(10);
+
+/// How long a heard robot may stay unreachable before it is linked to outside the rings.
+const PATIENCE: Duration = Duration::from_secs(4);
+
+/// A link that comes back this soon after it was dropped is needed by someone.
+const NEEDED: Duration = Duration::from_secs(8);
+
+/// How often a robot without any link looks for others.
+const ALONE: Duration = Duration::from_secs(1);
+
+/// How often the smallest robot of a connected whole looks for others.
+const LOOKOUT: Duration = Duration::from_secs(3);
+
+/// The bounds on how often every other robot looks.
+const REST: (Duration, Duration) = (Duration::from_secs(4), Duration::from_secs(60));
+
+/// What a robot sees around it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct View {
+    /// Who can be dialled, and when each was last heard.
+    pub(super) heard: BTreeMap<RobotId, Duration>,
+    /// To whom there is a link.
+    pub(super) linked: BTreeSet<RobotId>,
+    /// Who is reachable, over however many links.
+    pub(super) alive: BTreeSet<RobotId>,
+}
+
+/// What to do about it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Plan {
+    pub(super) dial: BTreeSet<RobotId>,
+    pub(super) drop: BTreeSet<RobotId>,
+    /// Look who is there.
+    pub(super) scout: bool,
+}
+
+/// Chooses the links of one robot. Pure: time is an argument.
+#[derive(Debug)]
+pub(super) struct Topology {
+    me: RobotId,
+    max_links: usize,
+    wanted_since: BTreeMap<RobotId, Duration>,
+    unreachable_since: BTreeMap<RobotId, Duration>,
+    dropped: BTreeMap<RobotId, Duration>,
+    bridges: BTreeSet<RobotId>,
+    scouted: Option<Duration>,
+    missing: u32,
+}
+
+impl Topology {
+    pub(super) fn new(me: RobotId, max_links: usize) -> Self {
+        Self {
+            me,
+            max_links,
+            wanted_since: BTreeMap::new(),
+            unreachable_since: BTreeMap::new(),
+            dropped: BTreeMap::new(),
+            bridges: BTreeSet::new(),
+            scouted: None,
+            missing: 0,
+        }
+    }
+
+    /// The next steps. Repeating one that is under way does no harm.
+    pub(super) fn plan(&mut self, now: Duration, view: &View) -> Plan {
+        let there: BTreeSet<_> = view
+            .heard
+            .iter()
+            .filter(|(id, at)| view.alive.contains(id) || now.saturating_sub(**at) < FRESH)
+            .map(|(id, _)| *id)
+            .chain(view.linked.iter().copied())
+            .collect();
+        let wanted = self.ring_neighbours(&there);
+        let mut dial = self.due_in_rings(now, &wanted, view);
+        dial.extend(self.due_outside(now, &there, view));
+        let drop = self.surplus(now, &wanted, view);
+        let scout = self.scout_is_due(now, &there, view);
+        Plan { dial, drop, scout }
+    }
+
+    /// Those before and after this robot in each ring of `there`.
+    fn ring_neighbours(&self, there: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        let mut neighbours = BTreeSet::new();
+        for ring in 0..self.max_links / 2 {
+            let here = place(ring, self.me);
+            // Going round from here, the next one has the least distance and the one before the greatest.
+            let around = |id: &&RobotId| place(ring, **id).wrapping_sub(here);
+            let others = || there.iter().filter(|id| **id != self.me);
+            neighbours.extend(others().min_by_key(around));
+            neighbours.extend(others().max_by_key(around));
+        }
+        neighbours
+    }
+
+    fn due_in_rings(&mut self, now: Duration, wanted: &BTreeSet<RobotId>, view: &View) -> BTreeSet<RobotId> {
+        let lacking: BTreeSet<_> = wanted.difference(&view.linked).copied().collect();
+        since(&mut self.wanted_since, &lacking, now);
+        let due = |id: &RobotId| self.me < *id || now.saturating_sub(self.wanted_since[id]) >= COURTESY;
+        lacking.into_iter().filter(due).collect()
+    }
+
+    /// The smallest of those that are heard and have not become reachable, each to be joined by one link.
+    fn due_outside(&mut self, now: Duration, there: &BTreeSet<RobotId>, view: &View) -> Option<RobotId> {
+        let unreachable: BTreeSet<_> =
+            there.iter().filter(|id| **id != self.me && !view.alive.contains(id)).copied().collect();
+        since(&mut self.unreachable_since, &unreachable, now);
+        let waited = |id: RobotId| now.saturating_sub(self.unreachable_since[&id]);
+        let smallest = unreachable.into_iter().find(|id| waited(*id) >= PATIENCE)?;
+        let mine = self.me < smallest || waited(smallest) >= COURTESY;
+        let due = mine && !view.linked.contains(&smallest);
+        if due && self.dropped.contains_key(&smallest) {
+            self.bridges.insert(smallest);
+        }
+        due.then_some(smallest)
+    }
+
+    /// Links above the bound that no ring wants.
+    fn surplus(&mut self, now: Duration, wanted: &BTreeSet<RobotId>, view: &View) -> BTreeSet<RobotId> {
+        self.dropped.retain(|_, at| now.saturating_sub(*at) < NEEDED + COURTESY + PATIENCE);
+        for id in &view.linked {
+            let came_back =
+                self.dropped.get(id).is_some_and(|at| (ALONE..NEEDED).contains(&now.saturating_sub(*at)));
+            if came_back && !wanted.contains(id) {
+                self.bridges.insert(*id);
+            }
+        }
+        self.bridges.retain(|id| view.alive.contains(id) || view.heard.contains_key(id));
+        let above = view.linked.len().saturating_sub(self.max_links);
+        let free = |id: &&RobotId| !wanted.contains(id) && !self.bridges.contains(id);
+        let drop: BTreeSet<_> = view.linked.iter().filter(free).take(above).copied().collect();
+        for id in &drop {
+            self.dropped.entry(*id).or_insert(now);
+        }
+        drop
+    }
+
+    fn scout_is_due(&mut self, now: Duration, there: &BTreeSet<RobotId>, view: &View) -> bool {
+        let everyone: BTreeSet<_> = there.union(&view.alive).copied().collect();
+        // A robot known by its token alone may be just out of hearing for good: look for it ever less often.
+        let missing = self.ring_neighbours(&everyone).iter().any(|id| !there.contains(id));
+        if !missing {
+            self.missing = 0;
+        }
+        let smallest = everyone.first().is_none_or(|id| *id >= self.me);
+        let period = if view.linked.is_empty() {
+            ALONE
+        } else if missing {
+            (ALONE / 2 * 2_u32.saturating_pow(self.missing)).min(REST.1)
+        } else if smallest {
+            LOOKOUT
+        } else {
+            (Duration::from_secs(2) * u32::try_from(everyone.len()).unwrap_or(u32::MAX)).clamp(REST.0, REST.1)
+        };
+        let due = self.scouted.is_none_or(|at| now.saturating_sub(at) >= period);
+        if due {
+            self.scouted = Some(now);
+            self.missing = if missing { (self.missing + 1).min(8) } else { 0 };
+        }
+        due
+    }
+}
+
+/// Keeps for each of `present` since when it has been there.
+fn since(times: &mut BTreeMap<RobotId, Duration>, present: &BTreeSet<RobotId>, now: Duration) {
+    times.retain(|id, _| present.contains(id));
+    for id in present {
+        times.entry(*id).or_insert(now);
+    }
+}
+
+/// A robot's place in a ring: its id, well mixed (the finaliser of SplitMix64).
+fn place(ring: usize, id: RobotId) -> u64 {
+    let mut z = (u64::from(id.0) + 1)
+        .wrapping_add(((ring as u64) << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    type Pair = (RobotId, RobotId);
+
+    /// Robots around each other: who hears whom, who has started, which links stand.
+    struct World {
+        now: Duration,
+        minds: BTreeMap<RobotId, (Topology, BTreeMap<RobotId, Duration>)>,
+        hears: BTreeSet<Pair>,
+        links: BTreeSet<Pair>,
+        scouts: usize,
+    }
+
+    fn pair(a: RobotId, b: RobotId) -> Pair {
+        (a.min(b), a.max(b))
+    }
+
+    impl World {
+        fn new(hears: impl IntoIterator<Item = Pair>) -> Self {
+            Self {
+                now: Duration::ZERO,
+                minds: BTreeMap::new(),
+                hears: hears.into_iter().map(|(a, b)| pair(a, b)).collect(),
+                links: BTreeSet::new(),
+                scouts: 0,
+            }
+        }
+
+        fn everyone_hears_everyone(ids: &BTreeSet<u32>) -> Self {
+            let pairs = ids.iter().flat_map(|a| ids.range(a + 1..).map(|b| (RobotId(*a), RobotId(*b))));
+            Self::new(pairs)
+        }
+
+        fn start(&mut self, id: RobotId, max_links: usize) {
+            self.minds.insert(id, (Topology::new(id, max_links), BTreeMap::new()));
+        }
+
+        fn kill(&mut self, id: RobotId) {
+            self.minds.remove(&id);
+            self.links.retain(|(a, b)| *a != id && *b != id);
+        }
+
+        fn linked(&self, id: RobotId) -> BTreeSet<RobotId> {
+            let other = |(a, b): &Pair| (*a == id).then_some(*b).or((*b == id).then_some(*a));
+            self.links.iter().filter_map(other).collect()
+        }
+
+        fn reachable(&self, from: RobotId) -> BTreeSet<RobotId> {
+            let mut seen = BTreeSet::from([from]);
+            let mut front = vec![from];
+            while let Some(id) = front.pop() {
+                front.extend(self.linked(id).into_iter().filter(|other| seen.insert(*other)));
+            }
+            seen.remove(&from);
+            seen
+        }
+
+        fn run(&mut self, time: Duration) {
+            let end = self.now + time;
+            while self.now < end {
+                self.now += Duration::from_millis(500);
+                let ids: Vec<_> = self.minds.keys().copied().collect();
+                for id in ids {
+                    let linked = self.linked(id);
+                    let alive = self.reachable(id);
+                    let (topology, heard) = self.minds.get_mut(&id).unwrap();
+                    let plan = topology.plan(self.now, &View { heard: heard.clone(), linked, alive });
+                    self.carry_out(id, &plan);
+                }
+            }
+        }
+
+        fn carry_out(&mut self, id: RobotId, plan: &Plan) {
+            for other in &plan.dial {
+                if self.minds.contains_key(other) {
+                    self.links.insert(pair(id, *other));
+                } else {
+                    self.minds.get_mut(&id).unwrap().1.remove(other);
+                }
+            }
+            for other in &plan.drop {
+                self.links.remove(&pair(id, *other));
+            }
+            if plan.scout {
+                self.scouts += 1;
+                let there = self.minds.keys().filter(|other| self.hears.contains(&pair(id, **other)));
+                let heard: Vec<_> = there.map(|other| (*other, self.now)).collect();
+                self.minds.get_mut(&id).unwrap().1.extend(heard);
+            }
+        }
+
+        fn is_one_whole(&self) -> bool {
+            let first = *self.minds.keys().next().unwrap();
+            self.reachable(first).len() + 1 == self.minds.len()
+        }
+
+        fn most_links(&self) -> usize {
+            self.minds.keys().map(|id| self.linked(*id).len()).max().unwrap()
+        }
+    }
+
+    fn ids() -> impl Strategy<Value = BTreeSet<u32>> {
+        proptest::collection::btree_set(0_u32..1000, 2..40)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+        #[test]
+        fn robots_in_hearing_become_one_whole_within_the_bound(ids in ids(), max_links in 2_usize..7) {
+            let mut world = World::everyone_hears_everyone(&ids);
+            for (i, id) in ids.iter().enumerate() {
+                world.start(RobotId(*id), max_links);
+                if i % 5 == 0 {
+                    world.run(Duration::from_millis(500));
+                }
+            }
+            world.run(Duration::from_secs(10));
+            prop_assert!(world.is_one_whole());
+            world.run(Duration::from_secs(20));
+            prop_assert!(world.is_one_whole());
+            prop_assert!(world.most_links() <= max_links);
+        }
+
+        #[test]
+        fn robots_that_come_and_go_stay_one_whole(
+            ids in ids(),
+            gone in proptest::collection::vec(any::<prop::sample::Index>(), 1..10),
+        ) {
+            let mut world = World::everyone_hears_everyone(&ids);
+            let ids: Vec<_> = ids.into_iter().map(RobotId).collect();
+            ids.iter().for_each(|id| world.start(*id, 4));
+            world.run(Duration::from_secs(10));
+            for index in &gone {
+                world.kill(*index.get(&ids));
+            }
+            world.run(Duration::from_secs(15));
+            prop_assert!(world.minds.is_empty() || world.is_one_whole());
+            for index in &gone {
+                world.start(*index.get(&ids), 4);
+            }
+            world.run(Duration::from_secs(40));
+            prop_assert!(world.is_one_whole());
+            prop_assert!(world.most_links() <= 4);
+        }
+
+        /// Out of full hearing no bound can be promised (think of a star), but the swarm holds together.
+        #[test]
+        fn robots_in_a_chain_of_hearing_become_one_whole(
+            n in 2_u32..25,
+            more in proptest::collection::vec((0_u32..25, 0_u32..25), 0..60),
+        ) {
+            let chain = (1..n).map(|i| (RobotId(i), RobotId(i / 2)));
+            let more = more.into_iter().filter(|(a, b)| a != b && *a < n && *b < n);
+            let mut world = World::new(chain.chain(more.map(|(a, b)| (RobotId(a), RobotId(b)))));
+            (0..n).for_each(|i| world.start(RobotId(i), 4));
+            world.run(Duration::from_secs(150));
+            for _ in 0..10 {
+                prop_assert!(world.is_one_whole());
+                world.run(Duration::from_secs(2));
+            }
+        }
+    }
+
+    #[test]
+    fn a_hundred_robots_are_few_hops_apart_and_rarely_look_around() {
+        let ids: BTreeSet<_> = (0..100).collect();
+        let mut world = World::everyone_hears_everyone(&ids);
+        ids.iter().for_each(|id| world.start(RobotId(*id), 4));
+        world.run(Duration::from_secs(10));
+        assert!(world.is_one_whole());
+        assert!(world.most_links() <= 4);
+        let mut front = BTreeSet::from([RobotId(0)]);
+        let mut hops = 0;
+        while front.len() < 100 {
+            front = front.iter().flat_map(|id| world.linked(*id)).chain(front.iter().copied()).collect();
+            hops += 1;
+        }
+        assert!(hops <= 7, "{hops} hops");
+        let before = world.scouts;
+        world.run(Duration::from_secs(60));
+        assert!(world.scouts - before <= 140, "{} looks a minute", world.scouts - before);
+    }
+
+    #[test]
+    fn two_wholes_merge_where_they_hear_each_other() {
+        let ids: BTreeSet<_> = (0..20).collect();
+        let mut world = World::everyone_hears_everyone(&ids);
+        let all = std::mem::take(&mut world.hears);
+        world.hears = all.iter().filter(|(a, b)| (a.0 < 10) == (b.0 < 10)).copied().collect();
+        ids.iter().for_each(|id| world.start(RobotId(*id), 4));
+        world.run(Duration::from_secs(20));
+        assert!(!world.is_one_whole());
+        world.hears = all;
+        world.run(Duration::from_secs(10));
+        assert!(world.is_one_whole());
+    }
+}
