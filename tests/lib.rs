@@ -1,1 +1,16 @@
-//! tests
+//! What the whole-swarm scenarios share: a classifier without pictures, robots in this process, robots as
+//! processes, and network namespaces to put them in.
+
+#[path = "set_up/classifier.rs"]
+mod classifier;
+#[path = "set_up/namespaces.rs"]
+mod namespaces;
+#[path = "set_up/process.rs"]
+mod process;
+#[path = "set_up/robots.rs"]
+mod robots;
+
+pub use classifier::{Fixed, look};
+pub use namespaces::{Namespaces, not_permitted};
+pub use process::Process;
+pub use robots::{Watched, config, start, unique};

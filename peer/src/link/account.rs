@@ -49,6 +49,17 @@ impl Account {
         self.error(&format!("refused {bytes} bytes on {key}: {cause}"));
     }
 
+    /// Another robot has this robot's id.
+    pub(super) fn twin(&self) {
+        self.count("twin");
+        self.error(&Refusal::Twin.to_string());
+    }
+
+    /// Sets a counter that is kept elsewhere.
+    pub(super) fn set(&self, name: &str, value: u64) {
+        self.lock().counters.insert(name.to_owned(), value);
+    }
+
     /// Puts an error among the latest; one that stands there already moves to the end.
     pub(super) fn error(&self, what: &str) {
         let what: String = what.chars().take(MAX_ERROR_LENGTH).collect();

@@ -72,23 +72,37 @@ impl LinkConfig {
                 cause: format!("{} links connect no swarm: take 2 or more", self.max_links),
             });
         }
-        let mut config = zenoh::Config::default();
-        let scouting = self.scouting.as_ref();
-        let ours = serde_json::json!({
+        self.with_defaults(&serde_json::json!({
             "id": zenoh_id(robot, swarm, nonce),
             "mode": "router",
             "listen/endpoints": self.listen,
-            "connect/endpoints": self.connect,
             "connect/timeout_ms": -1,
             "connect/exit_on_failure": false,
-            "connect/retry": { "period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2 },
             "scouting/delay": 0,
-            "scouting/multicast/enabled": scouting.is_some(),
-            "scouting/multicast/address": scouting.map_or_else(|| Scouting::default().address, |s| s.address.clone()),
-            "scouting/multicast/interface": scouting.map_or("auto", |s| &s.interface),
+            "timestamping/enabled": true,
+        }))
+    }
+
+    /// Zenoh's configuration for a client: it attaches to one robot and gives up after a few seconds without.
+    pub(super) fn client(&self) -> Result<zenoh::Config, LinkError> {
+        self.with_defaults(&serde_json::json!({
+            "mode": "client",
+            "listen/endpoints": [],
+            "connect/timeout_ms": 5000,
+        }))
+    }
+
+    fn with_defaults(&self, first: &Value) -> Result<zenoh::Config, LinkError> {
+        let mut config = zenoh::Config::default();
+        let scouting = self.scouting.clone().unwrap_or_default();
+        let rest = serde_json::json!({
+            "connect/endpoints": self.connect,
+            "connect/retry": { "period_init_ms": 200, "period_max_ms": 500, "period_increase_factor": 2 },
+            "scouting/multicast/enabled": self.scouting.is_some(),
+            "scouting/multicast/address": scouting.address,
+            "scouting/multicast/interface": scouting.interface,
             "scouting/multicast/autoconnect": { "router": [], "peer": [], "client": ["router"] },
             "scouting/gossip/autoconnect": { "router": [], "peer": [], "client": [] },
-            "timestamping/enabled": true,
             "adminspace/enabled": false,
             "transport/unicast/open_timeout": 1000,
             "transport/unicast/accept_timeout": 1000,
@@ -96,8 +110,7 @@ impl LinkConfig {
             "transport/link/tx/lease": 1000,
             "transport/link/tx/keep_alive": 4,
         });
-        let ours = ours.as_object().expect("it is written as an object");
-        for (path, value) in ours {
+        for (path, value) in [first, &rest].into_iter().filter_map(Value::as_object).flatten() {
             config
                 .insert_json5(path, &value.to_string())
                 .map_err(|error| LinkError::config(path, &*error))?;

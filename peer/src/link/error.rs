@@ -1,6 +1,7 @@
 //! What can go wrong when a robot is linked to others.
 
 use gestalt_protocol::SwarmNameError;
+use gestalt_strategies::mind::MindConfigError;
 use thiserror::Error;
 
 /// A robot that could not be linked. Nothing is left running.
@@ -14,6 +15,9 @@ pub enum LinkError {
         /// What is wrong with it, and the mend.
         cause: String,
     },
+    /// The parameters of the mind do not fit together.
+    #[error(transparent)]
+    Mind(#[from] MindConfigError),
     /// The name of the swarm cannot stand in a key.
     #[error(transparent)]
     Swarm(#[from] SwarmNameError),
@@ -35,9 +39,6 @@ pub enum LinkError {
     /// Zenoh refused to build the session or one of its subscriptions.
     #[error("cannot open the Zenoh session: {0}")]
     Open(String),
-    /// No answer from a robot in time.
-    #[error("no robot of the swarm answered: {0}")]
-    Silent(String),
 }
 
 impl LinkError {

@@ -7,6 +7,7 @@ use gestalt_protocol::{Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
+use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Publisher;
@@ -14,9 +15,8 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 use zenoh::sample::Locality;
 use zenoh::time::Timestamp;
-use zenoh::Wait;
 
-use super::account::{Account, Refusal};
+use super::account::Account;
 use super::inbox::Inbox;
 use super::keeper::Keeper;
 use super::session::Node;
@@ -178,6 +178,11 @@ impl Declared {
         for output in self.host.mind.handle(now, input) {
             self.carry_out(output);
         }
+        for (refusal, count) in self.host.mind.refusals().iter() {
+            if count > 0 {
+                self.host.account.set(refusal.name(), count);
+            }
+        }
     }
 
     fn carry_out(&mut self, output: Output) {
@@ -242,8 +247,7 @@ impl Declared {
     }
 
     fn announcement(&self, decision: &Decision) -> Announcement {
-        let vocabulary =
-            self.host.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
+        let vocabulary = self.host.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
         let label = decision.class.and_then(|class| vocabulary?.label(class)).map(str::to_owned);
         Announcement { decision: decision.clone(), label }
     }
@@ -285,7 +289,7 @@ impl Last {
 /// Answers a query for the status; one that a robot of the same id sends is a twin's.
 fn on_status(account: &Account, me: &str, query: &Query) {
     if query.parameters().get("from").is_some_and(|from| from != me) {
-        account.error(&Refusal::Twin.to_string());
+        account.twin();
     }
     let json = serde_json::to_string(&*account.lock())
         .expect("every field of a status, with string keys and finite numbers, has a place in JSON");
@@ -300,7 +304,7 @@ async fn ask_for_twin(node: Node, status_key: String, account: Arc<Account>) {
     let Ok(replies) = node.session().get(query).allowed_destination(Locality::Remote).await else { return };
     while let Ok(reply) = replies.recv_async().await {
         if reply.result().is_ok() {
-            account.error(&Refusal::Twin.to_string());
+            account.twin();
         }
     }
 }

@@ -189,7 +189,7 @@ impl Inbox {
     pub(super) fn on_link(&self, id: ZenohId, up: bool) {
         let Some(robot) = robot_of(id, self.swarm) else { return };
         if robot == self.me {
-            return self.account.error(&Refusal::Twin.to_string());
+            return self.account.twin();
         }
         let mut state = self.lock();
         if up {

@@ -1,1 +1,179 @@
-//! stub
+//! Finds other robots by multicast and keeps the links that [`topology`](super::topology) chooses.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::RobotId;
+use tokio::sync::mpsc;
+use tokio::time::MissedTickBehavior;
+use zenoh::config::WhatAmI;
+use zenoh::session::ZenohId;
+
+use super::account::Account;
+use super::identity::{robot_of, swarm_checksum};
+use super::inbox::Inbox;
+use super::session::Node;
+use super::topology::{Topology, View};
+
+/// How often links are looked after.
+const PERIOD: Duration = Duration::from_millis(500);
+
+/// How long answers to a call are waited for.
+const CALL: Duration = Duration::from_millis(700);
+
+/// The most robots kept in mind as heard.
+const MAX_HEARD: usize = 4096;
+
+/// The task that looks after the links of one robot.
+pub(super) struct Keeper {
+    me: RobotId,
+    swarm: u32,
+    topology: Topology,
+    node: Node,
+    inbox: Arc<Inbox>,
+    account: Arc<Account>,
+    scouting: zenoh::Config,
+    heard: BTreeMap<RobotId, Heard>,
+    busy: BTreeSet<RobotId>,
+    news: (mpsc::UnboundedSender<News>, mpsc::UnboundedReceiver<News>),
+}
+
+struct Heard {
+    id: ZenohId,
+    locators: Vec<String>,
+    at: Instant,
+}
+
+enum News {
+    Heard(ZenohId, Vec<String>),
+    Dialled(RobotId, bool),
+}
+
+impl Keeper {
+    pub(super) fn new(
+        me: RobotId,
+        swarm: &str,
+        max_links: usize,
+        node: Node,
+        inbox: Arc<Inbox>,
+        account: Arc<Account>,
+        scouting: zenoh::Config,
+    ) -> Self {
+        Self {
+            me,
+            swarm: swarm_checksum(swarm),
+            topology: Topology::new(me, max_links),
+            node,
+            inbox,
+            account,
+            scouting,
+            heard: BTreeMap::new(),
+            busy: BTreeSet::new(),
+            news: mpsc::unbounded_channel(),
+        }
+    }
+
+    /// Runs until it is aborted.
+    pub(super) async fn run(mut self) {
+        let started = Instant::now();
+        let mut tick = tokio::time::interval(PERIOD);
+        tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                Some(news) = self.news.1.recv() => self.on_news(news),
+                _ = tick.tick() => self.look_after(started).await,
+            }
+        }
+    }
+
+    fn on_news(&mut self, news: News) {
+        match news {
+            News::Heard(id, locators) => self.on_heard(id, locators),
+            News::Dialled(robot, stands) => {
+                self.busy.remove(&robot);
+                if !stands {
+                    self.account.count("dial_failed");
+                    self.heard.remove(&robot);
+                }
+            }
+        }
+    }
+
+    fn on_heard(&mut self, id: ZenohId, locators: Vec<String>) {
+        let Some(robot) = robot_of(id, self.swarm) else { return };
+        if robot == self.me {
+            if id != self.node.id() {
+                self.account.twin();
+            }
+            return;
+        }
+        if self.heard.len() < MAX_HEARD || self.heard.contains_key(&robot) {
+            self.heard.insert(robot, Heard { id, locators, at: Instant::now() });
+        }
+    }
+
+    async fn look_after(&mut self, started: Instant) {
+        let links = self.inbox.links();
+        let view = View {
+            heard: self
+                .heard
+                .iter()
+                .map(|(robot, heard)| (*robot, heard.at.saturating_duration_since(started)))
+                .collect(),
+            linked: links.values().copied().collect(),
+            alive: self.inbox.alive(),
+        };
+        let plan = self.topology.plan(started.elapsed(), &view);
+        for robot in plan.dial {
+            self.dial(robot);
+        }
+        for (id, robot) in links {
+            if plan.drop.contains(&robot) {
+                self.account.count("links_dropped");
+                self.node.hang_up(id).await;
+            }
+        }
+        if plan.scout {
+            self.call().await;
+        }
+    }
+
+    fn dial(&mut self, robot: RobotId) {
+        let Some(heard) = self.heard.get(&robot) else { return };
+        if !self.busy.insert(robot) {
+            return;
+        }
+        self.account.count("links_dialled");
+        let (node, news, id, locators) =
+            (self.node.clone(), self.news.0.clone(), heard.id, heard.locators.clone());
+        tokio::spawn(async move {
+            let stands = node.dial(id, &locators).await;
+            // The keeper may be gone: then nobody needs to know.
+            let _ = news.send(News::Dialled(robot, stands));
+        });
+    }
+
+    /// Asks who is there; the answers come as news.
+    async fn call(&self) {
+        self.account.count("scouted");
+        let news = self.news.0.clone();
+        let scouting = zenoh::scout(WhatAmI::Router, self.scouting.clone())
+            .callback(move |hello| {
+                let locators = hello.locators().iter().map(ToString::to_string).collect();
+                let _ = news.send(News::Heard(hello.zid(), locators));
+            })
+            .await;
+        match scouting {
+            Ok(scouting) => {
+                tokio::spawn(async move {
+                    tokio::time::sleep(CALL).await;
+                    scouting.stop();
+                });
+            }
+            Err(error) => self.account.error(&format!(
+                "cannot look for other robots: {error}: check the scouting address and interface"
+            )),
+        }
+    }
+}

@@ -2,14 +2,20 @@
 
 mod account;
 mod announcement;
+mod client;
 mod config;
 mod error;
+mod host;
 mod identity;
 mod inbox;
+mod keeper;
+mod robot;
 mod session;
 mod topology;
 
 pub use announcement::Announcement;
+pub use client::{Client, Decisions};
 pub use config::{LinkConfig, Scouting};
 pub use error::LinkError;
 pub use identity::fresh_nonce;
+pub use robot::{Event, Robot, RobotConfig};

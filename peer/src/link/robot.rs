@@ -13,9 +13,9 @@ use tokio::task::JoinHandle;
 
 use super::account::Account;
 use super::host::Host;
+use super::identity::swarm_checksum;
 use super::inbox::Inbox;
 use super::keeper::Keeper;
-use super::identity::swarm_checksum;
 use super::session::Node;
 use super::{Announcement, LinkConfig, LinkError};
 
@@ -42,8 +42,6 @@ pub struct RobotConfig {
     pub link: LinkConfig,
     /// The gestures' labels, for a robot that announces decisions without a classifier of its own.
     pub vocabulary: Option<Vocabulary>,
-    /// The seed of the mind's random choices.
-    pub seed: u64,
     /// Differs at every start, see [`fresh_nonce`](super::fresh_nonce).
     pub nonce: u64,
 }
@@ -84,7 +82,8 @@ impl Robot {
         if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
             return Err(LinkError::Runtime);
         }
-        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, seed, nonce } = config;
+        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, nonce } = config;
+        let mind = Mind::new(id, boot, mind)?;
         let keys = Keys::new(&swarm)?;
         let zenoh = link.to_zenoh(id, &swarm, nonce)?;
         let started = Instant::now();
@@ -117,7 +116,7 @@ impl Robot {
         });
         let host = Host {
             me: id,
-            mind: Mind::new(id, boot, mind, seed),
+            mind,
             started,
             node: node.clone(),
             keys,

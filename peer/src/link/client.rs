@@ -1,0 +1,128 @@
+//! A client of a swarm: no robot, no vote; it hears decisions, asks robots how they are, and instructs them.
+
+use std::time::Duration;
+
+use gestalt_protocol::{DecodeError, Instruction, InstructorId, Keys, Status, Topic, decode_json};
+use serde::de::DeserializeOwned;
+use zenoh::Session;
+use zenoh::bytes::Encoding;
+use zenoh::handlers::{RingChannel, RingChannelHandler};
+use zenoh::pubsub::Subscriber;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::{ConsolidationMode, QueryTarget};
+use zenoh::sample::Sample;
+
+use super::{Announcement, LinkConfig, LinkError};
+
+/// How many decisions wait for a slow reader before the oldest gives way.
+const MAX_WAITING: usize = 1024;
+
+/// A session in client mode, attached to any one robot; it attaches again when that robot goes and comes back.
+#[derive(Debug)]
+pub struct Client {
+    session: Session,
+    keys: Keys,
+}
+
+/// The swarm's decisions, as they are announced.
+#[derive(Debug)]
+pub struct Decisions(Subscriber<RingChannelHandler<Sample>>);
+
+impl Client {
+    /// Attaches to a robot at one of `link.connect`, or to one found by `link.scouting`.
+    ///
+    /// # Errors
+    /// [`LinkError::Config`] names what Zenoh cannot take, [`LinkError::Open`] says that no robot could be
+    /// reached.
+    pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
+        let keys = Keys::new(swarm)?;
+        let session = zenoh::open(link.client()?).await.map_err(|error| LinkError::open(&*error))?;
+        Ok(Self { session, keys })
+    }
+
+    /// Every decision from now on: one message each; where a spokesrobot died while speaking, its successor may
+    /// repeat it, which the round tells.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn decisions(&self) -> Result<Decisions, LinkError> {
+        let subscriber = self
+            .session
+            .declare_subscriber(self.keys.key(&Topic::Decision))
+            .with(RingChannel::new(MAX_WAITING))
+            .await
+            .map_err(|error| LinkError::open(&*error))?;
+        Ok(Decisions(subscriber))
+    }
+
+    /// The account of every robot that answers within `patience`, by robot.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn statuses(&self, patience: Duration) -> Result<Vec<Status>, LinkError> {
+        let mut statuses: Vec<Status> = self.ask(&self.keys.every_robot("status"), patience).await?;
+        statuses.sort_by_key(|status| status.robot);
+        Ok(statuses)
+    }
+
+    /// The last decision of the swarm; `None` when nobody who answers within `patience` knows of one.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn last_decision(&self, patience: Duration) -> Result<Option<Announcement>, LinkError> {
+        let known: Vec<Announcement> = self.ask(&self.keys.key(&Topic::Decision), patience).await?;
+        Ok(known.into_iter().max_by_key(|known| (known.decision.round.counter, known.decision.rank())))
+    }
+
+    async fn ask<T: DeserializeOwned>(&self, key: &str, patience: Duration) -> Result<Vec<T>, LinkError> {
+        let replies = self
+            .session
+            .get(key)
+            .target(QueryTarget::All)
+            .consolidation(ConsolidationMode::None)
+            .timeout(patience)
+            .await
+            .map_err(|error| LinkError::open(&*error))?;
+        let mut answers = Vec::new();
+        while let Ok(reply) = replies.recv_async().await {
+            // An error is a robot that left meanwhile; what is no answer is another program's on the same key.
+            if let Ok(sample) = reply.result()
+                && let Ok(answer) = decode_json(&sample.payload().to_bytes())
+            {
+                answers.push(answer);
+            }
+        }
+        Ok(answers)
+    }
+
+    /// Says something to all robots, in the name of an instructor.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn instruct(&self, as_whom: &InstructorId, say: &Instruction) -> Result<(), LinkError> {
+        let json = serde_json::to_string(say).expect("an instruction has a place in JSON");
+        self.session
+            .put(self.keys.key(&Topic::Feedback(as_whom.clone())), json)
+            .encoding(Encoding::APPLICATION_JSON)
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Block)
+            .await
+            .map_err(|error| LinkError::open(&*error))
+    }
+
+    /// Detaches.
+    pub async fn close(self) {
+        if let Err(error) = self.session.close().await {
+            tracing::debug!("closing the client's session: {error}");
+        }
+    }
+}
+
+impl Decisions {
+    /// Waits for the next decision; `None` once the client is closed. An error is a message on the swarm's key
+    /// that is no decision.
+    pub async fn next(&mut self) -> Option<Result<Announcement, DecodeError>> {
+        let sample = self.0.recv_async().await.ok()?;
+        Some(decode_json(&sample.payload().to_bytes()))
+    }
+}

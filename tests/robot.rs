@@ -1,0 +1,114 @@
+//! A robot as a process, for the scenarios: it reads orders on stdin and prints what happens as a line of JSON
+//! each. Its arguments are one JSON object: see `Orders`.
+
+use std::io::{BufRead, Write};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig};
+use gestalt_protocol::{ClassId, Decision, RobotId};
+use gestalt_tests::{Fixed, config, look};
+use serde_json::{Value, json};
+use tokio::sync::mpsc;
+
+fn main() {
+    let orders: Value = std::env::args()
+        .nth(1)
+        .and_then(|text| serde_json::from_str(&text).ok())
+        .expect("one argument: {\"id\": 1, \"swarm\": \"demo\", \"link\": {…}, \"sees\": 3}");
+    let (lines, stdin) = mpsc::channel(16);
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if lines.blocking_send(line).is_err() {
+                break;
+            }
+        }
+    });
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .expect("threads for the robot");
+    runtime.block_on(run(&orders, stdin));
+}
+
+async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
+    let id = orders["id"].as_u64().and_then(|id| u32::try_from(id).ok()).expect("\"id\": a number");
+    let swarm = orders["swarm"].as_str().expect("\"swarm\": a name");
+    let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
+    let boot = orders["boot"].as_u64().and_then(|boot| u32::try_from(boot).ok()).unwrap_or(1);
+    let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
+    let robot = match Robot::start(RobotConfig { link, boot, ..config(id, swarm, &[]) }).await {
+        Ok(robot) => robot,
+        Err(error) => {
+            eprintln!("{error}");
+            std::process::exit(1);
+        }
+    };
+    let mut events = robot.events();
+    if sees.is_some() {
+        robot.learned(Arc::new(Fixed::default()), "fixed");
+    }
+    say(id, json!({"event": "started", "locators": robot.locators()}));
+    let mut frames = tokio::time::interval(Duration::from_millis(100));
+    frames.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let mut open = false;
+    loop {
+        tokio::select! {
+            event = events.recv() => {
+                let Ok(event) = event else { continue };
+                match &event {
+                    Event::Opened(_) => open = true,
+                    Event::Closed(_) => open = false,
+                    _ => {}
+                }
+                say(id, described(&event));
+            }
+            _ = frames.tick(), if open => {
+                if let Some(class) = sees {
+                    robot.observe(look(class, 0.9));
+                }
+            }
+            line = stdin.recv() => match line.as_deref() {
+                Some("open") => robot.open_round(),
+                Some("status") => say(id, json!({"event": "status", "status": robot.status()})),
+                _ => break,
+            },
+        }
+    }
+    robot.stop().await;
+}
+
+fn described(event: &Event) -> Value {
+    match event {
+        Event::Opened(round) => json!({"event": "opened", "round": round.counter}),
+        Event::Closed(round) => json!({"event": "closed", "round": round.counter}),
+        Event::Held(decision) => outcome("held", decision),
+        Event::Announced(announcement) => outcome("announced", &announcement.decision),
+        Event::Neighbours(robots) => json!({"event": "neighbours", "robots": ids(robots)}),
+        Event::Alive(robots) => json!({"event": "alive", "robots": ids(robots)}),
+    }
+}
+
+fn outcome(event: &str, decision: &Decision) -> Value {
+    json!({
+        "event": event,
+        "round": decision.round.counter,
+        "class": decision.class.map(|class| class.0),
+        "author": decision.author.0,
+        "votes": decision.certificate.votes.len(),
+    })
+}
+
+fn ids<'a>(robots: impl IntoIterator<Item = &'a RobotId>) -> Vec<u32> {
+    robots.into_iter().map(|robot| robot.0).collect()
+}
+
+fn say(id: u32, mut what: Value) {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis());
+    what["robot"] = json!(id);
+    what["at_ms"] = json!(u64::try_from(now).unwrap_or(u64::MAX));
+    let mut out = std::io::stdout().lock();
+    // Whoever started the robot may be gone; then nobody reads.
+    let _ = writeln!(out, "{what}").and_then(|()| out.flush());
+}

@@ -1,0 +1,115 @@
+//! Robots as processes, each killed when it is dropped.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+type Told = Arc<(Mutex<Vec<Value>>, Condvar)>;
+
+/// A running `test-robot`.
+pub struct Process {
+    child: Child,
+    stdin: ChildStdin,
+    told: Told,
+}
+
+impl Process {
+    /// Starts `binary`, in a network namespace if one is named.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start(binary: &Path, namespace: Option<&str>, orders: &Value) -> Self {
+        let mut command = match namespace {
+            None => Command::new(binary),
+            Some(namespace) => {
+                let mut command = Command::new("ip");
+                command.args(["netns", "exec", namespace]).arg(binary);
+                command
+            }
+        };
+        let mut child = command
+            .arg(orders.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the robot's process starts");
+        let stdin = child.stdin.take().expect("stdin is piped");
+        let stdout = child.stdout.take().expect("stdout is piped");
+        let told = Told::default();
+        let teller = told.clone();
+        std::thread::spawn(move || {
+            for line in BufReader::new(stdout).lines().map_while(Result::ok) {
+                let Ok(value) = serde_json::from_str(&line) else { continue };
+                teller.0.lock().unwrap_or_else(PoisonError::into_inner).push(value);
+                teller.1.notify_all();
+            }
+        });
+        Self { child, stdin, told }
+    }
+
+    /// Gives an order: `open`, `status`, `quit`.
+    pub fn order(&mut self, order: &str) {
+        // A robot that was killed takes no orders.
+        let _ = writeln!(self.stdin, "{order}");
+    }
+
+    /// Everything it has told so far.
+    #[must_use]
+    pub fn told(&self) -> Vec<Value> {
+        self.told.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Waits until what it has told, all of it, gives `pick` a value.
+    pub fn wait<T>(&self, patience: Duration, mut pick: impl FnMut(&[Value]) -> Option<T>) -> Option<T> {
+        let deadline = Instant::now() + patience;
+        let mut told = self.told.0.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(found) = pick(&told) {
+                return Some(found);
+            }
+            let left = deadline.checked_duration_since(Instant::now())?;
+            told = self.told.1.wait_timeout(told, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// The class of the decision it holds for that round, and when it came to it, once that round is over;
+    /// `Some(None)` is "no decision".
+    pub fn decision(&self, round: u64, patience: Duration) -> Option<(Option<u64>, u64)> {
+        self.wait(patience, |told| {
+            let of = |event: &'static str| {
+                told.iter().rev().find(move |t| t["event"] == event && t["round"] == round)
+            };
+            let taking_part = of("opened").is_some();
+            let over = !taking_part || of("closed").is_some();
+            let held = of("held").filter(|_| over)?;
+            Some((held["class"].as_u64(), held["at_ms"].as_u64()?))
+        })
+    }
+
+    /// Sends it a signal, such as `STOP` or `CONT`.
+    ///
+    /// # Panics
+    /// When there is no `kill`.
+    pub fn signal(&self, name: &str) {
+        let kill = Command::new("kill").arg(format!("-{name}")).arg(self.child.id().to_string()).status();
+        assert!(kill.is_ok_and(|status| status.success()), "kill -{name}");
+    }
+
+    /// Kills it at once, as `kill -9` does.
+    pub fn kill(&mut self) {
+        // It may have ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}

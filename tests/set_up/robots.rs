@@ -1,0 +1,129 @@
+//! Robots in this process.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
+use gestalt_protocol::{ClassId, Decision, RobotId};
+use gestalt_strategies::{Classify, MindConfig};
+use tokio::sync::broadcast;
+use tokio::time::{Instant, timeout_at};
+
+use crate::{Fixed, look};
+
+/// A name that no other scenario and no other run has.
+#[must_use]
+pub fn unique(what: &str) -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    format!("{what}-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+}
+
+/// A robot on the loopback interface that dials `connect`.
+#[must_use]
+pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
+    RobotConfig {
+        id: RobotId(id),
+        name: format!("robot {id}"),
+        boot: 1,
+        swarm: swarm.to_owned(),
+        mind: MindConfig::default(),
+        link: LinkConfig {
+            listen: vec!["tcp/127.0.0.1:0".to_owned()],
+            connect: connect.to_vec(),
+            ..LinkConfig::default()
+        },
+        vocabulary: Some(Fixed::default().vocabulary().clone()),
+        nonce: fresh_nonce(),
+    }
+}
+
+/// A robot with its events kept from the start.
+pub struct Watched {
+    /// The robot.
+    pub robot: Arc<Robot>,
+    events: broadcast::Receiver<Event>,
+    looking: Option<tokio::task::JoinHandle<()>>,
+}
+
+/// Starts a robot; one that sees a class looks at it ten times a second.
+///
+/// # Panics
+/// When it cannot start.
+pub async fn start(config: RobotConfig, sees: Option<ClassId>) -> Watched {
+    let robot = Arc::new(Robot::start(config).await.expect("the robot starts"));
+    let events = robot.events();
+    let looking = sees.map(|class| {
+        robot.learned(Arc::new(Fixed::default()), "fixed");
+        let robot = robot.clone();
+        tokio::spawn(async move {
+            loop {
+                if robot.status().open {
+                    robot.observe(look(class, 0.9));
+                }
+                tokio::time::sleep(Duration::from_millis(100)).await;
+            }
+        })
+    });
+    Watched { robot, events, looking }
+}
+
+impl Watched {
+    /// Waits for an event for which `pick` has a value.
+    pub async fn wait<T>(
+        &mut self,
+        patience: Duration,
+        mut pick: impl FnMut(Event) -> Option<T>,
+    ) -> Option<T> {
+        let deadline = Instant::now() + patience;
+        loop {
+            match timeout_at(deadline, self.events.recv()).await.ok()? {
+                Ok(event) => {
+                    if let Some(found) = pick(event) {
+                        return Some(found);
+                    }
+                }
+                Err(broadcast::error::RecvError::Lagged(missed)) => eprintln!("{missed} events missed"),
+                Err(broadcast::error::RecvError::Closed) => return None,
+            }
+        }
+    }
+
+    /// The decision it holds once that round is over, or `None` when the time is up.
+    pub async fn decision(&mut self, counter: u32, patience: Duration) -> Option<Decision> {
+        let mut held = None;
+        let mut over = false;
+        self.wait(patience, |event| {
+            match event {
+                Event::Held(decision) if decision.round.counter >= counter => held = Some(decision),
+                Event::Closed(round) => over |= round.counter >= counter,
+                _ => {}
+            }
+            held.clone().filter(|_| over)
+        })
+        .await
+    }
+
+    /// Waits until it knows `others` other robots to be alive.
+    pub async fn sees_alive(&self, others: usize, patience: Duration) -> bool {
+        let deadline = Instant::now() + patience;
+        while self.robot.status().alive.len() <= others {
+            if Instant::now() > deadline {
+                return false;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        true
+    }
+
+    /// Stops it and waits until its session is closed.
+    pub async fn stop(self) {
+        if let Some(looking) = self.looking {
+            looking.abort();
+            let _ = looking.await;
+        }
+        if let Some(robot) = Arc::into_inner(self.robot) {
+            robot.stop().await;
+        }
+    }
+}
