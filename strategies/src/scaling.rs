@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_component_that_never_varied_is_ignored() {
-        let rows = vec![vec![0.1, 1.0], vec![0.1, 2.0], vec![0.1, 3.0]];
+        let rows = [vec![0.1, 1.0], vec![0.1, 2.0], vec![0.1, 3.0]];
         for method in [ScalingMethod::PerComponent, ScalingMethod::Common] {
             let scaling = Scaling::fit(rows.iter().map(Vec::as_slice), method);
             let mut out = Vec::new();

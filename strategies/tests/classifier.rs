@@ -150,7 +150,14 @@ fn options_out_of_range_are_refused() {
 
 #[test]
 fn two_samples_of_each_class_are_enough() {
-    let few = samples(6, 0.1, &mut generator(6));
+    let mut rng = generator(6);
+    let few: Vec<Sample> = (0..6)
+        .map(|i| {
+            let mut features: Vec<f32> = (0..5).map(|_| 0.1 * normal(&mut rng)).collect();
+            features[i % 3] += 1.0;
+            Sample { features, class: ClassId((i % 3) as u8), group: None }
+        })
+        .collect();
     let classifier = trained(&few, 6).classifier;
     assert_eq!(evaluate(&classifier, &few).accuracy().unwrap().value, 1.0);
 }

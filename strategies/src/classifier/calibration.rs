@@ -1,96 +1,81 @@
-//! From the decision value of one pair to a probability.
+//! From the decision values of all pairs to the probabilities of all classes.
 
 use serde::{Deserialize, Serialize};
 
-/// P(first class of the pair | decision value f) = 1 / (1 + exp(a·f + b)).
+use super::{Sigmoid, couple, pairs};
+
+/// What turns decision values into probabilities: a sigmoid for each pair, coupling, and one exponent.
 ///
-/// J. Platt, "Probabilistic outputs for support vector machines" (1999). Fit it on decision values of samples
-/// that the machine has **not** been trained on: those of training samples are pushed to the margin, and a
-/// sigmoid through them promises more than the machine keeps.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Sigmoid {
-    pub(crate) a: f64,
-    pub(crate) b: f64,
+/// Coupling is too cautious: most pairs know neither class of the sample, and their guesses pull towards
+/// "unknown". The exponent makes up for it: P(k) ∝ pₖ^s with one s for all classes, which is temperature scaling
+/// with T = 1/s (C. Guo et al., "On calibration of modern neural networks", ICML 2017). It never changes which
+/// class is the most probable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Calibration {
+    /// One per pair of classes.
+    pub sigmoids: Vec<Sigmoid>,
+    /// s, within [`SHARPEST`] of 1 either way.
+    pub sharpness: f64,
 }
 
-impl Sigmoid {
-    /// The probability of the first class, `0.0..=1.0`.
-    #[must_use]
-    pub fn probability(self, decision: f64) -> f64 {
-        let t = self.a * decision + self.b;
-        // The form that cannot overflow, on either side.
-        if t >= 0.0 { (-t).exp() / (1.0 + (-t).exp()) } else { 1.0 / (1.0 + t.exp()) }
+/// Held-out samples that are all judged right would ask for an infinite exponent.
+const SHARPEST: f64 = 3.0;
+
+/// Probabilities are kept this far off 0 and 1: of pairs, so that coupling is well posed (as LIBSVM does), and of
+/// classes, so that their logarithms can be added up as evidence.
+const LEAST: f64 = 1e-7;
+
+impl Calibration {
+    /// Fits to the decision values of samples that the machines have not seen, with their true classes.
+    pub fn fit(decisions: &[Vec<f64>], truths: &[usize], classes: usize) -> Self {
+        let sigmoids = pairs(classes).enumerate().map(|(pair, (i, j))| {
+            let of_pair = decisions.iter().zip(truths).filter(|(_, truth)| **truth == i || **truth == j);
+            Sigmoid::fit(&of_pair.map(|(row, truth)| (row[pair], *truth == i)).collect::<Vec<_>>())
+        });
+        let mut calibration = Self { sigmoids: sigmoids.collect(), sharpness: 1.0 };
+        let logs: Vec<Vec<f64>> = decisions
+            .iter()
+            .map(|row| calibration.probabilities(row, classes).iter().map(|p| p.ln()).collect())
+            .collect();
+        calibration.sharpness = sharpness(&logs, truths);
+        calibration
     }
 
-    /// Maximum-likelihood fit to decision values and whether each belongs to the first class, with Platt's
-    /// targets (n₊+1)/(n₊+2) and 1/(n₋+2) in place of 1 and 0, which keep it finite on separable values.
-    ///
-    /// The machine's two margins, +1 and −1, count as one more sample each: with very few held-out values,
-    /// chance could otherwise turn the sigmoid over.
-    ///
-    /// Newton's method with backtracking: H.-T. Lin, C.-J. Lin, R. C. Weng, "A note on Platt's probabilistic
-    /// outputs for support vector machines", Machine Learning 68 (2007).
-    pub(crate) fn fit(held_out: &[(f64, bool)]) -> Self {
-        const MAX_ITERATIONS: usize = 100;
-        const MIN_STEP: f64 = 1e-10;
-        const RIDGE: f64 = 1e-12;
-        const TOLERANCE: f64 = 1e-5;
-
-        let mut values = held_out.to_vec();
-        values.extend([(1.0, true), (-1.0, false)]);
-        let positive = values.iter().filter(|(_, first)| *first).count() as f64;
-        let negative = values.len() as f64 - positive;
-        let high = (positive + 1.0) / (positive + 2.0);
-        let low = 1.0 / (negative + 2.0);
-        let target = |first: bool| if first { high } else { low };
-        let loss = |a: f64, b: f64| -> f64 {
-            values
-                .iter()
-                .map(|&(f, first)| {
-                    let (t, z) = (target(first), a * f + b);
-                    if z >= 0.0 { t * z + (-z).exp().ln_1p() } else { (t - 1.0) * z + z.exp().ln_1p() }
-                })
-                .sum()
-        };
-
-        let (mut a, mut b) = (0.0, ((negative + 1.0) / (positive + 1.0)).ln());
-        let mut best = loss(a, b);
-        for _ in 0..MAX_ITERATIONS {
-            let (mut h11, mut h22, mut h21, mut g1, mut g2) = (RIDGE, RIDGE, 0.0, 0.0, 0.0);
-            for &(f, first) in &values {
-                let p = Self { a, b }.probability(f);
-                let (d1, d2) = (target(first) - p, p * (1.0 - p));
-                h11 += f * f * d2;
-                h22 += d2;
-                h21 += f * d2;
-                g1 += f * d1;
-                g2 += d1;
-            }
-            if g1.abs() < TOLERANCE && g2.abs() < TOLERANCE {
-                break;
-            }
-            let determinant = h11 * h22 - h21 * h21;
-            let (da, db) = (-(h22 * g1 - h21 * g2) / determinant, -(h11 * g2 - h21 * g1) / determinant);
-            let slope = g1 * da + g2 * db;
-            let mut step = 1.0;
-            let improved = loop {
-                let (next_a, next_b) = (a + step * da, b + step * db);
-                let next = loss(next_a, next_b);
-                if next < best + 1e-4 * step * slope {
-                    (a, b, best) = (next_a, next_b, next);
-                    break true;
-                }
-                step /= 2.0;
-                if step < MIN_STEP {
-                    break false;
-                }
-            };
-            if !improved {
-                break;
-            }
-        }
-        Self { a, b }
+    /// The probability of each class, given the decision value of each pair; they sum to 1.
+    pub fn probabilities(&self, decisions: &[f64], classes: usize) -> Vec<f64> {
+        let of_pairs = decisions.iter().zip(&self.sigmoids);
+        let of_pairs = of_pairs.map(|(&f, sigmoid)| sigmoid.probability(f).clamp(LEAST, 1.0 - LEAST));
+        let mut p = couple(of_pairs, classes);
+        p.iter_mut().for_each(|p| *p = p.powf(self.sharpness).max(LEAST));
+        let sum: f64 = p.iter().sum();
+        p.iter_mut().for_each(|p| *p /= sum);
+        p
     }
+}
+
+/// The s that makes the true classes most likely under P(k) ∝ exp(s·log pₖ). The log-likelihood is concave in s,
+/// so its slope is bisected.
+fn sharpness(logs: &[Vec<f64>], truths: &[usize]) -> f64 {
+    let slope = |s: f64| -> f64 {
+        let of_sample = logs.iter().zip(truths).map(|(logs, &truth)| {
+            let greatest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let (mut sum, mut mean) = (0.0, 0.0);
+            for log in logs {
+                let weight = (s * (log - greatest)).exp();
+                sum += weight;
+                mean += weight * log;
+            }
+            logs[truth] - mean / sum
+        });
+        of_sample.sum()
+    };
+    let (mut low, mut high) = (1.0 / SHARPEST, SHARPEST);
+    for _ in 0..30 {
+        // Halving the ratio, not the difference: 1/2 and 2 are as far from 1.
+        let middle = (low * high).sqrt();
+        if slope(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
 }
 
 #[cfg(test)]
@@ -98,36 +83,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_finds_the_sigmoid_that_labels_were_drawn_from() {
-        // 2,000 values on a grid; at each, the expected part of 20 labels is positive.
-        let truth = Sigmoid { a: -1.5, b: 0.5 };
-        let values: Vec<(f64, bool)> = (0..100)
-            .flat_map(|i| {
-                let f = f64::from(i) / 12.5 - 4.0;
-                let positive = (truth.probability(f) * 20.0).round() as i32;
-                (0..20).map(move |label| (f, label < positive))
-            })
-            .collect();
-        let fitted = Sigmoid::fit(&values);
-        assert!((fitted.a - truth.a).abs() < 0.1 && (fitted.b - truth.b).abs() < 0.1, "{fitted:?}");
+    fn confidence_is_raised_to_what_is_right() {
+        // Says 60 % each time, and is right in 9 of 10: 0.6^s / (0.6^s + 0.4^s) = 0.9.
+        let logs: Vec<Vec<f64>> = (0..10).map(|_| vec![0.6_f64.ln(), 0.4_f64.ln()]).collect();
+        let truths: Vec<usize> = (0..10).map(|i| usize::from(i == 0)).collect();
+        let expected = 9.0_f64.ln() / 1.5_f64.ln();
+        assert!(expected > SHARPEST, "{expected}");
+        assert!((sharpness(&logs, &truths) - SHARPEST).abs() < 1e-6, "as far as it goes");
+
+        let truths: Vec<usize> = (0..10).map(|i| usize::from(i < 3)).collect();
+        let expected = (7.0_f64 / 3.0).ln() / 1.5_f64.ln();
+        assert!((sharpness(&logs, &truths) - expected).abs() < 1e-6, "{expected}");
     }
 
     #[test]
-    fn separable_values_stay_short_of_certainty() {
-        let values: Vec<(f64, bool)> = (0..20).map(|i| (f64::from(i % 2) * 4.0 - 2.0, i % 2 == 1)).collect();
-        let p = Sigmoid::fit(&values).probability(2.0);
-        assert!((0.85..0.99).contains(&p), "{p}");
-    }
-
-    #[test]
-    fn a_few_unlucky_values_do_not_turn_it_over() {
-        let fitted = Sigmoid::fit(&[(-0.1, true), (-0.2, true), (0.1, false), (0.2, false)]);
-        assert!(fitted.probability(1.0) > fitted.probability(-1.0), "{fitted:?}");
-    }
-
-    #[test]
-    fn extreme_values_do_not_overflow() {
-        let sigmoid = Sigmoid { a: -1e12, b: 0.0 };
-        assert_eq!((sigmoid.probability(1e12), sigmoid.probability(-1e12)), (1.0, 0.0));
+    fn sharpening_keeps_the_order_and_the_sum() {
+        let sigmoids = vec![Sigmoid { a: -1.0, b: 0.0 }; 3];
+        let decisions = [0.5, 1.5, 0.3];
+        let plain = Calibration { sigmoids: sigmoids.clone(), sharpness: 1.0 }.probabilities(&decisions, 3);
+        let sharp = Calibration { sigmoids, sharpness: 2.0 }.probabilities(&decisions, 3);
+        assert!(sharp[0] > plain[0] && sharp[0] > sharp[1] && sharp[1] > sharp[2], "{plain:?} {sharp:?}");
+        assert!((sharp.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 }

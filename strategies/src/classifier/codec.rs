@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Classifier, Machine, Sigmoid, Space, pairs};
+use super::{Calibration, Classifier, Machine, Space, pairs};
 use crate::Vocabulary;
 
 /// Longest encoding that is read, in bytes.
@@ -36,7 +36,7 @@ struct Parts {
     vocabulary: Vocabulary,
     space: Space,
     machine: Machine,
-    sigmoids: Vec<Sigmoid>,
+    calibration: Calibration,
 }
 
 impl Classifier {
@@ -48,7 +48,7 @@ impl Classifier {
             vocabulary: self.vocabulary.clone(),
             space: self.space.clone(),
             machine: self.machine.clone(),
-            sigmoids: self.sigmoids.clone(),
+            calibration: self.calibration.clone(),
         };
         postcard::to_extend(&parts, vec![VERSION])
             .expect("postcard writes every value of known length into a vector")
@@ -72,7 +72,7 @@ impl Classifier {
             return Err(ModelError::Inconsistent("bytes after its end"));
         }
         parts.check().map_err(ModelError::Inconsistent)?;
-        Ok(Self::new(parts.feature_set, parts.vocabulary, parts.space, parts.machine, parts.sigmoids))
+        Ok(Self::new(parts.feature_set, parts.vocabulary, parts.space, parts.machine, parts.calibration))
     }
 }
 
@@ -111,15 +111,18 @@ impl Parts {
         if machine.vectors.len() != vectors * machine.width
             || machine.weights.len() != vectors * (classes - 1)
             || machine.offsets.len() != pairs
-            || self.sigmoids.len() != pairs
+            || self.calibration.sigmoids.len() != pairs
         {
             return Err("support vectors, weights and pairs that do not match");
         }
-        if !(machine.gamma > 0.0 && machine.gamma.is_finite())
+        if machine.gamma.is_nan()
+            || machine.gamma <= 0.0
+            || machine.gamma.is_infinite()
             || !all_within(&machine.vectors, 1e6)
             || !all_within(&machine.weights, 1e9)
             || !machine.offsets.iter().all(|v| v.abs() <= 1e12)
-            || !self.sigmoids.iter().all(|s| s.a.abs() <= 1e12 && s.b.abs() <= 1e12)
+            || !(0.01..=100.0).contains(&self.calibration.sharpness)
+            || !self.calibration.sigmoids.iter().all(|s| s.a.abs() <= 1e12 && s.b.abs() <= 1e12)
         {
             return Err("numbers out of range in the machines");
         }

@@ -2,7 +2,7 @@
 //! probabilities.
 //!
 //! ```text
-//! raw features ─► Scaling ─► Pca ─► Machine: a decision per pair ─► Sigmoid: P(i | i or j) ─► coupling ─► P(k)
+//! raw features ─► Scaling ─► Pca ─► Machine: a decision per pair ─► Calibration: P(k)
 //! ```
 
 mod calibration;
@@ -10,15 +10,18 @@ mod codec;
 mod coupling;
 mod kernel;
 mod machine;
+mod sigmoid;
 mod space;
 
 use gestalt_protocol::FeatureSpaceId;
 
-pub use calibration::Sigmoid;
+pub(crate) use calibration::Calibration;
 pub use codec::{MAX_MODEL, ModelError};
-pub(crate) use coupling::couple;
+use coupling::couple;
 pub(crate) use kernel::dot;
-pub(crate) use machine::{Machine, pairs};
+pub(crate) use machine::Machine;
+use machine::pairs;
+use sigmoid::Sigmoid;
 pub(crate) use space::Space;
 
 use crate::{Classify, ClassifyError, Pca, Scaling, Vocabulary};
@@ -30,8 +33,7 @@ pub struct Classifier {
     vocabulary: Vocabulary,
     space: Space,
     machine: Machine,
-    /// One per pair of classes.
-    sigmoids: Vec<Sigmoid>,
+    calibration: Calibration,
     /// Follows from the above; kept because it is asked for with every sample.
     id: FeatureSpaceId,
 }
@@ -42,10 +44,10 @@ impl Classifier {
         vocabulary: Vocabulary,
         space: Space,
         machine: Machine,
-        sigmoids: Vec<Sigmoid>,
+        calibration: Calibration,
     ) -> Self {
         let id = space.id(&feature_set);
-        Self { feature_set, vocabulary, space, machine, sigmoids, id }
+        Self { feature_set, vocabulary, space, machine, calibration, id }
     }
 
     /// The name of the raw feature set it was trained on, such as `hog-1`.
@@ -106,18 +108,8 @@ impl Classify for Classifier {
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
         let reduced = self.reduce(features)?;
-        let mut decisions = Vec::with_capacity(self.sigmoids.len());
+        let mut decisions = Vec::with_capacity(self.machine.offsets.len());
         self.machine.decide(&reduced, &mut decisions);
-        Ok(couple(calibrated(&decisions, &self.sigmoids), self.vocabulary.classes()))
+        Ok(self.calibration.probabilities(&decisions, self.vocabulary.classes()))
     }
-}
-
-/// P(i | i or j) of each pair, kept off 0 and 1 so that coupling is well posed, as LIBSVM does.
-pub(crate) fn calibrated<'a>(
-    decisions: &'a [f64],
-    sigmoids: &'a [Sigmoid],
-) -> impl Iterator<Item = f64> + 'a {
-    const LEAST: f64 = 1e-7;
-    let pairs = decisions.iter().zip(sigmoids);
-    pairs.map(|(&decision, sigmoid)| sigmoid.probability(decision).clamp(LEAST, 1.0 - LEAST))
 }

@@ -117,7 +117,7 @@ impl Pca {
 /// All principal directions with their share of the squared norm of `x`, falling.
 fn exact(x: &DMatrix<f64>) -> Vec<(f64, Vec<f64>)> {
     let tall = x.nrows() >= x.ncols();
-    let eigen = SymmetricEigen::new(if tall { x.tr_mul(x) } else { x * x.transpose() });
+    let eigen = SymmetricEigen::new(if tall { x.transpose() * x } else { x * x.transpose() });
     let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     order

@@ -15,14 +15,15 @@ const ITERATIONS: usize = 8;
 pub(super) fn leading(x: &DMatrix<f64>, wanted: usize, rng: &mut impl Rng) -> Vec<(f64, Vec<f64>)> {
     let block = (wanted + OVERSAMPLING).min(x.nrows()).min(x.ncols());
     let start = DMatrix::from_fn(x.ncols(), block, |_, _| rng.random_range(-1.0..1.0));
+    // Transposed once: nalgebra's `tr_mul` takes column by column, ten times slower than its blocked product.
+    let transposed = x.transpose();
     // Without an orthonormal basis in between, all columns would turn towards the first direction.
     let mut range = (x * start).qr().q();
     for _ in 0..ITERATIONS {
-        let back = x.tr_mul(&range).qr().q();
-        range = (x * back).qr().q();
+        range = (x * (&transposed * range)).qr().q();
     }
     // The small matrix B = Qᵀ·X has the leading singular values and right vectors of X.
-    let small = range.tr_mul(x);
+    let small = range.transpose() * x;
     let eigen = (&small * small.transpose()).symmetric_eigen();
     let mut order: Vec<usize> = (0..block).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-use crate::Sample;
+use super::Sample;
 
 /// What stays together when samples are split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub enum Folding {
 ///
 /// By group where every sample has one and every class comes to lie in at least two folds, so that no fold's
 /// complement lacks a class; else by sample.
-pub(crate) fn split(
+pub(super) fn split(
     samples: &[Sample],
     classes: usize,
     folds: usize,

@@ -1,12 +1,17 @@
 //! From labelled feature vectors to a classifier.
 
+mod folds;
+mod search;
+
 use gestalt_protocol::ClassId;
 use linfa_svm::SvmError;
 use rand::Rng;
 use thiserror::Error;
 
-use crate::classifier::{Classifier, Machine, Sigmoid, Space, calibrated, couple, pairs};
-use crate::folds::{Folding, split};
+pub use folds::Folding;
+use search::{Choice, Fold, HeldOut, Search};
+
+use crate::classifier::Classifier;
 use crate::{Components, ScalingMethod, Vocabulary};
 
 /// A labelled feature vector.
@@ -98,6 +103,9 @@ pub enum TrainError {
     /// All samples are the same.
     #[error("all samples have the same features: nothing tells the gestures apart")]
     NoVariance,
+    /// No pair of C and γ gave finite probabilities.
+    #[error("no C and γ gave a usable machine: try other values")]
+    NoFit,
     /// The solver refused.
     #[error("the support vector solver refused: {0}")]
     Solver(String),
@@ -140,8 +148,8 @@ pub struct Trained {
 
 /// Trains a classifier on samples of the raw feature set named `feature_set`.
 ///
-/// C and γ are those with the least log loss in cross-validation. The sigmoids are fitted on the decision values
-/// of samples held out there: scaling, principal components and machines of a fold have not seen them. The
+/// C and γ are those with the least log loss in cross-validation. The calibration is fitted on the decision
+/// values of samples held out there: scaling, principal components and machines of a fold have not seen them. The
 /// scaling, components and machines of the result are then fitted on all samples.
 ///
 /// The same samples, options and generator give the same classifier, byte for byte.
@@ -158,115 +166,22 @@ pub fn train(
 ) -> Result<Trained, TrainError> {
     check_options(feature_set, options)?;
     check_samples(vocabulary, samples)?;
-    let classes = vocabulary.classes();
-    let (assignment, folding) = split(samples, classes, options.folds, rng);
-    let folds: Vec<Fold> = (0..options.folds)
-        .map(|fold| Fold::new(samples, classes, options, rng, |i| assignment[i] != fold))
-        .collect();
-
-    let total = options.costs.len() * options.gammas.len() * options.folds + 1;
+    let search = Search::new(samples, vocabulary.classes(), options, rng);
+    let total = (options.gammas.len() + options.costs.len() - 1) * options.folds + 1;
     let mut done = 0;
-    let mut best: Option<(HeldOut, f64, f64)> = None;
-    for &gamma in &options.gammas {
-        for &cost in &options.costs {
-            let mut decisions = vec![Vec::new(); samples.len()];
-            for fold in &folds {
-                let machine = fold.fit(cost, gamma)?;
-                for &index in &fold.held_out {
-                    machine.decide(&fold.rows[index], &mut decisions[index]);
-                }
-                done += 1;
-                progress(Progress { done, total });
-            }
-            let outcome = HeldOut::new(&decisions, samples, classes);
-            if best.as_ref().is_none_or(|(least, ..)| outcome.log_loss < least.log_loss) {
-                best = Some((outcome, cost, gamma));
-            }
-        }
-    }
-    let (held_out, cost, gamma) = best.ok_or(TrainError::Option("no value of C or of γ to try"))?;
+    let best = search.run(options, || {
+        done += 1;
+        progress(Progress { done, total });
+    })?;
+    let Choice { cost, gamma, held_out } = best;
 
-    let all = Fold::new(samples, classes, options, rng, |_| true);
+    let all = Fold::new(samples, vocabulary.classes(), options, rng, |_| true);
     let machine = all.fit(cost, gamma)?;
     progress(Progress { done: total, total });
     let classifier =
-        Classifier::new(feature_set.to_owned(), vocabulary.clone(), all.space, machine, held_out.sigmoids);
+        Classifier::new(feature_set.to_owned(), vocabulary.clone(), all.space, machine, held_out.calibration);
     let HeldOut { accuracy, log_loss, .. } = held_out;
-    Ok(Trained { classifier, cost, gamma, folding, accuracy, log_loss })
-}
-
-/// A space fitted on some samples, and all samples as seen in it.
-struct Fold {
-    space: Space,
-    rows: Vec<Vec<f32>>,
-    /// By class, the samples it was fitted on.
-    members: Vec<Vec<usize>>,
-    /// The others.
-    held_out: Vec<usize>,
-    /// 1 / (total variance of the rows it was fitted on): the unit of γ.
-    gamma_unit: f64,
-}
-
-impl Fold {
-    fn new(
-        samples: &[Sample],
-        classes: usize,
-        options: &TrainOptions,
-        rng: &mut impl Rng,
-        learns: impl Fn(usize) -> bool,
-    ) -> Self {
-        let learned = samples.iter().enumerate().filter(|(index, _)| learns(*index));
-        let features = learned.clone().map(|(_, sample)| sample.features.as_slice());
-        let space = Space::fit(features, options.scaling, options.components, rng);
-        let rows: Vec<Vec<f32>> = samples.iter().map(|sample| space.project(&sample.features)).collect();
-        let mut members = vec![Vec::new(); classes];
-        let (mut squares, mut count) = (0.0, 0.0);
-        for (index, sample) in learned {
-            members[sample.class.index()].push(index);
-            // Rows are centred, so their squares sum up to the variance.
-            squares += rows[index].iter().map(|x| f64::from(x * x)).sum::<f64>();
-            count += 1.0;
-        }
-        let held_out = (0..samples.len()).filter(|index| !learns(*index)).collect();
-        Self { space, rows, members, held_out, gamma_unit: count / squares.max(f64::MIN_POSITIVE) }
-    }
-
-    fn fit(&self, cost: f64, gamma: f64) -> Result<Machine, SvmError> {
-        let row = |&index: &usize| self.rows[index].as_slice();
-        let members: Vec<Vec<&[f32]>> = self.members.iter().map(|m| m.iter().map(row).collect()).collect();
-        Machine::fit(&members, self.space.pca.kept(), cost, gamma * self.gamma_unit)
-    }
-}
-
-/// What cross-validation says about one choice of parameters.
-struct HeldOut {
-    sigmoids: Vec<Sigmoid>,
-    accuracy: f64,
-    log_loss: f64,
-}
-
-impl HeldOut {
-    fn new(decisions: &[Vec<f64>], samples: &[Sample], classes: usize) -> Self {
-        let sigmoids: Vec<Sigmoid> = pairs(classes)
-            .enumerate()
-            .map(|(pair, (i, j))| {
-                let values = samples.iter().zip(decisions).filter_map(|(sample, decisions)| {
-                    let class = sample.class.index();
-                    (class == i || class == j).then(|| (decisions[pair], class == i))
-                });
-                Sigmoid::fit(&values.collect::<Vec<_>>())
-            })
-            .collect();
-        let (mut right, mut loss) = (0, 0.0);
-        for (sample, decisions) in samples.iter().zip(decisions) {
-            let p = couple(calibrated(decisions, &sigmoids), classes);
-            let truth = p[sample.class.index()];
-            right += usize::from(p.iter().all(|other| *other <= truth));
-            loss -= truth.max(1e-12).ln();
-        }
-        let count = samples.len() as f64;
-        Self { sigmoids, accuracy: right as f64 / count, log_loss: loss / count }
-    }
+    Ok(Trained { classifier, cost, gamma, folding: search.folding, accuracy, log_loss })
 }
 
 fn check_options(feature_set: &str, options: &TrainOptions) -> Result<(), TrainError> {
