@@ -20,12 +20,18 @@ const WRIST: f32 = 1.4;
 const SMALLEST_HOLE: f64 = 0.002;
 /// More of the frame's edge than this is no hand's.
 const LARGEST_EDGE: f32 = 0.4;
-/// Directions in which the wrist is sought.
+/// Fingers are told apart this many palm radii from the palm's centre.
+const FINGERS: f32 = 2.0;
+/// Directions in which the wrist is sought: one every 4 degrees.
 const DIRECTIONS: usize = 90;
-/// Wider than a wrist: arcs beyond this many directions count the same.
-const WIDEST: usize = 22;
+/// An arc of more directions is as wide as a wrist can be.
+const WIDEST: usize = 18;
+/// The widest arc of a finger, in directions.
+const FINGER: usize = 7;
+/// How far beside its root a finger may end, in directions.
+const SPREAD: f32 = 4.0;
 /// How much likelier a wrist is below the palm than beside it.
-const GRAVITY: f32 = 0.5;
+const GRAVITY: f32 = 0.8;
 
 /// A hand on the canvas. Coordinates are those of the mask: canvas pixels plus [`MARGIN`], y downwards.
 pub struct Hand<'a> {
@@ -239,15 +245,24 @@ impl HandFinder {
         Ok((Point2f::new((around.x + centre.x) as f32, (around.y + centre.y) as f32), radius as f32))
     }
 
-    /// Which way the fingers are: opposite to the wrist, the widest arc in which the blob leaves a circle around the
-    /// palm, rather below than above. Straight up when no such arc is found.
+    /// Which way the fingers are: opposite to the wrist. That is the arc in which the blob leaves a circle around the palm
+    /// which is wide, rather below than above, and does not split into fingers further out. Straight up when the blob
+    /// leaves the circle nowhere.
     fn up(&self, palm: Point2f, radius: f32) -> Result<Point2f, opencv::Error> {
-        let ring = ring(&self.mask, palm, WRIST * radius, DIRECTIONS)?;
+        let near = arcs(&ring(&self.mask, palm, WRIST * radius, DIRECTIONS)?);
+        let far = arcs(&ring(&self.mask, palm, FINGERS * radius, DIRECTIONS)?);
+        let middle = |&(start, length): &(usize, usize)| start as f32 + (length - 1) as f32 / 2.0;
         let mut best = (0.0, Point2f::new(0.0, -1.0));
-        for (start, length) in arcs(&ring) {
-            let middle = start as f32 + (length - 1) as f32 / 2.0;
-            let (sin, cos) = (middle * std::f32::consts::TAU / DIRECTIONS as f32).sin_cos();
-            let score = length.min(WIDEST) as f32 * (1.0 + GRAVITY * sin);
+        for arc in &near {
+            let (at, length) = (middle(arc), arc.1);
+            let is_finger_of_it = |other: &&(usize, usize)| {
+                let away = (middle(other) - at).rem_euclid(DIRECTIONS as f32);
+                let away = away.min(DIRECTIONS as f32 - away);
+                other.1 <= FINGER && away <= length as f32 / 2.0 + SPREAD
+            };
+            let fingers = far.iter().filter(is_finger_of_it).count();
+            let (sin, cos) = (at * std::f32::consts::TAU / DIRECTIONS as f32).sin_cos();
+            let score = length.min(WIDEST) as f32 * (1.0 + GRAVITY * sin) / (1 + fingers) as f32;
             if score > best.0 {
                 best = (score, Point2f::new(-cos, -sin));
             }

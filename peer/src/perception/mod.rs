@@ -253,7 +253,7 @@ impl Perception {
         let features = match self.set {
             FeatureSet::Shape => features::measure(&hand)?,
             FeatureSet::Hog => {
-                hog::compute(&self.hog, self.canonical.crop_image(), &mut self.descriptors)?;
+                hog::compute(&self.hog, self.canonical.image(), &mut self.descriptors)?;
                 self.descriptors.as_slice().to_vec()
             }
         };
@@ -270,6 +270,6 @@ impl Perception {
     /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the first.
     #[must_use]
     pub fn crop(&self) -> &Mat {
-        self.canonical.crop_image()
+        self.canonical.image()
     }
 }
