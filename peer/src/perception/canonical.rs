@@ -5,7 +5,8 @@ use opencv::core::{
 };
 use opencv::imgproc::{COLOR_BGR2GRAY, INTER_AREA, cvt_color_def, resize};
 
-use super::hand::{Hand, MARGIN};
+use super::blob::MARGIN;
+use super::hand::Hand;
 
 /// Side of the square crop, pixels.
 pub const SIDE: i32 = 64;
@@ -34,17 +35,17 @@ impl Canonical {
         &self.crop
     }
 
-    /// Cuts the hand out of the canvas: its longer side scaled to fill the crop, centred, upright as in the frame (turning
+    /// Cuts the hand out of the close view: its longer side scaled to fill the crop, centred, upright as in the frame (turning
     /// it by its own axis cost 1 % of accuracy on signs 0-9), black where it is not.
-    pub fn crop(&mut self, canvas: &Mat, hand: &Hand<'_>) -> Result<(), opencv::Error> {
+    pub fn crop(&mut self, view: &Mat, hand: &Hand<'_>) -> Result<(), opencv::Error> {
         let bounds = hand.bounds;
         let scale = f64::from(SIDE - 2 * FRAME) / f64::from(bounds.width.max(bounds.height));
         let scaled = |side: i32| ((f64::from(side) * scale).round() as i32).max(1);
         let size = Size::new(scaled(bounds.width), scaled(bounds.height));
         let in_crop = Rect::new((SIDE - size.width) / 2, (SIDE - size.height) / 2, size.width, size.height);
-        let in_canvas = Rect::new(bounds.x - MARGIN, bounds.y - MARGIN, bounds.width, bounds.height);
+        let in_view = Rect::new(bounds.x - MARGIN, bounds.y - MARGIN, bounds.width, bounds.height);
 
-        cvt_color_def(&Mat::roi(canvas, in_canvas)?, &mut self.grey, COLOR_BGR2GRAY)?;
+        cvt_color_def(&Mat::roi(view, in_view)?, &mut self.grey, COLOR_BGR2GRAY)?;
         resize(&self.grey, &mut self.small, size, 0.0, 0.0, INTER_AREA)?;
         resize(&Mat::roi(hand.mask, bounds)?, &mut self.mask, size, 0.0, 0.0, INTER_AREA)?;
         let (mut mean, mut deviation) = (Scalar::default(), Scalar::default());

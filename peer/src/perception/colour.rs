@@ -10,10 +10,11 @@ use opencv::core::{BORDER_DEFAULT, CV_8U, Mat, MatTraitConst, MatTraitConstManua
 use opencv::core::{Scalar, Size};
 use opencv::imgproc::{INTER_AREA, THRESH_BINARY, gaussian_blur, resize, threshold};
 
+use super::frame::View;
 use super::{NoHand, NoObservation};
 
-/// The model is learned on a thumbnail smaller than the canvas by this factor.
-const THUMBNAIL: i32 = 4;
+/// The model is learned on a thumbnail smaller than the glance by this factor.
+const THUMBNAIL: i32 = 2;
 /// Rows and columns of the thumbnail's border that are taken for background.
 const BORDER: usize = 2;
 /// Where between the means of background (0) and hand (1) the boundary lies: nearer to the background, which varies less.
@@ -43,9 +44,8 @@ pub struct ColourModel {
     is_hand: Vec<bool>,
     border: Vec<f32>,
     background: Chroma,
-    score: Mat,
-    blurred: Mat,
-    mask: Mat,
+    /// What each value of blue, green and red adds to the score of a pixel.
+    tables: [[i32; 256]; 3],
     separation: f32,
 }
 
@@ -71,40 +71,53 @@ impl ColourModel {
             is_hand: Vec::new(),
             border: Vec::new(),
             background: [0.0; 2],
-            score: Mat::default(),
-            blurred: Mat::default(),
-            mask: Mat::default(),
+            tables: [[0; 256]; 3],
             separation: 0.0,
         }
     }
 
-    /// How many standard deviations apart hand and background were in the last frame.
-    pub fn separation(&self) -> f32 {
-        self.separation
+    /// How plainly hand and background differed in the last frame, `0.0..=1.0`: from 0.8 standard deviations to 2.
+    pub fn plausibility(&self) -> f32 {
+        ((self.separation - 0.8) / 1.2).clamp(0.0, 1.0)
     }
 
-    /// The mask (255 / 0) of the canvas's pixels that have the hand's colour.
-    pub fn segment(&mut self, canvas: &Mat) -> Result<&Mat, NoObservation> {
-        let size = canvas.size()?;
-        self.take_thumbnail(canvas, size)?;
-        let found = self.learn();
+    /// Learns the hand's colour from the frame at a glance.
+    pub fn learn(&mut self, glance: &View) -> Result<(), NoObservation> {
+        self.take_thumbnail(&glance.image)?;
+        let found = self.discriminate();
         let Some(model) = found.filter(|model| model.contrast >= self.minimum_contrast) else {
             let contrast = found.map_or(0.0, |model| model.contrast);
             return Err(NoHand::NothingStandsOut { contrast }.into());
         };
         self.separation = model.separation;
-        self.score(canvas, size, &model)?;
-        gaussian_blur(&self.score, &mut self.blurred, Size::new(3, 3), 0.0, 0.0, BORDER_DEFAULT)?;
-        threshold(&self.blurred, &mut self.mask, ZERO_SCORE, 255.0, THRESH_BINARY)?;
-        Ok(&self.mask)
+        self.tabulate(&model);
+        Ok(())
+    }
+
+    /// Marks the pixels of a view that have the colour learned.
+    pub fn mark(&self, view: &mut View) -> Result<(), opencv::Error> {
+        let size = view.image.size()?;
+        if view.score.size()? != size {
+            view.score = Mat::new_size_with_default(size, CV_8U, Scalar::all(0.0))?;
+        }
+        let [b, g, r] = &self.tables;
+        let pixels = view.image.data_bytes()?.chunks_exact(3);
+        for (score, bgr) in view.score.data_bytes_mut()?.iter_mut().zip(pixels) {
+            let sum = b[usize::from(bgr[0])] + g[usize::from(bgr[1])] + r[usize::from(bgr[2])];
+            *score = (sum >> FRACTION).clamp(0, 255) as u8;
+        }
+        gaussian_blur(&view.score, &mut view.blurred, Size::new(3, 3), 0.0, 0.0, BORDER_DEFAULT)?;
+        threshold(&view.blurred, &mut view.mask, ZERO_SCORE, 255.0, THRESH_BINARY)?;
+        Ok(())
     }
 }
 
 impl ColourModel {
     /// The frame's colours, small enough to learn from at once.
-    fn take_thumbnail(&mut self, canvas: &Mat, size: Size) -> Result<(), opencv::Error> {
+    fn take_thumbnail(&mut self, glance: &Mat) -> Result<(), opencv::Error> {
+        let size = glance.size()?;
         let small = Size::new(size.width / THUMBNAIL, size.height / THUMBNAIL);
-        resize(canvas, &mut self.thumbnail, small, 0.0, 0.0, INTER_AREA)?;
+        resize(glance, &mut self.thumbnail, small, 0.0, 0.0, INTER_AREA)?;
         let log = &self.logarithm;
         self.chroma.clear();
         self.chroma.extend(self.thumbnail.data_bytes()?.chunks_exact(3).map(|bgr| {
@@ -138,9 +151,9 @@ impl ColourModel {
         })
     }
 
-    /// Learns the discriminant: seeds by Otsu's threshold of the distance to the background, then a few rounds of
+    /// Finds the discriminant: seeds by Otsu's threshold of the distance to the background, then a few rounds of
     /// Fisher's discriminant on the pixels that the last round took for the hand. `None` where all pixels are alike.
-    fn learn(&mut self) -> Option<Discriminant> {
+    fn discriminate(&mut self) -> Option<Discriminant> {
         let distance = |c: &Chroma| c[0].abs() + c[1].abs();
         let mut histogram = [0u32; BINS];
         for chroma in &self.chroma {
@@ -160,26 +173,17 @@ impl ColourModel {
         learned
     }
 
-    /// Scores each pixel of the canvas: [`ZERO_SCORE`] on the boundary, more inside the hand's colours.
-    fn score(&mut self, canvas: &Mat, size: Size, model: &Discriminant) -> Result<(), opencv::Error> {
-        if self.score.size()? != size {
-            self.score = Mat::new_size_with_default(size, CV_8U, Scalar::all(0.0))?;
-        }
-        // The score is linear in the channels' logarithms, so one table per channel computes it exactly.
+    /// Prepares the scores: [`ZERO_SCORE`] on the boundary, more inside the hand's colours. They are linear in the logarithms
+    /// of the channels, so one table per channel holds them exactly.
+    fn tabulate(&mut self, model: &Discriminant) {
         let [red, blue] = model.weights;
-        let unit = CONTRAST_SCORE / model.contrast * f32::from(1u16 << FRACTION);
-        let table = |weight: f32, offset: f32| -> [i32; 256] {
-            std::array::from_fn(|value| ((weight * self.logarithm[value] + offset) * unit) as i32)
+        let unit = CONTRAST_SCORE / model.contrast;
+        let offset = ZERO_SCORE as f32 - (dot(model.weights, self.background) + model.boundary) * unit;
+        let scale = f32::from(1u16 << FRACTION);
+        let table = |weight: f32, offset: f32| {
+            self.logarithm.map(|logarithm| ((weight * unit * logarithm + offset) * scale) as i32)
         };
-        let zero = ZERO_SCORE as f32 * model.contrast / CONTRAST_SCORE;
-        let offset = zero - dot(model.weights, self.background) - model.boundary;
-        let (b, g, r) = (table(blue, 0.0), table(-red - blue, offset), table(red, 0.0));
-        let pixels = canvas.data_bytes()?.chunks_exact(3);
-        for (score, bgr) in self.score.data_bytes_mut()?.iter_mut().zip(pixels) {
-            let sum = b[usize::from(bgr[0])] + g[usize::from(bgr[1])] + r[usize::from(bgr[2])];
-            *score = (sum >> FRACTION).clamp(0, 255) as u8;
-        }
-        Ok(())
+        self.tables = [table(blue, 0.0), table(-red - blue, offset), table(red, 0.0)];
     }
 }
 

@@ -1,24 +1,26 @@
 //! How a robot sees: from a camera frame to the feature vector of the hand in it.
 //!
 //! ```text
-//! BGR frame, any size ─► canvas ─► hand-coloured pixels ─► blob ─► palm, wrist ─► hand ─┬─► 110 shape features
-//!        (frame)         (colour)                          (hand)                       └─► canonical crop ─► HOG
+//! BGR frame ─► glance ─► colour of the hand, its place ─► close view ─► palm, wrist ─► hand ─┬─► 110 shape features
+//!  any size   160×120                                      192×192                         └─► canonical crop ─► HOG
 //! ```
 //!
-//! The same hand gives nearly the same features whatever the camera: the canvas makes resolutions comparable, colours
-//! are judged relative to the background of the same frame, and every feature is a ratio, an angle or a count.
+//! The same hand gives nearly the same features whatever the camera: views of a fixed size make resolutions and distances
+//! comparable, colours are judged relative to the background of the same frame, and every feature is a ratio, an angle or a count.
 
+mod blob;
 mod canonical;
 mod colour;
 mod features;
 mod frame;
 mod hand;
 mod hog;
+mod ring;
 
 use std::str::FromStr;
 
 use gestalt_strategies::Observation;
-use opencv::core::{Mat, Vector};
+use opencv::core::{Mat, MatTraitConst, Rect, Size, Vector};
 use opencv::objdetect::HOGDescriptor;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -26,8 +28,13 @@ use thiserror::Error;
 use canonical::Canonical;
 use colour::ColourModel;
 pub use features::{FEATURES, Feature, features};
-use frame::Canvas;
+use frame::View;
 use hand::HandFinder;
+
+/// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
+const GLANCE: Size = Size { width: 160, height: 120 };
+/// The size of the close view of the hand: enough for the shape of its fingers.
+const CLOSE: Size = Size { width: 192, height: 192 };
 
 /// Which feature vector perception computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,7 +94,7 @@ pub struct HandConfig {
     /// How much the hand's colour must differ from the background's, in nats of log chromaticity; `0.01..=2.0`.
     /// An empty wall has 0.04, skin before a grey wall 0.3 to 0.7, a coloured glove 1 and more.
     pub minimum_contrast: f32,
-    /// The smallest share of the frame that a hand covers, `0.0005..=0.5`: below it, fingers are a pixel or two wide.
+    /// The smallest share of the frame that a hand covers, `0.0005..=0.5`: below it, a finger is a pixel wide.
     pub minimum_area: f32,
     /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to judge by.
     pub maximum_area: f32,
@@ -95,7 +102,7 @@ pub struct HandConfig {
 
 impl Default for HandConfig {
     fn default() -> Self {
-        Self { minimum_contrast: 0.12, minimum_area: 0.004, maximum_area: 0.7 }
+        Self { minimum_contrast: 0.12, minimum_area: 0.0015, maximum_area: 0.7 }
     }
 }
 
@@ -209,7 +216,8 @@ pub enum NoHand {
 /// Sees hands. Owns every buffer it needs, so that a frame allocates next to nothing.
 pub struct Perception {
     set: FeatureSet,
-    canvas: Canvas,
+    glance: View,
+    close: View,
     colours: ColourModel,
     finder: HandFinder,
     canonical: Canonical,
@@ -226,7 +234,8 @@ impl Perception {
         config.validate()?;
         Ok(Self {
             set,
-            canvas: Canvas::default(),
+            glance: View::new(GLANCE),
+            close: View::new(CLOSE),
             colours: ColourModel::new(config.minimum_contrast),
             finder: HandFinder::new(config),
             canonical: Canonical::default(),
@@ -246,10 +255,15 @@ impl Perception {
     /// # Errors
     /// See [`NoObservation`]; a frame without a hand is [`NoObservation::NoHand`].
     pub fn observe(&mut self, bgr: &Mat) -> Result<Observation, NoObservation> {
-        let canvas = self.canvas.fit(bgr)?;
-        let candidates = self.colours.segment(canvas)?;
-        let hand = self.finder.find(candidates)?;
-        self.canonical.crop(canvas, &hand)?;
+        frame::check(bgr)?;
+        self.glance.look(bgr, Rect::new(0, 0, bgr.cols(), bgr.rows()))?;
+        self.colours.learn(&self.glance)?;
+        self.colours.mark(&mut self.glance)?;
+        let region = self.finder.locate(&self.glance)?;
+        self.close.look(bgr, region)?;
+        self.colours.mark(&mut self.close)?;
+        let hand = self.finder.find(&self.close)?;
+        self.canonical.crop(&self.close.image, &hand)?;
         let features = match self.set {
             FeatureSet::Shape => features::measure(&hand)?,
             FeatureSet::Hog => {
@@ -257,11 +271,17 @@ impl Perception {
                 self.descriptors.as_slice().to_vec()
             }
         };
-        Ok(Observation { features, quality: hand.quality(self.colours.separation()) })
+        Ok(Observation { features, quality: self.colours.plausibility() * hand.plausibility })
     }
 
-    /// The hand's pixels in the last frame observed (255; elsewhere 0), on a canvas of at most 320×240 with a margin
-    /// of one pixel. Empty before the first hand.
+    /// The part of the last frame that was looked at closely, in pixels of the frame.
+    #[must_use]
+    pub fn region(&self) -> Rect {
+        self.close.region
+    }
+
+    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a margin of
+    /// one pixel. Empty before the first hand.
     #[must_use]
     pub fn mask(&self) -> &Mat {
         self.finder.mask()

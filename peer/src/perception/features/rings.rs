@@ -1,7 +1,8 @@
 //! Circles around the palm: how often and how widely the fingers cross them.
 
 use super::{Feature, feature};
-use crate::perception::hand::{Hand, arcs, ring};
+use crate::perception::hand::Hand;
+use crate::perception::ring::{arcs, ring};
 
 /// Radii of the circles in palm radii.
 const RADII: [f32; 4] = [1.5, 1.9, 2.3, 2.7];
@@ -47,9 +48,9 @@ pub fn measure(hand: &Hand<'_>) -> Result<[f32; TABLE.len()], opencv::Error> {
         let arcs = arcs(&covered);
         let share = |samples: usize| samples as f32 / SAMPLES as f32;
         values[i] = arcs.len() as f32;
-        values[4 + i] = arcs.iter().map(|&(_, length)| share(length)).sum();
+        values[4 + i] = arcs.iter().map(|arc| share(arc.length)).sum();
         if i < 2 {
-            values[8 + i] = arcs.iter().map(|&(_, length)| share(length)).fold(0.0, f32::max);
+            values[8 + i] = arcs.iter().map(|arc| share(arc.length)).fold(0.0, f32::max);
         }
     }
     Ok(values)
