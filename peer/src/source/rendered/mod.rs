@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 
 pub use hand::Glove;
 pub(super) use pose::Pinhole;
-pub use pose::{Pose, place};
+pub use pose::{Arc, Pose, place};
 pub use training::{LabelledFrame, TrainingFrames};
 
 use hand::Hand;

@@ -33,23 +33,47 @@ impl Pose {
     }
 }
 
-/// Places robots on an arc before the human: evenly over ±75° of bearing, each a little off its place, at 0.7 to
-/// 1.6 m, most of them looking up from the floor. The same seed gives the same places.
+/// Where the robots of a swarm may stand: an arc before the human.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Arc {
+    /// The robots spread over plus and minus this bearing, in degrees. Range 0..=90.
+    pub half_deg: f64,
+    /// Least and greatest elevation, in degrees. Range −60..=60.
+    pub elevation_deg: [f64; 2],
+    /// Least and greatest distance, in metres. Range 0.4..=3.
+    pub distance_m: [f64; 2],
+}
+
+impl Default for Arc {
+    /// ±75°, most of them looking up from the floor, at 0.6 to 1.15 m: near enough for a Foot-bot to see fingers.
+    fn default() -> Self {
+        Self { half_deg: 75.0, elevation_deg: [-25.0, 12.0], distance_m: [0.6, 1.15] }
+    }
+}
+
+impl Arc {
+    /// Places robots evenly over the arc, from the left to the right, each a little off its place. The same seed
+    /// gives the same places.
+    #[must_use]
+    pub fn place(&self, robots: usize, seed: u64) -> Vec<Pose> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let sector = 2.0 * self.half_deg / robots.max(1) as f64;
+        let mut between = |[low, high]: [f64; 2]| low + (high - low) * rng.random::<f64>();
+        (0..robots)
+            .map(|i| Pose {
+                bearing_deg: sector * (i as f64 + 0.5 + between([-0.4, 0.4])) - self.half_deg,
+                elevation_deg: between(self.elevation_deg),
+                distance_m: between(self.distance_m),
+            })
+            .collect()
+    }
+}
+
+/// Places robots on the default [`Arc`].
 #[must_use]
 pub fn place(robots: usize, seed: u64) -> Vec<Pose> {
-    const HALF_ARC_DEG: f64 = 75.0;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let sector = 2.0 * HALF_ARC_DEG / robots.max(1) as f64;
-    (0..robots)
-        .map(|i| {
-            let centre = -HALF_ARC_DEG + sector * (i as f64 + 0.5);
-            Pose {
-                bearing_deg: centre + sector * rng.random_range(-0.4..0.4),
-                elevation_deg: rng.random_range(-25.0..12.0),
-                distance_m: rng.random_range(0.7..1.6),
-            }
-        })
-        .collect()
+    Arc::default().place(robots, seed)
 }
 
 /// A pinhole camera in the hand's space.
@@ -140,5 +164,7 @@ mod tests {
         assert!(poses.iter().all(|pose| pose.bearing_deg.abs() <= 75.0));
         assert_eq!(poses, place(10, 3));
         assert_ne!(poses, place(10, 4));
+        let far = Arc { distance_m: [2.0, 2.5], ..Arc::default() }.place(5, 3);
+        assert!(far.iter().all(|pose| (2.0..=2.5).contains(&pose.distance_m)));
     }
 }

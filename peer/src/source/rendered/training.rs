@@ -28,7 +28,7 @@ pub struct LabelledFrame {
 /// An endless iterator of labelled frames: each person shows 0 to 5 in turn, each from a pose of its own, to the
 /// cameras in turn. The same seed gives the same frames.
 ///
-/// Poses cover what robots meet: bearing within ±`max_bearing_deg`, elevation −30° to 20°, 0.5 to 1.8 m.
+/// Poses cover what robots meet: bearing within ±`max_bearing_deg`, elevation −30° to 20°, 0.5 to 1.3 m.
 pub struct TrainingFrames {
     cameras: Vec<CameraModel>,
     glove: Glove,
@@ -65,7 +65,7 @@ impl Iterator for TrainingFrames {
         let pose = Pose {
             bearing_deg: rng.random_range(-self.max_bearing_deg..self.max_bearing_deg),
             elevation_deg: rng.random_range(-30.0..20.0),
-            distance_m: rng.random_range(0.5..1.8),
+            distance_m: rng.random_range(0.5..1.3),
         };
         let scene = Scene { gesture: Some(class), seed: self.seed.rotate_left(24) ^ person };
         let taken = RenderedSource::new(camera.clone(), pose, self.glove, rng.random())
