@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 /// A camera: its geometry and its faults.
@@ -96,6 +97,23 @@ impl CameraModel {
         Self::presets().into_iter().find(|model| model.name == name)
     }
 
+    /// Another specimen of this model, with faults of its own: no two cameras focus, expose and balance alike, and
+    /// some are far worse than the model promises.
+    #[must_use]
+    pub fn specimen(&self, rng: &mut impl Rng) -> Self {
+        // Most specimens are near the model, few far from it.
+        let wear = rng.random::<f64>().powi(2);
+        // Blur in proportion to the image, as the optics make it.
+        let blur_px = 2.5 * wear * f64::from(self.width_px) / 384.0;
+        Self {
+            noise_sigma: self.noise_sigma + 12.0 * wear * rng.random::<f64>(),
+            blur_sigma_px: self.blur_sigma_px + blur_px * rng.random::<f64>(),
+            gain: self.gain * rng.random_range(1.0 - 0.4 * wear..1.15),
+            cast_bgr: self.cast_bgr.map(|factor| factor * rng.random_range(0.93..1.07)),
+            ..self.clone()
+        }
+    }
+
     /// The time between two frames.
     #[must_use]
     pub fn period(&self) -> Duration {
@@ -112,6 +130,8 @@ impl CameraModel {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+
     use super::*;
 
     #[test]
@@ -121,6 +141,20 @@ mod tests {
             let edge_px = camera.focal_px() * half_width_at_1_m;
             assert!((edge_px - f64::from(camera.width_px) / 2.0).abs() < 1e-9, "{}", camera.name);
         }
+    }
+
+    #[test]
+    fn a_specimen_is_no_better_than_its_model_and_differs_from_the_next() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let model = CameraModel::footbot();
+        let specimens: Vec<CameraModel> = (0..50).map(|_| model.specimen(&mut rng)).collect();
+        for specimen in &specimens {
+            assert!(
+                specimen.noise_sigma >= model.noise_sigma && specimen.blur_sigma_px >= model.blur_sigma_px
+            );
+            assert_eq!(specimen.focal_px(), model.focal_px());
+        }
+        assert!(specimens.windows(2).all(|pair| pair[0] != pair[1]));
     }
 
     #[test]

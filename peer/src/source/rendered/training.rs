@@ -26,7 +26,7 @@ pub struct LabelledFrame {
 }
 
 /// An endless iterator of labelled frames: each person shows 0 to 5 in turn, each from a pose of its own, to the
-/// cameras in turn. The same seed gives the same frames.
+/// cameras in turn, each frame by another specimen of the camera. The same seed gives the same frames.
 ///
 /// Poses cover what robots meet: bearing within ±`max_bearing_deg`, elevation −30° to 20°, 0.5 to 1.3 m.
 pub struct TrainingFrames {
@@ -59,23 +59,54 @@ impl Iterator for TrainingFrames {
 
     fn next(&mut self) -> Option<Self::Item> {
         let (person, class) = (self.next / 6, (self.next % 6) as u8);
-        let camera = &self.cameras[(self.next / 6 % self.cameras.len() as u64) as usize];
+        let model = &self.cameras[(self.next / 6 % self.cameras.len() as u64) as usize];
         self.next += 1;
         let rng = &mut self.rng;
+        let camera = model.specimen(rng);
         let pose = Pose {
             bearing_deg: rng.random_range(-self.max_bearing_deg..self.max_bearing_deg),
             elevation_deg: rng.random_range(-30.0..20.0),
             distance_m: rng.random_range(0.5..1.3),
         };
         let scene = Scene { gesture: Some(class), seed: self.seed.rotate_left(24) ^ person };
-        let taken = RenderedSource::new(camera.clone(), pose, self.glove, rng.random())
+        let taken = RenderedSource::new(camera, pose, self.glove, rng.random())
             .and_then(|mut source| source.next_frame(Duration::ZERO, &scene));
         Some(taken.map(|frame| LabelledFrame {
             image: frame.image,
             class,
             group: person as u32,
-            camera: camera.name.clone(),
+            camera: model.name.clone(),
             pose,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use opencv::prelude::*;
+
+    use super::*;
+
+    fn frames(seed: u64) -> Vec<LabelledFrame> {
+        let cameras = vec![CameraModel::footbot(), CameraModel::parrot()];
+        TrainingFrames::new(cameras, Glove::Cyan, 60.0, seed).take(18).map(Result::unwrap).collect()
+    }
+
+    #[test]
+    fn every_person_shows_every_count_to_one_camera_model() {
+        let frames = frames(1);
+        for (i, frame) in frames.iter().enumerate() {
+            assert_eq!((frame.class, frame.group), ((i % 6) as u8, (i / 6) as u32));
+            assert_eq!(frame.camera, ["footbot", "parrot"][i / 6 % 2]);
+            assert!(frame.pose.bearing_deg.abs() <= 60.0);
+        }
+        assert_eq!((frames[0].image.cols(), frames[6].image.cols()), (384, 640));
+    }
+
+    #[test]
+    fn a_seed_fixes_every_frame() {
+        let bytes = |seed| frames(seed).last().unwrap().image.data_bytes().unwrap().to_vec();
+        assert_eq!(bytes(1), bytes(1));
+        assert_ne!(bytes(1), bytes(2));
     }
 }
