@@ -279,7 +279,7 @@ fn hand_colour(glove: Glove, rng: &mut impl Rng) -> [f32; 3] {
         Glove::Orange => [18.0, 118.0, 240.0],
         Glove::Skin => {
             const TONES: [[f32; 3]; 4] =
-                [[172.0, 196.0, 236.0], [130.0, 165.0, 215.0], [90.0, 125.0, 178.0], [62.0, 88.0, 130.0]];
+                [[150.0, 190.0, 242.0], [105.0, 160.0, 222.0], [75.0, 125.0, 192.0], [45.0, 85.0, 141.0]];
             TONES[rng.random_range(0..TONES.len())]
         }
     };
@@ -290,7 +290,7 @@ fn hand_colour(glove: Glove, rng: &mut impl Rng) -> [f32; 3] {
 /// Everyday cloth: dark to medium, hardly saturated.
 fn sleeve_colour(rng: &mut impl Rng) -> [f32; 3] {
     let lightness = rng.random_range(45.0..150.0);
-    std::array::from_fn(|_| lightness * rng.random_range(0.92_f32..1.08))
+    std::array::from_fn(|_| lightness * rng.random_range(0.95_f32..1.05))
 }
 
 #[cfg(test)]

@@ -163,6 +163,7 @@ mod tests {
     use opencv::prelude::*;
 
     use super::*;
+    use crate::perception::{FeatureSet, HandConfig, NoObservation, Perception};
 
     fn frames(pose: Pose, scene: Scene, seed: u64, count: usize) -> Vec<Vec<u8>> {
         let mut source = RenderedSource::new(CameraModel::footbot(), pose, Glove::Cyan, seed).unwrap();
@@ -204,6 +205,28 @@ mod tests {
         assert!(far > 500, "{far}");
         // Twice as far is a quarter of the area.
         assert!((3.0..5.0).contains(&(near as f64 / far as f64)), "{near} {far}");
+    }
+
+    #[test]
+    fn perception_finds_the_hand_in_every_frontal_view_and_none_in_an_empty_room() {
+        let mut perception = Perception::new(FeatureSet::Shape, HandConfig::default()).unwrap();
+        for (camera, glove) in CameraModel::presets()
+            .into_iter()
+            .flat_map(|camera| [Glove::Cyan, Glove::Orange].map(|glove| (camera.clone(), glove)))
+        {
+            for seed in 0..3 {
+                let mut source = RenderedSource::new(camera.clone(), Pose::FRONTAL, glove, seed).unwrap();
+                for count in 0..=5 {
+                    let scene = Scene { gesture: Some(count), seed };
+                    let frame = source.next_frame(Duration::ZERO, &scene).unwrap();
+                    let seen = perception.observe(&frame.image);
+                    assert!(seen.is_ok(), "{} {glove:?} {scene:?}: {seen:?}", camera.name);
+                }
+                let empty = source.next_frame(Duration::ZERO, &Scene { gesture: None, seed }).unwrap();
+                let seen = perception.observe(&empty.image);
+                assert!(matches!(seen, Err(NoObservation::NoHand(_))), "{} {seen:?}", camera.name);
+            }
+        }
     }
 
     #[test]
