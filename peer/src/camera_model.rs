@@ -4,6 +4,17 @@ use std::time::Duration;
 
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A property of a camera outside its range.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{property} is {value}: choose it from {low} to {high}")]
+pub struct CameraModelError {
+    property: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+}
 
 /// A camera: its geometry and its faults.
 ///
@@ -82,6 +93,31 @@ impl CameraModel {
             gain: 1.0,
             cast_bgr: [0.94, 1.0, 1.05],
             vignetting: 0.15,
+        }
+    }
+
+    /// Whether every property is within its range.
+    ///
+    /// # Errors
+    /// [`CameraModelError`] names the first that is not, and its range.
+    pub fn validate(&self) -> Result<(), CameraModelError> {
+        let [blue, green, red] = self.cast_bgr;
+        let properties = [
+            ("width_px", f64::from(self.width_px), 16.0, 4096.0),
+            ("height_px", f64::from(self.height_px), 16.0, 4096.0),
+            ("fps", self.fps, 0.1, 240.0),
+            ("horizontal_fov_deg", self.horizontal_fov_deg, 10.0, 150.0),
+            ("noise_sigma", self.noise_sigma, 0.0, 64.0),
+            ("blur_sigma_px", self.blur_sigma_px, 0.0, 16.0),
+            ("gain", self.gain, 0.1, 4.0),
+            ("cast_bgr[0]", blue, 0.1, 4.0),
+            ("cast_bgr[1]", green, 0.1, 4.0),
+            ("cast_bgr[2]", red, 0.1, 4.0),
+            ("vignetting", self.vignetting, 0.0, 1.0),
+        ];
+        match properties.into_iter().find(|(_, value, low, high)| !(low..=high).contains(&value)) {
+            Some((property, value, low, high)) => Err(CameraModelError { property, value, low, high }),
+            None => Ok(()),
         }
     }
 

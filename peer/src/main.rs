@@ -1,1 +1,20 @@
-fn main() {}
+//! The command line of Gestalt: see `gestalt --help`.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use gestalt_peer::cli;
+
+fn main() -> ExitCode {
+    let command = cli::Command::parse();
+    cli::start_log();
+    match command.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One line with every cause, whatever line breaks the causes have.
+            let line = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            eprintln!("gestalt: {line}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -118,14 +118,29 @@ pub fn write_png(path: &Path, image: &Mat) -> Result<(), PictureError> {
     // Encoded first and written by us, since OpenCV does not say why a file cannot be written.
     let mut bytes = Vector::new();
     imgcodecs::imencode(".png", image, &mut bytes, &Vector::new())?;
-    fs::write(path, bytes.as_slice()).map_err(|cause| match cause.kind() {
-        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-            PictureError::Permission(path.into())
+    fs::write(path, bytes.as_slice()).map_err(|cause| PictureError::io(path, cause))
+}
+
+/// Finds out whether a picture can be written there, before the work that leads to it is done.
+///
+/// # Errors
+/// [`PictureError`] names the path and what to do about it.
+pub fn writable(path: &Path) -> Result<(), PictureError> {
+    let opened = fs::OpenOptions::new().create(true).append(true).open(path);
+    opened.map(drop).map_err(|cause| PictureError::io(path, cause))
+}
+
+impl PictureError {
+    fn io(path: &Path, cause: io::Error) -> Self {
+        match cause.kind() {
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                Self::Permission(path.into())
+            }
+            io::ErrorKind::NotFound => Self::NoFolder(path.into()),
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull(path.into()),
+            _ => Self::Unwritable { path: path.into(), cause },
         }
-        io::ErrorKind::NotFound => PictureError::NoFolder(path.into()),
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => PictureError::DiskFull(path.into()),
-        _ => PictureError::Unwritable { path: path.into(), cause },
-    })
+    }
 }
 
 fn draw_panel(picture: &mut Mat, panel: &Panel<'_>, corner: Point) -> opencv::Result<()> {

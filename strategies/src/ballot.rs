@@ -64,10 +64,10 @@ impl Ballot {
         self.votes.is_empty()
     }
 
-    /// Whether that robot takes part, seeing or not.
+    /// Whether that robot has seen something, on whatever scale.
     #[must_use]
-    pub fn contains(&self, robot: RobotId) -> bool {
-        self.votes.contains_key(&robot)
+    pub fn has_evidence(&self, robot: RobotId) -> bool {
+        self.votes.get(&robot).is_some_and(|(_, vote)| !vote.evidence.is_empty())
     }
 
     /// Which vote of that robot is held.
@@ -173,7 +173,8 @@ mod tests {
     fn a_null_vote_takes_part_without_counting() {
         let mut ballot = Ballot::default();
         ballot.cast(RobotId(1), stamp(1, 1), vote(&[]));
-        assert!(ballot.contains(RobotId(1)));
+        assert!(!ballot.has_evidence(RobotId(1)));
+        assert_eq!(ballot.len(), 1);
         assert_eq!(ballot.contributors(SCALE), 0);
         assert_eq!(ballot.prevailing_scale(), None);
         assert_eq!(ballot.fuse(FusionRule::Majority, 6.0, SCALE), None);

@@ -1,12 +1,13 @@
 //! How good a classifier is on samples it has not seen.
 
 use gestalt_protocol::ClassId;
+use serde::Serialize;
 
 /// Bins of the calibration error over the confidence, each 1/15 wide.
 pub const CALIBRATION_BINS: usize = 15;
 
 /// A proportion with its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Proportion {
     /// The observed proportion, `0.0..=1.0`.
     pub value: f64,

@@ -97,7 +97,7 @@ impl Round {
         self.said = Some(Said { at: now, envelope, outdated: false });
     }
 
-    /// When this robot stops waiting for live robots that have not voted, and when it gives up.
+    /// When this robot stops waiting for live robots that have not seen anything, and when it gives up.
     pub fn patience_and_deadline(&self, config: &MindConfig) -> (Duration, Duration) {
         (self.since + config.patience, self.since + config.deadline)
     }
@@ -118,7 +118,8 @@ impl Round {
         let (patience, deadline) = self.patience_and_deadline(config);
         let late = now >= deadline;
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
-        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.contains(*robot));
+        // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
+        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.has_evidence(*robot));
         if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
             return;
         }

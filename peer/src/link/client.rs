@@ -12,7 +12,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 
-use super::{Announcement, LinkConfig, LinkError};
+use super::{Announcement, LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
 const MAX_WAITING: usize = 1024;
@@ -53,6 +53,14 @@ impl Client {
             .await
             .map_err(|error| LinkError::open(&*error))?;
         Ok(Decisions(subscriber))
+    }
+
+    /// Everything that happens in the swarm from now on: decisions, who holds which, robots that come and go.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn news(&self) -> Result<News, LinkError> {
+        News::listen(&self.session, self.keys.clone()).await.map_err(|error| LinkError::open(&*error))
     }
 
     /// The account of every robot that answers within `patience`, by robot.

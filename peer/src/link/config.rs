@@ -55,6 +55,14 @@ impl Default for LinkConfig {
 }
 
 impl LinkConfig {
+    /// Whether a robot could be linked like this.
+    ///
+    /// # Errors
+    /// [`LinkError::Config`] names the key and the mend.
+    pub fn check(&self, robot: RobotId) -> Result<(), LinkError> {
+        self.to_zenoh(robot, "gestalt", 0).map(drop)
+    }
+
     /// Zenoh's configuration for that robot.
     ///
     /// The values ahead of the user's own are those a swarm was measured to need: sessions in router mode relay

@@ -8,8 +8,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::rendered::Pinhole;
-use super::{Pose, Sensor, SourceError};
+use super::{Sensor, SourceError};
 use crate::camera_model::CameraModel;
+use crate::pose::Pose;
 
 /// Turns pictures of a hand, taken from the front, into views of one camera from one pose.
 ///

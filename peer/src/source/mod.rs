@@ -17,7 +17,7 @@ use thiserror::Error;
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
 pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image};
-pub use rendered::{Arc, Glove, Pose, RenderedSource, place};
+pub use rendered::{Glove, RenderedSource};
 pub use sensor::Sensor;
 pub use video::Video;
 

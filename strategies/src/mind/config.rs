@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::{FusionRule, MAX_ROBOTS};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Parameters no mind can work with; each names the field and the mend.
@@ -33,8 +34,10 @@ pub enum MindConfigError {
     },
 }
 
-/// How a robot takes part in rounds. All robots of a swarm should share these.
-#[derive(Clone, Debug, PartialEq)]
+/// How a robot takes part in rounds. All robots of a swarm should share these. In a configuration file durations are
+/// written as `"500ms"`, and what is left out is the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct MindConfig {
     /// How votes are fused.
     pub rule: FusionRule,
@@ -48,25 +51,36 @@ pub struct MindConfig {
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
     /// τ: how long until a view has changed enough to count as another look.
+    #[serde(with = "humantime_serde")]
     pub decorrelation: Duration,
-    /// How long a round waits for live robots that have not voted yet, before it decides without them.
+    /// How long a round waits for live robots that have not seen anything yet, before it decides without them. A robot
+    /// that never sees makes every round last this long.
+    #[serde(with = "humantime_serde")]
     pub patience: Duration,
     /// When a round ends undecided, from its opening.
+    #[serde(with = "humantime_serde")]
     pub deadline: Duration,
     /// After hearing of a round, requests to open another have no effect for this long: a copy of the request
     /// for this one may still be on its way.
+    #[serde(with = "humantime_serde")]
     pub refractory: Duration,
     /// The least time between two votes of one robot.
+    #[serde(with = "humantime_serde")]
     pub vote_interval: Duration,
     /// A vote is said again after this long, while the round is open.
+    #[serde(with = "humantime_serde")]
     pub vote_repeat: Duration,
     /// How long the spokesrobot lets decisions meet before it announces the greatest.
+    #[serde(with = "humantime_serde")]
     pub settle: Duration,
     /// How much longer each next robot waits for the announcement before it makes it itself.
+    #[serde(with = "humantime_serde")]
     pub takeover: Duration,
     /// The period of repair between neighbours while a round is open or the neighbourhood has just changed.
+    #[serde(with = "humantime_serde")]
     pub repair_busy: Duration,
     /// The same when nothing happens.
+    #[serde(with = "humantime_serde")]
     pub repair_idle: Duration,
 }
 

@@ -331,20 +331,19 @@ fn one_sure_robot_decides_alone_and_says_what_the_decision_rests_on() {
 }
 
 #[test]
-fn a_round_waits_for_every_live_robot_to_vote_but_not_beyond_patience() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([1, 2, 7])));
-    mind.handle(ms(0), Input::Open);
-    mind.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
-    assert_eq!(mind.held(), None, "robot 2 has not voted");
-    let mut patient = mind_with(7, MindConfig::default());
-    patient.handle(ms(0), Input::Alive(robots([1, 2, 7])));
-    patient.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
-    assert!(
-        patient.handle(ms(20), votes(2, 1, null(1))).iter().any(|o| matches!(o, Output::Hold(_))),
-        "blind votes suffice"
-    );
-    let late = live(&mut mind, ms(3000));
+fn a_round_waits_until_every_live_robot_has_seen_something_but_not_beyond_patience() {
+    let open = || {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(robots([1, 2])));
+        mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
+        mind
+    };
+    let mut all_see = open();
+    all_see.handle(ms(20), votes(2, 1, null(1)));
+    assert_eq!(all_see.held(), None, "robot 2 may be about to see");
+    let decided = all_see.handle(ms(30), votes(2, 2, vote(1, 0, SURE)));
+    assert!(decided.iter().any(|o| matches!(o, Output::Hold(_))));
+    let late = live(&mut open(), ms(3000));
     assert!(late.iter().any(|(at, o)| *at == ms(1000) && matches!(o, Output::Hold(_))));
 }
 

@@ -1,12 +1,12 @@
 //! The rendered source: a drawn, gloved hand as a camera of any model sees it from any pose.
 //!
-//! It needs no data and no device. The hand is a skeleton in space (`hand`), seen through a pinhole (`pose`), drawn
+//! It needs no data and no device. The hand is a skeleton in space (`hand`), seen through a pinhole (`pinhole`), drawn
 //! with depth and light (`raster`) before a room (`backdrop`), and exposed by the camera's sensor. How hard a view
 //! is to read follows from the pose alone: from the side the fingers hide each other, from afar they are few pixels.
 
 mod backdrop;
 mod hand;
-mod pose;
+mod pinhole;
 mod raster;
 mod training;
 
@@ -18,8 +18,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 pub use hand::Glove;
-pub(super) use pose::Pinhole;
-pub use pose::{Arc, Pose, place};
+pub(super) use pinhole::Pinhole;
 pub use training::{LabelledFrame, TrainingFrames};
 
 use hand::Hand;
@@ -27,6 +26,7 @@ use raster::{Light, Rasterizer};
 
 use super::{Frame, Scene, Sensor, Source, SourceError};
 use crate::camera_model::CameraModel;
+use crate::pose::Pose;
 
 /// A robot's camera in a drawn world. The same seed, scenes and frame numbers give the same frames, byte for byte.
 pub struct RenderedSource {

@@ -5,7 +5,7 @@ use opencv::core::{Mat, Vec3b};
 use opencv::prelude::*;
 
 use super::hand::Capsule;
-use super::pose::Pinhole;
+use super::Pinhole;
 
 /// How the scene is lit.
 #[derive(Clone, Copy, Debug)]

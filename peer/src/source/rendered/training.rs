@@ -6,8 +6,9 @@ use opencv::core::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Glove, Pose, RenderedSource};
+use super::{Glove, RenderedSource};
 use crate::camera_model::CameraModel;
+use crate::pose::Pose;
 use crate::source::{Scene, Source, SourceError};
 
 /// A frame whose gesture is known.

@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+"""Prints each decision of a running swarm, from any robot of it.
+
+    pip install eclipse-zenoh
+    python3 examples/subscribe.py --connect tcp/127.0.0.1:7447 --swarm gestalt
+
+One message per decision; `round` tells the rare repeat (a spokesrobot that died while it spoke) from news.
+"""
+import argparse
+import json
+import time
+
+import zenoh
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--connect", "-e", default="tcp/127.0.0.1:7447", help="a robot's endpoint")
+    arguments.add_argument("--swarm", default="gestalt", help="the swarm's name")
+    arguments.add_argument("--count", type=int, default=0, help="stop after so many decisions; 0: never")
+    arguments.add_argument("--json", action="store_true", help="print the messages as they came")
+    given = arguments.parse_args()
+
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([given.connect]))
+
+    with zenoh.open(config) as session:
+        decisions = session.declare_subscriber(f"gestalt/{given.swarm}/decision")
+        seen = 0
+        while given.count == 0 or seen < given.count:
+            # A short wait, so that Ctrl-C is heard between decisions.
+            sample = decisions.try_recv()
+            if sample is None:
+                time.sleep(0.02)
+                continue
+            text = sample.payload.to_string()
+            seen += 1
+            if given.json:
+                print(text, flush=True)
+                continue
+            decision = json.loads(text)
+            what = decision["label"] if decision["class"] is not None else "no decision"
+            robots = len(decision["certificate"]["votes"])
+            print(
+                f"round {decision['round']['counter']}: {what}"
+                f" ({decision['confidence']:.3f}, {robots} robots, {decision['certificate']['elapsed_ms']} ms)",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        pass

@@ -1,0 +1,98 @@
+//! `gestalt watch`: decisions and robots of a running swarm, live.
+
+use serde_json::json;
+
+use super::config_args::ConfigArgs;
+use super::show::{self, say};
+use super::{Failure, interrupted};
+use crate::link::{Client, Heard, News};
+
+/// Attaches to a swarm and prints its decisions, and robots as they come and go, until Ctrl-C.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: ConfigArgs,
+
+    /// Stop after so many decisions
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+
+    /// Print each robot's status once, and stop
+    #[arg(long)]
+    status: bool,
+
+    /// Print one JSON object a line
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When no robot is reached, or the session breaks.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let (swarm, link) = args.config.client()?;
+    super::runtime()?.block_on(async {
+        let client = Client::open(&swarm, &link).await?;
+        if args.status {
+            statuses(args.json, &client).await?;
+        } else {
+            let mut news = client.news().await?;
+            tokio::select! {
+                () = interrupted() => {}
+                watched = watch(args, &mut news) => watched?,
+            }
+        }
+        client.close().await;
+        Ok(())
+    })
+}
+
+async fn watch(args: &Args, news: &mut News) -> Result<(), Failure> {
+    let mut decisions = 0;
+    while let Some(heard) = news.next().await {
+        match heard {
+            Heard::Decided(it) => {
+                let words = show::decision(&it.decision, it.label.as_deref());
+                say(args.json, &json!({"event": "decision", "decision": it}), &words)?;
+                decisions += 1;
+                if args.count.is_some_and(|count| decisions >= count) {
+                    break;
+                }
+            }
+            Heard::Came(robot) => {
+                say(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} came"))?;
+            }
+            Heard::Left(robot) => {
+                say(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
+            }
+            // What each robot holds is in the decision's own message already.
+            Heard::Held(..) => {}
+        }
+    }
+    Ok(())
+}
+
+async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
+    for status in client.statuses(super::ANSWER).await? {
+        let state = match (status.round, status.open) {
+            (Some(round), true) => format!("round {round} open"),
+            (Some(round), false) => format!("round {round} over"),
+            (None, _) => "no round yet".to_owned(),
+        };
+        let mut words = format!(
+            "{} {}: camera {}, model {}, {state}, linked to {}, {} alive",
+            status.robot,
+            status.name,
+            status.camera,
+            status.model,
+            show::robots(&status.neighbours),
+            status.alive.len()
+        );
+        if let Some(error) = status.errors.last() {
+            words.push_str(&format!(", last error: {}", error.what));
+        }
+        say(as_json, &serde_json::to_value(&status)?, &words)?;
+    }
+    Ok(())
+}

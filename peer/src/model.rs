@@ -1,0 +1,121 @@
+//! The classifier a robot starts with, and the features it needs to be shown.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{
+    Classifier, Progress, Sample, TrainError, TrainOptions, Vocabulary, train,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+use crate::config::ModelSection;
+use crate::model_file::{self, ModelFileError};
+use crate::perception::{FeatureSet, FeatureSetError, HandConfig, Perception, PerceptionError};
+use crate::source::rendered::TrainingFrames;
+use crate::source::{Glove, SourceError};
+
+/// A classifier with what its user must know of it.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The classifier.
+    pub classifier: Arc<Classifier>,
+    /// The features it was trained on.
+    pub features: FeatureSet,
+    /// Its name for people.
+    pub name: String,
+}
+
+/// Why there is no model.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// The file.
+    #[error(transparent)]
+    File(#[from] ModelFileError),
+    /// The file holds a classifier for features that this program cannot compute.
+    #[error("model {path}: {cause}; train it again with this release")]
+    Features {
+        /// Which file.
+        path: PathBuf,
+        /// Which features.
+        cause: FeatureSetError,
+    },
+    /// No frames to train on.
+    #[error("training on drawn hands: {0}")]
+    Source(#[from] SourceError),
+    /// No perception to train with.
+    #[error("training on drawn hands: {0}")]
+    Perception(#[from] PerceptionError),
+    /// The training itself.
+    #[error("training on drawn hands: {0}")]
+    Training(#[from] TrainError),
+}
+
+/// How many drawn frames the embedded model is trained on.
+const RENDERED_FRAMES: usize = 1500;
+
+impl Model {
+    /// The model a configuration names; `None` for a robot without one. `progress` is told how far a training has
+    /// come, as done and total.
+    ///
+    /// # Errors
+    /// See [`ModelError`].
+    pub fn load(section: &ModelSection, progress: impl FnMut(usize, usize)) -> Result<Option<Self>, ModelError> {
+        match section {
+            ModelSection::None => Ok(None),
+            ModelSection::Rendered => {
+                let classifier = train_on_rendered(progress)?;
+                Self::new(classifier, "trained on drawn hands".to_owned(), PathBuf::new()).map(Some)
+            }
+            ModelSection::File(path) => {
+                let classifier = model_file::read(path)?;
+                Self::new(classifier, path.display().to_string(), path.clone()).map(Some)
+            }
+        }
+    }
+
+    /// Writes its classifier to a file.
+    ///
+    /// # Errors
+    /// [`ModelError::File`].
+    pub fn write(&self, path: &Path) -> Result<(), ModelError> {
+        Ok(model_file::write(path, &self.classifier)?)
+    }
+
+    fn new(classifier: Classifier, name: String, path: PathBuf) -> Result<Self, ModelError> {
+        let features =
+            classifier.feature_set().parse().map_err(|cause| ModelError::Features { path, cause })?;
+        Ok(Self { classifier: Arc::new(classifier), features, name })
+    }
+}
+
+/// Trains the embedded model: gestures `0` to `5`, drawn for all cameras, from the same seed every time.
+///
+/// # Errors
+/// See [`ModelError`].
+pub fn train_on_rendered(mut progress: impl FnMut(usize, usize)) -> Result<Classifier, ModelError> {
+    const SEED: u64 = 2026;
+    let features = FeatureSet::Shape;
+    let mut perception = Perception::new(features, HandConfig::default())?;
+    let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])
+        .expect("six different labels of one letter are a vocabulary");
+    let mut samples = Vec::with_capacity(RENDERED_FRAMES);
+    // The robots of a swarm stand within ±80°; frames without a hand to be found teach nothing.
+    for frame in TrainingFrames::new(Vec::new(), Glove::default(), 80.0, SEED).take(RENDERED_FRAMES) {
+        let frame = frame?;
+        if let Ok(observation) = perception.observe(&frame.image) {
+            samples.push(Sample {
+                features: observation.features,
+                class: ClassId(frame.class),
+                group: Some(frame.group),
+            });
+        }
+        progress(samples.len(), RENDERED_FRAMES);
+    }
+    let options = TrainOptions { costs: vec![8.0], gammas: vec![1.0], ..TrainOptions::default() };
+    let trained =
+        train(features.name(), &vocabulary, &samples, &options, &mut ChaCha8Rng::seed_from_u64(SEED), |_: Progress| {})?;
+    Ok(trained.classifier)
+}
