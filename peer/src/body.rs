@@ -8,7 +8,7 @@ use tokio::task::JoinHandle;
 use crate::config::Config;
 use crate::eye::{Eye, EyeError, Seen, look};
 use crate::link::{LinkError, Robot, RobotConfig, fresh_nonce};
-use crate::model::Model;
+use crate::model::RobotModel;
 
 /// Why a robot cannot start.
 #[derive(Debug, Error)]
@@ -38,7 +38,7 @@ impl Body {
     /// See [`BodyError`].
     pub async fn start(
         config: &Config,
-        model: Option<Model>,
+        model: Option<RobotModel>,
         boot: u32,
     ) -> Result<Self, BodyError> {
         let eye = match &model {

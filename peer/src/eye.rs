@@ -13,7 +13,7 @@ use tokio::sync::broadcast::Receiver;
 use crate::config::{CameraSection, SourceSection};
 use crate::human::Human;
 use crate::link::{Event, Robot};
-use crate::model::Model;
+use crate::model::RobotModel;
 use crate::perception::{HandConfig, NoObservation, Perception, PerceptionError};
 use crate::source::{Glove, ImageFolder, RenderedSource, Source, SourceError, Video};
 
@@ -71,7 +71,7 @@ impl Eye {
     ///
     /// # Errors
     /// See [`EyeError`].
-    pub fn open(camera: &CameraSection, model: &Model, robot: RobotId) -> Result<Option<Self>, EyeError> {
+    pub fn open(camera: &CameraSection, model: &RobotModel, robot: RobotId) -> Result<Option<Self>, EyeError> {
         let properties = camera.model.properties();
         let period = properties.period();
         let mut human = Human::new(0);

@@ -5,6 +5,8 @@ pub mod body;
 pub mod camera_model;
 pub mod cli;
 pub mod config;
+pub mod confusion;
+pub mod dataset;
 #[cfg(feature = "opencv")]
 pub mod eye;
 #[cfg(feature = "opencv")]
@@ -12,7 +14,6 @@ pub mod human;
 pub mod link;
 #[cfg(feature = "opencv")]
 pub mod model;
-#[cfg(feature = "opencv")]
 pub mod model_file;
 #[cfg(feature = "opencv")]
 pub mod perception;
@@ -21,6 +22,8 @@ pub mod picture;
 pub mod pose;
 #[cfg(feature = "opencv")]
 pub mod source;
+#[cfg(feature = "opencv")]
+pub mod survey;
 #[cfg(feature = "opencv")]
 pub mod swarm;
 pub mod topology;

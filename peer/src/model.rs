@@ -12,14 +12,14 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use crate::config::ModelSection;
-use crate::model_file::{self, ModelFileError};
+use crate::model_file::{Model, ModelFileError, Origin};
 use crate::perception::{FeatureSet, FeatureSetError, HandConfig, Perception, PerceptionError};
 use crate::source::rendered::TrainingFrames;
 use crate::source::{Glove, SourceError};
 
 /// A classifier with what its user must know of it.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub struct RobotModel {
     /// The classifier.
     pub classifier: Arc<Classifier>,
     /// The features it was trained on.
@@ -56,7 +56,7 @@ pub enum ModelError {
 /// How many drawn frames the embedded model is trained on.
 const RENDERED_FRAMES: usize = 1500;
 
-impl Model {
+impl RobotModel {
     /// The model a configuration names; `None` for a robot without one. `progress` is told how far a training has
     /// come, as done and total.
     ///
@@ -70,7 +70,7 @@ impl Model {
                 Self::new(classifier, "trained on drawn hands".to_owned(), PathBuf::new()).map(Some)
             }
             ModelSection::File(path) => {
-                let classifier = model_file::read(path)?;
+                let classifier = Model::read(path)?.classifier;
                 Self::new(classifier, path.display().to_string(), path.clone()).map(Some)
             }
         }
@@ -81,7 +81,8 @@ impl Model {
     /// # Errors
     /// [`ModelError::File`].
     pub fn write(&self, path: &Path) -> Result<(), ModelError> {
-        Ok(model_file::write(path, &self.classifier)?)
+        let origin = Origin { dataset: self.name.clone(), ..Origin::default() };
+        Ok(Model { classifier: Classifier::clone(&self.classifier), origin }.write(path)?)
     }
 
     fn new(classifier: Classifier, name: String, path: PathBuf) -> Result<Self, ModelError> {

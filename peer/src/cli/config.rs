@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::show::say;
+use super::show::line;
 use super::Failure;
 use crate::config::Config;
 
@@ -26,10 +26,9 @@ pub struct Args {
 /// What is wrong with the file, by key.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let Some(path) = &args.check else {
-        println!("{}", serde_json::to_string_pretty(&Config::default())?);
-        return Ok(());
+        return super::say(&format!("{}\n", serde_json::to_string_pretty(&Config::default())?));
     };
     let config = Config::read(path)?;
     let words = format!("{}: fit for {} of swarm '{}'", path.display(), config.name(), config.swarm.0);
-    say(args.json, &json!({"file": path, "valid": true, "config": config}), &words)
+    line(args.json, &json!({"file": path, "valid": true, "config": config}), &words)
 }

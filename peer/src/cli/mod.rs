@@ -2,18 +2,26 @@
 
 mod config;
 mod config_args;
+#[cfg(feature = "opencv")]
+mod evaluate;
 mod open;
 #[cfg(feature = "opencv")]
 mod peer;
+#[cfg(feature = "opencv")]
+mod progress;
+#[cfg(feature = "opencv")]
+mod report;
 mod show;
 #[cfg(feature = "opencv")]
 mod swarm;
+#[cfg(feature = "opencv")]
+mod train;
 mod watch;
 
+use std::io::{self, Write};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use tracing_subscriber::EnvFilter;
 
 /// A swarm of robots that reads hand gestures together.
@@ -36,6 +44,12 @@ enum Verb {
     Watch(watch::Args),
     /// Tell a running swarm to look: open a round
     Open(open::Args),
+    /// Learn a classifier from a folder of pictures
+    #[cfg(feature = "opencv")]
+    Train(train::Args),
+    /// Measure a classifier on a folder of pictures
+    #[cfg(feature = "opencv")]
+    Evaluate(evaluate::Args),
     /// Check a robot's configuration
     Config(config::Args),
 }
@@ -59,6 +73,10 @@ impl Command {
             Verb::Swarm(args) => swarm::run(&args),
             Verb::Watch(args) => watch::run(&args),
             Verb::Open(args) => open::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Train(args) => train::run(args),
+            #[cfg(feature = "opencv")]
+            Verb::Evaluate(args) => evaluate::run(args),
             Verb::Config(args) => config::run(&args),
         }
     }
@@ -83,11 +101,14 @@ async fn interrupted() {
     }
 }
 
-/// A progress bar on stderr, hidden where stderr is no terminal.
-fn bar(what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}")
-        .expect("the template is a constant that every start of a bar has proven");
-    ProgressBar::new(0).with_style(style).with_message(what)
+/// Writes a report to stdout, and sends it off at once: whoever reads may be a program that waits for it. A reader
+/// that has seen enough (`| head`) is no failure.
+fn say(report: &str) -> Result<(), Failure> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
 }
 
 /// Reads `500ms`, `2s`, `1m 30s`.

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::Failure;
 use super::config_args::ConfigArgs;
-use super::show::{self, say};
+use super::show::{self, line};
 use crate::link::Client;
 
 /// Opens a round as an instructor, and prints the swarm's decision.
@@ -46,6 +46,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .map_err(|_| format!("no decision within {:?}: is a robot of swarm '{swarm}' alive?", args.patience))?
             .ok_or("the session has ended")?;
         let words = show::decision(&decided.decision, decided.label.as_deref());
-        say(args.json, &json!({"event": "decision", "decision": decided}), &words)
+        line(args.json, &json!({"event": "decision", "decision": decided}), &words)
     })
 }

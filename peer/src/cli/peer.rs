@@ -6,11 +6,12 @@ use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::ConfigArgs;
-use super::show::{self, say};
-use super::{Failure, bar, interrupted};
+use super::show::{self, line};
+use super::progress::bar;
+use super::{Failure, interrupted};
 use crate::body::{Body, boot_number};
 use crate::link::Event;
-use crate::model::Model;
+use crate::model::RobotModel;
 
 /// Runs one robot until Ctrl-C.
 #[derive(Debug, clap::Args)]
@@ -33,8 +34,8 @@ pub struct Args {
 /// Whatever keeps the robot from starting.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let config = args.config.load()?;
-    let training = bar("training on drawn hands");
-    let model = Model::load(&config.model, |done, total| {
+    let training = bar("learning", 0);
+    let model = RobotModel::load(&config.model, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?;
@@ -42,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let body = Body::start(&config, model, boot_number(SystemTime::now())).await?;
         let mut events = body.robot().events();
-        say(
+        line(
             args.json,
             &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "locators": body.robot().locators()}),
             &format!("{} of swarm '{}' listens on {}", config.name(), config.swarm.0, body.robot().locators().join(" ")),
@@ -79,27 +80,27 @@ async fn tick(schedule: &mut Option<tokio::time::Interval>) {
 fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
     match event {
         Event::Opened(round) => {
-            say(as_json, &json!({"event": "opened", "round": round}), &format!("round {round} opens"))
+            line(as_json, &json!({"event": "opened", "round": round}), &format!("round {round} opens"))
         }
         Event::Closed(round) => {
-            say(as_json, &json!({"event": "closed", "round": round}), &format!("round {round} is over"))
+            line(as_json, &json!({"event": "closed", "round": round}), &format!("round {round} is over"))
         }
-        Event::Held(decision) => say(
+        Event::Held(decision) => line(
             as_json,
             &json!({"event": "held", "decision": decision}),
             &format!("holds {}", show::decision(decision, None)),
         ),
-        Event::Announced(announcement) => say(
+        Event::Announced(announcement) => line(
             as_json,
             &json!({"event": "announced", "decision": announcement}),
             &format!("swarm: {}", show::decision(&announcement.decision, announcement.label.as_deref())),
         ),
-        Event::Neighbours(robots) => say(
+        Event::Neighbours(robots) => line(
             as_json,
             &json!({"event": "neighbours", "robots": robots}),
             &format!("linked to {}", show::robots(robots)),
         ),
-        Event::Alive(robots) => say(
+        Event::Alive(robots) => line(
             as_json,
             &json!({"event": "alive", "robots": robots}),
             &format!("alive beside it: {}", show::robots(robots)),

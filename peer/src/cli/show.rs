@@ -1,23 +1,15 @@
 //! Decisions and robots in words, and results as lines on stdout.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 
 use gestalt_protocol::{ClassId, Decision, FusionRule, RobotId};
 use serde_json::Value;
 
 use super::Failure;
 
-/// Prints one result: as a JSON object on a line of its own, or in words. It is sent off at once: whoever reads
-/// may be a program that waits for it.
-pub(super) fn say(as_json: bool, object: &Value, words: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    if as_json {
-        writeln!(out, "{object}")?;
-    } else {
-        writeln!(out, "{words}")?;
-    }
-    Ok(out.flush()?)
+/// Prints one result on a line of its own: as a JSON object, or in words.
+pub(super) fn line(as_json: bool, object: &Value, words: &str) -> Result<(), Failure> {
+    super::say(&if as_json { format!("{object}\n") } else { format!("{words}\n") })
 }
 
 /// A decision with its certificate in short: `round 3@1: three .998 (8 robots in 812 ms, log pool: 1→3 2→2 …)`.

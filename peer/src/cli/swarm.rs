@@ -10,13 +10,14 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
-use super::show::{self, say};
-use super::{Failure, bar, interrupted};
+use super::show::{self, line};
+use super::progress::bar;
+use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::{CameraSection, Config, ModelSection, RenderedSection, SourceSection};
 use crate::human::Human;
 use crate::link::{Announcement, Client, LinkConfig, News};
-use crate::model::Model;
+use crate::model::RobotModel;
 use crate::picture::{self, Panel};
 use crate::pose::place;
 use crate::swarm::{Members, Roster, Score, Tally};
@@ -84,8 +85,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         picture::writable(picture)?;
     }
     let section = args.model.clone().map_or(ModelSection::Rendered, ModelSection::File);
-    let training = bar("training on drawn hands");
-    let model = Model::load(&section, |done, total| {
+    let training = bar("learning", 0);
+    let model = RobotModel::load(&section, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?
@@ -99,13 +100,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-async fn show_gestures(args: &Args, model: &Model) -> Result<(), Failure> {
+async fn show_gestures(args: &Args, model: &RobotModel) -> Result<(), Failure> {
     let configs = plan(args)?;
     let links = args.topology.links(configs.len(), &mut ChaCha8Rng::seed_from_u64(args.seed));
     let folder = tempfile::tempdir()?;
     let began = Instant::now();
-    let starting = bar("starting robots");
-    starting.set_length(configs.len() as u64);
+    let starting = bar("starting", configs.len());
     let started = |n| starting.set_position(n as u64);
     let (members, endpoints) = if args.processes {
         let configs = with_model_file(configs.clone(), model, folder.path())?;
@@ -118,7 +118,7 @@ async fn show_gestures(args: &Args, model: &Model) -> Result<(), Failure> {
     let client = Client::open(&args.swarm, &link).await?;
     let mut news = client.news().await?;
     wait_for_all(&client, configs.len()).await?;
-    say(
+    line(
         args.json,
         &json!({"event": "started", "robots": configs.len(), "links": links, "endpoints": endpoints, "seconds": began.elapsed().as_secs_f64()}),
         &format!(
@@ -159,7 +159,7 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
 }
 
 /// The same configurations, all with this model, written to a file that every process reads.
-fn with_model_file(mut configs: Vec<Config>, model: &Model, folder: &Path) -> Result<Vec<Config>, Failure> {
+fn with_model_file(mut configs: Vec<Config>, model: &RobotModel, folder: &Path) -> Result<Vec<Config>, Failure> {
     let file = folder.join("swarm.model");
     model.write(&file)?;
     for config in &mut configs {
@@ -210,7 +210,7 @@ async fn rounds(
         let held = news.holding(decision.round);
         let holding = held.iter().filter(|(_, held)| held.class == decision.class).count();
         let right = decision.class == Some(truth);
-        say(
+        line(
             args.json,
             &json!({"event": "decision", "shown": truth, "right": right, "holding": holding, "decision": announcement}),
             &format!(
@@ -229,7 +229,7 @@ async fn rounds(
         }
     }
     if let Some(path) = &args.picture {
-        say(args.json, &json!({"event": "picture", "file": path}), &format!("what every robot saw: {}", path.display()))?;
+        line(args.json, &json!({"event": "picture", "file": path}), &format!("what every robot saw: {}", path.display()))?;
     }
     Ok(tally.score())
 }
@@ -302,7 +302,7 @@ fn say_score(args: &Args, configs: &[Config], score: &Score) -> Result<(), Failu
         .iter()
         .filter_map(|(robot, accuracy)| Some(format!("{} {:.0} %", each.get(robot)?, 100.0 * accuracy)))
         .collect();
-    say(
+    line(
         args.json,
         &json!({"event": "score", "score": score}),
         &format!(

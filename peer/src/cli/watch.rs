@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::config_args::ConfigArgs;
-use super::show::{self, say};
+use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::link::{Client, Heard, News};
 
@@ -54,17 +54,17 @@ async fn watch(args: &Args, news: &mut News) -> Result<(), Failure> {
         match heard {
             Heard::Decided(it) => {
                 let words = show::decision(&it.decision, it.label.as_deref());
-                say(args.json, &json!({"event": "decision", "decision": it}), &words)?;
+                line(args.json, &json!({"event": "decision", "decision": it}), &words)?;
                 decisions += 1;
                 if args.count.is_some_and(|count| decisions >= count) {
                     break;
                 }
             }
             Heard::Came(robot) => {
-                say(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} came"))?;
+                line(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} came"))?;
             }
             Heard::Left(robot) => {
-                say(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
+                line(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
             }
             // What each robot holds is in the decision's own message already.
             Heard::Held(..) => {}
@@ -92,7 +92,7 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
         if let Some(error) = status.errors.last() {
             words.push_str(&format!(", last error: {}", error.what));
         }
-        say(as_json, &serde_json::to_value(&status)?, &words)?;
+        line(as_json, &serde_json::to_value(&status)?, &words)?;
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use tokio::process::{Child, ChildStdout, Command};
 
 use crate::body::{Body, BodyError, boot_number};
 use crate::config::Config;
-use crate::model::Model;
+use crate::model::RobotModel;
 
 /// How long a process may take until it listens.
 const START: Duration = Duration::from_secs(30);
@@ -59,7 +59,7 @@ impl Members {
     pub async fn here(
         configs: &[Config],
         links: &[(usize, usize)],
-        model: &Model,
+        model: &RobotModel,
         mut started: impl FnMut(usize),
     ) -> Result<(Self, Vec<String>), MembersError> {
         let mut bodies: Vec<Body> = Vec::new();

@@ -1,0 +1,82 @@
+//! The outcome of a measurement, as text and as JSON.
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{Evaluation, Proportion, Vocabulary};
+use serde_json::json;
+
+use crate::confusion;
+use crate::survey::{Rejected, Survey};
+
+/// The accuracy over all images that can be read: one whose hand is not found is not judged right.
+pub fn of_all(evaluation: &Evaluation, survey: &Survey) -> Option<Proportion> {
+    let right = (0..).zip(evaluation.confusion()).map(|(class, row): (usize, _)| row[class]).sum();
+    Proportion::wilson(right, evaluation.count() + survey.without_hand.len() as u64)
+}
+
+/// The measurement as text.
+pub fn text(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -> String {
+    let mut text = format!("  accuracy          {}\n", proportion(evaluation.accuracy()));
+    if !survey.without_hand.is_empty() {
+        text += &format!(
+            "  of all images     {}   no hand found in {}\n",
+            proportion(of_all(evaluation, survey)),
+            survey.without_hand.len()
+        );
+    }
+    if let (Some(error), Some(loss)) = (evaluation.calibration_error(), evaluation.log_loss()) {
+        text += &format!("  calibration error {error:.3}   log loss {loss:.3}\n");
+    }
+    text + "\n" + &confusion::table(evaluation, vocabulary)
+}
+
+/// The measurement as a JSON object.
+pub fn json(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -> serde_json::Value {
+    let proportion =
+        |p: Option<Proportion>| p.map(|p| json!({ "value": p.value, "low": p.low, "high": p.high }));
+    let classes: Vec<_> = (0_u8..)
+        .zip(vocabulary.labels())
+        .map(|(class, label)| {
+            json!({
+                "gesture": label,
+                "precision": evaluation.precision(ClassId(class)).map(|p| p.value),
+                "recall": evaluation.recall(ClassId(class)).map(|p| p.value),
+            })
+        })
+        .collect();
+    json!({
+        "images": evaluation.count(),
+        "without_hand": survey.without_hand.len(),
+        "unreadable": survey.unreadable.len(),
+        "accuracy": proportion(evaluation.accuracy()),
+        "accuracy_of_all": proportion(of_all(evaluation, survey)),
+        "calibration_error": evaluation.calibration_error(),
+        "log_loss": evaluation.log_loss(),
+        "classes": classes,
+        "confusion": evaluation.confusion(),
+    })
+}
+
+/// Says on stderr which files could not be used.
+pub fn rejected(survey: &Survey) {
+    let tell = |what: &str, rejected: &[Rejected]| {
+        for Rejected { image, cause } in rejected.iter().take(3) {
+            eprintln!("warning: {}: {cause}", image.path.display());
+        }
+        if rejected.len() > 3 {
+            eprintln!("warning: {} images {what} in all", rejected.len());
+        }
+    };
+    tell("cannot be read", &survey.unreadable);
+    tell("show no hand", &survey.without_hand);
+}
+
+/// Says on stderr which folders were left out.
+pub fn ignored(folders: &[String]) {
+    if !folders.is_empty() {
+        eprintln!("note: left out the folders {}", folders.join(", "));
+    }
+}
+
+fn proportion(p: Option<Proportion>) -> String {
+    p.map_or_else(|| "none".to_owned(), |p| format!("{:.3} (95 % {:.3} to {:.3})", p.value, p.low, p.high))
+}

@@ -1,0 +1,328 @@
+//! A trained classifier on disk.
+//!
+//! ```text
+//! magic "GESTALT\n" │ version u16 │ length of the body u64 │ CRC-32 of the body u32 │ body (postcard)
+//! ```
+//! Numbers are little-endian.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use gestalt_strategies::{Classifier, MAX_MODEL, ModelError};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+const MAGIC: &[u8; 8] = b"GESTALT\n";
+/// The layout of the file; another layout gets another number.
+const VERSION: u16 = 1;
+const HEADER: usize = 8 + 2 + 8 + 4;
+/// Longest body that is read: a classifier, and the record of its training.
+const MAX_BODY: u64 = 2 * MAX_MODEL as u64;
+
+/// A file that is no usable model.
+#[derive(Debug, Error)]
+pub enum ModelFileError {
+    /// It cannot be read or written.
+    #[error("cannot {action} the model {}: {source}", path.display())]
+    Io {
+        /// `read` or `write`.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Something else altogether.
+    #[error("{} is no model: `gestalt train` writes one", .0.display())]
+    NotAModel(PathBuf),
+    /// Written by another version of the program.
+    #[error("the model {} has file version {found}, this program reads version {VERSION}: train it anew", path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u16,
+    },
+    /// Its end is missing.
+    #[error("the model {} is cut short: {found} of {expected} bytes; copy it again or train it anew", path.display())]
+    CutShort {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of the body that are there.
+        found: u64,
+        /// Bytes of the body that its header promises.
+        expected: u64,
+    },
+    /// Its contents are not those that were written.
+    #[error("the model {} is damaged (checksum): copy it again or train it anew", .0.display())]
+    Damaged(PathBuf),
+    /// Checksum right, contents wrong: written by another program.
+    #[error("the model {} cannot be used: {source}", path.display())]
+    Contents {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: ModelError,
+    },
+    /// Larger than any model.
+    #[error("the model {} claims {size} bytes, more than the {MAX_BODY} a model may take", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Bytes it claims.
+        size: u64,
+    },
+    /// Trained on other features than those that are computed here.
+    #[error(
+        "the model takes {expected} features of the set '{model}', perception gives {found} of '{perception}': train a model for '{perception}'"
+    )]
+    FeatureSet {
+        /// The model's feature set.
+        model: String,
+        /// How many features the model takes.
+        expected: usize,
+        /// Perception's feature set.
+        perception: String,
+        /// How many features perception gives.
+        found: usize,
+    },
+}
+
+/// How a model came to be: what must be known to measure it honestly, and to make it again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Name of the dataset's folder.
+    pub dataset: String,
+    /// The people it has seen in training, by the numbers of that dataset.
+    pub people: Vec<u32>,
+    /// The [fingerprints](crate::dataset::LabelledImage::fingerprint) of the images it has seen in training, ascending.
+    pub images: Vec<u64>,
+    /// The seed of the training.
+    pub seed: u64,
+    /// The chosen C.
+    pub cost: f64,
+    /// The chosen γ, in units of 1 / (total variance of the reduced samples).
+    pub gamma: f64,
+}
+
+/// A classifier and its origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// What judges.
+    pub classifier: Classifier,
+    /// How it came to be.
+    pub origin: Origin,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Body {
+    origin: Origin,
+    classifier: Vec<u8>,
+}
+
+impl Model {
+    /// Reads a model. Any file gives a model or an error.
+    ///
+    /// # Errors
+    /// See [`ModelFileError`].
+    pub fn read(path: &Path) -> Result<Self, ModelFileError> {
+        let failed = |source| ModelFileError::Io { action: "read", path: path.to_owned(), source };
+        // Opening a folder succeeds, and a pipe would never end.
+        if !fs::metadata(path).map_err(failed)?.is_file() {
+            return Err(failed(io::Error::other("it is not a regular file")));
+        }
+        let mut file = File::open(path).map_err(failed)?.take(HEADER as u64 + MAX_BODY + 1);
+        let mut header = [0; HEADER];
+        if let Err(error) = file.read_exact(&mut header) {
+            return Err(match error.kind() {
+                io::ErrorKind::UnexpectedEof => ModelFileError::NotAModel(path.to_owned()),
+                _ => failed(error),
+            });
+        }
+        let (magic, rest) = header.split_at(8);
+        let (version, rest) = rest.split_at(2);
+        let (length, checksum) = rest.split_at(8);
+        if magic != MAGIC {
+            return Err(ModelFileError::NotAModel(path.to_owned()));
+        }
+        let version = little_endian(version) as u16;
+        if version != VERSION {
+            return Err(ModelFileError::Version { path: path.to_owned(), found: version });
+        }
+        let expected = little_endian(length);
+        if expected > MAX_BODY {
+            return Err(ModelFileError::TooLarge { path: path.to_owned(), size: expected });
+        }
+        let mut body = Vec::new();
+        file.read_to_end(&mut body).map_err(failed)?;
+        let found = body.len() as u64;
+        if found < expected {
+            return Err(ModelFileError::CutShort { path: path.to_owned(), found, expected });
+        }
+        if found > expected || u64::from(crc32fast::hash(&body)) != little_endian(checksum) {
+            return Err(ModelFileError::Damaged(path.to_owned()));
+        }
+        let contents = |source| ModelFileError::Contents { path: path.to_owned(), source };
+        let body: Body = postcard::from_bytes(&body).map_err(|_| contents(ModelError::Malformed))?;
+        let classifier = Classifier::decode(&body.classifier).map_err(contents)?;
+        Ok(Self { classifier, origin: body.origin })
+    }
+
+    /// Writes the model: to a temporary file beside `path`, which then takes its name, so that no reader ever
+    /// sees half a model and an older one survives a failure.
+    ///
+    /// # Errors
+    /// [`ModelFileError::Io`]; nothing has changed then.
+    pub fn write(&self, path: &Path) -> Result<(), ModelFileError> {
+        let body = Body { origin: self.origin.clone(), classifier: self.classifier.encode() };
+        let body =
+            postcard::to_stdvec(&body).expect("postcard writes every value of known length into a vector");
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend(VERSION.to_le_bytes());
+        bytes.extend((body.len() as u64).to_le_bytes());
+        bytes.extend(crc32fast::hash(&body).to_le_bytes());
+        bytes.extend(body);
+
+        let temporary = temporary(path);
+        let written = File::create(&temporary)
+            .and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()))
+            .and_then(|()| fs::rename(&temporary, path));
+        written.map_err(|source| {
+            // What could not be created cannot be removed; the first error is the one that tells.
+            let _ = fs::remove_file(&temporary);
+            ModelFileError::Io { action: "write", path: path.to_owned(), source }
+        })
+    }
+
+    /// Finds out whether [`Self::write`] can succeed, before the work of training is done.
+    ///
+    /// # Errors
+    /// [`ModelFileError::Io`] when the folder does not exist or may not be written.
+    pub fn check_writable(path: &Path) -> Result<(), ModelFileError> {
+        let temporary = temporary(path);
+        let failed = |source| ModelFileError::Io { action: "write", path: path.to_owned(), source };
+        if path.is_dir() {
+            return Err(failed(io::Error::other("it is a folder")));
+        }
+        File::create(&temporary).map_err(failed)?;
+        fs::remove_file(&temporary).map_err(failed)
+    }
+
+    /// Checks that the model takes what perception gives.
+    ///
+    /// # Errors
+    /// [`ModelFileError::FeatureSet`].
+    pub fn check_features(&self, name: &str, length: usize) -> Result<(), ModelFileError> {
+        if self.classifier.feature_set() == name && self.classifier.features() == length {
+            return Ok(());
+        }
+        Err(ModelFileError::FeatureSet {
+            model: self.classifier.feature_set().to_owned(),
+            expected: self.classifier.features(),
+            perception: name.to_owned(),
+            found: length,
+        })
+    }
+}
+
+fn little_endian(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
+/// A name beside `path` that no other process takes: a rename within one folder is atomic.
+fn temporary(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.tmp", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::ClassId;
+    use gestalt_strategies::{Sample, TrainOptions, Vocabulary, train};
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+
+    use super::*;
+
+    fn model() -> Model {
+        let sample = |i: u8| Sample {
+            features: vec![f32::from(i % 2), f32::from(i) / 10.0],
+            class: ClassId(i % 2),
+            group: None,
+        };
+        let samples: Vec<Sample> = (0..10).map(sample).collect();
+        let vocabulary = Vocabulary::new(["fist", "palm"]).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let trained =
+            train("toy-1", &vocabulary, &samples, &TrainOptions::default(), &mut rng, |_| ()).unwrap();
+        let origin = Origin { dataset: "toys".to_owned(), people: vec![3, 5], seed: 1, ..Origin::default() };
+        Model { classifier: trained.classifier, origin }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hands.model");
+        let model = model();
+        Model::check_writable(&path).unwrap();
+        model.write(&path).unwrap();
+        model.write(&path).unwrap();
+        assert_eq!(Model::read(&path).unwrap(), model);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+    }
+
+    #[test]
+    fn a_model_that_is_not_whole_is_refused_by_its_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hands.model");
+        model().write(&path).unwrap();
+        let whole = fs::read(&path).unwrap();
+        let read = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            Model::read(&path).unwrap_err()
+        };
+
+        for length in [0, 5, HEADER - 1] {
+            assert!(matches!(read(&whole[..length]), ModelFileError::NotAModel(_)), "{length}");
+        }
+        for length in [HEADER, whole.len() / 2, whole.len() - 1] {
+            assert!(matches!(read(&whole[..length]), ModelFileError::CutShort { .. }), "{length}");
+        }
+        let changed = |index: usize, value: u8| {
+            let mut bytes = whole.clone();
+            bytes[index] = value;
+            bytes
+        };
+        assert!(matches!(read(&changed(0, b'X')), ModelFileError::NotAModel(_)));
+        assert!(matches!(read(&changed(8, 9)), ModelFileError::Version { found: 9, .. }));
+        assert!(matches!(read(&changed(17, 1)), ModelFileError::TooLarge { .. }));
+        for index in [18, HEADER, whole.len() / 2, whole.len() - 1] {
+            let damaged = changed(index, whole[index] ^ 1);
+            assert!(matches!(read(&damaged), ModelFileError::Damaged(_)), "byte {index}");
+        }
+        assert!(matches!(read(&[&whole[..], &[0]].concat()), ModelFileError::Damaged(_)));
+    }
+
+    #[test]
+    fn what_cannot_be_read_or_written_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(Model::read(folder.path()), Err(ModelFileError::Io { action: "read", .. })));
+        let nowhere = folder.path().join("missing/hands.model");
+        assert!(matches!(Model::read(&nowhere), Err(ModelFileError::Io { .. })));
+        for path in [nowhere.as_path(), folder.path()] {
+            assert!(matches!(Model::check_writable(path), Err(ModelFileError::Io { action: "write", .. })));
+            assert!(matches!(model().write(path), Err(ModelFileError::Io { action: "write", .. })));
+        }
+    }
+
+    #[test]
+    fn a_model_of_other_features_is_refused() {
+        let model = model();
+        assert!(model.check_features("toy-1", 2).is_ok());
+        let error = model.check_features("hog-1", 1764).unwrap_err().to_string();
+        assert!(error.contains("'toy-1'") && error.contains("1764 of 'hog-1'"), "{error}");
+    }
+}
