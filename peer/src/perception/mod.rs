@@ -293,3 +293,6 @@ impl Perception {
         self.canonical.image()
     }
 }
+
+#[cfg(test)]
+mod tests;

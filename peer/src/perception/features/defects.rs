@@ -21,26 +21,37 @@ pub const TABLE: [Feature; 16] = [
     feature("defect_3_depth", "1", "depth of the third deepest valley / r"),
     feature("defect_4_depth", "1", "depth of the fourth deepest valley / r"),
     feature("defect_5_depth", "1", "depth of the fifth deepest valley / r"),
-    feature("defect_1_width", "1", "width of the deepest valley along the hull / r"),
-    feature("defect_2_width", "1", "width of the second deepest valley along the hull / r"),
-    feature("defect_3_width", "1", "width of the third deepest valley along the hull / r"),
-    feature("defect_4_width", "1", "width of the fourth deepest valley along the hull / r"),
     feature(
-        "defect_1_angle",
+        "defect_widths_1",
+        "1",
+        "largest width, along the hull, of a valley deeper than 0.5 r / r, 0 without one",
+    ),
+    feature("defect_widths_2", "1", "second largest of these widths / r, 0 where there is none; so the next"),
+    feature("defect_widths_3", "1", "third largest of these widths / r"),
+    feature("defect_widths_4", "1", "fourth largest of these widths / r"),
+    feature(
+        "defect_mean_angle",
         "rad",
-        "clockwise from up, as seen from c, to the bottom of the deepest valley",
+        "mean over all valleys, weighted by depth, of the angle clockwise from up, as seen from c",
+    ),
+    feature("defect_angle_deviation", "rad", "standard deviation of the same"),
+    feature(
+        "defect_first_angle",
+        "rad",
+        "smallest of these angles among valleys deeper than 0.5 r, 0 without one",
     ),
     feature(
-        "defect_2_angle",
+        "defect_last_angle",
         "rad",
-        "the same for the second deepest valley, 0 where there is none; so the next",
+        "largest of these angles among valleys deeper than 0.5 r, 0 without one",
     ),
-    feature("defect_3_angle", "rad", "the same for the third deepest valley"),
-    feature("defect_4_angle", "rad", "the same for the fourth deepest valley"),
-    feature("defect_1_distance", "1", "distance from c to the bottom of the deepest valley / r"),
+    feature(
+        "defect_mean_distance",
+        "1",
+        "mean over all valleys, weighted by depth, of the distance from c to the bottom / r",
+    ),
 ];
 
-#[derive(Clone, Copy, Default)]
 struct Defect {
     depth: f32,
     width: f32,
@@ -51,26 +62,37 @@ struct Defect {
 pub fn measure(hand: &Hand<'_>, outline: &Outline) -> [f32; TABLE.len()] {
     let mut defects = find(hand, outline);
     defects.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-    let deep = defects.iter().filter(|defect| defect.depth > DEEP).count();
+    let depth = |n: usize| defects.get(n).map_or(0.0, |defect| defect.depth);
     let total: f32 = defects.iter().map(|defect| defect.depth).sum();
-    let nth = |n: usize| defects.get(n).copied().unwrap_or_default();
+    // Weighted by depth, since which valley is the second deepest may hang on a pixel.
+    let mean = |of: &dyn Fn(&Defect) -> f32| {
+        ratio(defects.iter().map(|defect| defect.depth * of(defect)).sum(), total)
+    };
+    let mean_angle = mean(&|defect| defect.angle);
+    let variance = mean(&|defect| (defect.angle - mean_angle).powi(2));
+
+    let deep = &defects[..defects.partition_point(|defect| defect.depth > DEEP)];
+    let mut widths: Vec<f32> = deep.iter().map(|defect| defect.width).collect();
+    widths.sort_by(|a, b| b.total_cmp(a));
+    let width = |n: usize| widths.get(n).copied().unwrap_or(0.0);
+    let angles = || deep.iter().map(|defect| defect.angle);
     [
-        deep as f32,
+        deep.len() as f32,
         total,
-        nth(0).depth,
-        nth(1).depth,
-        nth(2).depth,
-        nth(3).depth,
-        nth(4).depth,
-        nth(0).width,
-        nth(1).width,
-        nth(2).width,
-        nth(3).width,
-        nth(0).angle,
-        nth(1).angle,
-        nth(2).angle,
-        nth(3).angle,
-        nth(0).distance,
+        depth(0),
+        depth(1),
+        depth(2),
+        depth(3),
+        depth(4),
+        width(0),
+        width(1),
+        width(2),
+        width(3),
+        mean_angle,
+        variance.sqrt(),
+        angles().reduce(f32::min).unwrap_or(0.0),
+        angles().reduce(f32::max).unwrap_or(0.0),
+        mean(&|defect| defect.distance),
     ]
 }
 
