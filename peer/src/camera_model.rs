@@ -6,14 +6,20 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A property of a camera outside its range.
+/// A camera that cannot be.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("{property} is {value}: choose it from {low} to {high}")]
+#[error("camera '{camera}': {field} is {value}, set it within {low}..={high}")]
 pub struct CameraModelError {
-    property: &'static str,
-    value: f64,
-    low: f64,
-    high: f64,
+    /// Its name.
+    pub camera: String,
+    /// The field that is out of its range.
+    pub field: &'static str,
+    /// What it is.
+    pub value: f64,
+    /// The least it may be.
+    pub low: f64,
+    /// The most it may be.
+    pub high: f64,
 }
 
 /// A camera: its geometry and its faults.
@@ -34,13 +40,13 @@ pub struct CameraModel {
     pub horizontal_fov_deg: f64,
     /// Standard deviation of the sensor's noise, in grey levels of 255. Range 0..=64.
     pub noise_sigma: f64,
-    /// Standard deviation of the optics' Gaussian blur, in pixels; 0 is sharp. Range 0..=16.
+    /// Standard deviation of the optics' Gaussian blur, in pixels; below 0.1 the image is sharp. Range 0..=16.
     pub blur_sigma_px: f64,
     /// Factor on all channels: under 1 is under-exposed. Range 0.1..=4.
     pub gain: f64,
     /// Factors on the blue, green and red channel: what white balance left undone. Range 0.1..=4 each.
     pub cast_bgr: [f64; 3],
-    /// How much darker the corners are than the centre, `0.0..=1.0`.
+    /// How much darker the corners are than the centre. Range 0..=1.
     pub vignetting: f64,
 }
 
@@ -96,31 +102,6 @@ impl CameraModel {
         }
     }
 
-    /// Whether every property is within its range.
-    ///
-    /// # Errors
-    /// [`CameraModelError`] names the first that is not, and its range.
-    pub fn validate(&self) -> Result<(), CameraModelError> {
-        let [blue, green, red] = self.cast_bgr;
-        let properties = [
-            ("width_px", f64::from(self.width_px), 16.0, 4096.0),
-            ("height_px", f64::from(self.height_px), 16.0, 4096.0),
-            ("fps", self.fps, 0.1, 240.0),
-            ("horizontal_fov_deg", self.horizontal_fov_deg, 10.0, 150.0),
-            ("noise_sigma", self.noise_sigma, 0.0, 64.0),
-            ("blur_sigma_px", self.blur_sigma_px, 0.0, 16.0),
-            ("gain", self.gain, 0.1, 4.0),
-            ("cast_bgr[0]", blue, 0.1, 4.0),
-            ("cast_bgr[1]", green, 0.1, 4.0),
-            ("cast_bgr[2]", red, 0.1, 4.0),
-            ("vignetting", self.vignetting, 0.0, 1.0),
-        ];
-        match properties.into_iter().find(|(_, value, low, high)| !(low..=high).contains(&value)) {
-            Some((property, value, low, high)) => Err(CameraModelError { property, value, low, high }),
-            None => Ok(()),
-        }
-    }
-
     /// All presets.
     #[must_use]
     pub fn presets() -> [Self; 3] {
@@ -150,17 +131,43 @@ impl CameraModel {
         }
     }
 
-    /// The time between two frames.
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// [`CameraModelError`] for the first field outside its range, or that is no number.
+    pub fn validate(&self) -> Result<(), CameraModelError> {
+        let [blue, green, red] = self.cast_bgr;
+        let fields = [
+            ("width_px", f64::from(self.width_px), 16.0, 4096.0),
+            ("height_px", f64::from(self.height_px), 16.0, 4096.0),
+            ("fps", self.fps, 0.1, 240.0),
+            ("horizontal_fov_deg", self.horizontal_fov_deg, 10.0, 150.0),
+            ("noise_sigma", self.noise_sigma, 0.0, 64.0),
+            ("blur_sigma_px", self.blur_sigma_px, 0.0, 16.0),
+            ("gain", self.gain, 0.1, 4.0),
+            ("cast_bgr (blue)", blue, 0.1, 4.0),
+            ("cast_bgr (green)", green, 0.1, 4.0),
+            ("cast_bgr (red)", red, 0.1, 4.0),
+            ("vignetting", self.vignetting, 0.0, 1.0),
+        ];
+        for (field, value, low, high) in fields {
+            if !(low..=high).contains(&value) {
+                return Err(CameraModelError { camera: self.name.clone(), field, value, low, high });
+            }
+        }
+        Ok(())
+    }
+
+    /// The time between two frames; for ever when there are none.
     #[must_use]
     pub fn period(&self) -> Duration {
-        Duration::from_secs_f64(1.0 / self.fps.clamp(0.1, 240.0))
+        Duration::try_from_secs_f64(1.0 / self.fps).unwrap_or(Duration::MAX)
     }
 
     /// The focal length of the pinhole, in pixels: w / (2 tan(fov / 2)).
     #[must_use]
     pub fn focal_px(&self) -> f64 {
-        f64::from(self.width_px)
-            / (2.0 * (self.horizontal_fov_deg.clamp(10.0, 150.0).to_radians() / 2.0).tan())
+        f64::from(self.width_px) / (2.0 * (self.horizontal_fov_deg.to_radians() / 2.0).tan())
     }
 }
 
@@ -191,6 +198,19 @@ mod tests {
             assert_eq!(specimen.focal_px(), model.focal_px());
         }
         assert!(specimens.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+
+    #[test]
+    fn a_field_out_of_range_is_named() {
+        let field = |camera: CameraModel| camera.validate().err().map(|error| error.field);
+        let good = CameraModel::footbot();
+        assert_eq!(field(good.clone()), None);
+        assert_eq!(field(CameraModel { width_px: 0, ..good.clone() }), Some("width_px"));
+        assert_eq!(field(CameraModel { fps: f64::NAN, ..good.clone() }), Some("fps"));
+        assert_eq!(field(CameraModel { cast_bgr: [1.0, 1.0, 9.0], ..good }), Some("cast_bgr (red)"));
+        for camera in CameraModel::presets() {
+            assert_eq!(field(camera), None);
+        }
     }
 
     #[test]

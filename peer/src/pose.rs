@@ -4,16 +4,31 @@ use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A pose that no camera can have.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("pose: {field} is {value}, set it within {low}..={high}")]
+pub struct PoseError {
+    /// The field that is out of its range.
+    pub field: &'static str,
+    /// What it is.
+    pub value: f64,
+    /// The least it may be.
+    pub low: f64,
+    /// The most it may be.
+    pub high: f64,
+}
 
 /// Where a camera is, seen from the hand; it looks at the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// Around the vertical, in degrees: 0 faces the palm, ±90 sees the hand edge on.
+    /// Around the vertical, in degrees: 0 faces the palm, ±90 sees the hand edge on. Range −180..=180.
     pub bearing_deg: f64,
-    /// Above the hand's height, in degrees: negative looks up from the floor.
+    /// Above the hand's height, in degrees: negative looks up from the floor. Range −90..=90.
     pub elevation_deg: f64,
-    /// From the palm, in metres.
+    /// From the palm, in metres. Range 0.3..=20.
     pub distance_m: f64,
 }
 
@@ -21,12 +36,30 @@ impl Pose {
     /// Before the palm, at its height, a good arm's length away.
     pub const FRONTAL: Self = Self { bearing_deg: 0.0, elevation_deg: 0.0, distance_m: 0.8 };
 
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// [`PoseError`] for the first field outside its range, or that is no number.
+    pub fn validate(&self) -> Result<(), PoseError> {
+        let fields = [
+            ("bearing_deg", self.bearing_deg, -180.0, 180.0),
+            ("elevation_deg", self.elevation_deg, -90.0, 90.0),
+            ("distance_m", self.distance_m, 0.3, 20.0),
+        ];
+        for (field, value, low, high) in fields {
+            if !(low..=high).contains(&value) {
+                return Err(PoseError { field, value, low, high });
+            }
+        }
+        Ok(())
+    }
+
     /// The position, in metres, with the palm at the origin, x to the right of who faces the palm, y up, z towards them.
     pub(crate) fn position(&self) -> Point3<f32> {
         let (bearing, elevation) = (self.bearing_deg.to_radians(), self.elevation_deg.to_radians());
         let at =
             Vector3::new(bearing.sin() * elevation.cos(), elevation.sin(), bearing.cos() * elevation.cos())
-                * self.distance_m.max(0.3);
+                * self.distance_m;
         Point3::from(at.cast())
     }
 }
@@ -83,6 +116,15 @@ pub fn place(robots: usize, seed: u64) -> Vec<Pose> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_field_out_of_range_is_named() {
+        let field = |pose: Pose| pose.validate().err().map(|error| error.field);
+        assert_eq!(field(Pose::FRONTAL), None);
+        assert_eq!(field(Pose { distance_m: 0.0, ..Pose::FRONTAL }), Some("distance_m"));
+        assert_eq!(field(Pose { bearing_deg: f64::NAN, ..Pose::FRONTAL }), Some("bearing_deg"));
+        assert!(place(100, 1).iter().all(|pose| pose.validate().is_ok()));
+    }
 
     #[test]
     fn robots_stand_on_the_arc_in_order_and_apart() {

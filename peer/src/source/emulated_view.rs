@@ -29,7 +29,7 @@ impl EmulatedView {
     /// hand that fills them). The seed draws noise and the small differences of aim from picture to picture.
     ///
     /// # Errors
-    /// [`SourceError::Camera`] when the camera's image has an impossible size.
+    /// [`SourceError::Camera`] or [`SourceError::Pose`] when a field of either is out of its range.
     pub fn new(
         camera: CameraModel,
         pose: Pose,
@@ -37,6 +37,7 @@ impl EmulatedView {
         seed: u64,
     ) -> Result<Self, SourceError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        pose.validate()?;
         let sensor = Sensor::new(&camera, &mut rng)?;
         Ok(Self { camera, pose, picture_height_m: picture_height_m.clamp(0.05, 10.0), sensor, rng })
     }
@@ -86,7 +87,7 @@ impl EmulatedView {
     /// The picture, reduced to at most twice the size at which the camera sees it: the warp interpolates between
     /// neighbours and would skip pixels of a larger one.
     fn near_target_scale(&self, picture: &Mat) -> Result<Mat, SourceError> {
-        let seen_px = self.camera.focal_px() * self.picture_height_m / self.pose.distance_m.max(0.3);
+        let seen_px = self.camera.focal_px() * self.picture_height_m / self.pose.distance_m;
         let scale = 2.0 * seen_px / f64::from(picture.rows().max(1));
         if scale >= 1.0 {
             return Ok(picture.clone());

@@ -14,6 +14,9 @@ use std::time::Duration;
 use opencv::core::Mat;
 use thiserror::Error;
 
+use crate::camera_model::CameraModelError;
+use crate::pose::PoseError;
+
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
 pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image};
@@ -102,9 +105,12 @@ pub enum SourceError {
     /// More fingers than a hand has.
     #[error("a hand cannot raise {0} fingers: 0 to 5")]
     Gesture(u8),
-    /// A camera model that cannot take a picture.
-    #[error("camera '{0}': the image must be 16 to 4096 pixels wide and high")]
-    Camera(String),
+    /// A camera that cannot be.
+    #[error(transparent)]
+    Camera(#[from] CameraModelError),
+    /// A place where no camera can be.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
     /// OpenCV failed where it should not.
     #[error("OpenCV: {0}")]
     OpenCv(#[from] opencv::Error),

@@ -30,12 +30,9 @@ impl Sensor {
     /// The sensor of this camera. The generator draws its noise pattern.
     ///
     /// # Errors
-    /// [`SourceError::Camera`] when the image has an impossible size.
+    /// [`SourceError::Camera`] when the camera cannot be.
     pub fn new(camera: &CameraModel, rng: &mut impl Rng) -> Result<Self, SourceError> {
-        let fits = |pixels: i32| (16..=4096).contains(&pixels);
-        if !fits(camera.width_px) || !fits(camera.height_px) {
-            return Err(SourceError::Camera(camera.name.clone()));
-        }
+        camera.validate()?;
         let noise = if camera.noise_sigma > 0.0 {
             let (rows, columns) = (camera.height_px + NOISE_MARGIN_PX, camera.width_px + NOISE_MARGIN_PX);
             let mut field = Mat::new_rows_cols_with_default(rows, columns, core::CV_16SC3, 0.into())?;
@@ -52,7 +49,7 @@ impl Sensor {
             None
         };
         Ok(Self {
-            blur_sigma_px: camera.blur_sigma_px.clamp(0.0, 16.0),
+            blur_sigma_px: camera.blur_sigma_px,
             levels: levels(camera)?,
             noise,
             transmission: if camera.vignetting > 0.0 { Some(transmission(camera)?) } else { None },
@@ -109,7 +106,7 @@ fn transmission(camera: &CameraModel) -> Result<Mat, SourceError> {
     for (i, out) in lens.data_typed_mut::<core::Vec3b>()?.iter_mut().enumerate() {
         let x = (i as i32 % columns) as f64 / f64::from(columns) - 0.5;
         let y = (i as i32 / columns) as f64 / f64::from(rows) - 0.5;
-        let share = 1.0 - camera.vignetting.min(1.0) * 2.0 * (x * x + y * y);
+        let share = 1.0 - camera.vignetting * 2.0 * (x * x + y * y);
         *out = core::Vec3b::all((255.0 * share).round() as u8);
     }
     Ok(lens)
@@ -166,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_size_is_refused() {
+    fn an_impossible_camera_is_refused() {
         let camera = CameraModel { width_px: 0, ..CameraModel::footbot() };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         assert!(matches!(Sensor::new(&camera, &mut rng), Err(SourceError::Camera(_))));

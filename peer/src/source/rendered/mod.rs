@@ -57,8 +57,9 @@ impl RenderedSource {
     /// A camera at that pose; `seed` tells robots with equal cameras apart.
     ///
     /// # Errors
-    /// [`SourceError::Camera`] when the camera's image has an impossible size.
+    /// [`SourceError::Camera`] or [`SourceError::Pose`] when a field of either is out of its range.
     pub fn new(camera: CameraModel, pose: Pose, glove: Glove, seed: u64) -> Result<Self, SourceError> {
+        pose.validate()?;
         let rng = &mut stream(seed, 0);
         let sensor = Sensor::new(&camera, rng)?;
         let room = backdrop::paint(&camera, rng)?;
@@ -82,9 +83,14 @@ impl RenderedSource {
     }
 
     /// Moves the camera.
-    pub fn set_pose(&mut self, pose: Pose) {
+    ///
+    /// # Errors
+    /// [`SourceError::Pose`] when a field is out of its range; the camera stays where it is.
+    pub fn set_pose(&mut self, pose: Pose) -> Result<(), SourceError> {
+        pose.validate()?;
         self.pose = pose;
         self.stage = None;
+        Ok(())
     }
 
     fn stage(&mut self, scene: &Scene) -> Result<Stage, SourceError> {
