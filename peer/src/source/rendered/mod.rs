@@ -201,6 +201,9 @@ mod tests {
         assert_ne!(a, b);
         let difference: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
         assert!(difference / (a.len() as u64) < 10);
+        // Nothing moves in an empty room, but the noise.
+        let [a, b] = frames(Pose::FRONTAL, Scene { gesture: None, ..scene }, 1, 2).try_into().unwrap();
+        assert_ne!(a, b);
     }
 
     #[test]
