@@ -7,6 +7,7 @@ pub mod cli;
 pub mod config;
 pub mod confusion;
 pub mod dataset;
+pub mod emulation;
 #[cfg(feature = "opencv")]
 pub mod eye;
 #[cfg(feature = "opencv")]

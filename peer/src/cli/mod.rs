@@ -2,6 +2,7 @@
 
 mod config;
 mod config_args;
+mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod open;
@@ -50,6 +51,8 @@ enum Verb {
     /// Measure a classifier on a folder of pictures
     #[cfg(feature = "opencv")]
     Evaluate(evaluate::Args),
+    /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares
+    Emulate(emulate::Args),
     /// Check a robot's configuration
     Config(config::Args),
 }
@@ -77,6 +80,7 @@ impl Command {
             Verb::Train(args) => train::run(args),
             #[cfg(feature = "opencv")]
             Verb::Evaluate(args) => evaluate::run(args),
+            Verb::Emulate(args) => emulate::run(&args),
             Verb::Config(args) => config::run(&args),
         }
     }

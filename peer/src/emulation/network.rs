@@ -1,0 +1,249 @@
+//! The links between emulated robots: what is connected, who knows it, and what a message costs on its way.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::time::Duration;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::route::{Link, link, shortest_ways};
+use super::scenario::LinkModel;
+
+/// The state of a robot as far as the network is concerned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Presence {
+    Up,
+    /// Reachable, but it passes nothing on.
+    Frozen,
+    Down,
+}
+
+/// A change that robots notice some time after it happened.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Change {
+    Link(Link, bool),
+    Robot(usize, bool),
+}
+
+/// Bytes a robot has put on its links.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Traffic {
+    /// Its own votes.
+    pub votes: u64,
+    /// What it tells its neighbours for repair.
+    pub repair: u64,
+    /// The decisions it holds or announces.
+    pub decisions: u64,
+    /// What it passed on for others.
+    pub relayed: u64,
+}
+
+/// What a broadcast carries, for the accounts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Vote,
+    Decision,
+}
+
+/// Links, what robots believe of them, and the routes that follow.
+pub(super) struct Network {
+    model: LinkModel,
+    rng: ChaCha8Rng,
+    /// Every link there is, and whether it carries anything now.
+    links: BTreeMap<Link, bool>,
+    presence: Vec<Presence>,
+    /// Links and robots that are believed to work: what routing goes by.
+    believed_links: BTreeSet<Link>,
+    believed_robots: Vec<bool>,
+    routes: Vec<Option<Rc<Vec<Link>>>>,
+    pub traffic: Vec<Traffic>,
+}
+
+impl Network {
+    pub fn new(size: usize, links: Vec<Link>, model: LinkModel, rng: ChaCha8Rng) -> Self {
+        Self {
+            model,
+            rng,
+            links: links.iter().map(|link| (*link, true)).collect(),
+            presence: vec![Presence::Up; size],
+            believed_links: links.into_iter().collect(),
+            believed_robots: vec![true; size],
+            routes: vec![None; size],
+            traffic: vec![Traffic::default(); size],
+        }
+    }
+
+    pub fn size(&self) -> usize {
+        self.presence.len()
+    }
+
+    pub fn presence(&self, robot: usize) -> Presence {
+        self.presence[robot]
+    }
+
+    /// The robots that are up.
+    pub fn up(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.size()).filter(|robot| self.presence[*robot] == Presence::Up)
+    }
+
+    pub fn set_presence(&mut self, robot: usize, presence: Presence) {
+        self.presence[robot] = presence;
+    }
+
+    /// Cuts or heals a link; says whether that changed anything.
+    pub fn set_link(&mut self, link: Link, up: bool) -> bool {
+        self.links.get_mut(&link).is_some_and(|state| std::mem::replace(state, up) != up)
+    }
+
+    /// Cuts or heals the link that the chance falls on.
+    pub fn flip_any_link(&mut self) -> Option<(Link, bool)> {
+        let n = self.rng.random_range(0..self.links.len().max(1) as u64) as usize;
+        let (link, up) = self.links.iter_mut().nth(n)?;
+        *up = !*up;
+        Some((*link, *up))
+    }
+
+    /// The links that carry nothing now.
+    pub fn cut_links(&self) -> Vec<Link> {
+        self.links.iter().filter(|(_, up)| !**up).map(|(link, _)| *link).collect()
+    }
+
+    /// The robots notice a change: from now on they route by it.
+    pub fn notice(&mut self, change: Change) {
+        match change {
+            Change::Link(link, true) => {
+                self.believed_links.insert(link);
+            }
+            Change::Link(link, false) => {
+                self.believed_links.remove(&link);
+            }
+            Change::Robot(robot, up) => self.believed_robots[robot] = up,
+        }
+        self.routes.iter_mut().for_each(|route| *route = None);
+    }
+
+    /// The robots that this one believes itself linked to.
+    pub fn neighbours(&self, robot: usize) -> Vec<usize> {
+        let believed = |other: &usize| self.believed_robots[*other];
+        (0..self.size())
+            .filter(|other| self.believed_links.contains(&link(robot, *other)))
+            .filter(believed)
+            .collect()
+    }
+
+    /// The robots that this one believes alive: those it can reach, itself included.
+    pub fn reachable(&mut self, robot: usize) -> BTreeSet<usize> {
+        self.route(robot).iter().map(|hop| hop.1).chain([robot]).collect()
+    }
+
+    fn route(&mut self, origin: usize) -> Rc<Vec<Link>> {
+        if let Some(route) = &self.routes[origin] {
+            return route.clone();
+        }
+        let route = Rc::new(shortest_ways(origin, self.size(), |robot| self.neighbours(robot)));
+        self.routes[origin] = Some(route.clone());
+        route
+    }
+
+    /// Sends something to all along the shortest ways believed to work: whom it reaches, and how long it takes.
+    /// What is lost on a hop is lost for all behind it.
+    pub fn broadcast(&mut self, origin: usize, bytes: usize, kind: Kind) -> Vec<(usize, Duration)> {
+        let mut taken = vec![None; self.size()];
+        taken[origin] = Some(Duration::ZERO);
+        let mut arrivals = Vec::new();
+        for &(from, to) in self.route(origin).iter() {
+            let Some(so_far) = taken[from] else { continue };
+            let traffic = &mut self.traffic[from];
+            let account = match kind {
+                _ if from != origin => &mut traffic.relayed,
+                Kind::Vote => &mut traffic.votes,
+                Kind::Decision => &mut traffic.decisions,
+            };
+            *account += bytes as u64;
+            let Some(hop) = self.hop(from, to) else { continue };
+            arrivals.push((to, so_far + hop));
+            if self.presence[to] == Presence::Up {
+                taken[to] = Some(so_far + hop);
+            }
+        }
+        arrivals
+    }
+
+    /// Sends something to one neighbour: how long it takes, if it arrives.
+    pub fn tell(&mut self, from: usize, to: usize, bytes: usize) -> Option<Duration> {
+        if !self.believed_links.contains(&link(from, to)) {
+            return None;
+        }
+        self.traffic[from].repair += bytes as u64;
+        self.hop(from, to)
+    }
+
+    fn hop(&mut self, from: usize, to: usize) -> Option<Duration> {
+        // The same number of draws whatever happens, so that one cut does not change all chances after it.
+        let (luck, lateness): (f64, f64) = (self.rng.random(), self.rng.random());
+        let works = self.links.get(&link(from, to)) == Some(&true) && self.presence[to] != Presence::Down;
+        (works && luck >= self.model.loss).then(|| self.model.latency + self.model.jitter.mul_f64(lateness))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::topology::Topology;
+
+    fn network(topology: Topology, size: usize, loss: f64) -> Network {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let links = topology.links(size, &mut rng);
+        Network::new(size, links, LinkModel { loss, ..LinkModel::default() }, rng)
+    }
+
+    fn reached(network: &mut Network, origin: usize) -> Vec<usize> {
+        network.broadcast(origin, 10, Kind::Vote).into_iter().map(|(to, _)| to).collect()
+    }
+
+    #[test]
+    fn a_broadcast_reaches_all_and_each_hop_is_paid_by_who_makes_it() {
+        let mut line = network(Topology::Line, 4, 0.0);
+        assert_eq!(reached(&mut line, 1), [0, 2, 3]);
+        let spent: Vec<_> = line.traffic.iter().map(|t| (t.votes, t.relayed)).collect();
+        assert_eq!(spent, [(0, 0), (20, 0), (0, 10), (0, 0)]);
+    }
+
+    #[test]
+    fn what_a_silent_cut_swallows_is_lost_until_it_is_noticed() {
+        let mut ring = network(Topology::Ring, 4, 0.0);
+        ring.set_link((0, 1), false);
+        assert_eq!(reached(&mut ring, 0), [3], "1 and, on the way of routing, 2 lie behind the cut");
+        ring.notice(Change::Link((0, 1), false));
+        assert_eq!(reached(&mut ring, 0), [3, 2, 1], "round the other way");
+    }
+
+    #[test]
+    fn a_frozen_relay_hears_and_passes_nothing_on() {
+        let mut line = network(Topology::Line, 4, 0.0);
+        line.set_presence(1, Presence::Frozen);
+        assert_eq!(reached(&mut line, 0), [1]);
+        line.set_presence(1, Presence::Down);
+        assert!(reached(&mut line, 0).is_empty());
+    }
+
+    #[test]
+    fn loss_falls_on_each_hop() {
+        let mut line = network(Topology::Line, 3, 0.3);
+        let mut counts = [0.0_f64; 3];
+        for _ in 0..4000 {
+            reached(&mut line, 0).into_iter().for_each(|to| counts[to] += 1.0 / 4000.0);
+        }
+        assert!((counts[1] - 0.7).abs() < 0.03 && (counts[2] - 0.49).abs() < 0.03, "{counts:?}");
+    }
+
+    #[test]
+    fn only_a_direct_neighbour_can_be_told() {
+        let mut line = network(Topology::Line, 3, 0.0);
+        assert!(line.tell(0, 1, 10).is_some());
+        assert_eq!(line.tell(0, 2, 10), None);
+    }
+}

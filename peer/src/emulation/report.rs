@@ -1,0 +1,257 @@
+//! What a run, and what many runs, show.
+
+use std::fmt;
+use std::time::Duration;
+
+use gestalt_protocol::FusionRule;
+use serde::Serialize;
+
+use super::network::{Network, Traffic};
+use super::record::{Record, Showing};
+use super::statistics::{Mean, Proportion};
+
+/// What one run of a scenario shows. Shares are of the rounds that a robot opened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// The seed it came of.
+    pub seed: u64,
+    /// How many robots there are.
+    pub robots: usize,
+    /// How many gestures were shown.
+    pub showings: u64,
+    /// Rounds in which the swarm decided for the gesture shown.
+    pub right: Proportion,
+    /// Rounds in which it decided for another.
+    pub wrong: Proportion,
+    /// Rounds in which the likeliest class was the one shown, sure enough for a decision or not.
+    pub likeliest_right: Proportion,
+    /// Single frames in which the robot that saw it found the gesture shown likeliest.
+    pub frames_right: Proportion,
+    /// Votes counted in decisions whose likeliest class was the gesture shown.
+    pub votes_right: Proportion,
+    /// Rounds at whose end all robots that are up hold the same decision.
+    pub unanimous: Proportion,
+    /// Rounds at whose end two robots hold different classes.
+    pub conflicts: u64,
+    /// Whether, at the end of the scenario, all robots that are up hold the same decision of the same round.
+    pub agreed_at_the_end: bool,
+    /// Milliseconds from the showing to the first robot that holds a class, per decided round.
+    pub decided_ms: Mean,
+    /// Milliseconds from the showing until no robot changes what it holds any more, per round.
+    pub settled_ms: Mean,
+    /// How often a decision was announced, per round.
+    pub announcements: Mean,
+    /// Bytes of votes a robot says per second of an open round, to each of its next hops.
+    pub vote_bytes_per_open_second: f64,
+    /// Bytes that a robot puts on its links over the whole run, on average, by purpose.
+    pub bytes_per_robot: BytesPerRobot,
+}
+
+/// Bytes that a robot puts on its links, without what the transport adds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct BytesPerRobot {
+    /// Its own votes.
+    pub votes: f64,
+    /// Repair with its neighbours.
+    pub repair: f64,
+    /// The decisions it holds and announces.
+    pub decisions: f64,
+    /// What it passes on for others.
+    pub relayed: f64,
+}
+
+impl Report {
+    pub(super) fn new(seed: u64, record: &Record, network: &Network) -> Self {
+        let opened: Vec<&Showing> = record.showings.iter().filter(|s| s.counter.is_some()).collect();
+        let rounds = opened.len() as u64;
+        let count = |holds: &dyn Fn(&Showing) -> bool| opened.iter().filter(|s| holds(s)).count() as u64;
+        let decision = |showing: &Showing| showing.outcome.as_ref().and_then(|o| o.decision.clone());
+        let decided = |showing: &Showing| decision(showing).and_then(|d| d.class);
+        let counted: Vec<bool> = opened
+            .iter()
+            .flat_map(|showing| {
+                let votes = decision(showing).map_or(Vec::new(), |d| d.certificate.votes);
+                votes.into_iter().map(|vote| vote.class == showing.shown)
+            })
+            .collect();
+        let mut held = network.up().map(|robot| &record.holds[robot]);
+        let first = held.next();
+        let total = sum(&network.traffic);
+        let robots = network.size();
+        let share = |bytes: u64| bytes as f64 / robots as f64;
+        let ms = |showing: &Showing, at: Duration| (at - showing.at).as_secs_f64() * 1e3;
+        let times = |at: &dyn Fn(&Showing) -> Option<Duration>| {
+            Mean::of(&opened.iter().filter_map(|s| Some(ms(s, at(s)?))).collect::<Vec<_>>())
+        };
+        let open = record.open.as_secs_f64();
+        Self {
+            seed,
+            robots,
+            showings: record.showings.len() as u64,
+            right: Proportion::new(count(&|s| decided(s) == Some(s.shown)), rounds),
+            wrong: Proportion::new(count(&|s| decided(s).is_some_and(|class| class != s.shown)), rounds),
+            likeliest_right: Proportion::new(
+                count(&|s| {
+                    decision(s)
+                        .is_some_and(|d| likeliest(&d.certificate.probabilities) == Some(s.shown.index()))
+                }),
+                rounds,
+            ),
+            frames_right: Proportion::new(record.frames_right, record.frames),
+            votes_right: Proportion::new(
+                counted.iter().filter(|right| **right).count() as u64,
+                counted.len() as u64,
+            ),
+            unanimous: Proportion::new(count(&|s| s.outcome.as_ref().is_some_and(|o| o.unanimous)), rounds),
+            conflicts: count(&|s| s.outcome.as_ref().is_some_and(|o| o.conflict)),
+            agreed_at_the_end: first.is_some_and(|first| first.is_some() && held.all(|other| other == first)),
+            decided_ms: times(&|s| s.first_held),
+            settled_ms: times(&|s| s.last_held),
+            announcements: Mean::of(&opened.iter().map(|s| f64::from(s.announcements)).collect::<Vec<_>>()),
+            vote_bytes_per_open_second: if open > 0.0 { total.votes as f64 / open } else { 0.0 },
+            bytes_per_robot: BytesPerRobot {
+                votes: share(total.votes),
+                repair: share(total.repair),
+                decisions: share(total.decisions),
+                relayed: share(total.relayed),
+            },
+        }
+    }
+}
+
+fn sum(traffic: &[Traffic]) -> Traffic {
+    traffic.iter().fold(Traffic::default(), |sum, robot| Traffic {
+        votes: sum.votes + robot.votes,
+        repair: sum.repair + robot.repair,
+        decisions: sum.decisions + robot.decisions,
+        relayed: sum.relayed + robot.relayed,
+    })
+}
+
+fn likeliest(probabilities: &[f64]) -> Option<usize> {
+    // Reversed, because of equal maxima the last one is returned and a fusion takes the first.
+    let ranked = probabilities.iter().enumerate().rev();
+    ranked.max_by(|a, b| a.1.total_cmp(b.1)).map(|(class, _)| class)
+}
+
+/// What many runs of one scenario, with one seed each, show together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// The fusion rule.
+    pub rule: FusionRule,
+    /// Its α.
+    pub alpha: f64,
+    /// How many seeds.
+    pub seeds: usize,
+    /// How many robots there are.
+    pub robots: usize,
+    /// As in [`Report`], over the rounds of all seeds.
+    pub right: Proportion,
+    /// As in [`Report`], over the rounds of all seeds.
+    pub wrong: Proportion,
+    /// As in [`Report`], over the rounds of all seeds.
+    pub likeliest_right: Proportion,
+    /// As in [`Report`], over the frames of all seeds.
+    pub frames_right: Proportion,
+    /// As in [`Report`], over the votes of all seeds.
+    pub votes_right: Proportion,
+    /// As in [`Report`], over the rounds of all seeds.
+    pub unanimous: Proportion,
+    /// As in [`Report`], over the rounds of all seeds.
+    pub conflicts: u64,
+    /// Seeds at whose end all robots agree.
+    pub agreed_at_the_end: Proportion,
+    /// The means of the seeds.
+    pub decided_ms: Mean,
+    /// The means of the seeds.
+    pub settled_ms: Mean,
+    /// The means of the seeds.
+    pub announcements: Mean,
+    /// The values of the seeds.
+    pub vote_bytes_per_open_second: Mean,
+}
+
+impl Summary {
+    /// Puts the reports of several seeds together.
+    #[must_use]
+    pub fn of(rule: FusionRule, alpha: f64, reports: &[Report]) -> Self {
+        let pool = |of: &dyn Fn(&Report) -> Proportion| {
+            let (hits, trials) = reports.iter().map(of).fold((0, 0), |(h, t), p| (h + p.hits, t + p.trials));
+            Proportion::new(hits, trials)
+        };
+        let mean = |of: &dyn Fn(&Report) -> f64| Mean::of(&reports.iter().map(of).collect::<Vec<_>>());
+        let agreed = reports.iter().filter(|report| report.agreed_at_the_end).count();
+        Self {
+            rule,
+            alpha,
+            seeds: reports.len(),
+            robots: reports.first().map_or(0, |report| report.robots),
+            right: pool(&|report| report.right),
+            wrong: pool(&|report| report.wrong),
+            likeliest_right: pool(&|report| report.likeliest_right),
+            frames_right: pool(&|report| report.frames_right),
+            votes_right: pool(&|report| report.votes_right),
+            unanimous: pool(&|report| report.unanimous),
+            conflicts: reports.iter().map(|report| report.conflicts).sum(),
+            agreed_at_the_end: Proportion::new(agreed as u64, reports.len() as u64),
+            decided_ms: mean(&|report| report.decided_ms.mean),
+            settled_ms: mean(&|report| report.settled_ms.mean),
+            announcements: mean(&|report| report.announcements.mean),
+            vote_bytes_per_open_second: mean(&|report| report.vote_bytes_per_open_second),
+        }
+    }
+}
+
+/// Several summaries as a table for people: shares in percent with their 95 % intervals.
+#[derive(Clone, Debug)]
+pub struct Table<'a>(pub &'a [Summary]);
+
+impl fmt::Display for Table<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent =
+            |p: Proportion| format!("{:5.1} [{:.1}, {:.1}]", 100.0 * p.share, 100.0 * p.low, 100.0 * p.high);
+        writeln!(
+            f,
+            "{:<20} {:>5}  {:<20} {:<18} {:<20} {:<20} {:>14} {:>9}",
+            "rule",
+            "alpha",
+            "right %",
+            "wrong %",
+            "likeliest right %",
+            "unanimous %",
+            "decided ms",
+            "vote B/s"
+        )?;
+        for summary in self.0 {
+            let rule = match summary.rule {
+                FusionRule::Majority => "majority",
+                FusionRule::MeanProbability => "mean_probability",
+                FusionRule::LogPool => "log_pool",
+                FusionRule::ConfidenceWeighted => "confidence_weighted",
+            };
+            writeln!(
+                f,
+                "{rule:<20} {:>5}  {:<20} {:<18} {:<20} {:<20} {:>7.0} ± {:<4.0} {:>9.0}",
+                summary.alpha,
+                percent(summary.right),
+                percent(summary.wrong),
+                percent(summary.likeliest_right),
+                percent(summary.unanimous),
+                summary.decided_ms.mean,
+                summary.decided_ms.half_width,
+                summary.vote_bytes_per_open_second.mean,
+            )?;
+        }
+        if let Some(any) = self.0.first() {
+            writeln!(
+                f,
+                "{} robots, {} rounds of {} seeds; one frame of one robot is right in {} %, 95 % intervals",
+                any.robots,
+                any.right.trials,
+                any.seeds,
+                percent(any.frames_right).trim_start(),
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,270 @@
+//! Reading is total and bounded: any bytes give a value or a typed error.
+
+use gestalt_protocol::{
+    Certificate, ClassId, CountedVote, Decision, DecodeError, Envelope, FusionRule, Give, Have, HeldVote,
+    Instruction, MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, PROTOCOL_VERSION,
+    Rank, RobotId, RoundId, Stamp, VocabularyId, Vote, decode_json,
+};
+use proptest::prelude::*;
+
+fn round() -> impl Strategy<Value = RoundId> {
+    (any::<u32>(), any::<u32>()).prop_map(|(counter, opener)| RoundId { counter, opener: RobotId(opener) })
+}
+
+fn stamp() -> impl Strategy<Value = Stamp> {
+    (any::<u32>(), any::<u32>()).prop_map(|(boot, sequence)| Stamp { boot, sequence })
+}
+
+fn vote() -> impl Strategy<Value = Vote> {
+    let evidence = prop_oneof![Just(vec![]), prop::collection::vec(-1e30f32..1e30, 2..=MAX_CLASSES)];
+    (round(), any::<u32>(), evidence, 0f32..1e6).prop_map(|(round, vocabulary, evidence, looks)| Vote {
+        round,
+        vocabulary: VocabularyId(vocabulary),
+        evidence,
+        looks,
+    })
+}
+
+fn decision() -> impl Strategy<Value = Decision> {
+    let rule = prop_oneof![
+        Just(FusionRule::Majority),
+        Just(FusionRule::MeanProbability),
+        Just(FusionRule::LogPool),
+        Just(FusionRule::ConfidenceWeighted),
+    ];
+    let counted = (stamp(), 0..2u8, 0f32..1e6);
+    let votes = prop::collection::btree_map(any::<u32>(), counted, 0..8).prop_map(|votes| {
+        let counted = |(robot, (stamp, class, weight))| CountedVote {
+            robot: RobotId(robot),
+            stamp,
+            class: ClassId(class),
+            weight,
+        };
+        votes.into_iter().map(counted).collect()
+    });
+    let certificate = (rule, prop::collection::vec(0f64..=1.0, 2..=MAX_CLASSES), votes, any::<u32>());
+    (round(), prop::option::of(0..2u8), 0f64..=1.0, any::<u32>(), certificate).prop_map(
+        |(round, class, confidence, author, (rule, probabilities, votes, elapsed_ms))| Decision {
+            round,
+            class: class.map(ClassId),
+            confidence,
+            author: RobotId(author),
+            certificate: Certificate { vocabulary: VocabularyId(1), rule, probabilities, votes, elapsed_ms },
+        },
+    )
+}
+
+fn message() -> impl Strategy<Value = Message> {
+    let have = (
+        prop::option::of(round()),
+        prop::option::of(decision()),
+        prop::collection::vec((any::<u32>(), stamp()), 0..10),
+        any::<bool>(),
+    )
+        .prop_map(|(round, decision, votes, answer)| Have {
+            round,
+            decision: decision.map(|decision| decision.rank()),
+            votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
+            answer,
+        });
+    let held = (any::<u32>(), stamp(), vote()).prop_map(|(robot, stamp, vote)| HeldVote {
+        robot: RobotId(robot),
+        stamp,
+        vote,
+    });
+    let give = (prop::option::of(decision()), prop::collection::vec(held, 0..5))
+        .prop_map(|(decision, votes)| Give { decision, votes });
+    prop_oneof![vote().prop_map(Message::Vote), have.prop_map(Message::Have), give.prop_map(Message::Give)]
+}
+
+fn envelope() -> impl Strategy<Value = Envelope> {
+    (any::<u32>(), stamp(), message()).prop_map(|(author, stamp, message)| Envelope {
+        author: RobotId(author),
+        stamp,
+        message,
+    })
+}
+
+proptest! {
+    #[test]
+    fn what_was_written_is_read(envelope in envelope()) {
+        prop_assert_eq!(Envelope::decode(&envelope.encode()), Ok(envelope));
+    }
+
+    #[test]
+    fn a_decision_survives_json_bit_for_bit(decision in decision()) {
+        let json = serde_json::to_vec(&decision).unwrap();
+        let read: Decision = decode_json(&json).unwrap();
+        prop_assert_eq!(read.confidence.to_bits(), decision.confidence.to_bits());
+        prop_assert_eq!(read, decision);
+    }
+
+    #[test]
+    fn random_bytes_never_panic_and_what_is_read_is_written_the_same(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        let mut versioned = vec![PROTOCOL_VERSION];
+        versioned.extend(&bytes);
+        for bytes in [bytes, versioned] {
+            if let Ok(envelope) = Envelope::decode(&bytes) {
+                // A varint can be written longer than it need be, so the bytes may differ, the meaning may not.
+                prop_assert_eq!(Envelope::decode(&envelope.encode()), Ok(envelope));
+            }
+            let _ = decode_json::<Decision>(&bytes);
+            let _ = decode_json::<Instruction>(&bytes);
+        }
+    }
+
+    #[test]
+    fn a_message_cut_short_or_with_something_behind_it_is_refused(envelope in envelope(), at in any::<prop::sample::Index>()) {
+        let mut bytes = envelope.encode();
+        let cut = at.index(bytes.len());
+        prop_assert!(Envelope::decode(&bytes[..cut]).is_err());
+        bytes.push(0);
+        prop_assert_eq!(Envelope::decode(&bytes), Err(DecodeError::Trailing(1)));
+    }
+
+    #[test]
+    fn a_flipped_bit_never_panics(envelope in envelope(), at in any::<prop::sample::Index>(), bit in 0..8u32) {
+        let mut bytes = envelope.encode();
+        let at = at.index(bytes.len());
+        bytes[at] ^= 1u8 << bit;
+        let _ = Envelope::decode(&bytes);
+    }
+
+    #[test]
+    fn ranks_are_a_total_order(a in decision(), b in decision(), c in decision()) {
+        let (a, b, c): (Rank, Rank, Rank) = (a.rank(), b.rank(), c.rank());
+        prop_assert_eq!(a.cmp(&b), b.cmp(&a).reverse());
+        if a <= b && b <= c {
+            prop_assert!(a <= c);
+        }
+    }
+}
+
+fn vote_of(evidence: Vec<f32>) -> Vote {
+    let round = RoundId { counter: 1, opener: RobotId(1) };
+    Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0 }
+}
+
+fn read(message: Message) -> Result<Envelope, DecodeError> {
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    Envelope::decode(&Envelope { author: RobotId(1), stamp, message }.encode())
+}
+
+#[test]
+fn no_bytes_too_many_bytes_and_another_version_are_told_apart() {
+    assert_eq!(Envelope::decode(&[]), Err(DecodeError::Empty));
+    assert_eq!(Envelope::decode(&[PROTOCOL_VERSION + 1, 1, 2]), Err(DecodeError::Version { found: 2 }));
+    let long = vec![PROTOCOL_VERSION; MAX_MESSAGE + 1];
+    assert_eq!(
+        Envelope::decode(&long),
+        Err(DecodeError::TooLong { length: MAX_MESSAGE + 1, limit: MAX_MESSAGE })
+    );
+    let long = vec![b' '; MAX_JSON + 1];
+    assert!(matches!(decode_json::<Instruction>(&long), Err(DecodeError::TooLong { .. })));
+    assert_eq!(decode_json::<Instruction>(&[]), Err(DecodeError::Empty));
+}
+
+#[test]
+fn a_vote_says_only_what_a_robot_can_mean() {
+    for (vote, what) in [
+        (vote_of(vec![1.0]), "single class"),
+        (vote_of(vec![f32::NAN, 0.0]), "not finite"),
+        (vote_of(vec![f32::INFINITY, 0.0]), "not finite"),
+        (Vote { looks: -1.0, ..vote_of(vec![]) }, "looks"),
+        (Vote { looks: f32::NAN, ..vote_of(vec![]) }, "looks"),
+    ] {
+        let Err(DecodeError::Impossible(why)) = read(Message::Vote(vote.clone())) else { panic!("{vote:?}") };
+        assert!(why.contains(what), "{why}");
+        let held = HeldVote { robot: RobotId(1), stamp: Stamp::default(), vote };
+        assert!(read(Message::Give(Give { decision: None, votes: vec![held] })).is_err());
+    }
+}
+
+#[test]
+fn more_classes_or_robots_than_the_limit_are_refused_by_their_reader() {
+    assert!(read(Message::Vote(vote_of(vec![0.0; MAX_CLASSES]))).is_ok());
+    assert!(matches!(
+        read(Message::Vote(vote_of(vec![0.0; MAX_CLASSES + 1]))),
+        Err(DecodeError::Malformed(_))
+    ));
+    let have = |robots: usize| {
+        let votes = (0..robots as u32).map(|robot| (RobotId(robot), Stamp::default())).collect();
+        read(Message::Have(Have { round: None, decision: None, votes, answer: false }))
+    };
+    assert!(have(MAX_ROBOTS).is_ok());
+    assert!(matches!(have(MAX_ROBOTS + 1), Err(DecodeError::Malformed(_))));
+}
+
+#[test]
+fn a_decision_that_contradicts_itself_is_refused() {
+    let counted = |robot, class| CountedVote {
+        robot: RobotId(robot),
+        stamp: Stamp::default(),
+        class: ClassId(class),
+        weight: 1.0,
+    };
+    let sound = Decision {
+        round: RoundId { counter: 1, opener: RobotId(1) },
+        class: Some(ClassId(1)),
+        confidence: 0.75,
+        author: RobotId(1),
+        certificate: Certificate {
+            vocabulary: VocabularyId(1),
+            rule: FusionRule::LogPool,
+            probabilities: vec![0.25, 0.75],
+            votes: vec![counted(1, 0), counted(2, 1)],
+            elapsed_ms: 1,
+        },
+    };
+    assert_eq!(sound.check(), Ok(()));
+    let broken = |change: &dyn Fn(&mut Decision)| {
+        let mut decision = sound.clone();
+        change(&mut decision);
+        decision.check().unwrap_err().to_string()
+    };
+    assert!(broken(&|d| d.confidence = 1.5).contains("probability"));
+    assert!(broken(&|d| d.confidence = f64::NAN).contains("probability"));
+    assert!(broken(&|d| d.certificate.probabilities[0] = -0.1).contains("probability"));
+    assert!(broken(&|d| d.class = Some(ClassId(2))).contains("class"));
+    assert!(broken(&|d| d.certificate.votes[0].class = ClassId(2)).contains("class"));
+    assert!(broken(&|d| d.certificate.votes[0].weight = f32::NAN).contains("weight"));
+    assert!(
+        broken(&|d| d.certificate.votes[1].robot = RobotId(1)).contains("out of order"),
+        "one robot counts once"
+    );
+    assert!(broken(&|d| d.certificate.votes.swap(0, 1)).contains("out of order"));
+}
+
+/// The bytes that one value takes on the wire, at least.
+fn on_the_wire(messages: [Message; 2]) -> usize {
+    let [without, with] = messages
+        .map(|message| Envelope { author: RobotId(0), stamp: Stamp::default(), message }.encode().len());
+    with - without
+}
+
+#[test]
+fn no_message_takes_more_memory_than_promised() {
+    // Whatever a vector claims, it grows with what has arrived, and at most to twice of it. So the bound holds if
+    // no element is larger in memory than the promised factor makes of its smallest encoding.
+    let factor = MAX_ALLOCATION / MAX_MESSAGE;
+    let null = Vote {
+        round: RoundId { counter: 0, opener: RobotId(0) },
+        vocabulary: VocabularyId(0),
+        evidence: vec![],
+        looks: 0.0,
+    };
+    let have = |votes| Message::Have(Have { round: None, decision: None, votes, answer: false });
+    let known = on_the_wire([have(vec![]), have(vec![(RobotId(0), Stamp::default())])]);
+    assert!(2 * size_of::<(RobotId, Stamp)>() <= factor * known);
+    let give = |votes| Message::Give(Give { decision: None, votes });
+    let held = HeldVote { robot: RobotId(0), stamp: Stamp::default(), vote: null };
+    let given = on_the_wire([give(vec![]), give(vec![held])]);
+    assert!(2 * size_of::<HeldVote>() <= factor * given);
+    let counted = 1 + 2 + 1 + 4;
+    assert!(2 * size_of::<CountedVote>() <= factor * counted);
+    // A claim of four thousand million elements with nothing behind it.
+    let mut claim = Envelope { author: RobotId(0), stamp: Stamp::default(), message: have(vec![]) }.encode();
+    claim.truncate(claim.len() - 2);
+    claim.extend([0xff, 0xff, 0xff, 0xff, 0x0f]);
+    assert!(matches!(Envelope::decode(&claim), Err(DecodeError::Malformed(_))));
+}
