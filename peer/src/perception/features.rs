@@ -3,16 +3,20 @@
 //! Each group stands in a file of its own, its table of documentation next to its formulas. All are ratios, angles and
 //! counts: independent of the canvas's size, of the hand's place and of its distance. Symbols in the formulas:
 //!
-//! - A: area of the hand, pixels; P: its perimeter; w, h: width and height of its upright bounding box;
+//! - A: area of the hand, pixels; P: its perimeter;
 //! - r: radius of the largest circle within the hand (the palm), c: the centre of that circle;
-//! - right, up: the axes of the hand; up leads from the wrist to the fingers.
+//! - right, up: the axes of the hand; up leads from the wrist to the fingers;
+//! - w, h: extent of the hand along these axes, in palm radii.
+//!
+//! The features are measured along the hand's axes, not the frame's: trained on upright hands, the same classifier reads
+//! tilted ones.
 
 mod blob;
 mod defects;
+mod fingers;
 mod moments;
 mod outline;
 mod palm;
-mod radial;
 mod rings;
 
 use super::hand::Hand;
@@ -39,7 +43,7 @@ const fn feature(name: &'static str, unit: &'static str, formula: &'static str) 
 /// The groups one after another. That their sizes add up to [`FEATURES`] is checked when this is compiled.
 static TABLE: [Feature; FEATURES] = {
     let groups: [&[Feature]; 6] =
-        [&blob::TABLE, &palm::TABLE, &defects::TABLE, &radial::TABLE, &rings::TABLE, &moments::TABLE];
+        [&blob::TABLE, &palm::TABLE, &defects::TABLE, &fingers::TABLE, &rings::TABLE, &moments::TABLE];
     let mut table = [feature("", "", ""); FEATURES];
     let (mut filled, mut group) = (0, 0);
     while group < groups.len() {
@@ -68,9 +72,9 @@ pub fn measure(hand: &Hand<'_>) -> Result<Vec<f32>, opencv::Error> {
     vector.extend(blob::measure(hand, &outline)?);
     vector.extend(palm::measure(hand, &outline));
     vector.extend(defects::measure(hand, &outline));
-    vector.extend(radial::measure(&outline));
+    vector.extend(fingers::measure(hand, &outline)?);
     vector.extend(rings::measure(hand)?);
-    vector.extend(moments::measure(hand)?);
+    vector.extend(moments::measure(&outline)?);
     Ok(vector)
 }
 

@@ -52,6 +52,13 @@ pub struct Hand<'a> {
 }
 
 impl Hand<'_> {
+    /// The mean of its pixels.
+    pub fn centroid(&self) -> Point2f {
+        let mean = |first: f64| (first / self.moments.m00.max(1.0)) as f32;
+        let corner = Point2f::new(self.bounds.x as f32, self.bounds.y as f32);
+        corner + Point2f::new(mean(self.moments.m10), mean(self.moments.m01))
+    }
+
     /// The right and up coordinates of a point from the palm's centre, in palm radii.
     pub fn axes(&self, point: Point2f) -> (f32, f32) {
         let from_palm = point - self.palm;
@@ -129,7 +136,10 @@ impl HandFinder {
         let arm = self.blobs.largest(&close.mask, MARGIN)?.ok_or(nothing)?;
         self.blobs.draw(&arm, size, &mut self.mask, &mut self.holes)?;
         let (palm, radius) = self.palm(&arm.contour)?;
-        let up = self.up(palm, radius)?;
+        let up = match from_edge(&arm.contour, close, palm, radius) {
+            Some(up) => up,
+            None => self.up(palm, radius)?,
+        };
         self.cut_forearm(palm, radius, up)?;
 
         let hand = self.blobs.largest(&self.mask, 0)?.ok_or(nothing)?;
@@ -160,7 +170,7 @@ impl HandFinder {
         Ok((Point2f::new((around.x + centre.x) as f32, (around.y + centre.y) as f32), radius as f32))
     }
 
-    /// Which way the fingers are: opposite to the wrist. That is the arc in which the blob leaves a circle around the palm
+    /// Which way the fingers are: opposite to the wrist, within the view. The wrist is the arc in which the blob leaves a circle around the palm
     /// which is wide, rather below than above, and does not split into fingers further out. Straight up when the blob
     /// leaves the circle nowhere.
     fn up(&self, palm: Point2f, radius: f32) -> Result<Point2f, opencv::Error> {
@@ -194,6 +204,31 @@ impl HandFinder {
         let forearm = [wrist + side, wrist - side, end - side, end + side].map(corner);
         fill_convex_poly_def(&mut self.mask, &Vector::from_slice(&forearm), Scalar::all(0.0))
     }
+}
+
+/// Which way the fingers are when the blob covers as much of the frame's edge as a wrist would: away from there, since the
+/// arm comes in there.
+fn from_edge(contour: &Vector<Point>, close: &View, palm: Point2f, radius: f32) -> Option<Point2f> {
+    let (region, frame) = (close.region, close.frame);
+    let (right, bottom) = (close.mask.cols() - 1 + MARGIN, close.mask.rows() - 1 + MARGIN);
+    let on_edge = |p: &Point| {
+        (p.x == MARGIN && region.x == 0)
+            || (p.y == MARGIN && region.y == 0)
+            || (p.x == right && region.x + region.width == frame.width)
+            || (p.y == bottom && region.y + region.height == frame.height)
+    };
+    let (mut count, mut sum) = (0.0, Point2f::default());
+    for point in contour.iter().filter(on_edge) {
+        count += 1.0;
+        sum += Point2f::new(point.x as f32, point.y as f32);
+    }
+    if count < radius {
+        return None;
+    }
+    let up = palm - sum * (1.0 / count);
+    let length = up.x.hypot(up.y);
+    // An arm that comes in on all sides comes from nowhere.
+    (length > radius / 2.0).then(|| up * (1.0 / length))
 }
 
 /// The share of the frame's edge that a contour lies on.

@@ -115,7 +115,7 @@ fn neither_place_nor_distance_nor_light_matters() {
     draw_hand(&mut dim, (320, 288), 60, 3, dark(SKIN));
     for other in [moved, dim] {
         let other = shape(&other);
-        for name in ["solidity", "aspect", "palm_radius", "reach", "defect_1_depth", "reach_000"] {
+        for name in ["solidity", "aspect", "palm_radius", "reach", "defect_1_depth", "top"] {
             let (a, b) = (feature(&reference, name), feature(&other, name));
             assert!((a - b).abs() < 0.1 * a.abs().max(1.0), "{name}: {a} and {b}");
         }

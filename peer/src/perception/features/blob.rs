@@ -3,20 +3,28 @@
 use opencv::core::{Point, Point2f, Vector};
 use opencv::imgproc::{approx_poly_dp, min_area_rect, min_enclosing_circle};
 
+use super::super::hand::Hand;
 use super::outline::Outline;
 use super::{Feature, feature, ratio};
-use crate::perception::hand::Hand;
 
 pub const TABLE: [Feature; 24] = [
-    feature("extent", "1", "A / (w h)"),
+    feature("extent", "1", "A / (w h r^2)"),
     feature("aspect", "1", "ln(w / h)"),
     feature("length", "1", "longer side of the smallest rotated rectangle / sqrt(A)"),
     feature("breadth", "1", "shorter side of the smallest rotated rectangle / sqrt(A)"),
     feature("rectangularity", "1", "A / area of the smallest rotated rectangle"),
-    feature("centroid_x", "1", "m10 / (m00 w), from the left of the bounding box"),
-    feature("centroid_y", "1", "m01 / (m00 h), from the top of the bounding box"),
-    feature("orientation_sin", "1", "e sin(2 t), t: direction of the principal axis, e: eccentricity"),
-    feature("orientation_cos", "1", "e cos(2 t), t: direction of the principal axis, e: eccentricity"),
+    feature(
+        "centroid_x",
+        "1",
+        "(right coordinate of the centroid - that of the left of the bounding box) / w",
+    ),
+    feature(
+        "centroid_y",
+        "1",
+        "(up coordinate of the centroid - that of the bottom of the bounding box) / h",
+    ),
+    feature("orientation_sin", "1", "e sin(2 t), t: angle from up to the principal axis, e: eccentricity"),
+    feature("orientation_cos", "1", "e cos(2 t), t: angle from up to the principal axis, e: eccentricity"),
     feature("major_axis", "1", "4 sqrt(l1 / A), l1: larger eigenvalue of the covariance of the pixels"),
     feature("minor_axis", "1", "4 sqrt(l2 / A), l2: smaller eigenvalue of the covariance of the pixels"),
     feature("eccentricity", "1", "sqrt(1 - l2 / l1)"),
@@ -37,35 +45,36 @@ pub const TABLE: [Feature; 24] = [
 pub fn measure(hand: &Hand<'_>, outline: &Outline) -> Result<[f32; TABLE.len()], opencv::Error> {
     let area = hand.moments.m00 as f32;
     let unit = area.sqrt();
-    let (width, height) = (hand.bounds.width as f32, hand.bounds.height as f32);
-    let rectangle = min_area_rect(&outline.points)?.size;
+    let rectangle = min_area_rect(hand.contour)?.size;
     let (mut centre, mut radius) = (Point2f::default(), 0.0);
-    min_enclosing_circle(&outline.points, &mut centre, &mut radius)?;
+    min_enclosing_circle(hand.contour, &mut centre, &mut radius)?;
     let m = &hand.moments;
-    let centroid = [m.m10 as f32, m.m01 as f32].map(|first| ratio(first, area));
+    let (right, up) = hand.axes(hand.centroid());
 
     // Eigenvalues of the covariance, in units of A.
     let [xx, xy, yy] = [m.nu20, m.nu11, m.nu02].map(|second| second as f32);
     let difference = (4.0 * xy * xy + (xx - yy) * (xx - yy)).sqrt();
     let (large, small) = ((xx + yy + difference) / 2.0, ((xx + yy - difference) / 2.0).max(0.0));
     let eccentricity = (1.0 - ratio(small, large)).max(0.0).sqrt();
-    let (sin, cos) = (ratio(2.0 * xy, difference), ratio(xx - yy, difference));
+    // Twice the angles, because an axis has no front; the frame's y points down, up's as well.
+    let axis = (2.0 * xy).atan2(xx - yy);
+    let (sin, cos) = (axis - 2.0 * hand.up.y.atan2(hand.up.x)).sin_cos();
 
     let (hole_area, hole_right, hole_up) = hand.holes.first().map_or((0.0, 0.0, 0.0), |hole| {
         let (right, up) = hand.axes(hole.centre);
         (ratio(hole.area as f32, area).sqrt(), right, up)
     });
     let mut simple = Vector::<Point>::new();
-    approx_poly_dp(&outline.points, &mut simple, 0.02 * f64::from(outline.perimeter), true)?;
+    approx_poly_dp(hand.contour, &mut simple, 0.02 * f64::from(outline.perimeter), true)?;
 
     Ok([
-        ratio(area, width * height),
-        (width / height).ln(),
+        ratio(area, outline.width * outline.height * hand.radius * hand.radius),
+        (outline.width / outline.height).ln(),
         ratio(rectangle.width.max(rectangle.height), unit),
         ratio(rectangle.width.min(rectangle.height), unit),
         ratio(area, rectangle.width * rectangle.height),
-        centroid[0] / width,
-        centroid[1] / height,
+        (right - outline.corner.x) / outline.width,
+        (up - outline.corner.y) / outline.height,
         eccentricity * sin,
         eccentricity * cos,
         4.0 * large.sqrt(),
