@@ -36,11 +36,7 @@ impl Body {
     ///
     /// # Errors
     /// See [`BodyError`].
-    pub async fn start(
-        config: &Config,
-        model: Option<RobotModel>,
-        boot: u32,
-    ) -> Result<Self, BodyError> {
+    pub async fn start(config: &Config, model: Option<RobotModel>, boot: u32) -> Result<Self, BodyError> {
         let eye = match &model {
             Some(model) => Eye::open(&config.camera, model, config.robot.id)?,
             None => None,

@@ -7,8 +7,8 @@ use gestalt_protocol::{ClassId, RobotId, RoundId};
 use gestalt_strategies::{Classify, Observation};
 use opencv::core::Mat;
 use thiserror::Error;
-use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::broadcast::Receiver;
+use tokio::sync::broadcast::error::RecvError;
 
 use crate::config::{CameraSection, SourceSection};
 use crate::human::Human;
@@ -71,7 +71,11 @@ impl Eye {
     ///
     /// # Errors
     /// See [`EyeError`].
-    pub fn open(camera: &CameraSection, model: &RobotModel, robot: RobotId) -> Result<Option<Self>, EyeError> {
+    pub fn open(
+        camera: &CameraSection,
+        model: &RobotModel,
+        robot: RobotId,
+    ) -> Result<Option<Self>, EyeError> {
         let properties = camera.model.properties();
         let period = properties.period();
         let mut human = Human::new(0);

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{
-    Classifier, Progress, Sample, TrainError, TrainOptions, Vocabulary, train,
-};
+use gestalt_strategies::{Classifier, Progress, Sample, TrainError, TrainOptions, Vocabulary, train};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
@@ -62,7 +60,10 @@ impl RobotModel {
     ///
     /// # Errors
     /// See [`ModelError`].
-    pub fn load(section: &ModelSection, progress: impl FnMut(usize, usize)) -> Result<Option<Self>, ModelError> {
+    pub fn load(
+        section: &ModelSection,
+        progress: impl FnMut(usize, usize),
+    ) -> Result<Option<Self>, ModelError> {
         match section {
             ModelSection::None => Ok(None),
             ModelSection::Rendered => {
@@ -116,7 +117,13 @@ pub fn train_on_rendered(mut progress: impl FnMut(usize, usize)) -> Result<Class
         progress(samples.len(), RENDERED_FRAMES);
     }
     let options = TrainOptions { costs: vec![8.0], gammas: vec![1.0], ..TrainOptions::default() };
-    let trained =
-        train(features.name(), &vocabulary, &samples, &options, &mut ChaCha8Rng::seed_from_u64(SEED), |_: Progress| {})?;
+    let trained = train(
+        features.name(),
+        &vocabulary,
+        &samples,
+        &options,
+        &mut ChaCha8Rng::seed_from_u64(SEED),
+        |_: Progress| {},
+    )?;
     Ok(trained.classifier)
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::show::line;
 use super::Failure;
+use super::show::line;
 use crate::config::Config;
 
 /// Checks a robot's configuration, or prints the default one.

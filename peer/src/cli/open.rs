@@ -43,7 +43,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let decided = tokio::time::timeout(args.patience, news.decision_after(before)).await;
         client.close().await;
         let decided = decided
-            .map_err(|_| format!("no decision within {:?}: is a robot of swarm '{swarm}' alive?", args.patience))?
+            .map_err(|_| {
+                format!("no decision within {:?}: is a robot of swarm '{swarm}' alive?", args.patience)
+            })?
             .ok_or("the session has ended")?;
         let words = show::decision(&decided.decision, decided.label.as_deref());
         line(args.json, &json!({"event": "decision", "decision": decided}), &words)

@@ -6,8 +6,8 @@ use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::ConfigArgs;
-use super::show::{self, line};
 use super::progress::bar;
+use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::body::{Body, boot_number};
 use crate::link::Event;

@@ -10,8 +10,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
-use super::show::{self, line};
 use super::progress::bar;
+use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::{CameraSection, Config, ModelSection, RenderedSection, SourceSection};
@@ -159,7 +159,11 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
 }
 
 /// The same configurations, all with this model, written to a file that every process reads.
-fn with_model_file(mut configs: Vec<Config>, model: &RobotModel, folder: &Path) -> Result<Vec<Config>, Failure> {
+fn with_model_file(
+    mut configs: Vec<Config>,
+    model: &RobotModel,
+    folder: &Path,
+) -> Result<Vec<Config>, Failure> {
     let file = folder.join("swarm.model");
     model.write(&file)?;
     for config in &mut configs {
@@ -229,7 +233,11 @@ async fn rounds(
         }
     }
     if let Some(path) = &args.picture {
-        line(args.json, &json!({"event": "picture", "file": path}), &format!("what every robot saw: {}", path.display()))?;
+        line(
+            args.json,
+            &json!({"event": "picture", "file": path}),
+            &format!("what every robot saw: {}", path.display()),
+        )?;
     }
     Ok(tally.score())
 }
@@ -249,9 +257,8 @@ async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement,
 
 /// How many robots see it otherwise than the swarm.
 fn dissenters(bodies: &[Body], decision: &Decision) -> usize {
-    let own = |body: &Body| {
-        body.seen().filter(|seen| seen.round.counter == decision.round.counter)?.opinion()
-    };
+    let own =
+        |body: &Body| body.seen().filter(|seen| seen.round.counter == decision.round.counter)?.opinion();
     bodies.iter().filter(|body| own(body).map(|(class, _)| class) != decision.class).count()
 }
 
@@ -264,7 +271,8 @@ fn draw(
     truth: ClassId,
 ) -> Result<(), Failure> {
     let RoundId { counter, .. } = decision.round;
-    let seen: Vec<_> = bodies.iter().zip(configs).filter_map(|(body, config)| Some((config, body.seen()?))).collect();
+    let seen: Vec<_> =
+        bodies.iter().zip(configs).filter_map(|(body, config)| Some((config, body.seen()?))).collect();
     let panels: Vec<Panel<'_>> = seen
         .iter()
         .filter(|(_, seen)| seen.round.counter == counter)

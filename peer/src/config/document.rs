@@ -26,11 +26,14 @@ impl FromStr for Override {
 
     fn from_str(given: &str) -> Result<Self, ConfigError> {
         let refuse = |mend: &str| ConfigError::Override { given: given.to_owned(), mend: mend.to_owned() };
-        let (key, value) =
-            given.split_once(':').ok_or_else(|| refuse("write KEY:VALUE, for example rounds/deadline:\"8s\""))?;
+        let (key, value) = given
+            .split_once(':')
+            .ok_or_else(|| refuse("write KEY:VALUE, for example rounds/deadline:\"8s\""))?;
         let path: Vec<String> = key.split('/').map(str::to_owned).collect();
         if path.iter().any(String::is_empty) {
-            return Err(refuse("the key is a path of names with '/' between them, for example rounds/deadline"));
+            return Err(refuse(
+                "the key is a path of names with '/' between them, for example rounds/deadline",
+            ));
         }
         // A bare word is meant as a string: mode:client, as on Zenoh's own command line.
         let value = json5::from_str(value).or_else(|cause| {

@@ -274,7 +274,10 @@ impl Config {
         if !(2..=16).contains(&self.links.max_links) {
             return Err(ConfigError::value(
                 "links.max_links",
-                format!("{} is outside 2..=16: two connect a swarm, four give it spare ways", self.links.max_links),
+                format!(
+                    "{} is outside 2..=16: two connect a swarm, four give it spare ways",
+                    self.links.max_links
+                ),
             ));
         }
         if let CameraChoice::Custom(model) = &self.camera.model {

@@ -135,9 +135,8 @@ impl Members {
 
 /// The configuration of the robot at position `i`, told to connect to the robots before it that it is linked to.
 fn linked(config: &Config, i: usize, links: &[(usize, usize)], endpoints: &[String]) -> Config {
-    let neighbours = links.iter().filter_map(|&(a, b)| {
-        if a.max(b) == i { endpoints.get(a.min(b)) } else { None }
-    });
+    let neighbours =
+        links.iter().filter_map(|&(a, b)| if a.max(b) == i { endpoints.get(a.min(b)) } else { None });
     let mut config = config.clone();
     let endpoints: Vec<Value> = neighbours.map(|endpoint| Value::String(endpoint.clone())).collect();
     config.zenoh.insert("connect".to_owned(), serde_json::json!({ "endpoints": endpoints }));

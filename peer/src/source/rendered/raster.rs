@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use opencv::core::{Mat, Vec3b};
 use opencv::prelude::*;
 
-use super::hand::Capsule;
 use super::Pinhole;
+use super::hand::Capsule;
 
 /// How the scene is lit.
 #[derive(Clone, Copy, Debug)]
