@@ -1,5 +1,5 @@
 //! A robot as a process, for the scenarios: it reads orders on stdin and prints what happens as a line of JSON
-//! each. Its arguments are one JSON object: see `Orders`.
+//! each. Its argument is one JSON object.
 
 use std::io::{BufRead, Write};
 use std::sync::Arc;
@@ -38,6 +38,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
     let boot = orders["boot"].as_u64().and_then(|boot| u32::try_from(boot).ok()).unwrap_or(1);
     let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
+    let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
     let robot = match Robot::start(RobotConfig { link, boot, ..config(id, swarm, &[]) }).await {
         Ok(robot) => robot,
         Err(error) => {
@@ -66,7 +67,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
             }
             _ = frames.tick(), if open => {
                 if let Some(class) = sees {
-                    robot.observe(look(class, 0.9));
+                    robot.observe(look(class, p));
                 }
             }
             line = stdin.recv() => match line.as_deref() {

@@ -92,11 +92,13 @@ impl Watched {
     /// The decision it holds once that round is over, or `None` when the time is up.
     pub async fn decision(&mut self, counter: u32, patience: Duration) -> Option<Decision> {
         let mut held = None;
-        let mut over = false;
+        // A robot that hears of a round by its decision takes no part in it.
+        let mut over = true;
         self.wait(patience, |event| {
             match event {
+                Event::Opened(round) if round.counter >= counter => over = false,
                 Event::Held(decision) if decision.round.counter >= counter => held = Some(decision),
-                Event::Closed(round) => over |= round.counter >= counter,
+                Event::Closed(round) if round.counter >= counter => over = true,
                 _ => {}
             }
             held.clone().filter(|_| over)

@@ -1,3 +1,10 @@
 //! Whole swarms on real Zenoh, one scenario a file. Run them one after the other: they measure time.
 
+mod churn;
+mod clients;
+mod field;
 mod in_process;
+mod line;
+mod ring;
+mod scouting;
+mod trouble;

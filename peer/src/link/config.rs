@@ -1,5 +1,7 @@
 //! How a robot is linked to others, as the user says it and as Zenoh takes it.
 
+use std::time::Duration;
+
 use gestalt_protocol::RobotId;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -22,6 +24,11 @@ pub struct LinkConfig {
     /// The number of links to robots that scouting builds up to, at least 2. Explicit endpoints and clients are
     /// not counted.
     pub max_links: usize,
+    /// How long a link may be silent before it counts as lost, and how long an attempt to make one may take. A
+    /// silently lost relay is routed around after about this time; where a hundred robots share a busy processor,
+    /// a short lease loses links that are merely slow.
+    #[serde(with = "humantime_serde")]
+    pub lease: Duration,
     /// Anything Zenoh's own configuration offers, verbatim; it has the last word, except for `id`.
     pub zenoh: serde_json::Map<String, Value>,
 }
@@ -49,6 +56,7 @@ impl Default for LinkConfig {
             connect: Vec::new(),
             scouting: None,
             max_links: 4,
+            lease: Duration::from_secs(1),
             zenoh: serde_json::Map::new(),
         }
     }
@@ -102,6 +110,7 @@ impl LinkConfig {
 
     fn with_defaults(&self, first: &Value) -> Result<zenoh::Config, LinkError> {
         let mut config = zenoh::Config::default();
+        let lease = u64::try_from(self.lease.as_millis()).unwrap_or(u64::MAX);
         let scouting = self.scouting.clone().unwrap_or_default();
         let rest = serde_json::json!({
             "connect/endpoints": self.connect,
@@ -112,10 +121,10 @@ impl LinkConfig {
             "scouting/multicast/autoconnect": { "router": [], "peer": [], "client": ["router"] },
             "scouting/gossip/autoconnect": { "router": [], "peer": [], "client": [] },
             "adminspace/enabled": false,
-            "transport/unicast/open_timeout": 1000,
-            "transport/unicast/accept_timeout": 1000,
+            "transport/unicast/open_timeout": lease,
+            "transport/unicast/accept_timeout": lease,
             "transport/unicast/max_links": 1,
-            "transport/link/tx/lease": 1000,
+            "transport/link/tx/lease": lease,
             "transport/link/tx/keep_alive": 4,
         });
         for (path, value) in [first, &rest].into_iter().filter_map(Value::as_object).flatten() {

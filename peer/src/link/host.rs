@@ -17,6 +17,7 @@ use zenoh::sample::Locality;
 use zenoh::time::Timestamp;
 
 use super::account::Account;
+use super::census::take_census;
 use super::inbox::Inbox;
 use super::keeper::Keeper;
 use super::session::Node;
@@ -24,6 +25,9 @@ use super::{Announcement, Event, LinkError};
 
 /// When a new robot asks whether its id is taken: late enough that its links stand.
 const TWIN_CHECK: Duration = Duration::from_secs(3);
+
+/// A robot that changes its decision of a round again within this time says so only once.
+const HOLD_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Everything the task needs; [`Host::declare`] makes it known to the swarm.
 pub(super) struct Host {
@@ -47,6 +51,10 @@ pub(super) struct Declared {
     swarm: Publisher<'static>,
     last: Arc<Last>,
     alive: LivelinessToken,
+    /// The decision still to be published on `robot/<me>/decision`.
+    unsaid: Option<Announcement>,
+    /// The round of the decision published last, and when.
+    said: Option<(u32, Instant)>,
 }
 
 /// The decision this robot holds, as the queryable on `decision` gives it.
@@ -120,7 +128,7 @@ impl Host {
         let held = decision(Topic::RobotDecision(self.me)).await?;
         let swarm = decision(Topic::Decision).await?;
         let alive = session.liveliness().declare_token(self.keys.key(&Topic::Alive(self.me))).await?;
-        Ok(Declared { host: self, vote, held, swarm, last, alive })
+        Ok(Declared { host: self, vote, held, swarm, last, alive, unsaid: None, said: None })
     }
 }
 
@@ -133,9 +141,15 @@ impl Declared {
             self.host.keys.key(&Topic::Status(self.host.me)),
             self.host.account.clone(),
         ));
+        let census = tokio::spawn(take_census(
+            self.host.node.clone(),
+            self.host.keys.clone(),
+            self.host.inbox.clone(),
+        ));
         let inbox = self.host.inbox.clone();
         loop {
             let wake = self.host.mind.next_wake().map(|wake| self.host.started + wake);
+            let wake = wake.into_iter().chain(self.hold_due()).min();
             tokio::select! {
                 () = inbox.ready() => {
                     for input in inbox.take() {
@@ -150,6 +164,7 @@ impl Declared {
             }
         }
         twin_check.abort();
+        census.abort();
         if let Some(keeper) = keeper {
             keeper.abort();
         }
@@ -178,6 +193,7 @@ impl Declared {
         for output in self.host.mind.handle(now, input) {
             self.carry_out(output);
         }
+        self.publish_hold();
         for (refusal, count) in self.host.mind.refusals().iter() {
             if count > 0 {
                 self.host.account.set(refusal.name(), count);
@@ -195,12 +211,10 @@ impl Declared {
             }
             Output::Tell(neighbour, envelope) => self.repair(neighbour, &envelope),
             Output::Hold(decision) => {
-                let announcement = self.announcement(&decision);
-                let json = self.publish("robot_decision", &self.held, &announcement);
-                self.last.set(json, self.host.node.session().new_timestamp());
                 let mut status = self.host.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
+                self.unsaid = Some(self.announcement(&decision));
                 self.tell(Event::Held(decision));
             }
             Output::Announce(decision) => {
@@ -218,6 +232,25 @@ impl Declared {
                 self.host.account.lock().open = false;
                 self.tell(Event::Closed(round));
             }
+        }
+    }
+
+    /// When the decision held is to be published: the first of a round at once, each next one a moment later, so
+    /// that robots which are just settling among each other do not each say every step of it to all.
+    fn hold_due(&self) -> Option<Instant> {
+        let round = self.unsaid.as_ref()?.decision.round.counter;
+        let again = self.said.filter(|(said, _)| *said == round);
+        Some(again.map_or_else(Instant::now, |(_, at)| at + HOLD_INTERVAL))
+    }
+
+    fn publish_hold(&mut self) {
+        if self.hold_due().is_none_or(|due| Instant::now() < due) {
+            return;
+        }
+        if let Some(announcement) = self.unsaid.take() {
+            let json = self.publish("robot_decision", &self.held, &announcement);
+            self.last.set(json, self.host.node.session().new_timestamp());
+            self.said = Some((announcement.decision.round.counter, Instant::now()));
         }
     }
 

@@ -34,6 +34,7 @@ pub(super) struct Inbox {
     account: Arc<Account>,
     state: Mutex<State>,
     ready: Notify,
+    unrest: Notify,
 }
 
 #[derive(Debug, Default)]
@@ -50,7 +51,7 @@ struct State {
 impl Inbox {
     pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>) -> Self {
         let state = Mutex::new(State::default());
-        Self { me, swarm, keys, account, state, ready: Notify::new() }
+        Self { me, swarm, keys, account, state, ready: Notify::new(), unrest: Notify::new() }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -60,6 +61,11 @@ impl Inbox {
     /// Waits until there is something to take.
     pub(super) async fn ready(&self) {
         self.ready.notified().await;
+    }
+
+    /// Waits until a robot or a link has come or gone since the last time.
+    pub(super) async fn unrest(&self) {
+        self.unrest.notified().await;
     }
 
     /// Takes everything that has arrived, changes of the neighbourhood first.
@@ -182,7 +188,26 @@ impl Inbox {
         if changed {
             state.alive_changed = true;
             self.ready.notify_one();
+            self.unrest.notify_one();
         }
+    }
+
+    /// Corrects who is alive: those who answered a census are, those who stayed away twice are not.
+    pub(super) fn on_census(&self, present: &BTreeSet<RobotId>, gone: &BTreeSet<RobotId>) {
+        let mut state = self.lock();
+        let before = state.alive.clone();
+        state.alive.extend(present);
+        state.alive.retain(|id| !gone.contains(id));
+        if state.alive != before {
+            self.account.count("census_corrections");
+            state.alive_changed = true;
+            self.ready.notify_one();
+        }
+    }
+
+    /// The robots alive by liveliness.
+    pub(super) fn tokens(&self) -> BTreeSet<RobotId> {
+        self.lock().alive.clone()
     }
 
     /// A link to another session came or went.
@@ -199,6 +224,7 @@ impl Inbox {
         }
         state.links_changed = true;
         self.ready.notify_one();
+        self.unrest.notify_one();
     }
 
     /// The sessions of robots that this one is linked to now.

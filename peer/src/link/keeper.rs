@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use gestalt_protocol::RobotId;
 use tokio::sync::mpsc;
-use tokio::time::MissedTickBehavior;
 use zenoh::config::WhatAmI;
 use zenoh::session::ZenohId;
 
@@ -19,11 +18,18 @@ use super::topology::{Topology, View};
 /// How often links are looked after.
 const PERIOD: Duration = Duration::from_millis(500);
 
+/// How often when no link has come or gone for a while.
+const IDLE_PERIOD: Duration = Duration::from_millis(1500);
+const UNREST: Duration = Duration::from_secs(10);
+
 /// How long answers to a call are waited for.
 const CALL: Duration = Duration::from_millis(700);
 
 /// The most robots kept in mind as heard.
 const MAX_HEARD: usize = 4096;
+
+/// A robot that could not be dialled so often in a row is gone, unless it is heard anew.
+const MAX_FAILURES: u32 = 3;
 
 /// The task that looks after the links of one robot.
 pub(super) struct Keeper {
@@ -43,6 +49,7 @@ struct Heard {
     id: ZenohId,
     locators: Vec<String>,
     at: Instant,
+    failures: u32,
 }
 
 enum News {
@@ -77,13 +84,24 @@ impl Keeper {
     /// Runs until it is aborted.
     pub(super) async fn run(mut self) {
         let started = Instant::now();
-        let mut tick = tokio::time::interval(PERIOD);
-        tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut busy_until = started + UNREST;
+        let mut before = BTreeMap::new();
         loop {
-            tokio::select! {
-                Some(news) = self.news.1.recv() => self.on_news(news),
-                _ = tick.tick() => self.look_after(started).await,
+            let links = self.inbox.links();
+            if links != before || !self.busy.is_empty() {
+                busy_until = Instant::now() + UNREST;
+                before = links;
             }
+            let period = if Instant::now() < busy_until { PERIOD } else { IDLE_PERIOD };
+            let next = tokio::time::sleep(period);
+            tokio::pin!(next);
+            loop {
+                tokio::select! {
+                    Some(news) = self.news.1.recv() => self.on_news(news),
+                    () = &mut next => break,
+                }
+            }
+            self.look_after(started).await;
         }
     }
 
@@ -94,9 +112,17 @@ impl Keeper {
                 self.busy.remove(&robot);
                 if !stands {
                     self.account.count("dial_failed");
-                    self.heard.remove(&robot);
+                    self.on_failure(robot);
                 }
             }
+        }
+    }
+
+    fn on_failure(&mut self, robot: RobotId) {
+        let Some(heard) = self.heard.get_mut(&robot) else { return };
+        heard.failures += 1;
+        if heard.failures >= MAX_FAILURES {
+            self.heard.remove(&robot);
         }
     }
 
@@ -109,7 +135,7 @@ impl Keeper {
             return;
         }
         if self.heard.len() < MAX_HEARD || self.heard.contains_key(&robot) {
-            self.heard.insert(robot, Heard { id, locators, at: Instant::now() });
+            self.heard.insert(robot, Heard { id, locators, at: Instant::now(), failures: 0 });
         }
     }
 

@@ -2,6 +2,7 @@
 
 mod account;
 mod announcement;
+mod census;
 mod client;
 mod config;
 mod error;

@@ -14,19 +14,29 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 
 /// How long a robot that was heard is thought to be there without a sign of life.
-const FRESH: Duration = Duration::from_secs(5);
+const FRESH: Duration = Duration::from_secs(15);
+
+/// How long the same robots must have been in sight before links are made, or unmade, to suit: every link made or
+/// unmade is news to the whole swarm. Robots that keep coming delay the making by no more than the third.
+const SETTLED: Duration = Duration::from_millis(900);
+const SETTLED_TO_DROP: Duration = Duration::from_secs(8);
+const UNSETTLED: Duration = Duration::from_secs(3);
 
 /// How long the smaller id of a pair is left to dial before the other does.
-const COURTESY: Duration = Duration::from_secs(10);
+const COURTESY: Duration = Duration::from_secs(2);
 
 /// How long a heard robot may stay unreachable before it is linked to outside the rings.
 const PATIENCE: Duration = Duration::from_secs(4);
+const PATIENCE_OF_OTHERS: Duration = Duration::from_secs(15);
 
 /// A link that comes back this soon after it was dropped is needed by someone.
 const NEEDED: Duration = Duration::from_secs(8);
 
 /// How often a robot without any link looks for others.
 const ALONE: Duration = Duration::from_secs(1);
+
+/// When a new robot looks again, after its first look: others may have started at the same time.
+const FIRST_LOOKS: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(3)];
 
 /// How often the smallest robot of a connected whole looks for others.
 const LOOKOUT: Duration = Duration::from_secs(3);
@@ -59,11 +69,15 @@ pub(super) struct Plan {
 pub(super) struct Topology {
     me: RobotId,
     max_links: usize,
+    there: BTreeSet<RobotId>,
+    settled_since: Duration,
+    unsettled_since: Option<Duration>,
     wanted_since: BTreeMap<RobotId, Duration>,
     unreachable_since: BTreeMap<RobotId, Duration>,
     dropped: BTreeMap<RobotId, Duration>,
     bridges: BTreeSet<RobotId>,
     scouted: Option<Duration>,
+    looks: usize,
     missing: u32,
 }
 
@@ -72,11 +86,15 @@ impl Topology {
         Self {
             me,
             max_links,
+            there: BTreeSet::new(),
+            settled_since: Duration::ZERO,
+            unsettled_since: None,
             wanted_since: BTreeMap::new(),
             unreachable_since: BTreeMap::new(),
             dropped: BTreeMap::new(),
             bridges: BTreeSet::new(),
             scouted: None,
+            looks: 0,
             missing: 0,
         }
     }
@@ -90,12 +108,31 @@ impl Topology {
             .map(|(id, _)| *id)
             .chain(view.linked.iter().copied())
             .collect();
+        let (settled, since) = self.settled(now, &there);
         let wanted = self.ring_neighbours(&there);
         let mut dial = self.due_in_rings(now, &wanted, view);
         dial.extend(self.due_outside(now, &there, view));
-        let drop = self.surplus(now, &wanted, view);
+        if !settled {
+            dial.clear();
+        }
+        let drop = if since >= SETTLED_TO_DROP { self.surplus(now, &wanted, view) } else { BTreeSet::new() };
         let scout = self.scout_is_due(now, &there, view);
         Plan { dial, drop, scout }
+    }
+
+    /// Whether it is time to act on who is there, and since when nobody has come or gone.
+    fn settled(&mut self, now: Duration, there: &BTreeSet<RobotId>) -> (bool, Duration) {
+        if *there != self.there {
+            self.there.clone_from(there);
+            self.settled_since = now;
+            self.unsettled_since.get_or_insert(now);
+        }
+        let since = now.saturating_sub(self.settled_since);
+        let unsettled = self.unsettled_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+        if since >= SETTLED {
+            self.unsettled_since = None;
+        }
+        (since >= SETTLED || unsettled >= UNSETTLED, since)
     }
 
     /// Those before and after this robot in each ring of `there`.
@@ -125,8 +162,11 @@ impl Topology {
             there.iter().filter(|id| **id != self.me && !view.alive.contains(id)).copied().collect();
         since(&mut self.unreachable_since, &unreachable, now);
         let waited = |id: RobotId| now.saturating_sub(self.unreachable_since[&id]);
-        let smallest = unreachable.into_iter().find(|id| waited(*id) >= PATIENCE)?;
-        let mine = self.me < smallest || waited(smallest) >= COURTESY;
+        // One robot of a whole is enough; the others step in where it does not hear those that they hear.
+        let first = view.alive.first().is_none_or(|id| self.me < *id);
+        let patience = if first { PATIENCE } else { PATIENCE_OF_OTHERS };
+        let smallest = unreachable.into_iter().find(|id| waited(*id) >= patience)?;
+        let mine = self.me < smallest || waited(smallest) >= patience + COURTESY;
         let due = mine && !view.linked.contains(&smallest);
         if due && self.dropped.contains_key(&smallest) {
             self.bridges.insert(smallest);
@@ -164,6 +204,8 @@ impl Topology {
         let smallest = everyone.first().is_none_or(|id| *id >= self.me);
         let period = if view.linked.is_empty() {
             ALONE
+        } else if let Some(first) = FIRST_LOOKS.get(self.looks) {
+            *first
         } else if missing {
             (ALONE / 2 * 2_u32.saturating_pow(self.missing)).min(REST.1)
         } else if smallest {
@@ -174,6 +216,7 @@ impl Topology {
         let due = self.scouted.is_none_or(|at| now.saturating_sub(at) >= period);
         if due {
             self.scouted = Some(now);
+            self.looks += 1;
             self.missing = if missing { (self.missing + 1).min(8) } else { 0 };
         }
         due

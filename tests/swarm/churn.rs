@@ -1,0 +1,130 @@
+//! Nine robots in a grid whose links are cut silently and healed at random while rounds run.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use gestalt_tests::not_permitted;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde_json::Value;
+
+use crate::field::Field;
+
+/// With `GESTALT_LONG` set: ten runs of 30 s; otherwise two of 10 s.
+fn extent() -> (u64, Duration) {
+    match std::env::var_os("GESTALT_LONG") {
+        Some(_) => (10, Duration::from_secs(30)),
+        None => (2, Duration::from_secs(10)),
+    }
+}
+
+fn grid() -> Vec<(u32, u32)> {
+    let across = (0..9).filter(|i| i % 3 < 2).map(|i| (i, i + 1));
+    let down = (0..6).map(|i| (i, i + 3));
+    across.chain(down).collect()
+}
+
+#[test]
+fn a_grid_under_churn_never_ends_a_round_differently_and_agrees_in_calm() {
+    if not_permitted() {
+        return;
+    }
+    let (runs, time) = extent();
+    for seed in 0..runs {
+        one_run(seed, time);
+    }
+}
+
+fn one_run(seed: u64, time: Duration) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Robots differ in what they see: 4 see a 1, 3 see a 2; which votes are heard matters.
+    let mut field = Field::with(
+        9,
+        &grid(),
+        |node| match node {
+            0 | 2 | 4 | 8 => Some(1),
+            1 | 3 | 6 => Some(2),
+            _ => None,
+        },
+        0.7,
+        |_| serde_json::json!({}),
+    );
+    let links: Vec<_> = field.namespaces.links().collect();
+    let mut cut = vec![false; links.len()];
+    let began = Instant::now();
+    let mut opened = 0;
+    while began.elapsed() < time {
+        let k = rng.next_u32() as usize % links.len();
+        if cut[k] {
+            field.namespaces.heal(links[k]);
+        } else if cut.iter().filter(|cut| **cut).count() < 5 {
+            field.namespaces.cut(links[k]);
+        } else {
+            continue;
+        }
+        cut[k] = !cut[k];
+        if opened as u128 * 2000 <= began.elapsed().as_millis() {
+            opened += 1;
+            let opener = rng.next_u32() as usize % 9;
+            field.robots[opener].order("open");
+        }
+        std::thread::sleep(Duration::from_millis(u64::from(100 + rng.next_u32() % 400)));
+    }
+    for (k, link) in links.iter().enumerate() {
+        if cut[k] {
+            field.namespaces.heal(*link);
+        }
+    }
+    let calm = Instant::now();
+    let agreed = wait_until_last_agreed(&field, Duration::from_secs(10));
+    let took = calm.elapsed();
+    let last = &lasts(&field)[0];
+    eprintln!("churn, seed {seed}: {opened} rounds opened, {last:?} held by all after {took:?} of calm");
+    let differing = differing_outcomes(&field);
+    assert!(agreed, "seed {seed}: no agreement in 10 s of calm: {:?}", lasts(&field));
+    assert!(took <= Duration::from_secs(3), "seed {seed}: agreement only after {took:?} of calm");
+    assert!(differing.is_empty(), "seed {seed}: rounds ended differently: {differing:?}");
+}
+
+/// The last decision each robot holds: round and class.
+fn lasts(field: &Field) -> Vec<Option<(u64, Value)>> {
+    let last = |told: &[Value]| {
+        let held = told.iter().rev().find(|told| told["event"] == "held")?;
+        Some((held["round"].as_u64()?, held["class"].clone()))
+    };
+    field.robots.iter().map(|robot| last(&robot.told())).collect()
+}
+
+fn wait_until_last_agreed(field: &Field, patience: Duration) -> bool {
+    let deadline = Instant::now() + patience;
+    while Instant::now() < deadline {
+        let newest =
+            field.robots.iter().flat_map(|robot| robot.told()).filter_map(|told| told["round"].as_u64());
+        let newest = newest.max();
+        let lasts = lasts(field);
+        if lasts
+            .iter()
+            .all(|last| last.is_some() && *last == lasts[0] && last.as_ref().map(|l| l.0) == newest)
+        {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    false
+}
+
+/// The rounds that ended with more than one class, by what the robots last held of each.
+fn differing_outcomes(field: &Field) -> BTreeMap<u64, BTreeMap<String, Vec<usize>>> {
+    let mut outcomes: BTreeMap<u64, BTreeMap<String, Vec<usize>>> = BTreeMap::new();
+    for (node, robot) in field.robots.iter().enumerate() {
+        let mut finals = BTreeMap::new();
+        for told in robot.told().iter().filter(|told| told["event"] == "held") {
+            finals.insert(told["round"].as_u64().unwrap(), told["class"].to_string());
+        }
+        for (round, class) in finals {
+            outcomes.entry(round).or_default().entry(class).or_default().push(node);
+        }
+    }
+    outcomes.retain(|_, classes| classes.len() > 1);
+    outcomes
+}
