@@ -27,7 +27,7 @@ use tracing_subscriber::EnvFilter;
 
 /// A swarm of robots that reads hand gestures together.
 #[derive(Debug, Parser)]
-#[command(name = "gestalt", version, about, propagate_version = true)]
+#[command(name = "gestalt", version, propagate_version = true)]
 pub struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -86,9 +86,10 @@ impl Command {
     }
 }
 
-/// Sends log lines to stderr; `RUST_LOG` chooses which, warnings when it is silent.
+/// Sends log lines to stderr; `RUST_LOG` chooses which. When it is silent: our own warnings, and Zenoh's errors; what
+/// else concerns the user is said in Gestalt's own words.
 pub fn start_log() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,gestalt_peer=warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
 }
 

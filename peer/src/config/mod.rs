@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use thiserror::Error;
 
 use crate::camera_model::CameraModel;
-use crate::link::{LinkConfig, Scouting};
+use crate::link::{LinkConfig, LinkError, Scouting};
 use crate::pose::Pose;
 
 pub use document::{Document, Override};
@@ -117,10 +117,11 @@ pub struct CameraSection {
 }
 
 /// A camera by name, or described.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraChoice {
     /// 384×288 at 2 frames per second.
+    #[default]
     Footbot,
     /// 640×360 at 30 frames per second.
     Parrot,
@@ -128,12 +129,6 @@ pub enum CameraChoice {
     Laptop,
     /// Any other.
     Custom(CameraModel),
-}
-
-impl Default for CameraChoice {
-    fn default() -> Self {
-        Self::Footbot
-    }
 }
 
 /// Where a robot's frames come from.
@@ -290,7 +285,10 @@ impl Config {
                 "a robot with a camera source needs a classifier: \"rendered\" or {file: \"FILE\"}, or set camera.source to \"none\"",
             ));
         }
-        self.link().check(self.robot.id).map_err(|error| ConfigError::value("zenoh", error.to_string()))
+        self.link().check(self.robot.id).map_err(|error| match error {
+            LinkError::Config { key, cause } => ConfigError::Value { key, cause },
+            other => ConfigError::value("zenoh", other.to_string()),
+        })
     }
 }
 

@@ -41,15 +41,35 @@ pub enum LinkError {
     Open(String),
 }
 
+/// What Zenoh says, without the places in its source that it says it at.
+pub(super) fn reason(cause: &(dyn std::error::Error + Send + Sync)) -> String {
+    let said = cause.to_string();
+    let words = said.split(' ').collect::<Vec<_>>();
+    let place = |i: usize| words.get(i).is_some_and(|word| word.contains(".rs:"));
+    let kept = (0..words.len()).filter(|&i| !place(i) && !(words[i] == "at" && place(i + 1)));
+    kept.map(|i| words[i]).collect::<Vec<_>>().join(" ")
+}
+
 impl LinkError {
     pub(super) fn config(path: &str, cause: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::Config {
             key: format!("zenoh.{}", path.replace('/', ".")),
-            cause: format!("{cause}: see Zenoh's DEFAULT_CONFIG.json5 for the keys and their values"),
+            cause: format!("{}: see Zenoh's DEFAULT_CONFIG.json5 for the keys and their values", reason(cause)),
         }
     }
 
     pub(super) fn open(cause: &(dyn std::error::Error + Send + Sync)) -> Self {
-        Self::Open(cause.to_string())
+        Self::Open(reason(cause))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zenohs_reason_comes_without_the_places_in_its_source() {
+        let zenoh = std::io::Error::other("no route at /home/a/zenoh-1/src/lib.rs:62. at all at b/tcp.rs:3.");
+        assert_eq!(reason(&zenoh), "no route at all");
     }
 }

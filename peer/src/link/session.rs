@@ -18,6 +18,7 @@ use zenoh_transport::{
 };
 
 use super::LinkError;
+use super::error::reason;
 
 /// A Zenoh session with a handle on each of its links.
 #[derive(Clone)]
@@ -58,7 +59,7 @@ impl Node {
         let node = Self { session, runtime, links };
         if let Err(error) = started {
             node.close().await;
-            return Err(LinkError::Start { listen, cause: error.to_string() });
+            return Err(LinkError::Start { listen, cause: reason(&*error) });
         }
         Ok(node)
     }
