@@ -22,7 +22,6 @@ pub(crate) struct Round {
     pub agreement: Agreement,
     evidence: Option<Evidence>,
     said: Option<Said>,
-    concluded: bool,
 }
 
 /// This robot's vote as it was last said.
@@ -44,7 +43,6 @@ impl Round {
             agreement: Agreement::default(),
             evidence: None,
             said: None,
-            concluded: false,
         }
     }
 
@@ -111,8 +109,8 @@ impl Round {
         scale: Option<Scale>,
         config: &MindConfig,
     ) {
-        let held = self.agreement.held().is_some();
-        if !self.open || self.concluded || held {
+        // One of its own per round: what is concluded is held at once.
+        if !self.open || self.agreement.held().is_some() {
             return;
         }
         let (patience, deadline) = self.patience_and_deadline(config);
@@ -140,7 +138,6 @@ impl Round {
             (fusion.probabilities, confidence)
         });
         let votes = scale.map_or(Vec::new(), |s| self.ballot.counted(config.rule, config.clip, s));
-        self.concluded = true;
         self.agreement.believe(Decision {
             round: self.id,
             class,
