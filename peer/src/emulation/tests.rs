@@ -103,6 +103,27 @@ fn after_cuts_and_heals_all_agree() {
 }
 
 #[test]
+fn within_three_seconds_of_calm_all_hold_the_last_decision() {
+    let churn = Churn {
+        from: Duration::from_secs(3),
+        until: Duration::from_secs(33),
+        period: Duration::from_millis(300),
+    };
+    let calm_for = Duration::from_secs(3);
+    let rounds = 11;
+    let scenario = Scenario {
+        interval: (churn.until + calm_for) / (rounds + 1),
+        rounds,
+        churn: Some(churn),
+        ..calm(9, 0, Topology::Grid, rounds)
+    };
+    for seed in 0..20 {
+        let report = run(&scenario, seed).unwrap();
+        assert!(report.agreed_at_the_end, "seed {seed}: {report:?}");
+    }
+}
+
+#[test]
 fn a_robot_that_missed_a_round_is_told_of_it_when_it_is_back() {
     let fault = |at: u64, event| Fault { at: Duration::from_secs(at), event };
     let scenario = Scenario {
