@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "1,4,16", value_name = "LIST")]
     costs: Vec<f64>,
     /// The values of gamma to try, in units of 1 / (total variance of the reduced features)
-    #[arg(long, value_delimiter = ',', default_value = "0.25,0.5,1,2", value_name = "LIST")]
+    #[arg(long, value_delimiter = ',', default_value = "0.125,0.25,0.5,1", value_name = "LIST")]
     gammas: Vec<f64>,
     /// Parts of the cross-validation that chooses C and gamma and calibrates the probabilities
     #[arg(long, default_value_t = 5, value_name = "N")]

@@ -124,3 +124,57 @@ fn fit_pair(
         .shrinking(false)
         .fit(&DatasetBase::new(records, targets))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decisions(machine: &Machine, x: &[f32]) -> Vec<f64> {
+        let mut decisions = Vec::new();
+        machine.decide(x, &mut decisions);
+        decisions
+    }
+
+    #[test]
+    fn a_pair_decides_as_libsvm_does() {
+        // sklearn.svm.SVC(C=2, gamma=0.5, tol=1e-6) 1.9.1, which is LIBSVM, on the same 20 samples.
+        let sample = |i: usize| {
+            let side = if i < 10 { 0.5 } else { -0.5 };
+            [((5 * i) as f64).sin() + side, ((3 * i) as f64).cos() + side].map(|v| v as f32)
+        };
+        let samples: Vec<[f32; 2]> = (0..20).map(sample).collect();
+        let of = |samples: &[[f32; 2]]| -> Vec<Vec<f32>> { samples.iter().map(|s| s.to_vec()).collect() };
+        let (first, second) = (of(&samples[..10]), of(&samples[10..]));
+        let members: Vec<Vec<&[f32]>> =
+            [&first, &second].map(|class| class.iter().map(Vec::as_slice).collect()).to_vec();
+        let machine = Machine::fit(&members, 2, 2.0, 0.5).unwrap();
+        assert_eq!(machine.counts.iter().sum::<usize>(), 14);
+        for (x, expected) in [
+            ([0.0, 0.0], -0.233_87),
+            ([1.0, 1.0], 1.076_38),
+            ([-1.0, 1.0], 0.099_20),
+            ([0.3, -0.8], -0.580_71),
+            ([-2.0, -2.0], -0.432_18),
+        ] {
+            let found = decisions(&machine, &x)[0];
+            // LIBSVM's default tolerance, which is ours, leaves this much open.
+            assert!((found - expected).abs() < 2e-3, "{found} for {expected}");
+        }
+    }
+
+    #[test]
+    fn each_pair_is_what_it_would_be_alone() {
+        let class = |k: usize| -> Vec<Vec<f32>> {
+            (0..8).map(|i| vec![(i * (k + 2)) as f32 % 5.0, (k as f32) + 0.2 * (i % 3) as f32]).collect()
+        };
+        let classes: Vec<Vec<Vec<f32>>> = (0..4).map(class).collect();
+        let slices: Vec<Vec<&[f32]>> =
+            classes.iter().map(|rows| rows.iter().map(Vec::as_slice).collect()).collect();
+        let all = decisions(&Machine::fit(&slices, 2, 1.0, 0.7).unwrap(), &[1.0, 1.5]);
+        for ((i, j), together) in pairs(4).zip(all) {
+            let pair = [slices[i].clone(), slices[j].clone()];
+            let alone = decisions(&Machine::fit(&pair, 2, 1.0, 0.7).unwrap(), &[1.0, 1.5])[0];
+            assert!((together - alone).abs() < 1e-5, "{i} {j}: {together} and {alone}");
+        }
+    }
+}

@@ -139,3 +139,90 @@ fn oriented(direction: &[f64]) -> impl Iterator<Item = f32> + '_ {
     let sign = if largest < 0.0 { -1.0 } else { 1.0 };
     direction.iter().map(move |v| (v * sign) as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+
+    use super::*;
+
+    fn centred(count: usize, width: usize, value: impl Fn(usize, usize) -> f64) -> Vec<f32> {
+        let mut x = DMatrix::from_fn(count, width, value);
+        for mut column in x.column_iter_mut() {
+            let mean = column.mean();
+            column.add_scalar_mut(-mean);
+        }
+        x.transpose().iter().map(|v| *v as f32).collect()
+    }
+
+    fn fit(rows: &[f32], width: usize, keep: Components) -> Pca {
+        Pca::fit(rows, width, keep, &mut ChaCha8Rng::seed_from_u64(1))
+    }
+
+    #[test]
+    fn it_agrees_with_scikit_learn() {
+        // sklearn.decomposition.PCA(svd_solver="full") 1.9.1 on the same 8×4 matrix, signs as in `oriented`.
+        let rows = centred(8, 4, |i, j| ((1 + 3 * i + 7 * j + i * j) as f64).sin());
+        let pca = fit(&rows, 4, Components::Count(2));
+        let expected =
+            [0.080_301, 0.854_495, 0.476_829, -0.189_798, -0.101_624, -0.487_119, 0.865_143, -0.062_571];
+        assert!(pca.basis.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{:?}", pca.basis);
+        assert!((pca.explained() - 0.726_150).abs() < 1e-5, "{}", pca.explained());
+    }
+
+    #[test]
+    fn fewer_rows_than_columns_give_the_same_components() {
+        // The rows once, and four times over: the first by the Gram matrix, the second by the covariance.
+        let rows = centred(6, 20, |i, j| ((i * i + 3 * j + i * j) as f64).sin() * (1 + i) as f64);
+        let (wide, tall) =
+            (fit(&rows, 20, Components::Count(3)), fit(&rows.repeat(4), 20, Components::Count(3)));
+        assert_eq!(wide.kept(), 3);
+        assert!(wide.basis.iter().zip(&tall.basis).all(|(a, b)| (a - b).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_large_matrix_gives_the_components_of_the_exact_decomposition() {
+        // Spectrum falling by 3 % a step, as slowly as that of real gradients.
+        let (count, width) = (300, 400);
+        let rows = centred(count, width, |i, j| {
+            (0..60)
+                .map(|k| {
+                    let (u, v) = ((i * (2 * k + 3)) as f64, (j * (2 * k + 5)) as f64);
+                    0.97_f64.powi(k as i32) * (u * 0.11).sin() * (v * 0.07).cos()
+                })
+                .sum()
+        });
+        let x = DMatrix::from_row_iterator(count, width, rows.iter().map(|&v| f64::from(v)));
+        let exact = exact(&x);
+        let total: f64 = exact.iter().map(|(variance, _)| variance).sum();
+        let leading: f64 = exact[..20].iter().map(|(variance, _)| variance).sum();
+        let pca = fit(&rows, width, Components::Count(20));
+        assert!((pca.explained() - leading / total).abs() < 1e-6, "{}", pca.explained());
+        for (found, (_, direction)) in pca.directions().zip(&exact).take(10) {
+            let cosine: f64 = found.iter().zip(direction).map(|(&a, b)| f64::from(a) * b).sum();
+            assert!(cosine.abs() > 0.999_9, "{cosine}");
+        }
+        let part = leading / total;
+        let kept = fit(&rows, width, Components::Variance(part - 1e-6)).kept();
+        assert_eq!(kept, 20, "as few as keep {part}");
+    }
+
+    #[test]
+    fn no_more_components_are_kept_than_the_data_have() {
+        let flat = centred(10, 5, |i, j| (i * (j + 1)) as f64);
+        assert_eq!(fit(&flat, 5, Components::Count(5)).kept(), 1, "all rows lie on one line");
+    }
+
+    #[test]
+    fn directions_are_orthonormal() {
+        let rows = centred(40, 12, |i, j| ((i * 7 + j * j * 3) as f64).sin());
+        let pca = fit(&rows, 12, Components::Variance(0.95));
+        for (i, a) in pca.directions().enumerate() {
+            for (j, b) in pca.directions().enumerate() {
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((dot(a, b) - expected).abs() < 1e-5, "{i} {j}");
+            }
+        }
+    }
+}

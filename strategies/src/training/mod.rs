@@ -32,7 +32,7 @@ pub struct Sample {
 /// | `scaling` | per component | how features are brought to one scale | |
 /// | `components` | 60 | principal components kept | ≥ 1, or a part of the variance in 0–1 |
 /// | `costs` | 1, 4, 16 | values of C that are tried | > 0 |
-/// | `gammas` | ¼, ½, 1, 2 | values of γ that are tried, in units of 1 / (variance of the reduced samples) | > 0 |
+/// | `gammas` | ⅛, ¼, ½, 1 | values of γ that are tried, in units of 1 / (variance of the reduced samples) | > 0 |
 /// | `folds` | 5 | parts of the cross-validation | 2–20 |
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainOptions {
@@ -54,7 +54,7 @@ impl Default for TrainOptions {
             scaling: ScalingMethod::PerComponent,
             components: Components::Count(60),
             costs: vec![1.0, 4.0, 16.0],
-            gammas: vec![0.25, 0.5, 1.0, 2.0],
+            gammas: vec![0.125, 0.25, 0.5, 1.0],
             folds: 5,
         }
     }
