@@ -59,7 +59,8 @@ impl BlobFinder {
         Ok(largest)
     }
 
-    /// Draws a blob found last, white on a black mask of `size`, and collects its holes that are no noise, largest first.
+    /// Draws a blob found last, white on a black mask of `size`, and collects its holes that are no noise,
+    /// largest first.
     pub fn draw(
         &self,
         blob: &Blob,
@@ -72,7 +73,8 @@ impl BlobFinder {
         } else {
             *mask = Mat::new_size_with_default(size, CV_8U, Scalar::all(0.0))?;
         }
-        // Outline and holes in one call: even and odd nesting leaves the holes black and the pixels around them whole.
+        // Outline and holes in one call: even and odd nesting leaves the holes black and the pixels around them
+        // whole.
         self.fill(mask, blob.index, i32::MAX)?;
         holes.clear();
         let mut child = blob.first_hole;

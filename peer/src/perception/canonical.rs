@@ -13,7 +13,8 @@ pub const SIDE: i32 = 64;
 
 /// Free space around the hand, pixels.
 const FRAME: i32 = 4;
-/// Mean and standard deviation of the hand's pixels in the crop, so that the strength of the light does not matter.
+/// Mean and standard deviation of the hand's pixels in the crop, so that the strength of the light does not
+/// matter.
 const MEAN: f64 = 140.0;
 const DEVIATION: f64 = 40.0;
 /// A hand without texture is not amplified beyond this many times.
@@ -35,8 +36,8 @@ impl Canonical {
         &self.crop
     }
 
-    /// Cuts the hand out of the close view: its longer side scaled to fill the crop, centred, upright as in the frame (turning
-    /// it by its own axis cost 1 % of accuracy on signs 0-9), black where it is not.
+    /// Cuts the hand out of the close view: its longer side scaled to fill the crop, centred, upright as in the
+    /// frame (turning it by its own axis cost 1 % of accuracy on signs 0-9), black where it is not.
     pub fn crop(&mut self, view: &Mat, hand: &Hand<'_>) -> Result<(), opencv::Error> {
         let bounds = hand.bounds;
         let scale = f64::from(SIDE - 2 * FRAME) / f64::from(bounds.width.max(bounds.height));

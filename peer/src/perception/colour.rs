@@ -1,10 +1,11 @@
 //! Which pixels have the colour of the hand: a colour model learned anew from every frame.
 //!
-//! Colours are compared as logarithms of channel ratios, log(R/G) and log(B/G). There a change of the light's colour or
-//! of the camera's white balance is a shift, common to all pixels, and a change of its strength (a shadow, a
-//! vignette) is none at all; so what is measured relative to the frame's own background needs no further colour
-//! constancy. The hand is what differs most from the frame's border, and Fisher's linear discriminant (R. A. Fisher, 1936)
-//! between the two says along which direction of colour to look, be it skin or a glove of any colour.
+//! Colours are compared as logarithms of channel ratios, log(R/G) and log(B/G). There a change of the light's
+//! colour or of the camera's white balance is a shift, common to all pixels, and a change of its strength (a
+//! shadow, a vignette) is none at all; so what is measured relative to the frame's own background needs no
+//! further colour constancy. The hand is what differs most from the frame's border, and Fisher's linear
+//! discriminant (R. A. Fisher, 1936) between the two says along which direction of colour to look, be it skin
+//! or a glove of any colour.
 
 use opencv::core::{BORDER_DEFAULT, CV_8U, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual};
 use opencv::core::{Scalar, Size};
@@ -17,7 +18,8 @@ use super::{NoHand, NoObservation};
 const THUMBNAIL: i32 = 2;
 /// Rows and columns of the thumbnail's border that are taken for background.
 const BORDER: usize = 2;
-/// Where between the means of background (0) and hand (1) the boundary lies: nearer to the background, which varies less.
+/// Where between the means of background (0) and hand (1) the boundary lies: nearer to the background, which
+/// varies less.
 const BOUNDARY: f32 = 0.38;
 /// Added to a channel before the logarithm, so that the noise of dark pixels stays small.
 const DARK: f32 = 8.0;
@@ -76,7 +78,8 @@ impl ColourModel {
         }
     }
 
-    /// How plainly hand and background differed in the last frame, `0.0..=1.0`: from 0.8 standard deviations to 2.
+    /// How plainly hand and background differed in the last frame, `0.0..=1.0`: from 0.8 standard deviations to
+    /// 2.
     pub fn plausibility(&self) -> f32 {
         ((self.separation - 0.8) / 1.2).clamp(0.0, 1.0)
     }
@@ -151,8 +154,9 @@ impl ColourModel {
         })
     }
 
-    /// Finds the discriminant: seeds by Otsu's threshold of the distance to the background, then a few rounds of
-    /// Fisher's discriminant on the pixels that the last round took for the hand. `None` where all pixels are alike.
+    /// Finds the discriminant: seeds by Otsu's threshold of the distance to the background, then a few rounds
+    /// of Fisher's discriminant on the pixels that the last round took for the hand. `None` where all pixels
+    /// are alike.
     fn discriminate(&mut self) -> Option<Discriminant> {
         let distance = |c: &Chroma| c[0].abs() + c[1].abs();
         let mut histogram = [0u32; BINS];
@@ -173,8 +177,8 @@ impl ColourModel {
         learned
     }
 
-    /// Prepares the scores: [`ZERO_SCORE`] on the boundary, more inside the hand's colours. They are linear in the logarithms
-    /// of the channels, so one table per channel holds them exactly.
+    /// Prepares the scores: [`ZERO_SCORE`] on the boundary, more inside the hand's colours. They are linear in
+    /// the logarithms of the channels, so one table per channel holds them exactly.
     fn tabulate(&mut self, model: &Discriminant) {
         let [red, blue] = model.weights;
         let unit = CONTRAST_SCORE / model.contrast;
@@ -243,7 +247,8 @@ fn fisher(chroma: &[Chroma], is_hand: &[bool]) -> Option<Discriminant> {
     let spread = |i: usize| (hand_spread[i] + other_spread[i]) / 2.0;
     let (xx, xy, yy) = (spread(0) + NOISE, spread(1), spread(2) + NOISE);
     let apart = [hand[0] - other[0], hand[1] - other[1]];
-    // The inverse of the 2×2 covariance times the difference of the means, to scale; then scaled to a largest weight of 1.
+    // The inverse of the 2×2 covariance times the difference of the means, to scale; then scaled to a largest
+    // weight of 1.
     let weights = [yy * apart[0] - xy * apart[1], xx * apart[1] - xy * apart[0]];
     let largest = weights[0].abs().max(weights[1].abs());
     if !largest.is_normal() {

@@ -1,15 +1,16 @@
 //! The 110 hand-crafted features: what they are called, what they mean, and the vector of them.
 //!
-//! Each group stands in a file of its own, its table of documentation next to its formulas. All are ratios, angles and
-//! counts: independent of the canvas's size, of the hand's place and of its distance. Symbols in the formulas:
+//! Each group stands in a file of its own, its table of documentation next to its formulas. All are ratios,
+//! angles and counts: independent of the canvas's size, of the hand's place and of its distance. Symbols in the
+//! formulas:
 //!
 //! - A: area of the hand, pixels; P: its perimeter;
 //! - r: radius of the largest circle within the hand (the palm), c: the centre of that circle;
 //! - right, up: the axes of the hand; up leads from the wrist to the fingers;
 //! - w, h: extent of the hand along these axes, in palm radii.
 //!
-//! The features are measured along the hand's axes, not the frame's: trained on upright hands, the same classifier reads
-//! tilted ones.
+//! The features are measured along the hand's axes, not the frame's: trained on upright hands, the same
+//! classifier reads tilted ones.
 
 mod blob;
 mod defects;

@@ -1,4 +1,5 @@
-//! Views of a frame: the whole of it at a glance, then a closer look at the hand, each of a size that makes cameras alike.
+//! Views of a frame: the whole of it at a glance, then a closer look at the hand, each of a size that makes
+//! cameras alike.
 
 use opencv::core::{CV_8U, Mat, MatTraitConst, Rect, Size};
 use opencv::imgproc::{INTER_AREA, INTER_LINEAR, resize};

@@ -96,7 +96,8 @@ impl HandFinder {
         &self.mask
     }
 
-    /// Where the hand is: the region of the frame around the largest blob seen at a glance, with room on each side.
+    /// Where the hand is: the region of the frame around the largest blob seen at a glance, with room on each
+    /// side.
     pub fn locate(&mut self, glance: &View) -> Result<Rect, NoObservation> {
         let size = glance.mask.size()?;
         let blob = self.blobs.largest(&glance.mask, 0)?.ok_or(NoHand::TooSmall { share: 0.0 })?;
@@ -170,9 +171,9 @@ impl HandFinder {
         Ok((Point2f::new((around.x + centre.x) as f32, (around.y + centre.y) as f32), radius as f32))
     }
 
-    /// Which way the fingers are: opposite to the wrist, within the view. The wrist is the arc in which the blob leaves a circle around the palm
-    /// which is wide, rather below than above, and does not split into fingers further out. Straight up when the blob
-    /// leaves the circle nowhere.
+    /// Which way the fingers are: opposite to the wrist, within the view. The wrist is the arc in which the
+    /// blob leaves a circle around the palm which is wide, rather below than above, and does not split into
+    /// fingers further out. Straight up when the blob leaves the circle nowhere.
     fn up(&self, palm: Point2f, radius: f32) -> Result<Point2f, opencv::Error> {
         let around = |palm_radii: f32| ring(&self.mask, palm, palm_radii * radius, DIRECTIONS);
         let (near, far) = (arcs(&around(WRIST)?), arcs(&around(FINGERS)?));
@@ -206,8 +207,8 @@ impl HandFinder {
     }
 }
 
-/// Which way the fingers are when the blob covers as much of the frame's edge as a wrist would: away from there, since the
-/// arm comes in there.
+/// Which way the fingers are when the blob covers as much of the frame's edge as a wrist would: away from
+/// there, since the arm comes in there.
 fn from_edge(contour: &Vector<Point>, close: &View, palm: Point2f, radius: f32) -> Option<Point2f> {
     let (region, frame) = (close.region, close.frame);
     let (right, bottom) = (close.mask.cols() - 1 + MARGIN, close.mask.rows() - 1 + MARGIN);

@@ -1,12 +1,13 @@
 //! How a robot sees: from a camera frame to the feature vector of the hand in it.
 //!
-//! ```text
-//! BGR frame ─► glance ─► colour of the hand, its place ─► close view ─► palm, wrist ─► hand ─┬─► 110 shape features
+//! ```text BGR frame ─► glance ─► colour of the hand, its place ─► close view ─► palm, wrist ─► hand ─┬─► 110
+//! shape features
 //!  any size   160×120                                      192×192                         └─► canonical crop ─► HOG
 //! ```
 //!
-//! The same hand gives nearly the same features whatever the camera: views of a fixed size make resolutions and distances
-//! comparable, colours are judged relative to the background of the same frame, and every feature is a ratio, an angle or a count.
+//! The same hand gives nearly the same features whatever the camera: views of a fixed size make resolutions and
+//! distances comparable, colours are judged relative to the background of the same frame, and every feature is
+//! a ratio, an angle or a count.
 
 mod blob;
 mod canonical;
@@ -96,7 +97,8 @@ pub struct HandConfig {
     pub minimum_contrast: f32,
     /// The smallest share of the frame that a hand covers, `0.0005..=0.5`: below it, a finger is a pixel wide.
     pub minimum_area: f32,
-    /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to judge by.
+    /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to
+    /// judge by.
     pub maximum_area: f32,
 }
 
@@ -280,14 +282,15 @@ impl Perception {
         self.close.region
     }
 
-    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a margin of
-    /// one pixel. Empty before the first hand.
+    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a
+    /// margin of one pixel. Empty before the first hand.
     #[must_use]
     pub fn mask(&self) -> &Mat {
         self.finder.mask()
     }
 
-    /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the first.
+    /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the
+    /// first.
     #[must_use]
     pub fn crop(&self) -> &Mat {
         self.canonical.image()

@@ -4,8 +4,8 @@ use opencv::core::{Mat, MatTraitConst, MatTraitConstManual, Point2f};
 
 use super::blob::MARGIN;
 
-/// Samples a drawn mask on a circle, clockwise from the direction of x. Outside the view it continues as at its edge: an
-/// arm goes on there.
+/// Samples a drawn mask on a circle, clockwise from the direction of x. Outside the view it continues as at its
+/// edge: an arm goes on there.
 pub fn ring(mask: &Mat, centre: Point2f, radius: f32, samples: usize) -> Result<Vec<bool>, opencv::Error> {
     let columns = mask.cols();
     let (right, bottom) = (columns - 1 - MARGIN, mask.rows() - 1 - MARGIN);

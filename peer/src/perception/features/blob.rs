@@ -3,9 +3,9 @@
 use opencv::core::{Point, Point2f, Vector};
 use opencv::imgproc::{approx_poly_dp, min_area_rect, min_enclosing_circle};
 
-use super::super::hand::Hand;
 use super::outline::Outline;
 use super::{Feature, feature, ratio};
+use crate::perception::hand::Hand;
 
 pub const TABLE: [Feature; 24] = [
     feature("extent", "1", "A / (w h r^2)"),

@@ -2,9 +2,9 @@
 
 use opencv::core::Point;
 
-use super::super::hand::Hand;
 use super::outline::Outline;
 use super::{Feature, feature, ratio};
+use crate::perception::hand::Hand;
 
 /// Valleys deeper than this many palm radii are counted.
 const DEEP: f32 = 0.5;
@@ -96,8 +96,8 @@ pub fn measure(hand: &Hand<'_>, outline: &Outline) -> [f32; TABLE.len()] {
     ]
 }
 
-/// The valley between each two neighbouring corners of the hull. (OpenCV's `convexityDefects` computes the same, but refuses
-/// outlines that touch themselves.)
+/// The valley between each two neighbouring corners of the hull. (OpenCV's `convexityDefects` computes the
+/// same, but refuses outlines that touch themselves.)
 fn find(hand: &Hand<'_>, outline: &Outline) -> Vec<Defect> {
     let points = hand.contour.as_slice();
     let n = points.len();

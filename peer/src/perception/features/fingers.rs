@@ -4,10 +4,10 @@ use std::f32::consts::TAU;
 
 use opencv::core::{MatTraitConst, MatTraitConstManual, Point2f};
 
-use super::super::blob::MARGIN;
-use super::super::hand::Hand;
 use super::outline::Outline;
 use super::{Feature, feature};
+use crate::perception::blob::MARGIN;
+use crate::perception::hand::Hand;
 
 /// Directions of the radial profile.
 const RAYS: usize = 120;
@@ -27,7 +27,7 @@ pub const TABLE: [Feature; 24] = [
     feature(
         "peak_1",
         "1",
-        "distance from c of the farthest peak of the outline / r; a peak is a point of the outline farther than 1.5 r and than all within 12 degrees, wrist left out",
+        "distance of the farthest peak from c / r; a peak exceeds 1.5 r and all within 12 degrees",
     ),
     feature("peak_2", "1", "distance of the second farthest peak / r, 0 where there is none; so the next"),
     feature("peak_3", "1", "distance of the third farthest peak / r"),

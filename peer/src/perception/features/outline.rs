@@ -3,7 +3,7 @@
 use opencv::core::{Point, Point2f, Vector};
 use opencv::imgproc::{arc_length, contour_area_def, convex_hull};
 
-use super::super::hand::Hand;
+use crate::perception::hand::Hand;
 
 /// A point of the outline as seen from the palm's centre.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! The palm, and how the rest of the hand lies around it.
 
-use super::super::hand::Hand;
 use super::outline::Outline;
 use super::{Feature, feature, ratio};
+use crate::perception::hand::Hand;
 
 pub const TABLE: [Feature; 8] = [
     feature("palm_radius", "1", "r / sqrt(A)"),

@@ -1,8 +1,8 @@
 //! Circles around the palm: how often and how widely the fingers cross them.
 
-use super::super::hand::Hand;
-use super::super::ring::{arcs, ring};
 use super::{Feature, feature};
+use crate::perception::hand::Hand;
+use crate::perception::ring::{arcs, ring};
 
 /// Radii of the circles in palm radii.
 const RADII: [f32; 4] = [1.5, 1.9, 2.3, 2.7];
