@@ -46,7 +46,7 @@ pub(super) fn reason(cause: &(dyn std::error::Error + Send + Sync)) -> String {
     let said = cause.to_string();
     let words = said.split(' ').collect::<Vec<_>>();
     let place = |i: usize| words.get(i).is_some_and(|word| word.contains(".rs:"));
-    let kept = (0..words.len()).filter(|&i| !place(i) && !(words[i] == "at" && place(i + 1)));
+    let kept = (0..words.len()).filter(|&i| !(place(i) || words[i] == "at" && place(i + 1)));
     kept.map(|i| words[i]).collect::<Vec<_>>().join(" ")
 }
 
