@@ -131,14 +131,17 @@ pub fn run(args: Args) -> Result<(), Failure> {
 
     let options = args.options();
     let started = Instant::now();
-    let bar = progress::bar("training", (options.gammas.len() + options.costs.len() - 1) * options.folds + 1);
+    let bar = progress::bar("training", 0);
     let trained = train(
         args.features.name(),
         &dataset.vocabulary,
         &survey.samples(),
         &options,
         &mut ChaCha8Rng::seed_from_u64(args.seed),
-        |progress| bar.set_position(progress.done as u64),
+        |progress| {
+            bar.set_length(progress.total as u64);
+            bar.set_position(progress.done as u64);
+        },
     )?;
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
