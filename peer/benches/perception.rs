@@ -9,7 +9,8 @@ use std::time::Duration;
 use divan::{Bencher, black_box};
 use gestalt_peer::camera_model::CameraModel;
 use gestalt_peer::perception::{FeatureSet, HandConfig, Perception};
-use gestalt_peer::source::{Glove, Pose, RenderedSource, Scene, Source};
+use gestalt_peer::pose::Pose;
+use gestalt_peer::source::{Glove, RenderedSource, Scene, Source};
 use opencv::Result;
 use opencv::core::{
     BORDER_DEFAULT, CV_8U, Mat, Point, Point2f, Rect, Scalar, Size, Vec4i, Vector, in_range,
