@@ -7,6 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig};
 use gestalt_protocol::{ClassId, Decision, RobotId};
+use gestalt_strategies::MindConfig;
 use gestalt_tests::{Fixed, config, look};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
@@ -39,7 +40,9 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let boot = orders["boot"].as_u64().and_then(|boot| u32::try_from(boot).ok()).unwrap_or(1);
     let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
     let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
-    let robot = match Robot::start(RobotConfig { link, boot, ..config(id, swarm, &[]) }).await {
+    let quorum = orders["quorum"].as_u64().and_then(|quorum| u32::try_from(quorum).ok()).unwrap_or(1);
+    let mind = MindConfig { quorum, ..MindConfig::default() };
+    let robot = match Robot::start(RobotConfig { link, boot, mind, ..config(id, swarm, &[]) }).await {
         Ok(robot) => robot,
         Err(error) => {
             eprintln!("{error}");

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use gestalt_tests::{Namespaces, Process, unique};
-use serde_json::{Value, json};
+use serde_json::json;
 
 const PORT: u16 = 7447;
 
@@ -17,54 +17,48 @@ pub struct Field {
     swarm: String,
     sees: Vec<Option<u8>>,
     p: f64,
+    quorum: u32,
 }
 
 impl Field {
     /// Starts a robot in each of `nodes` namespaces and waits until all know of all.
     pub fn new(nodes: u32, links: &[(u32, u32)], sees: impl Fn(u32) -> Option<u8>) -> Self {
-        Self::with(nodes, links, sees, 0.9, |_| json!({}))
+        Self::with(nodes, links, sees, 0.9, 1)
     }
 
-    /// The same with robots that see a class with probability `p`, and a Zenoh configuration for some of them.
+    /// The same with robots that see a class with probability `p`, and decide when `quorum` of them have voted.
     pub fn with(
         nodes: u32,
         links: &[(u32, u32)],
         sees: impl Fn(u32) -> Option<u8>,
         p: f64,
-        zenoh: impl Fn(u32) -> Value,
+        quorum: u32,
     ) -> Self {
         let namespaces = Namespaces::new(nodes, links);
         let sees = (0..nodes).map(sees).collect();
-        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, p };
+        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, p, quorum };
         for node in 0..nodes {
-            let robot = field.process(node, 1, &zenoh(node));
+            let robot = field.process(node);
             field.robots.push(robot);
         }
         field.wait_for_all(Duration::from_secs(15));
         field
     }
 
-    fn process(&self, node: u32, boot: u32, zenoh: &Value) -> Process {
+    fn process(&self, node: u32) -> Process {
         let orders = json!({
             "id": node,
-            "boot": boot,
             "swarm": self.swarm,
             "sees": self.sees[node as usize],
             "p": self.p,
+            "quorum": self.quorum,
             "link": {
                 "listen": [format!("tcp/0.0.0.0:{PORT}")],
                 "connect": self.namespaces.to_dial(node, PORT),
-                "zenoh": zenoh,
             },
         });
         let binary = Path::new(env!("CARGO_BIN_EXE_test-robot"));
         Process::start(binary, Some(&self.namespaces.name(node)), &orders)
-    }
-
-    /// Starts a robot anew, as after a crash.
-    pub fn restart(&mut self, node: u32, boot: u32) {
-        self.robots[node as usize].kill();
-        self.robots[node as usize] = self.process(node, boot, &json!({}));
     }
 
     /// Waits until every robot knows all others to be alive.

@@ -38,8 +38,7 @@ fn a_round_in_which_a_relay_freezes_ends_the_same_everywhere() {
     }
     // Robot 0 sees, and needs several looks; what it says goes round the ring both ways.
     let links: Vec<_> = (0..NODES).map(|i| (i, (i + 1) % NODES)).collect();
-    let mut field =
-        Field::with(NODES, &links, |node| (node == 0).then_some(5), 0.6, |_| serde_json::json!({}));
+    let mut field = Field::with(NODES, &links, |node| (node == 0).then_some(5), 0.6, 1);
     for (round, relay) in [(1, 1), (2, 5), (3, 2), (4, 4)] {
         field.robots[0].order("open");
         std::thread::sleep(Duration::from_millis(100));

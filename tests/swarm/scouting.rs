@@ -36,6 +36,19 @@ fn sums(robots: &[Watched]) -> BTreeMap<String, u64> {
     sums
 }
 
+/// Processor time by thread name, in ticks. TEMPORARY
+fn by_thread() -> BTreeMap<String, f64> {
+    let mut sums = BTreeMap::new();
+    for task in std::fs::read_dir("/proc/self/task").unwrap().flatten() {
+        let Ok(stat) = std::fs::read_to_string(task.path().join("stat")) else { continue };
+        let name = stat[stat.find('(').unwrap()..stat.rfind(')').unwrap()].to_owned();
+        let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+        *sums.entry(name).or_default() +=
+            fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap();
+    }
+    sums
+}
+
 async fn converged(robots: &[Watched], patience: Duration) -> bool {
     let deadline = Instant::now() + patience;
     for robot in robots {
@@ -85,7 +98,17 @@ async fn a_hundred_robots_in_hearing_keep_four_links_each_and_agree() {
     let mean = links.iter().sum::<usize>() as f64 / 100.0;
     let most = links.iter().max().unwrap();
     let (before, since) = (processor_time(), Instant::now());
+    let (threads, c0) = (by_thread(), sums(&robots));
     tokio::time::sleep(Duration::from_secs(5)).await;
+    for (name, ticks) in by_thread() {
+        eprintln!("{name} {}", ticks - threads.get(&name).unwrap_or(&0.0));
+    }
+    for (name, n) in sums(&robots) {
+        let d = n - c0.get(&name).unwrap_or(&0);
+        if d > 0 {
+            eprintln!("{name} +{d}");
+        }
+    }
     let load = (processor_time() - before) / since.elapsed().as_secs_f64();
     eprintln!("counters {:?}", sums(&robots));
     eprintln!(

@@ -26,8 +26,11 @@ use super::{Announcement, Event, LinkError};
 /// When a new robot asks whether its id is taken: late enough that its links stand.
 const TWIN_CHECK: Duration = Duration::from_secs(3);
 
-/// A robot that changes its decision of a round again within this time says so only once.
-const HOLD_INTERVAL: Duration = Duration::from_millis(50);
+/// A robot that draws another decision of the same round within this time says so only once.
+const OWN_HOLD_INTERVAL: Duration = Duration::from_millis(50);
+
+/// How long a robot holds another's decision before it says so: all have heard it from its author.
+const ADOPTED_HOLD_DELAY: Duration = Duration::from_millis(300);
 
 /// Everything the task needs; [`Host::declare`] makes it known to the swarm.
 pub(super) struct Host {
@@ -51,8 +54,8 @@ pub(super) struct Declared {
     swarm: Publisher<'static>,
     last: Arc<Last>,
     alive: LivelinessToken,
-    /// The decision still to be published on `robot/<me>/decision`.
-    unsaid: Option<Announcement>,
+    /// The decision still to be published on `robot/<me>/decision`, and when.
+    unsaid: Option<(Announcement, Instant)>,
     /// The round of the decision published last, and when.
     said: Option<(u32, Instant)>,
 }
@@ -149,7 +152,7 @@ impl Declared {
         let inbox = self.host.inbox.clone();
         loop {
             let wake = self.host.mind.next_wake().map(|wake| self.host.started + wake);
-            let wake = wake.into_iter().chain(self.hold_due()).min();
+            let wake = wake.into_iter().chain(self.unsaid.as_ref().map(|(_, due)| *due)).min();
             tokio::select! {
                 () = inbox.ready() => {
                     for input in inbox.take() {
@@ -214,7 +217,7 @@ impl Declared {
                 let mut status = self.host.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
-                self.unsaid = Some(self.announcement(&decision));
+                self.unsaid = Some((self.announcement(&decision), self.hold_due(&decision)));
                 self.tell(Event::Held(decision));
             }
             Output::Announce(decision) => {
@@ -235,19 +238,19 @@ impl Declared {
         }
     }
 
-    /// When the decision held is to be published: the first of a round at once, each next one a moment later, so
-    /// that robots which are just settling among each other do not each say every step of it to all.
-    fn hold_due(&self) -> Option<Instant> {
-        let round = self.unsaid.as_ref()?.decision.round.counter;
-        let again = self.said.filter(|(said, _)| *said == round);
-        Some(again.map_or_else(Instant::now, |(_, at)| at + HOLD_INTERVAL))
+    /// When a decision now held is to be published. Robots that are just settling among each other would otherwise
+    /// each say every step of it to all.
+    fn hold_due(&self, decision: &Decision) -> Instant {
+        let now = Instant::now();
+        if decision.author != self.host.me {
+            return now + ADOPTED_HOLD_DELAY;
+        }
+        let before = self.said.filter(|(round, _)| *round == decision.round.counter);
+        before.map_or(now, |(_, at)| at + OWN_HOLD_INTERVAL)
     }
 
     fn publish_hold(&mut self) {
-        if self.hold_due().is_none_or(|due| Instant::now() < due) {
-            return;
-        }
-        if let Some(announcement) = self.unsaid.take() {
+        if let Some((announcement, _)) = self.unsaid.take_if(|(_, due)| Instant::now() >= *due) {
             let json = self.publish("robot_decision", &self.held, &announcement);
             self.last.set(json, self.host.node.session().new_timestamp());
             self.said = Some((announcement.decision.round.counter, Instant::now()));

@@ -19,7 +19,7 @@ use super::topology::{Topology, View};
 const PERIOD: Duration = Duration::from_millis(500);
 
 /// How often when no link has come or gone for a while.
-const IDLE_PERIOD: Duration = Duration::from_millis(1500);
+const IDLE_PERIOD: Duration = Duration::from_secs(3);
 const UNREST: Duration = Duration::from_secs(10);
 
 /// How long answers to a call are waited for.
