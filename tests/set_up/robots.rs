@@ -1,14 +1,14 @@
 //! Robots in this process.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
 use gestalt_protocol::{ClassId, Decision, RobotId};
 use gestalt_strategies::{Classify, MindConfig};
 use tokio::sync::broadcast;
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, MissedTickBehavior, timeout_at};
 
 use crate::{Fixed, look};
 
@@ -55,17 +55,30 @@ pub async fn start(config: RobotConfig, sees: Option<ClassId>) -> Watched {
     let events = robot.events();
     let looking = sees.map(|class| {
         robot.learned(Arc::new(Fixed::default()), "fixed");
-        let robot = robot.clone();
-        tokio::spawn(async move {
-            loop {
-                if robot.status().open {
-                    robot.observe(look(class, 0.9));
-                }
-                tokio::time::sleep(Duration::from_millis(100)).await;
-            }
-        })
+        tokio::spawn(look_when_open(Arc::downgrade(&robot), class))
     });
     Watched { robot, events, looking }
+}
+
+async fn look_when_open(robot: Weak<Robot>, class: ClassId) {
+    let Some(mut events) = robot.upgrade().map(|robot| robot.events()) else { return };
+    let mut frames = tokio::time::interval(Duration::from_millis(100));
+    frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut open = false;
+    loop {
+        tokio::select! {
+            event = events.recv() => match event {
+                Ok(Event::Opened(_)) => open = true,
+                Ok(Event::Closed(_)) => open = false,
+                Err(broadcast::error::RecvError::Closed) => return,
+                _ => {}
+            },
+            _ = frames.tick(), if open => {
+                let Some(robot) = robot.upgrade() else { return };
+                robot.observe(look(class, 0.9));
+            }
+        }
+    }
 }
 
 impl Watched {
