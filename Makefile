@@ -23,16 +23,17 @@ endef
 packages:
 	@$(call install,$(PACKAGES))
 
-# A heterogeneous swarm of real Zenoh peers looks at gestures and decides. Leaves its pictures in out/.
+# A heterogeneous swarm of real Zenoh peers looks at gestures and decides. Leaves its picture in out/. One build
+# serves the demo and the tests: the dev profile is optimised.
 demo: packages
-	cargo build --release -p gestalt-peer
-	target/release/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 12 --picture out/round.png
+	cargo build --workspace --bins
+	mkdir -p out
+	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 12 --picture out/round.png
 
-# Fast tests beside the code first, then whole swarms, one after the other: they measure time and share two cores.
+# One test after the other: whole swarms measure time, and share the processor.
 test: packages
 	@$(call install,$(TEST_PACKAGES))
-	cargo test --workspace --exclude gestalt-tests
-	cargo test -p gestalt-tests -- --test-threads=1
+	cargo test --workspace -- --test-threads=1
 
 # Every speed the README states, with its yardstick in the same run.
 bench: packages

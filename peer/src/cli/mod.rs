@@ -89,7 +89,8 @@ impl Command {
 /// Sends log lines to stderr; `RUST_LOG` chooses which. When it is silent: our own warnings, and Zenoh's errors; what
 /// else concerns the user is said in Gestalt's own words.
 pub fn start_log() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,gestalt_peer=warn"));
+    let filter =
+        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,gestalt_peer=warn"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
 }
 

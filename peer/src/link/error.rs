@@ -54,7 +54,10 @@ impl LinkError {
     pub(super) fn config(path: &str, cause: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::Config {
             key: format!("zenoh.{}", path.replace('/', ".")),
-            cause: format!("{}: see Zenoh's DEFAULT_CONFIG.json5 for the keys and their values", reason(cause)),
+            cause: format!(
+                "{}: see Zenoh's DEFAULT_CONFIG.json5 for the keys and their values",
+                reason(cause)
+            ),
         }
     }
 
