@@ -114,9 +114,17 @@ impl Document {
                 path if path == "." => "the configuration".to_owned(),
                 path => path,
             },
-            cause: error.into_inner().to_string(),
+            cause: with_mend(error.into_inner().to_string()),
         })
     }
+}
+
+/// What serde says names what was expected; a duration's form is worth an example.
+fn with_mend(mut cause: String) -> String {
+    if cause.ends_with("expected a duration") {
+        cause.push_str(": write a number with a unit, like \"500ms\" or \"2s\"");
+    }
+    cause
 }
 
 #[cfg(test)]

@@ -232,7 +232,10 @@ impl Declared {
                 self.tell(Event::Opened(round));
             }
             Output::Closed(round) => {
-                self.host.account.lock().open = false;
+                // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
+                let mut status = self.host.account.lock();
+                (status.round, status.open) = (Some(round), false);
+                drop(status);
                 self.tell(Event::Closed(round));
             }
         }
