@@ -24,14 +24,9 @@ impl Proportion {
     /// The share with its score interval (Wilson 1927), which holds near 0 and 1 too.
     #[must_use]
     pub fn new(hits: u64, trials: u64) -> Self {
-        if trials == 0 {
-            return Self { hits, trials, share: 0.0, low: 0.0, high: 1.0 };
-        }
-        let n = trials as f64;
-        let share = hits as f64 / n;
-        let centre = (share + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
-        let half = Z / (1.0 + Z * Z / n) * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
-        Self { hits, trials, share, low: (centre - half).max(0.0), high: (centre + half).min(1.0) }
+        let measured = gestalt_strategies::Proportion::wilson(hits, trials);
+        let (share, low, high) = measured.map_or((0.0, 0.0, 1.0), |p| (p.value, p.low, p.high));
+        Self { hits, trials, share, low, high }
     }
 }
 
