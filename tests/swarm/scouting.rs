@@ -85,7 +85,7 @@ async fn a_hundred_robots_in_hearing_keep_four_links_each_and_agree() {
     let mean = links.iter().sum::<usize>() as f64 / 100.0;
     let most = links.iter().max().unwrap();
     let (before, since) = (processor_time(), Instant::now());
-    tokio::time::sleep(Duration::from_secs(5)).await;
+    tokio::time::sleep(Duration::from_secs(10)).await;
     let load = (processor_time() - before) / since.elapsed().as_secs_f64();
     eprintln!(
         "100 robots by scouting: {mean} links each, at most {most}; idle load {:.1} % of a core",

@@ -39,7 +39,7 @@ const ALONE: Duration = Duration::from_secs(1);
 const FIRST_LOOKS: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(3)];
 
 /// How often the smallest robot of a connected whole looks for others.
-const LOOKOUT: Duration = Duration::from_secs(3);
+const LOOKOUT: Duration = Duration::from_secs(4);
 
 /// The bounds on how often every other robot looks.
 const REST: (Duration, Duration) = (Duration::from_secs(4), Duration::from_secs(60));
@@ -70,6 +70,7 @@ pub(super) struct Topology {
     me: RobotId,
     max_links: usize,
     there: BTreeSet<RobotId>,
+    wanted: BTreeSet<RobotId>,
     settled_since: Duration,
     unsettled_since: Option<Duration>,
     wanted_since: BTreeMap<RobotId, Duration>,
@@ -87,6 +88,7 @@ impl Topology {
             me,
             max_links,
             there: BTreeSet::new(),
+            wanted: BTreeSet::new(),
             settled_since: Duration::ZERO,
             unsettled_since: None,
             wanted_since: BTreeMap::new(),
@@ -109,7 +111,7 @@ impl Topology {
             .chain(view.linked.iter().copied())
             .collect();
         let (settled, since) = self.settled(now, &there);
-        let wanted = self.ring_neighbours(&there);
+        let wanted = self.wanted.clone();
         let mut dial = self.due_in_rings(now, &wanted, view);
         dial.extend(self.due_outside(now, &there, view));
         if !settled {
@@ -124,6 +126,7 @@ impl Topology {
     fn settled(&mut self, now: Duration, there: &BTreeSet<RobotId>) -> (bool, Duration) {
         if *there != self.there {
             self.there.clone_from(there);
+            self.wanted = self.ring_neighbours(there);
             self.settled_since = now;
             self.unsettled_since.get_or_insert(now);
         }
@@ -195,9 +198,10 @@ impl Topology {
     }
 
     fn scout_is_due(&mut self, now: Duration, there: &BTreeSet<RobotId>, view: &View) -> bool {
-        let everyone: BTreeSet<_> = there.union(&view.alive).copied().collect();
         // A robot known by its token alone may be just out of hearing for good: look for it ever less often.
-        let missing = self.ring_neighbours(&everyone).iter().any(|id| !there.contains(id));
+        let everyone = there | &view.alive;
+        let missing = everyone.len() > there.len()
+            && self.ring_neighbours(&everyone).iter().any(|id| !there.contains(id));
         if !missing {
             self.missing = 0;
         }
