@@ -60,6 +60,7 @@ fn a_round_in_which_a_relay_freezes_ends_the_same_everywhere() {
         let (first, last) = (times.iter().min().unwrap(), times.iter().max().unwrap());
         assert!(last - first <= 1500, "an outage of {} ms", last - first);
         std::thread::sleep(Duration::from_millis(1500));
-        field.wait_for_all(Duration::from_secs(8));
+        // A token that Zenoh lost on the way is found by the census, the second of which comes after some eight seconds.
+        field.wait_for_all(Duration::from_secs(15));
     }
 }
