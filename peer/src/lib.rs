@@ -1,4 +1,16 @@
 //! How a robot of a Gestalt swarm sees, talks, and gets run.
+//!
+//! ```text
+//! source ─► perception ─► eye ─► Robot (link: Zenoh + the mind) ─► votes, decisions ─► other robots, clients
+//!                                  └─ the same mind in `emulation`, on a seeded network
+//! ```
+//!
+//! [`link::Robot`] is a robot without eyes, for a controller with a camera of its own; [`body::Body`] is a robot with one,
+//! from a [`config::Config`]. [`link::Client`] watches a swarm without being part of it. The verbs of the binary
+//! `gestalt` are in [`cli`].
+//!
+//! OpenCV sits behind the feature `opencv` (on by default): without it, swarms can be watched, instructed and
+//! emulated, and [`link::Robot`] works as ever.
 
 #[cfg(feature = "opencv")]
 pub mod body;

@@ -73,7 +73,7 @@ impl Default for Pose {
 /// Where the robots of a swarm may stand: an arc before the human.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Arc {
+pub struct Placement {
     /// The robots spread over plus and minus this bearing, in degrees. Range 0..=90.
     pub half_deg: f64,
     /// Least and greatest elevation, in degrees. Range −60..=60.
@@ -82,14 +82,14 @@ pub struct Arc {
     pub distance_m: [f64; 2],
 }
 
-impl Default for Arc {
+impl Default for Placement {
     /// ±75°, most of them looking up from the floor, at 0.6 to 1.15 m: near enough for a Foot-bot to see fingers.
     fn default() -> Self {
         Self { half_deg: 75.0, elevation_deg: [-25.0, 12.0], distance_m: [0.6, 1.15] }
     }
 }
 
-impl Arc {
+impl Placement {
     /// Places robots evenly over the arc, from the left to the right, each a little off its place. The same seed
     /// gives the same places.
     #[must_use]
@@ -107,10 +107,10 @@ impl Arc {
     }
 }
 
-/// Places robots on the default [`Arc`].
+/// Places robots on the default [`Placement`].
 #[must_use]
 pub fn place(robots: usize, seed: u64) -> Vec<Pose> {
-    Arc::default().place(robots, seed)
+    Placement::default().place(robots, seed)
 }
 
 #[cfg(test)]
@@ -134,7 +134,7 @@ mod tests {
         assert!(poses.iter().all(|pose| pose.bearing_deg.abs() <= 75.0));
         assert_eq!(poses, place(10, 3));
         assert_ne!(poses, place(10, 4));
-        let far = Arc { distance_m: [2.0, 2.5], ..Arc::default() }.place(5, 3);
+        let far = Placement { distance_m: [2.0, 2.5], ..Placement::default() }.place(5, 3);
         assert!(far.iter().all(|pose| (2.0..=2.5).contains(&pose.distance_m)));
     }
 }

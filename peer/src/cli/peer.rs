@@ -103,7 +103,7 @@ fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
         Event::Alive(robots) => line(
             as_json,
             &json!({"event": "alive", "robots": robots}),
-            &format!("alive beside it: {}", show::robots(robots)),
+            &format!("alive: {}", show::robots(robots)),
         ),
     }
 }

@@ -101,7 +101,7 @@ impl Default for MindConfig {
             settle: Duration::from_millis(200),
             takeover: Duration::from_millis(400),
             repair_busy: Duration::from_millis(500),
-            repair_idle: Duration::from_secs(2),
+            repair_idle: Duration::from_secs(4),
         }
     }
 }
