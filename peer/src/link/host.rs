@@ -7,9 +7,9 @@ use gestalt_protocol::{Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
+use tokio::task::JoinHandle;
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
-use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
@@ -17,7 +17,7 @@ use zenoh::sample::Locality;
 use zenoh::time::Timestamp;
 
 use super::account::Account;
-use super::census::take_census;
+use super::census::{keep_token, take_census};
 use super::inbox::Inbox;
 use super::keeper::Keeper;
 use super::session::Node;
@@ -53,7 +53,8 @@ pub(super) struct Declared {
     held: Publisher<'static>,
     swarm: Publisher<'static>,
     last: Arc<Last>,
-    alive: LivelinessToken,
+    /// Keeps the liveliness token declared, and takes it along when it ends.
+    token: JoinHandle<()>,
     /// The decision still to be published on `robot/<me>/decision`, and when.
     unsaid: Option<(Announcement, Instant)>,
     /// The round of the decision published last, and when.
@@ -130,8 +131,10 @@ impl Host {
         };
         let held = decision(Topic::RobotDecision(self.me)).await?;
         let swarm = decision(Topic::Decision).await?;
-        let alive = session.liveliness().declare_token(self.keys.key(&Topic::Alive(self.me))).await?;
-        Ok(Declared { host: self, vote, held, swarm, last, alive, unsaid: None, said: None })
+        let alive = self.keys.key(&Topic::Alive(self.me));
+        let token = session.liveliness().declare_token(&alive).await?;
+        let token = tokio::spawn(keep_token(self.node.clone(), alive, self.inbox.clone(), token));
+        Ok(Declared { host: self, vote, held, swarm, last, token, unsaid: None, said: None })
     }
 }
 
@@ -171,9 +174,7 @@ impl Declared {
         if let Some(keeper) = keeper {
             keeper.abort();
         }
-        if let Err(error) = self.alive.undeclare().await {
-            tracing::debug!("withdrawing the liveliness token: {error}");
-        }
+        self.token.abort();
         self.host.node.close().await;
     }
 

@@ -35,6 +35,7 @@ pub(super) struct Inbox {
     state: Mutex<State>,
     ready: Notify,
     unrest: Notify,
+    lost_link: Notify,
 }
 
 #[derive(Debug, Default)]
@@ -51,7 +52,16 @@ struct State {
 impl Inbox {
     pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>) -> Self {
         let state = Mutex::new(State::default());
-        Self { me, swarm, keys, account, state, ready: Notify::new(), unrest: Notify::new() }
+        Self {
+            me,
+            swarm,
+            keys,
+            account,
+            state,
+            ready: Notify::new(),
+            unrest: Notify::new(),
+            lost_link: Notify::new(),
+        }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -66,6 +76,11 @@ impl Inbox {
     /// Waits until a robot or a link has come or gone since the last time.
     pub(super) async fn unrest(&self) {
         self.unrest.notified().await;
+    }
+
+    /// Waits until a link has gone since the last time.
+    pub(super) async fn lost_link(&self) {
+        self.lost_link.notified().await;
     }
 
     /// Takes everything that has arrived, changes of the neighbourhood first.
@@ -221,6 +236,7 @@ impl Inbox {
             state.links.insert(id, robot);
         } else {
             state.links.remove(&id);
+            self.lost_link.notify_one();
         }
         state.links_changed = true;
         self.ready.notify_one();
