@@ -153,6 +153,10 @@ fn merge(config: &mut zenoh::Config, path: &str, value: &Value) -> Result<(), Li
             .insert_json5(path, &value.to_string())
             .map_err(|error| LinkError::config(path, &*error));
     };
+    if children.is_empty() {
+        // Nothing to set, but a key to be one of Zenoh's.
+        return config.get_json(path).map(drop).map_err(|error| LinkError::config(path, &*error));
+    }
     let one_by_one =
         children.iter().try_for_each(|(key, child)| merge(config, &format!("{path}/{key}"), child));
     // Some objects, such as values by mode, can only be set as a whole.
