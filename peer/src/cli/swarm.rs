@@ -152,6 +152,11 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
         config.rounds.rule = args.rule;
         config.links.scouting.enabled = false;
         config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));
+        if !args.processes {
+            // Robots of one process live and die together; a short lease would only mistake a busy processor for a
+            // lost robot.
+            config.zenoh.insert("transport".to_owned(), json!({"link": {"tx": {"lease": 10_000}}}));
+        }
         config.validate()?;
         configs.push(config);
     }
