@@ -33,7 +33,7 @@ demo: packages
 # One test after the other: whole swarms measure time, and share the processor.
 test: packages
 	@$(call install,$(TEST_PACKAGES))
-	cargo test --workspace -- --test-threads=1
+	cargo test --workspace --lib --bins --tests --examples -- --test-threads=1
 
 # Every speed the README states, with its yardstick in the same run.
 bench: packages
