@@ -1,8 +1,8 @@
 //! How a robot sees: from a camera frame to the feature vector of the hand in it.
 //!
-//! ```text BGR frame ─► glance ─► colour of the hand, its place ─► close view ─► palm, wrist ─► hand ─┬─► 110
-//! shape features
-//!  any size   160×120                                      192×192                         └─► canonical crop ─► HOG
+//! ```text
+//! BGR frame ─► glance ─► colour and place of the hand ─► close view ─► palm, wrist ─► hand ─┬─► 110 shape features
+//! any size     160×120                                   192×192                            └─► crop ─► HOG
 //! ```
 //!
 //! The same hand gives nearly the same features whatever the camera: views of a fixed size make resolutions and
