@@ -4,17 +4,24 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-/// Says, on stderr, when this machine does not let the test make network namespaces.
+/// Says, on stderr, when this machine does not let the test make network namespaces, or not enter them (a chroot may
+/// do the one without the other).
 #[must_use]
 pub fn not_permitted() -> bool {
     let name = format!("gt{}", std::process::id());
-    let made = Command::new("ip").args(["netns", "add", &name]).stderr(Stdio::null()).status();
-    if made.is_ok_and(|status| status.success()) {
-        let _ = Command::new("ip").args(["netns", "del", &name]).status();
-        return false;
+    let ip = |words: &[&str]| {
+        let done = Command::new("ip").args(words).stderr(Stdio::null()).status();
+        done.is_ok_and(|status| status.success())
+    };
+    let made = ip(&["netns", "add", &name]);
+    let entered = made && ip(&["netns", "exec", &name, "true"]);
+    if made {
+        ip(&["netns", "del", &name]);
     }
-    eprintln!("SKIPPED: no right to make network namespaces here (needs root and iproute2)");
-    true
+    if !entered {
+        eprintln!("SKIPPED: no right to make and enter network namespaces here (needs root and iproute2)");
+    }
+    !entered
 }
 
 /// Robots' namespaces and the links between them. Every link runs over a bridge of its own in a namespace of
