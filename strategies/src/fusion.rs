@@ -61,23 +61,27 @@ pub fn fuse<'a>(
         return None;
     }
 
-    let top = top_of(&totals);
-    let lead = totals[top.index()]
-        - totals
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| *k != top.index())
-            .map(|(_, total)| *total)
-            .fold(f64::NEG_INFINITY, f64::max);
     let one_robot = match rule {
         FusionRule::Majority | FusionRule::MeanProbability => 1.0,
         FusionRule::LogPool | FusionRule::ConfidenceWeighted => 2.0 * clip,
     };
+    let mut probabilities = totals.clone();
     match rule {
-        FusionRule::Majority | FusionRule::MeanProbability => totals.iter_mut().for_each(|t| *t /= robots),
-        FusionRule::LogPool | FusionRule::ConfidenceWeighted => softmax(&mut totals),
+        FusionRule::Majority | FusionRule::MeanProbability => {
+            probabilities.iter_mut().for_each(|p| *p /= robots);
+        }
+        FusionRule::LogPool | FusionRule::ConfidenceWeighted => softmax(&mut probabilities),
     }
-    Some(Fusion { probabilities: totals, top, margin: lead / one_robot })
+    // The top is that of the probabilities, which the certificate shows: totals a rounding apart may be equal there.
+    let top = top_of(&probabilities);
+    let second = totals
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| *k != top.index())
+        .map(|(_, total)| *total)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let margin = ((totals[top.index()] - second) / one_robot).max(0.0);
+    Some(Fusion { probabilities, top, margin })
 }
 
 /// What one robot's row counts in [`fuse`], `0.0..=1.0`: its certainty in a confidence-weighted pool, else 1.
