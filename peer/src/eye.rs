@@ -32,7 +32,6 @@ pub enum EyeError {
 pub struct Eye {
     source: Box<dyn Source>,
     perception: Perception,
-    classifier: Arc<dyn Classify>,
     human: Human,
 }
 
@@ -46,24 +45,31 @@ pub enum Glance {
     NoFrame(SourceError),
 }
 
-/// A frame, and what the robot made of it.
+/// A frame, and what perception made of it.
 #[derive(Clone, Debug)]
 pub struct Seen {
     /// In which round.
     pub round: RoundId,
     /// The frame, BGR.
     pub image: Mat,
-    /// The probability of each class; empty when no hand was found.
-    pub probabilities: Vec<f64>,
+    /// The raw features of the hand; `None` when no hand was found.
+    pub features: Option<Vec<f32>>,
 }
 
 impl Seen {
-    /// The likeliest class and its probability; `None` when no hand was found.
+    /// What a classifier thinks of it: the probability of each class; empty when no hand was found.
     #[must_use]
-    pub fn opinion(&self) -> Option<(ClassId, f64)> {
-        let by_class = (0..).map(ClassId).zip(self.probabilities.iter().copied());
-        by_class.max_by(|(_, a), (_, b)| a.total_cmp(b))
+    pub fn probabilities(&self, classifier: &dyn Classify) -> Vec<f64> {
+        let judged = self.features.as_ref().and_then(|features| classifier.probabilities(features).ok());
+        judged.unwrap_or_default()
     }
+}
+
+/// The likeliest class and its probability; `None` of no classes.
+#[must_use]
+pub fn likeliest(probabilities: &[f64]) -> Option<(ClassId, f64)> {
+    let by_class = (0..).map(ClassId).zip(probabilities.iter().copied());
+    by_class.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
 impl Eye {
@@ -91,7 +97,7 @@ impl Eye {
             SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
         };
         let perception = Perception::new(model.features, HandConfig::default())?;
-        Ok(Some(Self { source, perception, classifier: model.classifier.clone(), human }))
+        Ok(Some(Self { source, perception, human }))
     }
 
     /// What it looks through, in words.
@@ -107,12 +113,9 @@ impl Eye {
             Err(error) => return Glance::NoFrame(error),
         };
         let observation = self.perception.observe(&frame.image);
-        let probabilities = match &observation {
-            Ok(observation) => self.classifier.probabilities(&observation.features).unwrap_or_default(),
-            Err(_) => Vec::new(),
-        };
+        let features = observation.as_ref().ok().map(|observation| observation.features.clone());
         *seen.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some(Seen { round, image: frame.image, probabilities });
+            Some(Seen { round, image: frame.image, features });
         match observation {
             Ok(observation) => Glance::Hand(observation),
             Err(none) => Glance::NoHand(none),

@@ -15,6 +15,7 @@ use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::{CameraSection, Config, ModelSection, RenderedSection, SourceSection};
+use crate::eye::likeliest;
 use crate::human::Human;
 use crate::link::{Announcement, Client, LinkConfig, News};
 use crate::model::RobotModel;
@@ -129,7 +130,7 @@ async fn show_gestures(args: &Args, model: &RobotModel) -> Result<(), Failure> {
             endpoints.first().map_or("none of them", String::as_str)
         ),
     )?;
-    let score = rounds(args, &configs, &members, &client, &mut news).await;
+    let score = rounds(args, &configs, &members, model, &client, &mut news).await;
     client.close().await;
     members.stop().await;
     say_score(args, &configs, &score?)
@@ -202,6 +203,7 @@ async fn rounds(
     args: &Args,
     configs: &[Config],
     members: &Members,
+    model: &RobotModel,
     client: &Client,
     news: &mut News,
 ) -> Result<Score, Failure> {
@@ -230,10 +232,10 @@ async fn rounds(
             ),
         )?;
         if let Some(path) = &args.picture {
-            let disputed = 1 + dissenters(members.bodies(), decision);
+            let disputed = 1 + dissenters(members.bodies(), model, decision);
             if disputed > most_disputed {
                 most_disputed = disputed;
-                draw(path, configs, members.bodies(), decision, truth)?;
+                draw(path, configs, members.bodies(), model, decision, truth)?;
             }
         }
     }
@@ -261,9 +263,11 @@ async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement,
 }
 
 /// How many robots see it otherwise than the swarm.
-fn dissenters(bodies: &[Body], decision: &Decision) -> usize {
-    let own =
-        |body: &Body| body.seen().filter(|seen| seen.round.counter == decision.round.counter)?.opinion();
+fn dissenters(bodies: &[Body], model: &RobotModel, decision: &Decision) -> usize {
+    let own = |body: &Body| {
+        let seen = body.seen().filter(|seen| seen.round.counter == decision.round.counter)?;
+        likeliest(&seen.probabilities(&*model.classifier))
+    };
     bodies.iter().filter(|body| own(body).map(|(class, _)| class) != decision.class).count()
 }
 
@@ -272,6 +276,7 @@ fn draw(
     path: &Path,
     configs: &[Config],
     bodies: &[Body],
+    model: &RobotModel,
     decision: &Decision,
     truth: ClassId,
 ) -> Result<(), Failure> {
@@ -282,14 +287,15 @@ fn draw(
         .iter()
         .filter(|(_, seen)| seen.round.counter == counter)
         .map(|(config, seen)| {
-            let opinion = seen.opinion();
-            let by_class = (0u8..).zip(&seen.probabilities);
+            let probabilities = seen.probabilities(&*model.classifier);
+            let opinion = likeliest(&probabilities);
+            let by_class = (0u8..).zip(probabilities);
             Panel {
                 title: config.name(),
                 image: &seen.image,
                 opinion: opinion.map(|(class, probability)| (class.to_string(), probability)),
                 correct: opinion.map(|(class, _)| Some(class) == decision.class),
-                probabilities: by_class.map(|(class, p)| (class.to_string(), *p)).collect(),
+                probabilities: by_class.map(|(class, p)| (class.to_string(), p)).collect(),
             }
         })
         .collect();

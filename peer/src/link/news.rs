@@ -85,12 +85,6 @@ impl News {
         of_round.map(|(robot, held)| (*robot, held.clone())).collect()
     }
 
-    /// The robots alive now.
-    #[must_use]
-    pub fn alive(&self) -> BTreeSet<RobotId> {
-        self.known().alive.clone()
-    }
-
     fn known(&self) -> MutexGuard<'_, Known> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
