@@ -4,10 +4,9 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::PathBuf;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
-use super::Failure;
+use super::{Failure, progress};
 use crate::emulation::{self, Scenario, ScenarioError, Table, Trace};
 
 /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares.
@@ -56,10 +55,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 
     let seeds = args.seeds.unwrap_or(scenario.seeds);
-    let runs = u64::from(seeds) * scenario.compare.len().max(1) as u64;
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let progress = ProgressBar::new(runs).with_style(style);
+    let runs = seeds as usize * scenario.compare.len().max(1);
+    let progress = progress::bar("runs", runs);
     let summaries = emulation::compare(&scenario, seeds, || progress.inc(1))?;
     progress.finish_and_clear();
 

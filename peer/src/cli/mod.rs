@@ -8,7 +8,6 @@ mod evaluate;
 mod open;
 #[cfg(feature = "opencv")]
 mod peer;
-#[cfg(feature = "opencv")]
 mod progress;
 #[cfg(feature = "opencv")]
 mod report;
