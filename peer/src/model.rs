@@ -88,7 +88,7 @@ impl RobotModel {
 
     fn new(classifier: Classifier, name: String, path: PathBuf) -> Result<Self, ModelError> {
         let features =
-            classifier.feature_set().parse().map_err(|cause| ModelError::Features { path, cause })?;
+            classifier.space().feature_set().parse().map_err(|cause| ModelError::Features { path, cause })?;
         Ok(Self { classifier: Arc::new(classifier), features, name })
     }
 }

@@ -214,12 +214,12 @@ impl Model {
     /// # Errors
     /// [`ModelFileError::FeatureSet`].
     pub fn check_features(&self, name: &str, length: usize) -> Result<(), ModelFileError> {
-        if self.classifier.feature_set() == name && self.classifier.features() == length {
+        if self.classifier.space().feature_set() == name && self.classifier.space().features() == length {
             return Ok(());
         }
         Err(ModelFileError::FeatureSet {
-            model: self.classifier.feature_set().to_owned(),
-            expected: self.classifier.features(),
+            model: self.classifier.space().feature_set().to_owned(),
+            expected: self.classifier.space().features(),
             perception: name.to_owned(),
             found: length,
         })

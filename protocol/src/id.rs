@@ -118,6 +118,21 @@ pub struct Stamp {
     pub sequence: u32,
 }
 
+/// A sample that was shared: its author, and its place among all that this author ever shared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct SampleId {
+    /// Who made and shared it.
+    pub author: RobotId,
+    /// Counts from 1 without gaps, also across restarts.
+    pub number: u32,
+}
+
+impl fmt::Display for SampleId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}#{}", self.author, self.number)
+    }
+}
+
 /// Names a list of gestures: votes are fused only with votes over the same list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]

@@ -23,7 +23,9 @@ pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
 pub use envelope::{
     DecodeError, Envelope, MAX_ALLOCATION, MAX_JSON, MAX_MESSAGE, PROTOCOL_VERSION, decode_json,
 };
-pub use id::{ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, Stamp, VocabularyId};
+pub use id::{
+    ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,
+};
 pub use instruction::Instruction;
 pub use key::{Keys, SwarmNameError, Topic};
 pub use message::{Give, Have, HeldVote, MAX_CLASSES, MAX_ROBOTS, Message, Vote};

@@ -177,7 +177,7 @@ fn what_is_stored_judges_the_same() {
     let classifier = trained(&samples, 8).classifier;
     let read = Classifier::decode(&classifier.encode()).unwrap();
     assert_eq!(read, classifier);
-    assert_eq!((read.feature_set(), read.features()), ("shape-1", 5));
+    assert_eq!((read.space().feature_set(), read.space().features()), ("shape-1", 5));
     for sample in &samples {
         assert_eq!(read.probabilities(&sample.features), classifier.probabilities(&sample.features));
     }
@@ -188,9 +188,13 @@ fn the_feature_space_has_a_name_of_its_own() {
     let some = samples(60, 0.5, &mut generator(9));
     let first = trained(&some, 9).classifier;
     let renamed = train("hog-1", &vocabulary(), &some, &options(), &mut generator(9), |_| ()).unwrap();
-    assert_ne!(first.space(), renamed.classifier.space(), "another feature set");
-    assert_ne!(first.space(), trained(&some[6..], 9).classifier.space(), "another scaling and basis");
-    assert_eq!(first.space(), Classifier::decode(&first.encode()).unwrap().space());
+    assert_ne!(first.space().id(), renamed.classifier.space().id(), "another feature set");
+    assert_ne!(
+        first.space().id(),
+        trained(&some[6..], 9).classifier.space().id(),
+        "another scaling and basis"
+    );
+    assert_eq!(first.space().id(), Classifier::decode(&first.encode()).unwrap().space().id());
 }
 
 #[test]
@@ -221,7 +225,7 @@ proptest! {
             bytes[index] = value;
         }
         if let Ok(classifier) = Classifier::decode(&bytes) {
-            let features = vec![f32::MAX; classifier.features()];
+            let features = vec![f32::MAX; classifier.space().features()];
             let p = classifier.probabilities(&features).unwrap();
             prop_assert!(p.iter().all(|p| p.is_finite()), "{p:?}");
         }

@@ -44,7 +44,7 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let model = Model::read(&args.model)?;
     let vocabulary = model.classifier.vocabulary();
     // A set that this program does not know is named by the error; one of another length by the check.
-    let set: FeatureSet = model.classifier.feature_set().parse()?;
+    let set: FeatureSet = model.classifier.space().feature_set().parse()?;
     model.check_features(set.name(), set.length())?;
     let mut perception = Perception::new(set, HandConfig::default())?;
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use clap::ArgGroup;
 use gestalt_strategies::{
-    Classify, Components, Evaluation, Folding, ScalingMethod, TrainOptions, Trained, train,
+    Classify, Components, Evaluation, Folding, Reduction, ScalingMethod, TrainOptions, Trained, train,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -214,9 +214,9 @@ fn text(
         format!("  gestures   {}", classifier.vocabulary().labels().join(" ")),
         format!(
             "  features   {} → {} principal components, {:.1} % of the variance",
-            classifier.feature_set(),
-            classifier.pca().kept(),
-            100.0 * classifier.pca().explained()
+            classifier.space().feature_set(),
+            classifier.space().components(),
+            100.0 * explained(classifier)
         ),
         format!(
             "  machine    C = {}, γ = {}, {} support vectors",
@@ -253,10 +253,10 @@ fn summary(
         "dataset": path(&args.dataset),
         "gestures": classifier.vocabulary().labels(),
         "ignored": ignored,
-        "feature_set": classifier.feature_set(),
-        "space": classifier.space().to_string(),
-        "components": classifier.pca().kept(),
-        "variance": classifier.pca().explained(),
+        "feature_set": classifier.space().feature_set(),
+        "space": classifier.space().id().to_string(),
+        "components": classifier.space().components(),
+        "variance": explained(classifier),
         "cost": trained.cost,
         "gamma": trained.gamma,
         "support_vectors": classifier.support_vectors(),
@@ -273,6 +273,14 @@ fn summary(
         "seconds": seconds,
         "test": test.map(|(evaluation, survey)| report::json(evaluation, survey, classifier.vocabulary())),
     })
+}
+
+/// Part of the variance that the classifier's space keeps, `0.0..=1.0`.
+fn explained(classifier: &gestalt_strategies::Classifier) -> f64 {
+    match classifier.space().reduction() {
+        Reduction::Pca(pca) => pca.explained(),
+        Reduction::Selected { width, kept } => kept.len() as f64 / *width as f64,
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A robot of a swarm, as the program around it holds it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use gestalt_protocol::{Decision, Keys, RobotId, RoundId, Status};
@@ -69,6 +69,8 @@ pub struct Robot {
     account: Arc<Account>,
     commands: mpsc::Sender<Input>,
     events: broadcast::Sender<Event>,
+    /// For the first who asks: a link may stand before there was time to.
+    first_events: Mutex<Option<broadcast::Receiver<Event>>>,
     locators: Vec<String>,
     host: JoinHandle<()>,
 }
@@ -110,7 +112,7 @@ impl Robot {
         let node = Node::open(zenoh.clone(), on_link).await?;
         let locators = node.locators();
         let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
-        let (events, _) = broadcast::channel(MAX_EVENTS);
+        let (events, first_events) = broadcast::channel(MAX_EVENTS);
         let keeper = link.scouting.is_some().then(|| {
             Keeper::new(id, &swarm, link.max_links, node.clone(), inbox.clone(), account.clone(), zenoh)
         });
@@ -133,7 +135,8 @@ impl Robot {
                 return Err(error);
             }
         };
-        Ok(Self { account, commands, events, locators, host })
+        let first_events = Mutex::new(Some(first_events));
+        Ok(Self { account, commands, events, first_events, locators, host })
     }
 
     /// Says: a gesture is being shown now.
@@ -161,10 +164,12 @@ impl Robot {
         }
     }
 
-    /// What happens to it from now on. A receiver that lags by more than 1,024 events is told how many it missed.
+    /// What happens to it from now on; for who asks first, from its start on. A receiver that lags by more than 1,024
+    /// events is told how many it missed.
     #[must_use]
     pub fn events(&self) -> broadcast::Receiver<Event> {
-        self.events.subscribe()
+        let first = self.first_events.lock().unwrap_or_else(PoisonError::into_inner).take();
+        first.unwrap_or_else(|| self.events.subscribe())
     }
 
     /// Its account of itself, as the query on `robot/<id>/status` gives it.

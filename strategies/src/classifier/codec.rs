@@ -1,17 +1,17 @@
 //! A classifier as bytes.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Calibration, Classifier, Machine, Space, pairs};
-use crate::Vocabulary;
+use super::{Calibration, Classifier, Machine, pairs};
+use crate::{FeatureSpace, Vocabulary};
 
 /// Longest encoding that is read, in bytes.
 pub const MAX_MODEL: usize = 64 * 1024 * 1024;
-/// Most raw features a classifier may take.
-const MAX_FEATURES: usize = 65_536;
 /// The layout below; another layout gets another number.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// Bytes that are no classifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -32,9 +32,8 @@ pub enum ModelError {
 
 #[derive(Serialize, Deserialize)]
 struct Parts {
-    feature_set: String,
     vocabulary: Vocabulary,
-    space: Space,
+    space: FeatureSpace,
     machine: Machine,
     calibration: Calibration,
 }
@@ -44,9 +43,8 @@ impl Classifier {
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         let parts = Parts {
-            feature_set: self.feature_set.clone(),
             vocabulary: self.vocabulary.clone(),
-            space: self.space.clone(),
+            space: FeatureSpace::clone(&self.space),
             machine: self.machine.clone(),
             calibration: self.calibration.clone(),
         };
@@ -72,7 +70,7 @@ impl Classifier {
             return Err(ModelError::Inconsistent("bytes after its end"));
         }
         parts.check().map_err(ModelError::Inconsistent)?;
-        Ok(Self::new(parts.feature_set, parts.vocabulary, parts.space, parts.machine, parts.calibration))
+        Ok(Self::new(parts.vocabulary, Arc::new(parts.space), parts.machine, parts.calibration))
     }
 }
 
@@ -81,29 +79,11 @@ impl Parts {
     fn check(&self) -> Result<(), &'static str> {
         let classes = self.vocabulary.classes();
         let pairs = pairs(classes).count();
-        let Space { scaling, pca } = &self.space;
         let machine = &self.machine;
         let all_within = |values: &[f32], limit: f32| values.iter().all(|v| v.abs() <= limit);
 
-        if !(1..=64).contains(&self.feature_set.len()) {
-            return Err("the name of the feature set is not 1 to 64 bytes");
-        }
-        if !(1..=MAX_FEATURES).contains(&pca.width)
-            || scaling.mean.len() != pca.width
-            || scaling.factor.len() != pca.width
-        {
-            return Err("scaling and principal components take different numbers of features");
-        }
-        if !all_within(&scaling.mean, f32::MAX) || !all_within(&scaling.factor, f32::MAX) {
-            return Err("a scaling that is not finite");
-        }
-        if pca.basis.is_empty() || pca.basis.len() % pca.width != 0 || pca.kept() > pca.width {
-            return Err("principal components of uneven length");
-        }
-        if !all_within(&pca.basis, 1.001) || !(0.0..=1.0).contains(&pca.explained) {
-            return Err("principal components that are no directions");
-        }
-        if machine.width != pca.kept() || machine.counts.len() != classes {
+        self.space.check()?;
+        if machine.width != self.space.components() || machine.counts.len() != classes {
             return Err("machines for another space or vocabulary");
         }
         let vectors = machine.counts.iter().try_fold(0_usize, |sum, &count| sum.checked_add(count));

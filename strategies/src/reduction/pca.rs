@@ -107,6 +107,17 @@ impl Pca {
         self.basis.chunks_exact(self.width)
     }
 
+    /// Whether it holds directions of one length, and not too many.
+    pub(crate) fn check(&self) -> Result<(), &'static str> {
+        if self.basis.is_empty() || !self.basis.len().is_multiple_of(self.width) || self.kept() > self.width {
+            return Err("principal components of uneven length");
+        }
+        if !self.basis.iter().all(|v| v.abs() <= 1.001) || !(0.0..=1.0).contains(&self.explained) {
+            return Err("principal components that are no directions");
+        }
+        Ok(())
+    }
+
     /// Writes the coordinates of a centred vector over `coordinates`.
     pub(crate) fn project(&self, centred: &[f32], coordinates: &mut Vec<f32>) {
         coordinates.clear();

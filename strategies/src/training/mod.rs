@@ -3,6 +3,8 @@
 mod folds;
 mod search;
 
+use std::sync::Arc;
+
 use gestalt_protocol::ClassId;
 use linfa_svm::SvmError;
 use rand::Rng;
@@ -166,7 +168,7 @@ pub fn train(
 ) -> Result<Trained, TrainError> {
     check_options(feature_set, options)?;
     check_samples(vocabulary, samples)?;
-    let search = Search::new(samples, vocabulary.classes(), options, rng);
+    let search = Search::new(feature_set, samples, vocabulary.classes(), options, rng);
     let total = (options.gammas.len() + options.costs.len() - 1) * options.folds + 1;
     let mut done = 0;
     let best = search.run(options, || {
@@ -175,11 +177,10 @@ pub fn train(
     })?;
     let Choice { cost, gamma, held_out } = best;
 
-    let all = Fold::new(samples, vocabulary.classes(), options, rng, |_| true);
+    let all = Fold::new(feature_set, samples, vocabulary.classes(), options, rng, |_| true);
     let machine = all.fit(cost, gamma)?;
     progress(Progress { done: total, total });
-    let classifier =
-        Classifier::new(feature_set.to_owned(), vocabulary.clone(), all.space, machine, held_out.calibration);
+    let classifier = Classifier::new(vocabulary.clone(), Arc::new(all.space), machine, held_out.calibration);
     let HeldOut { accuracy, log_loss, .. } = held_out;
     Ok(Trained { classifier, cost, gamma, folding: search.folding, accuracy, log_loss })
 }

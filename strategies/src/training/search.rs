@@ -5,7 +5,8 @@ use rand::Rng;
 
 use super::folds::{Folding, split};
 use super::{Sample, TrainError, TrainOptions};
-use crate::classifier::{Calibration, Machine, Space};
+use crate::FeatureSpace;
+use crate::classifier::{Calibration, Machine};
 
 /// The samples, split and seen in the space of each fold.
 pub(super) struct Search<'a> {
@@ -23,10 +24,17 @@ pub(super) struct Choice {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(samples: &'a [Sample], classes: usize, options: &TrainOptions, rng: &mut impl Rng) -> Self {
+    pub fn new(
+        feature_set: &str,
+        samples: &'a [Sample],
+        classes: usize,
+        options: &TrainOptions,
+        rng: &mut impl Rng,
+    ) -> Self {
         let (assignment, folding) = split(samples, classes, options.folds, rng);
-        let folds = (0..options.folds)
-            .map(|fold| Fold::new(samples, classes, options, rng, |index| assignment[index] != fold));
+        let folds = (0..options.folds).map(|fold| {
+            Fold::new(feature_set, samples, classes, options, rng, |index| assignment[index] != fold)
+        });
         Self { samples, classes, folds: folds.collect(), folding }
     }
 
@@ -74,7 +82,7 @@ impl<'a> Search<'a> {
 
 /// A space fitted on some samples, and all samples as seen in it.
 pub(super) struct Fold {
-    pub space: Space,
+    pub space: FeatureSpace,
     rows: Vec<Vec<f32>>,
     /// By class, the samples it was fitted on.
     members: Vec<Vec<usize>>,
@@ -86,6 +94,7 @@ pub(super) struct Fold {
 
 impl Fold {
     pub fn new(
+        feature_set: &str,
         samples: &[Sample],
         classes: usize,
         options: &TrainOptions,
@@ -94,8 +103,8 @@ impl Fold {
     ) -> Self {
         let learned = samples.iter().enumerate().filter(|(index, _)| learns(*index));
         let features = learned.clone().map(|(_, sample)| sample.features.as_slice());
-        let space = Space::fit(features, options.scaling, options.components, rng);
-        let rows: Vec<Vec<f32>> = samples.iter().map(|sample| space.project(&sample.features)).collect();
+        let space = FeatureSpace::fit(feature_set, features, options.scaling, options.components, rng);
+        let rows: Vec<Vec<f32>> = samples.iter().map(|sample| space.coordinates(&sample.features)).collect();
         let mut members = vec![Vec::new(); classes];
         let (mut squares, mut count) = (0.0, 0.0);
         for (index, sample) in learned {
@@ -111,7 +120,7 @@ impl Fold {
     pub fn fit(&self, cost: f64, gamma: f64) -> Result<Machine, SvmError> {
         let row = |&index: &usize| self.rows[index].as_slice();
         let members: Vec<Vec<&[f32]>> = self.members.iter().map(|m| m.iter().map(row).collect()).collect();
-        Machine::fit(&members, self.space.pca.kept(), cost, gamma * self.gamma_unit)
+        Machine::fit(&members, self.space.components(), cost, gamma * self.gamma_unit)
     }
 }
 

@@ -26,7 +26,7 @@ pub fn libsvm(
     write(&folder.join("learned"), classifier, learned);
     write(&folder.join("unseen"), classifier, unseen);
     let squares = |sample: &Sample| -> f64 {
-        classifier.reduce(&sample.features).unwrap().iter().map(|x| f64::from(x * x)).sum()
+        classifier.space().project(&sample.features).unwrap().iter().map(|x| f64::from(x * x)).sum()
     };
     let gamma = gamma * learned.len() as f64 / learned.iter().map(squares).sum::<f64>();
     let run = |program: &str, arguments: &str| {
@@ -55,7 +55,7 @@ fn write(path: &Path, classifier: &Classifier, samples: &[Sample]) {
     let mut text = String::new();
     for sample in samples {
         write!(text, "{}", sample.class).unwrap();
-        for (index, value) in classifier.reduce(&sample.features).unwrap().iter().enumerate() {
+        for (index, value) in classifier.space().project(&sample.features).unwrap().iter().enumerate() {
             write!(text, " {}:{value}", index + 1).unwrap();
         }
         text.push('\n');
