@@ -37,4 +37,11 @@ pub trait Classify: Debug + Send + Sync {
     /// # Errors
     /// See [`ClassifyError`].
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError>;
+
+    /// The same of a vector already reduced: coordinates in the classifier's [`FeatureSpace`](crate::FeatureSpace).
+    /// `None` for a classifier without such a space, and for coordinates of another length or that are not finite.
+    fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
+        let _ = coordinates;
+        None
+    }
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Calibration, Classifier, Machine, pairs};
+use super::{Calibration, Classifier, MAX_COORDINATE, Machine, pairs};
 use crate::{FeatureSpace, Vocabulary};
 
 /// Longest encoding that is read, in bytes.
 pub const MAX_MODEL: usize = 64 * 1024 * 1024;
 /// The layout below; another layout gets another number.
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// Bytes that are no classifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -34,6 +34,7 @@ pub enum ModelError {
 struct Parts {
     vocabulary: Vocabulary,
     space: FeatureSpace,
+    learned: Vec<u32>,
     machine: Machine,
     calibration: Calibration,
 }
@@ -45,6 +46,7 @@ impl Classifier {
         let parts = Parts {
             vocabulary: self.vocabulary.clone(),
             space: FeatureSpace::clone(&self.space),
+            learned: self.learned.clone(),
             machine: self.machine.clone(),
             calibration: self.calibration.clone(),
         };
@@ -70,14 +72,18 @@ impl Classifier {
             return Err(ModelError::Inconsistent("bytes after its end"));
         }
         parts.check().map_err(ModelError::Inconsistent)?;
-        Ok(Self::new(parts.vocabulary, Arc::new(parts.space), parts.machine, parts.calibration))
+        let Parts { vocabulary, space, learned, machine, calibration } = parts;
+        Ok(Self::new(vocabulary, Arc::new(space), learned, machine, calibration))
     }
 }
 
 impl Parts {
     /// Whether all dimensions agree, and all numbers lie where sums of them stay finite.
     fn check(&self) -> Result<(), &'static str> {
-        let classes = self.vocabulary.classes();
+        if self.learned.len() != self.vocabulary.classes() {
+            return Err("samples of another vocabulary");
+        }
+        let classes = self.learned.iter().filter(|count| **count > 0).count();
         let pairs = pairs(classes).count();
         let machine = &self.machine;
         let all_within = |values: &[f32], limit: f32| values.iter().all(|v| v.abs() <= limit);
@@ -89,7 +95,7 @@ impl Parts {
         let vectors = machine.counts.iter().try_fold(0_usize, |sum, &count| sum.checked_add(count));
         let vectors = vectors.filter(|&n| n <= MAX_MODEL).ok_or("too many support vectors")?;
         if machine.vectors.len() != vectors * machine.width
-            || machine.weights.len() != vectors * (classes - 1)
+            || machine.weights.len() != vectors * classes.saturating_sub(1)
             || machine.offsets.len() != pairs
             || self.calibration.sigmoids.len() != pairs
         {
@@ -98,7 +104,7 @@ impl Parts {
         if machine.gamma.is_nan()
             || machine.gamma <= 0.0
             || machine.gamma.is_infinite()
-            || !all_within(&machine.vectors, 1e6)
+            || !all_within(&machine.vectors, MAX_COORDINATE)
             || !all_within(&machine.weights, 1e9)
             || !machine.offsets.iter().all(|v| v.abs() <= 1e12)
             || !(0.01..=100.0).contains(&self.calibration.sharpness)

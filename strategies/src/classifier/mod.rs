@@ -17,18 +17,27 @@ use std::sync::Arc;
 pub(crate) use calibration::Calibration;
 pub use codec::{MAX_MODEL, ModelError};
 use coupling::couple;
-pub(crate) use kernel::dot;
-pub(crate) use machine::Machine;
-use machine::pairs;
-use sigmoid::Sigmoid;
+pub(crate) use kernel::{dot, squared_distance};
+pub(crate) use machine::{Machine, pairs};
+pub(crate) use sigmoid::Sigmoid;
+
+use gestalt_protocol::ClassId;
 
 use crate::{Classify, ClassifyError, FeatureSpace, Vocabulary};
 
-/// A trained classifier. [`crate::train`] makes one, [`Classifier::decode`] reads one.
+/// Coordinates of support vectors lie within ± this, so that their squared distances are finite.
+pub(crate) const MAX_COORDINATE: f32 = 1e6;
+
+/// A trained classifier. [`crate::train`] and [`crate::Learner`] make one, [`Classifier::decode`] reads one.
+///
+/// It need not have met all gestures of its vocabulary. After n samples, one that it has never met gets the
+/// probability 1 / (n + classes), Laplace's rule of succession; the others share the rest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classifier {
     vocabulary: Vocabulary,
     space: Arc<FeatureSpace>,
+    /// How many samples of each class it has learned from. Machines and calibration are of those with any.
+    learned: Vec<u32>,
     machine: Machine,
     calibration: Calibration,
 }
@@ -37,10 +46,11 @@ impl Classifier {
     pub(crate) fn new(
         vocabulary: Vocabulary,
         space: Arc<FeatureSpace>,
+        learned: Vec<u32>,
         machine: Machine,
         calibration: Calibration,
     ) -> Self {
-        Self { vocabulary, space, machine, calibration }
+        Self { vocabulary, space, learned, machine, calibration }
     }
 
     /// The space it judges in.
@@ -49,10 +59,45 @@ impl Classifier {
         &self.space
     }
 
+    /// How many samples of each class it has learned from.
+    #[must_use]
+    pub fn learned(&self) -> &[u32] {
+        &self.learned
+    }
+
     /// How many support vectors all pairs share.
     #[must_use]
     pub fn support_vectors(&self) -> usize {
         self.machine.counts.iter().sum()
+    }
+
+    /// The support vectors with their classes.
+    pub(crate) fn vectors(&self) -> impl Iterator<Item = (ClassId, &[f32])> {
+        let classes = self.met().zip(&self.machine.counts);
+        let classes = classes.flat_map(|(class, &count)| std::iter::repeat_n(ClassId(class as u8), count));
+        classes.zip(self.machine.vectors.chunks_exact(self.machine.width))
+    }
+
+    /// The classes it has met.
+    fn met(&self) -> impl Iterator<Item = usize> {
+        self.learned.iter().enumerate().filter(|(_, count)| **count > 0).map(|(class, _)| class)
+    }
+
+    /// Judges coordinates in its space.
+    fn judge(&self, coordinates: &[f32]) -> Vec<f64> {
+        let (classes, met) = (self.learned.len(), self.met().count());
+        let learned: f64 = self.learned.iter().map(|count| f64::from(*count)).sum();
+        let unmet = 1.0 / (learned + classes as f64);
+        let mut probabilities = vec![unmet; classes];
+        if met > 0 {
+            let mut decisions = Vec::with_capacity(self.machine.offsets.len());
+            self.machine.decide(coordinates, &mut decisions);
+            let rest = 1.0 - unmet * (classes - met) as f64;
+            for (class, p) in self.met().zip(self.calibration.probabilities(&decisions, met)) {
+                probabilities[class] = p * rest;
+            }
+        }
+        probabilities
     }
 }
 
@@ -62,9 +107,11 @@ impl Classify for Classifier {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        let reduced = self.space.project(features)?;
-        let mut decisions = Vec::with_capacity(self.machine.offsets.len());
-        self.machine.decide(&reduced, &mut decisions);
-        Ok(self.calibration.probabilities(&decisions, self.vocabulary.classes()))
+        Ok(self.judge(&self.space.project(features)?))
+    }
+
+    fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
+        let fits = coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite());
+        fits.then(|| self.judge(coordinates))
     }
 }

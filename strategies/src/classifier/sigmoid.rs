@@ -31,6 +31,25 @@ impl Sigmoid {
     /// Newton's method with backtracking: H.-T. Lin, C.-J. Lin, R. C. Weng, "A note on Platt's probabilistic
     /// outputs for support vector machines", Machine Learning 68 (2007).
     pub fn fit(held_out: &[(f64, bool)]) -> Self {
+        let (positive, negative) = sizes(held_out);
+        Self { a: 0.0, b: ((negative + 2.0) / (positive + 2.0)).ln() }.climb(held_out, 0.0)
+    }
+
+    /// The same fit where b is taken to be about 0, give or take the logarithm of the ratio of the class sizes.
+    ///
+    /// A machine says 0 where both classes are as likely, but leans to the larger one. Of classes of one size, b
+    /// could tell little but the chance that dealt the samples: it would move the border between them with each
+    /// sample that comes or goes.
+    pub fn fit_at_border(held_out: &[(f64, bool)]) -> Self {
+        /// Least deviation of b, so that its inverse is finite.
+        const LEAST: f64 = 1e-3;
+        let (positive, negative) = sizes(held_out);
+        let deviation = ((negative + 2.0) / (positive + 2.0)).ln();
+        Self { a: 0.0, b: 0.0 }.climb(held_out, 1.0 / deviation.powi(2).max(LEAST * LEAST))
+    }
+
+    /// The fit from a start on, with a normal prior of mean 0 and this precision on b.
+    fn climb(self, held_out: &[(f64, bool)], precision: f64) -> Self {
         const MAX_ITERATIONS: usize = 100;
         const MIN_STEP: f64 = 1e-10;
         const RIDGE: f64 = 1e-12;
@@ -38,25 +57,26 @@ impl Sigmoid {
 
         let mut values = held_out.to_vec();
         values.extend([(1.0, true), (-1.0, false)]);
-        let positive = values.iter().filter(|(_, first)| *first).count() as f64;
-        let negative = values.len() as f64 - positive;
+        let (positive, negative) = sizes(&values);
         let high = (positive + 1.0) / (positive + 2.0);
         let low = 1.0 / (negative + 2.0);
         let target = |first: bool| if first { high } else { low };
         let loss = |a: f64, b: f64| -> f64 {
-            values
+            let of_samples: f64 = values
                 .iter()
                 .map(|&(f, first)| {
                     let (t, z) = (target(first), a * f + b);
                     if z >= 0.0 { t * z + (-z).exp().ln_1p() } else { (t - 1.0) * z + z.exp().ln_1p() }
                 })
-                .sum()
+                .sum();
+            of_samples + 0.5 * precision * b * b
         };
 
-        let (mut a, mut b) = (0.0, ((negative + 1.0) / (positive + 1.0)).ln());
+        let Self { mut a, mut b } = self;
         let mut best = loss(a, b);
         for _ in 0..MAX_ITERATIONS {
-            let (mut h11, mut h22, mut h21, mut g1, mut g2) = (RIDGE, RIDGE, 0.0, 0.0, 0.0);
+            let (mut h11, mut h22, mut h21, mut g1, mut g2) =
+                (RIDGE, RIDGE + precision, 0.0, 0.0, precision * b);
             for &(f, first) in &values {
                 let p = Self { a, b }.probability(f);
                 let (d1, d2) = (target(first) - p, p * (1.0 - p));
@@ -91,6 +111,12 @@ impl Sigmoid {
         }
         Self { a, b }
     }
+}
+
+/// How many values are of the first class, and of the second.
+fn sizes(values: &[(f64, bool)]) -> (f64, f64) {
+    let positive = values.iter().filter(|(_, first)| *first).count() as f64;
+    (positive, values.len() as f64 - positive)
 }
 
 #[cfg(test)]
@@ -129,5 +155,23 @@ mod tests {
     fn extreme_values_do_not_overflow() {
         let sigmoid = Sigmoid { a: -1e12, b: 0.0 };
         assert_eq!((sigmoid.probability(1e12), sigmoid.probability(-1e12)), (1.0, 0.0));
+    }
+
+    #[test]
+    fn the_border_moves_for_classes_of_different_size_only() {
+        // Each class about its margin, but a third of the first on the other side.
+        let value = |i: usize, first: bool| {
+            let noise = (i % 7) as f64 / 7.0;
+            if first && !i.is_multiple_of(3) { 0.5 + noise } else { -0.5 - noise }
+        };
+        let of = |first: usize, second: usize| -> Vec<(f64, bool)> {
+            let first = (0..first).map(|i| (value(i, true), true));
+            first.chain((0..second).map(|i| (value(i, false), false))).collect()
+        };
+        let (equal, unequal) = (of(60, 60), of(60, 20));
+        assert!(Sigmoid::fit_at_border(&equal).b.abs() < 1e-3, "{:?}", Sigmoid::fit_at_border(&equal));
+        assert!(Sigmoid::fit(&equal).b.abs() > 0.2, "{:?}", Sigmoid::fit(&equal));
+        let (border, free) = (Sigmoid::fit_at_border(&unequal), Sigmoid::fit(&unequal));
+        assert!(border.b / free.b > 0.5, "{border:?} and {free:?}");
     }
 }

@@ -180,7 +180,9 @@ pub fn train(
     let all = Fold::new(feature_set, samples, vocabulary.classes(), options, rng, |_| true);
     let machine = all.fit(cost, gamma)?;
     progress(Progress { done: total, total });
-    let classifier = Classifier::new(vocabulary.clone(), Arc::new(all.space), machine, held_out.calibration);
+    let learned = all.counts();
+    let classifier =
+        Classifier::new(vocabulary.clone(), Arc::new(all.space), learned, machine, held_out.calibration);
     let HeldOut { accuracy, log_loss, .. } = held_out;
     Ok(Trained { classifier, cost, gamma, folding: search.folding, accuracy, log_loss })
 }

@@ -117,6 +117,11 @@ impl Fold {
         Self { space, rows, members, held_out, gamma_unit: count / squares.max(f64::MIN_POSITIVE) }
     }
 
+    /// How many samples of each class it was fitted on.
+    pub fn counts(&self) -> Vec<u32> {
+        self.members.iter().map(|members| members.len() as u32).collect()
+    }
+
     pub fn fit(&self, cost: f64, gamma: f64) -> Result<Machine, SvmError> {
         let row = |&index: &usize| self.rows[index].as_slice();
         let members: Vec<Vec<&[f32]>> = self.members.iter().map(|m| m.iter().map(row).collect()).collect();

@@ -1,0 +1,66 @@
+//! An even sample of each class, with the classes as even as the stream allows.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::ClassId;
+use rand::{Rng, RngExt};
+
+use super::Forgetting;
+use crate::training_set::{HeldSample, Samples, draw};
+
+/// Class-balancing reservoir sampling (Chrysakis & Moens, "Online continual learning from imbalanced data", ICML
+/// 2020). A class that is or once was the largest of a full set is *full*. The newest sample, of class c,
+/// - if c is not full, takes the place of any sample of the largest class (ties at random);
+/// - if c is full, stays with probability m / n in place of any other of c, and else goes itself: m samples of c are
+///   held, n have come.
+///
+/// Small classes are kept whole, and full ones are even samples of what came of them. How many came of each class is
+/// counted from what the set is told: after a restart, from what is held. Cost: a step per class.
+#[derive(Clone, Debug, Default)]
+pub struct ClassBalancedReservoir {
+    classes: BTreeMap<ClassId, Stream>,
+    /// Whom this rule named last: what else is removed was retracted, and counts as never come.
+    named: Option<u64>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Stream {
+    came: u64,
+    full: bool,
+}
+
+impl Forgetting for ClassBalancedReservoir {
+    fn inserted(&mut self, sample: &HeldSample) {
+        self.classes.entry(sample.class).or_default().came += 1;
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        if self.named.take_if(|named| *named == sample.key).is_none() {
+            let stream = self.classes.entry(sample.class).or_default();
+            stream.came = stream.came.saturating_sub(1);
+        }
+    }
+
+    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+        let newest = samples.iter().next_back()?;
+        let held = |class| samples.class_count(class) - usize::from(class == newest.class);
+        let most = samples.classes().map(held).max()?;
+        let largest: Vec<ClassId> = samples.classes().filter(|class| held(*class) == most).collect();
+        for class in &largest {
+            self.classes.entry(*class).or_default().full = true;
+        }
+
+        let Stream { came, full } = self.classes.get(&newest.class).copied().unwrap_or_default();
+        let kin = held(newest.class);
+        self.named = if !full || kin == 0 {
+            let class = draw(&largest, rng)?;
+            draw(samples.class_keys(class), rng)
+        } else if rng.random_range(0..came.max(1)) < kin as u64 {
+            // The newest has the greatest key, so it is the last of its class.
+            draw(&samples.class_keys(newest.class)[..kin], rng)
+        } else {
+            Some(newest.key)
+        };
+        self.named
+    }
+}

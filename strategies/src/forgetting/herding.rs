@@ -1,0 +1,53 @@
+//! What can go without moving the mean away from that of all that came.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::ClassId;
+use rand::Rng;
+
+use super::Forgetting;
+use crate::training_set::{Cluster, HeldSample, Samples, Sum, narrow};
+
+/// Of the class K with the most samples (ties at random)
+/// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that ever came, S the sum of the m held.
+/// That is the x nearest to S − (m − 1) μ. Ties go to the oldest.
+///
+/// Herding (Welling 2009; iCaRL, Rebuffi et al. 2017) turned round: exemplars are dropped instead of chosen, one at
+/// a time. μ is kept from what the set is told, without what was retracted: after a restart, it begins with what is
+/// held. Cost: one pass over K; the sums are kept.
+#[derive(Clone, Debug, Default)]
+pub struct HerdingForgetting {
+    classes: BTreeMap<ClassId, Class>,
+    /// Whom this rule named last: what else is removed was retracted, and counts as never come.
+    named: Option<u64>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Class {
+    came: Sum,
+    held: Cluster,
+}
+
+impl Forgetting for HerdingForgetting {
+    fn inserted(&mut self, sample: &HeldSample) {
+        let class = self.classes.entry(sample.class).or_default();
+        class.came.add(&sample.vector);
+        class.held.insert(sample);
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        let class = self.classes.entry(sample.class).or_default();
+        class.held.remove(sample);
+        if self.named.take_if(|named| *named == sample.key).is_none() {
+            class.came.subtract(&sample.vector);
+        }
+    }
+
+    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+        let Class { came, held } = self.classes.get(&samples.draw_largest_class(rng)?)?;
+        let others = held.sum.count() - 1.0;
+        let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum.total(j) - others * mean).collect();
+        self.named = held.points.nearest_to(&narrow(target));
+        self.named
+    }
+}

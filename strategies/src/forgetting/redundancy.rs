@@ -1,0 +1,47 @@
+//! What another sample says as well.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::ClassId;
+use rand::Rng;
+
+use super::Forgetting;
+use crate::training_set::{HeldSample, Neighbours, Samples, draw};
+
+/// Of the class K with the most samples (ties at random), personal, shared and external alike,
+/// arg min over x of min over x' ≠ x in K of ‖x − x'‖. The two of the closest pair tie: one of them goes at random.
+/// Of equally close pairs it is the one with the smaller keys.
+///
+/// From the source research. Cost: two passes over K per sample that comes, and one per sample whose nearest
+/// neighbour has gone once it may be of the closest pair. Plainly: all pairs of K each time.
+///
+/// Forgetting after k-center greedy (Sener & Savarese 2018) comes to the same pair: the sample without which the
+/// others cover K best is the one that has another nearest.
+#[derive(Clone, Debug, Default)]
+pub struct Redundancy {
+    /// Per class: every sample seeks, and is every other's neighbour.
+    classes: BTreeMap<ClassId, Neighbours>,
+}
+
+impl Forgetting for Redundancy {
+    fn inserted(&mut self, sample: &HeldSample) {
+        let class = self.classes.entry(sample.class).or_default();
+        class.add_seeker(sample.key, &sample.vector);
+        class.add_neighbour(sample.key, &sample.vector);
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        let class = self.classes.entry(sample.class).or_default();
+        class.remove_seeker(sample.key);
+        class.remove_neighbour(sample.key);
+    }
+
+    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+        let class = samples.draw_largest_class(rng)?;
+        let pair = self.classes.entry(class).or_default().closest()?;
+        match pair.neighbour {
+            Some(neighbour) => draw(&[pair.seeker, neighbour], rng),
+            None => Some(pair.seeker),
+        }
+    }
+}

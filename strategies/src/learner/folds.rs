@@ -1,0 +1,63 @@
+//! Which samples of a class are held out together.
+
+use super::samples::{Key, Sample};
+
+/// The fold of each sample of a class, `0..folds`.
+///
+/// It depends on the sample's key alone, so that it stays when others come and go and does not depend on their
+/// order. Chance would deal a class of few samples unevenly: those are dealt in turn, so that one with fewer than
+/// `folds` is left out one by one.
+pub(super) fn folds(samples: &[Sample], folds: usize) -> Vec<usize> {
+    let few = 4 * folds;
+    let hashes: Vec<u64> = samples.iter().map(|sample| hash(sample.key)).collect();
+    if samples.len() >= few {
+        return hashes.iter().map(|hash| (hash % folds as u64) as usize).collect();
+    }
+    let rank = |hash: u64| hashes.iter().filter(|other| **other < hash).count();
+    hashes.iter().map(|hash| rank(*hash) % folds).collect()
+}
+
+/// The finaliser of SplitMix64, a bijection: G. Steele, D. Lea, C. Flood, "Fast splittable pseudorandom number
+/// generators", OOPSLA 2014.
+fn hash(key: Key) -> u64 {
+    let mut z = match key {
+        Key::Inserted(key) => key,
+        Key::Support(index) => !u64::from(index),
+    };
+    z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(keys: impl Iterator<Item = u64>) -> Vec<Sample> {
+        keys.map(|key| Sample { key: Key::Inserted(key), vector: Vec::new(), kernel: Vec::new() }).collect()
+    }
+
+    #[test]
+    fn few_samples_are_dealt_in_turn_and_fewer_left_out_one_by_one() {
+        for count in 1..20 {
+            let folds = folds(&samples(0..count), 5);
+            for fold in 0..5 {
+                let held_out = folds.iter().filter(|of| **of == fold).count() as u64;
+                assert!((count / 5..=count.div_ceil(5)).contains(&held_out), "{held_out} of {count}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sample_of_many_keeps_its_fold() {
+        let all = folds(&samples(0..100), 5);
+        let some = folds(&samples((0..100).filter(|key| key % 3 != 0).rev()), 5);
+        let expected: Vec<usize> = (0..100).filter(|key| key % 3 != 0).rev().map(|key| all[key]).collect();
+        assert_eq!(some, expected);
+        assert!(
+            (0..5).all(|fold| (10..=30).contains(&all.iter().filter(|of| **of == fold).count())),
+            "{all:?}"
+        );
+    }
+}

@@ -1,0 +1,60 @@
+//! What keeps the mean of what was shared at the mean of what was seen.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::ClassId;
+use rand::Rng;
+
+use super::Selection;
+use crate::Classify;
+use crate::training_set::{Cluster, HeldSample, Part, Samples, Sum, narrow};
+
+/// A class K at random among those with personal samples, then
+/// arg min over x personal in K of ‖μ − (S + x) / (k + 1)‖: μ the mean of the own samples of K (personal and
+/// shared), S the sum of the k shared ones. That is the x nearest to (k + 1) μ − S. Ties go to the oldest.
+///
+/// Herding (Welling, "Herding dynamical weights to learn", ICML 2009), as iCaRL chooses exemplars (Rebuffi et al.,
+/// CVPR 2017). The first pick is the most representative one, the next ones make up for what it lacked. Cost: one
+/// pass over K's personal samples per choice; the sums are kept.
+#[derive(Clone, Debug, Default)]
+pub struct HerdingSelection {
+    classes: BTreeMap<ClassId, Own>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Own {
+    personal: Cluster,
+    shared: Sum,
+}
+
+impl Selection for HerdingSelection {
+    fn inserted(&mut self, sample: &HeldSample) {
+        let own = self.classes.entry(sample.class).or_default();
+        match sample.part {
+            Part::Personal => own.personal.insert(sample),
+            Part::Shared => own.shared.add(&sample.vector),
+            Part::External => {}
+        }
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        let own = self.classes.entry(sample.class).or_default();
+        match sample.part {
+            Part::Personal => own.personal.remove(sample),
+            Part::Shared => own.shared.subtract(&sample.vector),
+            Part::External => {}
+        }
+    }
+
+    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+        let Own { personal, shared } = self.classes.get(&samples.draw_personal_class(rng)?)?;
+        let (k, count) = (shared.count(), shared.count() + personal.sum.count());
+        let target = (0..personal.points.dimension())
+            .map(|j| {
+                let mean = (shared.total(j) + personal.sum.total(j)) / count;
+                (k + 1.0) * mean - shared.total(j)
+            })
+            .collect();
+        personal.points.nearest_to(&narrow(target))
+    }
+}

@@ -1,0 +1,60 @@
+//! What covers all that was seen with the fewest samples.
+
+use rand::Rng;
+
+use super::Selection;
+use crate::Classify;
+use crate::training_set::{HeldSample, Neighbours, Part, Samples, Sum, narrow};
+
+/// arg max over all personal x of min over all shared and external x' of ‖x − x'‖, whatever their classes: the point
+/// that the centres so far cover worst becomes the next. With no common knowledge at all the one nearest to the
+/// centroid of the personal samples. Ties go to the oldest; there is nothing random.
+///
+/// The greedy k-center algorithm (Gonzalez 1985), within a factor of 2 of the best cover, as used to choose core sets
+/// (Sener & Savarese, ICLR 2018), which do not look at classes. Within a class it would be
+/// [`Novelty`](super::Novelty), and it is kept up to date in the same way, at the same cost, over all classes.
+#[derive(Clone, Debug, Default)]
+pub struct KCenter {
+    /// The personal samples seek, the common ones are their neighbours.
+    distances: Neighbours,
+    /// The sum of the personal ones.
+    personal: Sum,
+}
+
+impl Selection for KCenter {
+    fn inserted(&mut self, sample: &HeldSample) {
+        match sample.part {
+            Part::Personal => {
+                self.distances.add_seeker(sample.key, &sample.vector);
+                self.personal.add(&sample.vector);
+            }
+            Part::Shared | Part::External => self.distances.add_neighbour(sample.key, &sample.vector),
+        }
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        match sample.part {
+            Part::Personal => {
+                self.distances.remove_seeker(sample.key);
+                self.personal.subtract(&sample.vector);
+            }
+            Part::Shared | Part::External => self.distances.remove_neighbour(sample.key),
+        }
+    }
+
+    fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {
+        // Another class makes no difference.
+        if before.part != after.part {
+            self.removed(before);
+            self.inserted(after);
+        }
+    }
+
+    fn select(&mut self, _: &Samples, _: Option<&dyn Classify>, _: &mut dyn Rng) -> Option<u64> {
+        if self.distances.has_neighbours() {
+            self.distances.farthest().map(|pair| pair.seeker)
+        } else {
+            self.distances.seekers().nearest_to(&narrow(self.personal.mean()?))
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! What the rules of selection and forgetting pick.
+
+mod operations;
+mod plain;
+
+use std::collections::BTreeSet;
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{
+    Classify, ClassifyError, Forgetting, ForgettingRule, Receipt, Selection, SelectionRule, SetChange,
+    TrainingSet, Vocabulary,
+};
+use operations::{ME, Operation, Store, as_is, generator, id, operations, round, rules, run, set};
+use plain::{PlainForgetting, PlainSelection};
+use proptest::prelude::*;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(500))]
+
+    #[test]
+    fn the_rules_pick_what_their_formulas_say(
+        operations in operations(120), capacity in 1..40_usize, rules in rules(), seed: u64
+    ) {
+        let plain = || {
+            TrainingSet::new(ME, capacity, Box::new(PlainSelection(rules.0)), Box::new(PlainForgetting::new(rules.1)))
+        };
+        let (mut fast, mut plainly) = (set(capacity, rules.0, rules.1), plain());
+        let (mut rng, mut same_rng) = (generator(seed), generator(seed));
+        let mut store = Store::default();
+        for operation in &operations {
+            if let Operation::Restart = operation {
+                (fast, plainly) = (set(capacity, rules.0, rules.1), plain());
+                store.restore_into(&mut fast);
+                store.restore_into(&mut plainly);
+            }
+            let (changes, _) = run(&mut fast, operation, &mut rng);
+            prop_assert_eq!(&changes, &run(&mut plainly, operation, &mut same_rng).0);
+            store.apply(&fast, &changes);
+        }
+        prop_assert_eq!(rng, same_rng);
+    }
+}
+
+/// Own samples of one class at these places of a line, then common ones.
+fn line(set: &mut TrainingSet, personal: &[f32], common: &[f32]) {
+    let mut rng = generator(1);
+    for place in personal {
+        set.keep(ClassId(0), round(1), vec![*place], &mut rng);
+    }
+    for (number, place) in (1..).zip(common) {
+        set.receive(id(9, number), ClassId(0), round(1), vec![*place], &mut rng);
+    }
+}
+
+#[test]
+fn on_a_line_the_choices_can_be_read_off() {
+    use SelectionRule::{Herding, KCenter, Margin, Novelty, Representativity};
+    // The mean of the personal ones is 3.
+    let personal = [-1.0, 0.0, 2.5, 4.5, 9.0];
+    for (rule, common, expected) in [
+        (Representativity, &[][..], &[2.5, 4.5, 0.0][..]),
+        (Representativity, &[2.0, 10.0], &[2.5, 4.5]),
+        // Without common knowledge the most representative, then the farthest from it and from what followed.
+        (Novelty, &[], &[2.5, 9.0, -1.0]),
+        (KCenter, &[], &[2.5, 9.0, -1.0]),
+        (Novelty, &[8.0, 2.0], &[-1.0, 4.5]),
+        // The second is nearest to 2 · 3 − 2.5, the third to 3 · 3 − 7.
+        (Herding, &[8.0], &[2.5, 4.5, 0.0]),
+        // The judge's classes lie at −1 and 1; the third is as far from both.
+        (Margin, &[], &[0.0]),
+    ] {
+        let mut set = set(100, rule, ForgettingRule::Fifo);
+        line(&mut set, &personal, common);
+        let judge = Line(Vocabulary::new(["left", "right"]).unwrap());
+        let changes = set.share(expected.len(), Some(&judge), &as_is, &mut generator(2));
+        let picked: Vec<f32> = changes
+            .iter()
+            .map(|change| match change {
+                SetChange::Shared(key, _) => set.get(*key).unwrap().vector[0],
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        assert_eq!(picked, expected, "{rule} beside {common:?}");
+    }
+}
+
+/// The farther right, the surer of the right; undecided at 0.
+#[derive(Debug)]
+struct Line(Vocabulary);
+
+impl Classify for Line {
+    fn vocabulary(&self) -> &Vocabulary {
+        &self.0
+    }
+
+    fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+        let right = 1.0 / (1.0 + f64::from(-features[0]).exp());
+        Ok(vec![1.0 - right, right])
+    }
+
+    fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
+        self.probabilities(coordinates).ok()
+    }
+}
+
+#[test]
+fn on_a_line_what_goes_can_be_read_off() {
+    use ForgettingRule::{Fifo, Herding, Redundancy, Representativity};
+    for (rule, expected) in [
+        (Fifo, &[0.0][..]),
+        (Redundancy, &[4.0, 4.5]),
+        // The mean is 3.7.
+        (Representativity, &[10.0]),
+        // Without 4 the mean of the others stays nearest to what it was.
+        (Herding, &[4.0]),
+    ] {
+        let mut gone = BTreeSet::new();
+        for seed in 0..20 {
+            let mut set = set(4, SelectionRule::Random, rule);
+            line(&mut set, &[0.0, 4.0, 10.0], &[4.5]);
+            let changes = set.keep(ClassId(0), round(2), vec![-1.0], &mut generator(seed));
+            let [_, SetChange::Removed(victim)] = &changes[..] else { panic!("{changes:?}") };
+            gone.insert(victim.vector[0].to_string());
+        }
+        let expected: BTreeSet<String> = expected.iter().map(f32::to_string).collect();
+        assert_eq!(gone, expected, "{rule}");
+    }
+}
+
+#[test]
+fn fast_and_plain_pick_the_same_among_many() {
+    let runs = SelectionRule::ALL
+        .map(|rule| (rule, ForgettingRule::Random))
+        .into_iter()
+        .chain(ForgettingRule::ALL.map(|rule| (SelectionRule::Random, rule)));
+    for rules in runs {
+        let changes = |mut set: TrainingSet| {
+            let mut rng = generator(3);
+            let mut changes = Vec::new();
+            for number in 1..=700 {
+                let vector = |rng: &mut ChaCha8Rng| (0..40).map(|_| rng.random_range(-1.0..1.0)).collect();
+                let class = ClassId(number as u8 % 2);
+                let (own, other) = (vector(&mut rng), vector(&mut rng));
+                changes.extend(set.keep(class, round(number), own, &mut rng));
+                match set.receive(id(1, number), class, round(number), other, &mut rng) {
+                    Receipt::New(more) => changes.extend(more),
+                    other => panic!("a new sample is new: {other:?}"),
+                }
+                if number.is_multiple_of(50) {
+                    changes.extend(set.share(3, None, &as_is, &mut rng));
+                }
+            }
+            changes
+        };
+        let plain: (Box<dyn Selection>, Box<dyn Forgetting>) =
+            (Box::new(PlainSelection(rules.0)), Box::new(PlainForgetting::new(rules.1)));
+        let found = changes(set(1380, rules.0, rules.1));
+        assert!(found == changes(TrainingSet::new(ME, 1380, plain.0, plain.1)), "{rules:?}");
+        assert_eq!(found.iter().filter(|change| matches!(change, SetChange::Shared(..))).count(), 42);
+    }
+}
+
+/// How often each of the samples of a stream is held at its end, as a part of the runs.
+fn survival(rule: ForgettingRule, capacity: usize, stream: &[u8], runs: u64) -> Vec<f64> {
+    let mut held = vec![0.0; stream.len()];
+    for seed in 0..runs {
+        let mut rng = generator(seed);
+        let mut set = set(capacity, SelectionRule::Random, rule);
+        for (i, class) in stream.iter().enumerate() {
+            set.keep(ClassId(*class), round(1), vec![i as f32], &mut rng);
+        }
+        for sample in set.iter() {
+            held[sample.vector[0] as usize] += 1.0 / runs as f64;
+        }
+    }
+    held
+}
+
+#[test]
+fn a_reservoir_holds_every_sample_of_the_stream_with_the_same_probability() {
+    let stream = [0; 40];
+    let held = survival(ForgettingRule::Reservoir, 10, &stream, 4000);
+    // The standard deviation of a part of 4,000 runs is .007.
+    assert!(held.iter().all(|part| (part - 0.25).abs() < 0.035), "{held:?}");
+}
+
+#[test]
+fn a_class_balanced_reservoir_keeps_small_classes_whole_and_samples_large_ones_evenly() {
+    // Class 1 comes 4 times among 60 of class 0.
+    let stream: Vec<u8> = (0..64).map(|i| u8::from(i % 16 == 15)).collect();
+    let held = survival(ForgettingRule::ClassBalancedReservoir, 12, &stream, 4000);
+    for (part, class) in held.iter().zip(&stream) {
+        let expected = if *class == 1 { 1.0 } else { 8.0 / 60.0 };
+        assert!((part - expected).abs() < 0.035, "{held:?}");
+    }
+}
