@@ -37,6 +37,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         mind: MindConfig::default(),
         link: LinkConfig { connect: std::env::args().skip(1).collect(), ..LinkConfig::default() },
         vocabulary: None,
+        learning: None,
         nonce: fresh_nonce(),
     })
     .await?;

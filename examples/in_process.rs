@@ -42,6 +42,7 @@ async fn robot(id: u32, connect: &[String]) -> Robot {
         mind: MindConfig::default(),
         link,
         vocabulary: None,
+        learning: None,
         nonce: fresh_nonce(),
     };
     let robot = Robot::start(config).await.expect("a free port of this machine");

@@ -1,8 +1,10 @@
-//! What the whole-swarm scenarios share: a classifier without pictures, robots in this process, robots as
-//! processes, and network namespaces to put them in.
+//! What the whole-swarm scenarios share: a classifier without pictures, robots that learn, robots in this process,
+//! robots as processes, and network namespaces to put them in.
 
 #[path = "set_up/classifier.rs"]
 mod classifier;
+#[path = "set_up/learning.rs"]
+mod learning;
 #[path = "set_up/namespaces.rs"]
 mod namespaces;
 #[path = "set_up/process.rs"]
@@ -11,6 +13,7 @@ mod process;
 mod robots;
 
 pub use classifier::{Fixed, look};
+pub use learning::{gesture, learning, short_rounds, space};
 pub use namespaces::{Namespaces, not_permitted};
 pub use process::Process;
-pub use robots::{Watched, config, start, unique};
+pub use robots::{Watched, config, start, start_learning, unique};

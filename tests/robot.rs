@@ -2,13 +2,16 @@
 //! each. Its argument is one JSON object.
 
 use std::io::{BufRead, Write};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig};
-use gestalt_protocol::{ClassId, Decision, RobotId};
+use gestalt_peer::link::{Client, Event, LinkConfig, Robot, RobotConfig};
+use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId, RoundId};
 use gestalt_strategies::MindConfig;
-use gestalt_tests::{Fixed, config, look};
+use gestalt_tests::{Fixed, config, gesture, learning, look, short_rounds};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
@@ -41,8 +44,17 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
     let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
     let quorum = orders["quorum"].as_u64().and_then(|quorum| u32::try_from(quorum).ok()).unwrap_or(1);
-    let mind = MindConfig { quorum, ..MindConfig::default() };
-    let robot = match Robot::start(RobotConfig { link, boot, mind, ..config(id, swarm, &[]) }).await {
+    // {"learn": {"keep": 3, "share": 0.5, "memory": "FILE"}}: learns what it is shown and told.
+    let learning = orders["learn"]["keep"].as_u64().map(|keep| {
+        let keep = usize::try_from(keep).expect("\"keep\": a number");
+        let share = orders["learn"]["share"].as_f64().expect("\"share\": a part");
+        learning(keep, share, orders["learn"]["memory"].as_str().map(PathBuf::from))
+    });
+    let rounds = if learning.is_some() { short_rounds() } else { MindConfig::default() };
+    let mind = MindConfig { quorum, ..rounds };
+    let learns = learning.is_some();
+    let robot = match Robot::start(RobotConfig { link, boot, mind, learning, ..config(id, swarm, &[]) }).await
+    {
         Ok(robot) => robot,
         Err(error) => {
             eprintln!("{error}");
@@ -50,18 +62,23 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
         }
     };
     let mut events = robot.events();
-    if sees.is_some() {
+    if sees.is_some() && !learns {
         robot.learned(Arc::new(Fixed::default()), "fixed");
     }
     say(id, json!({"event": "started", "locators": robot.locators()}));
-    let mut frames = tokio::time::interval(Duration::from_millis(100));
+    let mut rng = ChaCha8Rng::seed_from_u64(u64::from(id) << 32 | u64::from(std::process::id()));
+    let mut sees = sees;
+    let period = Duration::from_millis(if learns { 20 } else { 100 });
+    let mut frames = tokio::time::interval(period);
     frames.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut open = false;
+    let mut last = None;
     loop {
         tokio::select! {
             event = events.recv() => {
                 let Ok(event) = event else { continue };
                 match &event {
+                    Event::Held(decision) => last = Some(decision.round),
                     Event::Opened(_) => open = true,
                     Event::Closed(_) => open = false,
                     _ => {}
@@ -70,17 +87,40 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
             }
             _ = frames.tick(), if open => {
                 if let Some(class) = sees {
-                    robot.observe(look(class, p));
+                    robot.observe(if learns { gesture(class, &mut rng) } else { look(class, p) });
                 }
             }
             line = stdin.recv() => match line.as_deref() {
                 Some("open") => robot.open_round(),
+                // `shown 3`: what is before its camera from now on.
+                Some(order) if order.starts_with("shown ") => {
+                    sees = order["shown ".len()..].parse().ok().map(ClassId);
+                }
+                // `was 3`: a client says so of the last round.
+                Some(order) if order.starts_with("was ") => {
+                    let class = order["was ".len()..].parse().map(ClassId).expect("a class");
+                    if let Some(round) = last {
+                        teach(swarm.to_owned(), robot.locators().to_vec(), round, class);
+                    }
+                }
                 Some("status") => say(id, json!({"event": "status", "status": robot.status()})),
                 _ => break,
             },
         }
     }
     robot.stop().await;
+}
+
+/// Attaches a client to this robot for as long as it takes to say what the gesture of a round was.
+fn teach(swarm: String, connect: Vec<String>, round: RoundId, class: ClassId) {
+    tokio::spawn(async move {
+        let link = LinkConfig { connect, ..LinkConfig::default() };
+        let client = Client::open(&swarm, &link).await.expect("the robot listens");
+        let was = Instruction::Was { round, class: Gesture::Class(class) };
+        let answer = client.teach(&"ada".parse().expect("a name"), &was, Duration::from_secs(3)).await;
+        client.close().await;
+        eprintln!("taught {round}: {:?}", answer.map(|answer| answer.map(|answer| answer.outcome)));
+    });
 }
 
 fn described(event: &Event) -> Value {
@@ -90,6 +130,9 @@ fn described(event: &Event) -> Value {
         Event::Held(decision) => outcome("held", decision),
         Event::Announced(announcement) => outcome("announced", &announcement.decision),
         Event::Neighbours(robots) => json!({"event": "neighbours", "robots": ids(robots)}),
+        Event::Shared(samples) => json!({"event": "shared", "samples": samples}),
+        Event::Answered(_, answer) => json!({"event": "answered", "answer": answer}),
+        Event::Remembered(revision) => json!({"event": "remembered", "revision": revision}),
         Event::Alive(robots) => json!({"event": "alive", "robots": ids(robots)}),
     }
 }

@@ -24,6 +24,7 @@ async fn main() {
         mind: MindConfig::default(),
         link: LinkConfig { listen: vec!["tcp/127.0.0.1:0".to_owned()], ..LinkConfig::default() },
         vocabulary: None,
+        learning: None,
         nonce: fresh_nonce(),
     })
     .await

@@ -2,12 +2,13 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use gestalt_strategies::Classify;
 use thiserror::Error;
 use tokio::task::JoinHandle;
 
-use crate::config::Config;
+use crate::config::{Config, LearnFrom, LearningSection};
 use crate::eye::{Eye, EyeError, Seen, look};
-use crate::link::{LinkError, Robot, RobotConfig, fresh_nonce};
+use crate::link::{LinkError, Robot, RobotConfig, RobotLearning, fresh_nonce};
 use crate::model::RobotModel;
 
 /// Why a robot cannot start.
@@ -41,20 +42,24 @@ impl Body {
             Some(model) => Eye::open(&config.camera, model, config.robot.id)?,
             None => None,
         };
+        let learning = model.as_ref().and_then(|model| learning(&config.learning, model));
         let robot = Arc::new(
             Robot::start(RobotConfig {
                 id: config.robot.id,
                 name: config.name(),
-                boot,
+                // Starts that are counted on disk begin at one.
+                boot: if learning.as_ref().is_some_and(|l| l.memory.is_some()) { 1 } else { boot },
                 swarm: config.swarm.0.clone(),
                 mind: config.rounds.clone(),
                 link: config.link(),
                 vocabulary: None,
+                learning: learning.clone(),
                 nonce: fresh_nonce(),
             })
             .await?,
         );
-        if let Some(model) = model {
+        // One that learns starts with what it has in mind.
+        if let Some(model) = model.filter(|_| learning.is_none()) {
             robot.learned(model.classifier, &model.name);
         }
         let seen = Arc::new(Mutex::new(None));
@@ -89,6 +94,18 @@ impl Body {
             Err(_) => tracing::error!("the robot is still in use, and leaves the swarm when that ends"),
         }
     }
+}
+
+/// How a robot with that model learns; `None` for one that does not.
+fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearning> {
+    section.enabled.then(|| RobotLearning {
+        config: section.samples.clone(),
+        space: model.classifier.space().clone(),
+        vocabulary: model.classifier.vocabulary().clone(),
+        base: (section.from == LearnFrom::Model).then(|| model.classifier.clone()),
+        memory: section.memory.clone(),
+        seed: section.seed,
+    })
 }
 
 /// A boot number for a robot that keeps no count of its starts: tenths of a second since 2026, which grows from

@@ -25,6 +25,7 @@ pub mod eye;
 #[cfg(feature = "opencv")]
 pub mod human;
 pub mod link;
+pub mod memory;
 #[cfg(feature = "opencv")]
 pub mod model;
 pub mod model_file;

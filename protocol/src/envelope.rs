@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::{ClassId, Decision, Message, RobotId, Stamp, Vote};
 
 /// The version byte in front of every envelope. Another version is refused, not guessed at.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;
 
 /// The longest envelope accepted, in bytes.
 pub const MAX_MESSAGE: usize = 512 * 1024;
@@ -111,6 +111,9 @@ impl Message {
         match self {
             Self::Vote(vote) => vote.check(),
             Self::Have(_) => Ok(()),
+            Self::Samples(samples) => samples.check(),
+            Self::Know(know) => know.check(),
+            Self::Lessons(lessons) => lessons.check(),
             Self::Give(give) => {
                 give.decision.iter().try_for_each(Decision::check)?;
                 give.votes.iter().try_for_each(|held| held.vote.check())

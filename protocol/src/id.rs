@@ -15,6 +15,9 @@ pub enum IdError {
     /// An instructor's name that could not stand in a key expression.
     #[error("'{0}' is no instructor name: 1 to 32 of the characters A-Z a-z 0-9 _ -")]
     NotAName(String),
+    /// A round that is not written as it is displayed.
+    #[error("'{0}' is no round: write its counter and its opener, like 5@2")]
+    NotARound(String),
 }
 
 /// A robot, unique in its swarm. Small numbers travel in fewer bytes.
@@ -109,6 +112,18 @@ impl fmt::Display for RoundId {
     }
 }
 
+impl FromStr for RoundId {
+    type Err = IdError;
+
+    /// Reads what is displayed: `5@2`.
+    fn from_str(text: &str) -> Result<Self, IdError> {
+        let parts = text.split_once('@').and_then(|(counter, opener)| {
+            Some(Self { counter: counter.parse().ok()?, opener: opener.parse().ok()? })
+        });
+        parts.ok_or_else(|| IdError::NotARound(text.chars().take(40).collect()))
+    }
+}
+
 /// Orders the messages of one author, also across its restarts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Stamp {
@@ -158,6 +173,15 @@ mod tests {
         assert_eq!("7".parse(), Ok(RobotId(7)));
         for other in ["+7", "007", " 7", "", "-1", "4294967296"] {
             assert!(other.parse::<RobotId>().is_err(), "{other}");
+        }
+    }
+
+    #[test]
+    fn a_round_is_read_as_it_is_displayed() {
+        let round = RoundId { counter: 5, opener: RobotId(2) };
+        assert_eq!(round.to_string().parse(), Ok(round));
+        for bad in ["", "5", "@2", "5@", "5@x", "5@2@3"] {
+            assert!(bad.parse::<RoundId>().is_err(), "{bad}");
         }
     }
 

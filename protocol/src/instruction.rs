@@ -1,13 +1,71 @@
-//! What a human says to the swarm.
+//! What a human says to the swarm, and what the swarm answers.
+
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A human's word to the swarm, JSON on `instructor/<id>/feedback`: for example `{"say": "open"}`.
+use crate::{ClassId, RobotId, RoundId};
+
+/// A human's word to the swarm, JSON on `instructor/<id>/feedback`. For example:
+///
+/// ```json
+/// {"say": "open"}
+/// {"say": "was", "round": {"counter": 5, "opener": 2}, "class": 3}
+/// {"say": "was", "round": {"counter": 5, "opener": 2}, "class": "three"}
+/// {"say": "right", "round": {"counter": 5, "opener": 2}}
+/// {"say": "wrong", "round": {"counter": 5, "opener": 2}}
+/// {"say": "retract", "round": {"counter": 5, "opener": 2}}
+/// ```
+///
+/// The round is named as in the [`Decision`](crate::Decision) it is about. A later word of the same instructor on the
+/// same round replaces the earlier one; each word but `open` is answered, see [`Answer`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "say", rename_all = "snake_case", from = "Read")]
 pub enum Instruction {
-    /// "Look now": open a round. Without effect while one is open.
+    /// "Look now": open a round. Without effect while one is open, and for half a second after one was opened: a copy
+    /// of the request for that one may still be on its way.
     Open,
+    /// "It was this gesture": full feedback.
+    Was {
+        /// The round.
+        round: RoundId,
+        /// The gesture, by class or by label.
+        class: Gesture,
+    },
+    /// "Right": the gesture was the one decided.
+    Right {
+        /// The round.
+        round: RoundId,
+    },
+    /// "Wrong": the gesture was any but the one decided. Partial feedback.
+    Wrong {
+        /// The round.
+        round: RoundId,
+    },
+    /// "I said nothing": takes back what this instructor said of the round.
+    Retract {
+        /// The round.
+        round: RoundId,
+    },
+}
+
+/// A gesture as people name it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Gesture {
+    /// By its index in the vocabulary.
+    Class(ClassId),
+    /// By its label.
+    Label(String),
+}
+
+impl fmt::Display for Gesture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Class(class) => write!(f, "class {class}"),
+            Self::Label(label) => write!(f, "'{label}'"),
+        }
+    }
 }
 
 /// How an [`Instruction`] is read. Its variants have braces because serde lets unknown keys pass beside a variant
@@ -16,12 +74,88 @@ pub enum Instruction {
 #[serde(tag = "say", rename_all = "snake_case", deny_unknown_fields)]
 enum Read {
     Open {},
+    Was { round: RoundId, class: Gesture },
+    Right { round: RoundId },
+    Wrong { round: RoundId },
+    Retract { round: RoundId },
 }
 
 impl From<Read> for Instruction {
     fn from(read: Read) -> Self {
         match read {
             Read::Open {} => Self::Open,
+            Read::Was { round, class } => Self::Was { round, class },
+            Read::Right { round } => Self::Right { round },
+            Read::Wrong { round } => Self::Wrong { round },
+            Read::Retract { round } => Self::Retract { round },
+        }
+    }
+}
+
+impl Instruction {
+    /// The round it is about; none for [`Self::Open`].
+    #[must_use]
+    pub fn round(&self) -> Option<RoundId> {
+        match self {
+            Self::Open => None,
+            Self::Was { round, .. }
+            | Self::Right { round }
+            | Self::Wrong { round }
+            | Self::Retract { round } => Some(*round),
+        }
+    }
+}
+
+/// What the swarm answers to an instructor's word, JSON on `instructor/<id>/answer`: one message each, from the live
+/// robot of the smallest id that can answer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Who answers.
+    pub robot: RobotId,
+    /// The time of the word that is answered, in the swarm's own time: the Zenoh timestamp of its message.
+    pub at: u64,
+    /// The word that is answered.
+    pub to: Instruction,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// The gesture that the round's samples now stand for, if one is known.
+    pub class: Option<ClassId>,
+    /// How many samples of that round the answering robot holds and trains on.
+    pub samples: u32,
+}
+
+/// What became of an instructor's word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It is known from now on, and what was seen in that round is labelled by it.
+    Learned,
+    /// It was known already: nothing changed.
+    Known,
+    /// Noted, but the robot that answers holds nothing that was seen in that round: it came too late, or saw nothing.
+    NothingSeen,
+    /// No such round is known, or it is too long ago.
+    UnknownRound,
+    /// "Right" and "wrong" need a decision, and that round ended without one.
+    NoDecision,
+    /// The vocabulary has no such gesture.
+    UnknownGesture,
+    /// The robots have no memory for samples: learning is not configured.
+    NotLearning,
+}
+
+impl Outcome {
+    /// The outcome in words.
+    #[must_use]
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Learned => "learned",
+            Self::Known => "known already; nothing changed",
+            Self::NothingSeen => "noted, but nothing seen in that round is held",
+            Self::UnknownRound => "no such round is known, or it is too long ago",
+            Self::NoDecision => "that round ended without a decision: say which gesture it was",
+            Self::UnknownGesture => "the vocabulary has no such gesture",
+            Self::NotLearning => "the robots are not set up to learn",
         }
     }
 }

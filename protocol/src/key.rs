@@ -20,6 +20,8 @@ pub struct Keys {
 pub enum Topic {
     /// `robot/<id>/vote`: the robot's latest vote, a postcard [`Envelope`](crate::Envelope).
     Vote(RobotId),
+    /// `robot/<id>/sample`: samples the robot shares, a postcard [`Envelope`](crate::Envelope).
+    Sample(RobotId),
     /// `robot/<id>/repair`: what neighbours tell that robot alone, a postcard [`Envelope`](crate::Envelope).
     Repair(RobotId),
     /// `robot/<id>/decision`: the decision that robot holds, JSON.
@@ -32,6 +34,8 @@ pub enum Topic {
     Decision,
     /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON.
     Feedback(InstructorId),
+    /// `instructor/<id>/answer`: the swarm's [`Answer`](crate::Answer) to it, JSON.
+    Answer(InstructorId),
 }
 
 impl Keys {
@@ -56,12 +60,14 @@ impl Keys {
         let prefix = &self.prefix;
         match topic {
             Topic::Vote(id) => format!("{prefix}robot/{id}/vote"),
+            Topic::Sample(id) => format!("{prefix}robot/{id}/sample"),
             Topic::Repair(id) => format!("{prefix}robot/{id}/repair"),
             Topic::RobotDecision(id) => format!("{prefix}robot/{id}/decision"),
             Topic::Status(id) => format!("{prefix}robot/{id}/status"),
             Topic::Alive(id) => format!("{prefix}robot/{id}/alive"),
             Topic::Decision => format!("{prefix}decision"),
             Topic::Feedback(id) => format!("{prefix}instructor/{id}/feedback"),
+            Topic::Answer(id) => format!("{prefix}instructor/{id}/answer"),
         }
     }
 
@@ -71,10 +77,10 @@ impl Keys {
         format!("{}robot/*/{what}", self.prefix)
     }
 
-    /// The key expression for the feedback of every instructor.
+    /// The key expression for one kind of thing of every instructor: `instructor/*/<what>`.
     #[must_use]
-    pub fn every_instructor(&self) -> String {
-        format!("{}instructor/*/feedback", self.prefix)
+    pub fn every_instructor(&self, what: &str) -> String {
+        format!("{}instructor/*/{what}", self.prefix)
     }
 
     /// What a key is about; `None` for a key of another swarm or of no known form.
@@ -87,6 +93,7 @@ impl Keys {
                 let id = id.parse().ok()?;
                 match what {
                     "vote" => Topic::Vote(id),
+                    "sample" => Topic::Sample(id),
                     "repair" => Topic::Repair(id),
                     "decision" => Topic::RobotDecision(id),
                     "status" => Topic::Status(id),
@@ -95,6 +102,7 @@ impl Keys {
                 }
             }
             ("instructor", Some(id), Some("feedback")) => Topic::Feedback(id.parse().ok()?),
+            ("instructor", Some(id), Some("answer")) => Topic::Answer(id.parse().ok()?),
             _ => return None,
         };
         chunks.next().is_none().then_some(topic)
@@ -110,12 +118,14 @@ mod tests {
         let keys = Keys::new("demo").unwrap();
         let topics = [
             Topic::Vote(RobotId(1)),
+            Topic::Sample(RobotId(1)),
             Topic::Repair(RobotId(2)),
             Topic::RobotDecision(RobotId(3)),
             Topic::Status(RobotId(4)),
             Topic::Alive(RobotId(u32::MAX)),
             Topic::Decision,
             Topic::Feedback("ada".parse().unwrap()),
+            Topic::Answer("ada".parse().unwrap()),
         ];
         for topic in topics {
             assert_eq!(keys.parse(&keys.key(&topic)), Some(topic));

@@ -1,7 +1,7 @@
 //! What the robots of a Gestalt swarm say to each other, and where.
 //!
 //! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Decision`],
-//! [`Status`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
+//! [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
 //! of it travels.
 //!
 //! This crate holds no behaviour: when to speak, and what to make of what is heard, is `gestalt-strategies`;
@@ -16,7 +16,9 @@ mod envelope;
 mod id;
 mod instruction;
 mod key;
+mod lesson;
 mod message;
+mod sample;
 mod status;
 
 pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
@@ -26,7 +28,11 @@ pub use envelope::{
 pub use id::{
     ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,
 };
-pub use instruction::Instruction;
+pub use instruction::{Answer, Gesture, Instruction, Outcome};
 pub use key::{Keys, SwarmNameError, Topic};
+pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use message::{Give, Have, HeldVote, MAX_CLASSES, MAX_ROBOTS, Message, Vote};
-pub use status::{Reported, Status};
+pub use sample::{
+    Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
+};
+pub use status::{Learning, Reported, Status};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Decision, Rank, RobotId, RoundId, Stamp, VocabularyId, bounded};
+use crate::{Decision, Digest, Know, Lessons, Rank, RobotId, RoundId, Samples, Stamp, VocabularyId, bounded};
 
 /// The largest vocabulary: more classes than this are refused at both ends.
 pub const MAX_CLASSES: usize = 64;
@@ -19,6 +19,12 @@ pub enum Message {
     Have(Have),
     /// To one neighbour: what it was found to lack.
     Give(Give),
+    /// To all from their author, or to one neighbour that lacks them: samples to learn from.
+    Samples(Samples),
+    /// To one neighbour: all samples and lessons that the author has, in short.
+    Know(Know),
+    /// To one neighbour: what instructors said and it has not heard.
+    Lessons(Lessons),
 }
 
 /// One robot's evidence in one round: the whole sum so far, so that the latest replaces all earlier ones and
@@ -47,6 +53,8 @@ pub struct Have {
     /// Which votes of that round the author holds; empty once the round is over.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<(RobotId, Stamp)>,
+    /// All samples and lessons the author has, as digests; absent from a robot that does not learn.
+    pub knowledge: Option<Digest>,
     /// Whether this is itself an answer to a [`Have`]; such a one is answered with a [`Give`] only, so that two
     /// robots never talk in circles.
     pub answer: bool,

@@ -29,10 +29,38 @@ pub struct Status {
     pub round: Option<RoundId>,
     /// Whether that round is open.
     pub open: bool,
+    /// What it has learned from; absent for a robot that does not learn.
+    pub learning: Option<Learning>,
     /// Counters since its start, by name: messages, bytes, frames, and everything refused, by cause.
     pub counters: BTreeMap<String, u64>,
     /// The latest errors, newest last, at most sixteen.
     pub errors: Vec<Reported>,
+}
+
+/// What a robot has learned from.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Learning {
+    /// The feature space of its samples, 16 hexadecimal digits.
+    pub space: String,
+    /// T: how many samples it may hold.
+    pub capacity: usize,
+    /// Its own samples that it has not shared, by class.
+    pub personal: Vec<usize>,
+    /// Its own samples that it has shared, by class.
+    pub shared: Vec<usize>,
+    /// The samples it has from others, by class.
+    pub external: Vec<usize>,
+    /// Samples kept aside, until it is known which gesture they show.
+    pub aside: usize,
+    /// A digest of the common knowledge it holds, shared and external, ids and classes, 16 hexadecimal digits:
+    /// equal digests mean equal knowledge.
+    pub common: String,
+    /// Rounds of which it knows what an instructor said.
+    pub lessons: usize,
+    /// Where it keeps all this: a path, `none`, or what is wrong with it.
+    pub memory: String,
+    /// How often it has trained.
+    pub trainings: u64,
 }
 
 /// An error as the status reports it.

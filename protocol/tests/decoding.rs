@@ -1,9 +1,10 @@
 //! Reading is total and bounded: any bytes give a value or a typed error.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, DecodeError, Envelope, FusionRule, Give, Have, HeldVote,
-    Instruction, MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, PROTOCOL_VERSION,
-    Rank, RobotId, RoundId, Stamp, VocabularyId, Vote, decode_json,
+    Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope, FeatureSpaceId, FusionRule,
+    Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES,
+    MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId,
+    SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -59,12 +60,14 @@ fn message() -> impl Strategy<Value = Message> {
         prop::option::of(round()),
         prop::option::of(decision()),
         prop::collection::vec((any::<u32>(), stamp()), 0..10),
+        prop::option::of((any::<u64>(), any::<u64>())),
         any::<bool>(),
     )
-        .prop_map(|(round, decision, votes, answer)| Have {
+        .prop_map(|(round, decision, votes, knowledge, answer)| Have {
             round,
             decision: decision.map(|decision| decision.rank()),
             votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
+            knowledge: knowledge.map(|(samples, lessons)| Digest { samples, lessons }),
             answer,
         });
     let held = (any::<u32>(), stamp(), vote()).prop_map(|(robot, stamp, vote)| HeldVote {
@@ -74,7 +77,70 @@ fn message() -> impl Strategy<Value = Message> {
     });
     let give = (prop::option::of(decision()), prop::collection::vec(held, 0..5))
         .prop_map(|(decision, votes)| Give { decision, votes });
-    prop_oneof![vote().prop_map(Message::Vote), have.prop_map(Message::Have), give.prop_map(Message::Give)]
+    prop_oneof![
+        vote().prop_map(Message::Vote),
+        have.prop_map(Message::Have),
+        give.prop_map(Message::Give),
+        samples().prop_map(Message::Samples),
+        know().prop_map(Message::Know),
+        prop::collection::vec(lesson(), 0..5).prop_map(|lessons| Message::Lessons(Lessons { lessons })),
+    ]
+}
+
+fn samples() -> impl Strategy<Value = Samples> {
+    let vector = prop_oneof![
+        prop::collection::vec(-1e30f32..1e30, 1..40).prop_map(Vector::F32),
+        prop::collection::vec((any::<u8>(), 0..0x7c_u8), 1..40)
+            .prop_map(|halves| Vector::F16(halves.into_iter().flat_map(|(low, high)| [low, high]).collect())),
+        prop::collection::vec(any::<i8>(), 1..40).prop_map(Vector::I8),
+    ];
+    let sample = ((any::<u32>(), 1..u32::MAX), 0..MAX_CLASSES as u8, round(), vector).prop_map(
+        |((author, number), class, round, vector)| SharedSample {
+            id: SampleId { author: RobotId(author), number },
+            class: ClassId(class),
+            round,
+            vector,
+        },
+    );
+    (any::<u64>(), prop::collection::vec(sample, 0..5))
+        .prop_map(|(space, samples)| Samples { space: FeatureSpaceId(space), samples })
+}
+
+fn know() -> impl Strategy<Value = Know> {
+    // Steps of at least two between the ends give intervals with gaps between them.
+    let numbers = prop::collection::vec((2..1000_u32, 0..1000_u32), 0..6).prop_map(|steps| {
+        let mut last = 0;
+        let interval = |(gap, length)| {
+            let first = last + gap;
+            last = first + length;
+            (first, last)
+        };
+        steps.into_iter().map(interval).collect::<Vec<_>>()
+    });
+    let samples = prop::collection::btree_map(any::<u32>(), numbers, 0..5).prop_map(|known| {
+        known.into_iter().map(|(author, numbers)| Known { author: RobotId(author), numbers }).collect()
+    });
+    (samples, prop::collection::vec((round(), any::<u64>()), 0..5), any::<(u64, u64)>(), any::<bool>())
+        .prop_map(|(samples, lessons, (of_samples, of_lessons), answer)| Know {
+            samples,
+            lessons,
+            digest: Digest { samples: of_samples, lessons: of_lessons },
+            answer,
+        })
+}
+
+fn lesson() -> impl Strategy<Value = Lesson> {
+    let word = prop_oneof![
+        (0..MAX_CLASSES as u8).prop_map(|class| Word::Was(ClassId(class))),
+        (0..MAX_CLASSES as u8).prop_map(|class| Word::Not(ClassId(class))),
+        Just(Word::Retracted),
+    ];
+    (round(), "[a-zA-Z0-9_-]{1,32}", any::<u64>(), word).prop_map(|(round, name, at, word)| Lesson {
+        round,
+        instructor: name.parse().expect("a name of that form"),
+        at,
+        word,
+    })
 }
 
 fn envelope() -> impl Strategy<Value = Envelope> {
@@ -153,7 +219,7 @@ fn read(message: Message) -> Result<Envelope, DecodeError> {
 #[test]
 fn no_bytes_too_many_bytes_and_another_version_are_told_apart() {
     assert_eq!(Envelope::decode(&[]), Err(DecodeError::Empty));
-    assert_eq!(Envelope::decode(&[PROTOCOL_VERSION + 1, 1, 2]), Err(DecodeError::Version { found: 2 }));
+    assert_eq!(Envelope::decode(&[PROTOCOL_VERSION + 1, 1, 2]), Err(DecodeError::Version { found: 3 }));
     let long = vec![PROTOCOL_VERSION; MAX_MESSAGE + 1];
     assert_eq!(
         Envelope::decode(&long),
@@ -189,10 +255,56 @@ fn more_classes_or_robots_than_the_limit_are_refused_by_their_reader() {
     ));
     let have = |robots: usize| {
         let votes = (0..robots as u32).map(|robot| (RobotId(robot), Stamp::default())).collect();
-        read(Message::Have(Have { round: None, decision: None, votes, answer: false }))
+        read(Message::Have(Have { round: None, decision: None, votes, knowledge: None, answer: false }))
     };
     assert!(have(MAX_ROBOTS).is_ok());
     assert!(matches!(have(MAX_ROBOTS + 1), Err(DecodeError::Malformed(_))));
+}
+
+#[test]
+fn a_sample_says_only_what_a_robot_can_have_seen() {
+    let sample = |vector| SharedSample {
+        id: SampleId { author: RobotId(1), number: 1 },
+        class: ClassId(0),
+        round: RoundId { counter: 1, opener: RobotId(1) },
+        vector,
+    };
+    let sound = sample(Vector::F32(vec![0.0; MAX_COMPONENTS]));
+    let of = |sample| {
+        read(Message::Samples(Samples { space: FeatureSpaceId(1), samples: vec![sample] })).map(|_| ())
+    };
+    assert_eq!(of(sound.clone()), Ok(()));
+    assert!(matches!(of(sample(Vector::F32(vec![0.0; MAX_COMPONENTS + 1]))), Err(DecodeError::Malformed(_))));
+    for wrong in [
+        sample(Vector::F32(vec![f32::NAN])),
+        sample(Vector::F32(vec![f32::INFINITY])),
+        sample(Vector::F16(vec![0x00, 0x7c])),
+        sample(Vector::F16(vec![0x01, 0xfe])),
+        sample(Vector::F16(vec![0x00])),
+        sample(Vector::I8(vec![])),
+        SharedSample { class: ClassId(64), ..sound.clone() },
+        SharedSample { id: SampleId { author: RobotId(1), number: 0 }, ..sound },
+    ] {
+        assert!(matches!(of(wrong.clone()), Err(DecodeError::Impossible(_))), "{wrong:?}");
+    }
+}
+
+#[test]
+fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
+    let of = |numbers: &[(u32, u32)]| {
+        let known = Known { author: RobotId(1), numbers: numbers.to_vec() };
+        read(Message::Know(Know {
+            samples: vec![known],
+            lessons: vec![],
+            digest: Digest::default(),
+            answer: false,
+        }))
+        .is_ok()
+    };
+    assert!(of(&[(1, 5), (7, u32::MAX)]));
+    for wrong in [&[(0, 5)][..], &[(5, 4)], &[(1, 5), (5, 9)], &[(1, 5), (6, 9)], &[(7, u32::MAX), (1, 2)]] {
+        assert!(!of(wrong), "{wrong:?}");
+    }
 }
 
 #[test]
@@ -253,7 +365,8 @@ fn no_message_takes_more_memory_than_promised() {
         evidence: vec![],
         looks: 0.0,
     };
-    let have = |votes| Message::Have(Have { round: None, decision: None, votes, answer: false });
+    let have =
+        |votes| Message::Have(Have { round: None, decision: None, votes, knowledge: None, answer: false });
     let known = on_the_wire([have(vec![]), have(vec![(RobotId(0), Stamp::default())])]);
     assert!(2 * size_of::<(RobotId, Stamp)>() <= factor * known);
     let give = |votes| Message::Give(Give { decision: None, votes });
@@ -264,7 +377,7 @@ fn no_message_takes_more_memory_than_promised() {
     assert!(2 * size_of::<CountedVote>() <= factor * counted);
     // A claim of four thousand million elements with nothing behind it.
     let mut claim = Envelope { author: RobotId(0), stamp: Stamp::default(), message: have(vec![]) }.encode();
-    claim.truncate(claim.len() - 2);
+    claim.truncate(claim.len() - 3);
     claim.extend([0xff, 0xff, 0xff, 0xff, 0x0f]);
     assert!(matches!(Envelope::decode(&claim), Err(DecodeError::Malformed(_))));
 }

@@ -2,8 +2,9 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Have, HeldVote, Instruction,
-    Message, RobotId, RoundId, Stamp, VocabularyId, Vote, decode_json,
+    Answer, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId, FusionRule,
+    Gesture, Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message, Outcome, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2) };
@@ -49,7 +50,7 @@ fn travels_as(message: Message, expected: &str) {
 }
 
 // version, author, boot, sequence (varint), variant
-const HEAD: &str = "01 07 01 8201";
+const HEAD: &str = "02 07 01 8201";
 
 #[test]
 fn a_vote() {
@@ -69,15 +70,17 @@ fn what_a_robot_has() {
         round: Some(ROUND),
         decision: Some(decision().rank()),
         votes: vec![(RobotId(7), Stamp { boot: 1, sequence: 9 })],
+        knowledge: Some(Digest { samples: 300, lessons: 1 }),
         answer: true,
     };
-    // Some round; Some rank: decided, robots, confidence as f64, author; one vote: robot, boot, sequence; answer
+    // Some round; Some rank: decided, robots, confidence as f64, author; one vote: robot, boot, sequence; Some digest:
+    // samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202 01 01 01 000000000000e83f 04 01 07 01 09 01"),
+        &format!("{HEAD} 01 01ac0202 01 01 01 000000000000e83f 04 01 07 01 09 01ac0201 01"),
     );
-    let nothing = Have { round: None, decision: None, votes: vec![], answer: false };
-    travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00"));
+    let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
+    travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
 }
 
 #[test]
@@ -92,6 +95,66 @@ fn what_a_robot_gives() {
     );
 }
 
+fn sample(vector: Vector) -> SharedSample {
+    let id = SampleId { author: RobotId(7), number: 200 };
+    SharedSample { id, class: ClassId(3), round: ROUND, vector }
+}
+
+#[test]
+fn shared_samples() {
+    let space = FeatureSpaceId(0x0102);
+    let samples = [
+        Vector::F32(vec![1.5, -1.5]),
+        Vector::F16(vec![0x00, 0x3e, 0x00, 0xbe]),
+        Vector::I8(vec![127, -128]),
+    ];
+    // the space (varint); each sample: author, number, class, round, kind of vector, length, components
+    travels_as(
+        Message::Samples(Samples { space, samples: samples.map(sample).to_vec() }),
+        &format!(
+            "{HEAD} 03 8202 03 07c80103ac0202 00 02 0000c03f0000c0bf 07c80103ac0202 01 04 003e00be \
+             07c80103ac0202 02 02 7f80"
+        )
+        .replace("\n", ""),
+    );
+}
+
+#[test]
+fn a_sample_of_24_components_takes_at_most_64_bytes() {
+    // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot come to.
+    let sample = SharedSample {
+        id: SampleId { author: RobotId(4096), number: 1_000_000 },
+        class: ClassId(63),
+        round: RoundId { counter: 1_000_000, opener: RobotId(4096) },
+        vector: Vector::I8(vec![-128; 24]),
+    };
+    let samples = Samples { space: FeatureSpaceId(u64::MAX), samples: vec![sample] };
+    let stamp = Stamp { boot: 10_000, sequence: 1_000_000 };
+    let bytes = Envelope { author: RobotId(4096), stamp, message: Message::Samples(samples) }.encode();
+    assert!(bytes.len() <= 64, "{} bytes", bytes.len());
+}
+
+#[test]
+fn what_a_robot_knows() {
+    let know = Know {
+        samples: vec![Known { author: RobotId(3), numbers: vec![(1, 300), (302, 302)] }],
+        lessons: vec![(ROUND, 5)],
+        digest: Digest { samples: 300, lessons: 1 },
+        answer: true,
+    };
+    travels_as(Message::Know(know), &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202 05 ac0201 01"));
+}
+
+#[test]
+fn what_instructors_said() {
+    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), at: 1, word };
+    let lessons = vec![said(Word::Was(ClassId(3))), said(Word::Not(ClassId(4))), said(Word::Retracted)];
+    travels_as(
+        Message::Lessons(Lessons { lessons }),
+        &format!("{HEAD} 05 03 ac0202 03616461 01 0003 ac0202 03616461 01 0104 ac0202 03616461 01 02"),
+    );
+}
+
 #[test]
 fn a_decision_for_clients() {
     let json = r#"{"round":{"counter":300,"opener":2},"class":1,"confidence":0.75,"author":4,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0}],"elapsed_ms":1250}}"#;
@@ -102,9 +165,47 @@ fn a_decision_for_clients() {
 }
 
 #[test]
-fn an_instruction_as_people_write_it() {
-    assert_eq!(decode_json::<Instruction>(br#" {"say": "open"} "#), Ok(Instruction::Open));
-    for wrong in ["{}", r#"{"say":"close"}"#, r#"{"say":"open","now":1}"#, "[]", "open"] {
+fn instructions_as_people_write_them() {
+    let round = ROUND;
+    let by_class = Instruction::Was { round, class: Gesture::Class(ClassId(3)) };
+    let by_label = Instruction::Was { round, class: Gesture::Label("three".to_owned()) };
+    for (json, instruction) in [
+        (r#" {"say": "open"} "#, Instruction::Open),
+        (r#"{"say":"was","round":{"counter":300,"opener":2},"class":3}"#, by_class),
+        (r#"{"say":"was","round":{"counter":300,"opener":2},"class":"three"}"#, by_label),
+        (r#"{"round":{"counter":300,"opener":2},"say":"right"}"#, Instruction::Right { round }),
+        (r#"{"say":"wrong","round":{"counter":300,"opener":2}}"#, Instruction::Wrong { round }),
+        (r#"{"say":"retract","round":{"counter":300,"opener":2}}"#, Instruction::Retract { round }),
+    ] {
+        assert_eq!(decode_json::<Instruction>(json.as_bytes()), Ok(instruction.clone()), "{json}");
+        let written = serde_json::to_string(&instruction).unwrap();
+        assert_eq!(decode_json::<Instruction>(written.as_bytes()), Ok(instruction), "{written}");
+    }
+    for wrong in [
+        "{}",
+        r#"{"say":"close"}"#,
+        r#"{"say":"open","now":1}"#,
+        "[]",
+        "open",
+        r#"{"say":"right"}"#,
+        r#"{"say":"was","round":{"counter":300,"opener":2}}"#,
+        r#"{"say":"was","round":{"counter":300,"opener":2},"class":300}"#,
+    ] {
         assert!(decode_json::<Instruction>(wrong.as_bytes()).is_err(), "{wrong}");
     }
+}
+
+#[test]
+fn an_answer_for_instructors() {
+    let answer = Answer {
+        robot: RobotId(1),
+        at: 7,
+        to: Instruction::Right { round: ROUND },
+        outcome: Outcome::NothingSeen,
+        class: Some(ClassId(3)),
+        samples: 0,
+    };
+    let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2}},"outcome":"nothing_seen","class":3,"samples":0}"#;
+    assert_eq!(serde_json::to_string(&answer).unwrap(), json);
+    assert_eq!(decode_json::<Answer>(json.as_bytes()), Ok(answer));
 }

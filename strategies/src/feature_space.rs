@@ -1,10 +1,11 @@
 //! The space that classifiers judge in and samples are shared in: scaled, then reduced.
 
-use gestalt_protocol::FeatureSpaceId;
+use gestalt_protocol::{ClassId, FeatureSpaceId};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::{ClassifyError, Components, Pca, Reduction, Scaling, ScalingMethod};
+use crate::reduction::best;
+use crate::{ClassifyError, Components, Pca, Ranking, Reduction, Scaling, ScalingMethod};
 
 /// From the raw features of one named set to the few coordinates that carry what they say.
 ///
@@ -36,6 +37,23 @@ impl FeatureSpace {
             all.extend_from_slice(&row);
         }
         let reduction = Reduction::Pca(Pca::fit(&all, scaling.width(), keep, rng));
+        Self::with_reduction(feature_set, rows, scaling, reduction)
+    }
+
+    /// Fits the space of these labelled feature vectors, at least two, of one length, finite; it keeps the features that
+    /// rank best, at least one.
+    #[must_use]
+    pub fn fit_ranked(
+        feature_set: &str,
+        samples: &[(&[f32], ClassId)],
+        method: ScalingMethod,
+        ranking: Ranking,
+        keep: usize,
+    ) -> Self {
+        let rows = samples.iter().map(|(features, _)| *features);
+        let scaling = Scaling::fit(rows.clone(), method);
+        let kept = best(samples, ranking, keep);
+        let reduction = Reduction::Selected { width: scaling.width(), kept };
         Self::with_reduction(feature_set, rows, scaling, reduction)
     }
 

@@ -15,12 +15,14 @@ mod agreement;
 pub mod ballot;
 mod classifier;
 mod classify;
+mod coding;
 mod evaluation;
 mod evidence;
 mod feature_space;
 pub mod forgetting;
 pub mod fusion;
 mod learner;
+mod lessons;
 pub mod mind;
 mod observation;
 mod reduction;
@@ -34,14 +36,19 @@ mod vocabulary;
 pub use ballot::Ballot;
 pub use classifier::{Classifier, MAX_MODEL, ModelError};
 pub use classify::{Classify, ClassifyError};
+pub use coding::{Precision, VectorError, decode_vector};
 pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
 pub use evidence::Evidence;
 pub use feature_space::FeatureSpace;
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use learner::{LearnError, Learner, LearnerOptions};
-pub use mind::{Input, Mind, MindConfig, MindConfigError, Output, Refusal, Refusals};
+pub use lessons::{Candidates, Heard, LessonBook, Verdict};
+pub use mind::{
+    Change, Input, Instructed, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory,
+    MemoryError, Mind, MindConfig, MindConfigError, Output, Refusal, Refusals, TrainingChange,
+};
 pub use observation::Observation;
-pub use reduction::{Components, Pca, Reduction};
+pub use reduction::{Components, Pca, Ranking, Reduction};
 pub use scaling::{Scaling, ScalingMethod};
 pub use selection::{Selection, SelectionRule};
 pub use training::{Folding, MIN_SAMPLES, Progress, Sample, TrainError, TrainOptions, Trained, train};

@@ -115,6 +115,10 @@ impl Round {
         }
         let (patience, deadline) = self.patience_and_deadline(config);
         let late = now >= deadline;
+        // Asked at every input: with a thousand robots, counting their votes each time would be most of the work.
+        if now < patience && self.ballot.len() < alive.len() {
+            return;
+        }
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
         // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
         let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.has_evidence(*robot));

@@ -58,6 +58,12 @@ impl Vocabulary {
         &self.labels
     }
 
+    /// The gesture of that label.
+    #[must_use]
+    pub fn class(&self, label: &str) -> Option<ClassId> {
+        (0..).map(ClassId).zip(&self.labels).find(|(_, known)| *known == label).map(|(class, _)| class)
+    }
+
     /// How many gestures there are.
     #[must_use]
     pub fn classes(&self) -> usize {

@@ -1,16 +1,18 @@
 //! Robots in this process.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
 use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
 use gestalt_protocol::{ClassId, Decision, RobotId};
 use gestalt_strategies::{Classify, MindConfig};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 use tokio::sync::broadcast;
 use tokio::time::{Instant, MissedTickBehavior, timeout_at};
 
-use crate::{Fixed, look};
+use crate::{Fixed, gesture, look};
 
 /// A name that no other scenario and no other run has.
 #[must_use]
@@ -34,6 +36,7 @@ pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
             ..LinkConfig::default()
         },
         vocabulary: Some(Fixed::default().vocabulary().clone()),
+        learning: None,
         nonce: fresh_nonce(),
     }
 }
@@ -58,6 +61,45 @@ pub async fn start(config: RobotConfig, sees: Option<ClassId>) -> Watched {
         tokio::spawn(look_when_open(Arc::downgrade(&robot), class))
     });
     Watched { robot, events, looking }
+}
+
+/// Starts a robot that learns, and sees what `shown` says at each look.
+///
+/// # Panics
+/// When it cannot start.
+pub async fn start_learning(config: RobotConfig, shown: Arc<AtomicU8>) -> Watched {
+    let seed = u64::from(config.id.0) << 32 | u64::from(config.nonce as u32);
+    let robot = Arc::new(Robot::start(config).await.expect("the robot starts"));
+    let (events, of_eye) = (robot.events(), robot.events());
+    let looking = tokio::spawn(look_at(Arc::downgrade(&robot), of_eye, shown, seed));
+    Watched { robot, events, looking: Some(looking) }
+}
+
+/// Looks fifty times a second while the robot wants to see.
+async fn look_at(
+    robot: Weak<Robot>,
+    mut events: broadcast::Receiver<Event>,
+    shown: Arc<AtomicU8>,
+    seed: u64,
+) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut frames = tokio::time::interval(Duration::from_millis(20));
+    frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut open = false;
+    loop {
+        tokio::select! {
+            event = events.recv() => match event {
+                Ok(Event::Opened(_)) => open = true,
+                Ok(Event::Closed(_)) => open = false,
+                Err(broadcast::error::RecvError::Closed) => return,
+                _ => {}
+            },
+            _ = frames.tick(), if open => {
+                let Some(robot) = robot.upgrade() else { return };
+                robot.observe(gesture(ClassId(shown.load(Ordering::Relaxed)), &mut rng));
+            }
+        }
+    }
 }
 
 async fn look_when_open(robot: Weak<Robot>, class: ClassId) {

@@ -31,11 +31,13 @@ async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on() {
         for topic in [
             Topic::Vote(RobotId(9)),
             Topic::Vote(RobotId(0)),
+            Topic::Sample(RobotId(9)),
             Topic::Repair(RobotId(0)),
             Topic::Repair(RobotId(1)),
             Topic::RobotDecision(RobotId(9)),
             Topic::Decision,
             Topic::Feedback("vandal".parse().unwrap()),
+            Topic::Answer("vandal".parse().unwrap()),
         ] {
             let mut bytes = vec![0; length];
             rng.fill_bytes(&mut bytes);
@@ -45,7 +47,7 @@ async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on() {
     tokio::time::sleep(Duration::from_millis(500)).await;
     for robot in [&first, &second] {
         let status = robot.robot.status();
-        for kind in ["vote", "repair", "robot_decision", "decision", "feedback"] {
+        for kind in ["vote", "sample", "repair", "robot_decision", "decision", "feedback", "answer"] {
             let refused =
                 status.counters.iter().filter(|(name, _)| name.starts_with(&format!("refused_{kind}_")));
             assert!(refused.map(|(_, count)| count).sum::<u64>() >= 8, "{kind}: {:?}", status.counters);

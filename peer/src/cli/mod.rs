@@ -14,6 +14,7 @@ mod report;
 mod show;
 #[cfg(feature = "opencv")]
 mod swarm;
+mod teach;
 #[cfg(feature = "opencv")]
 mod train;
 mod watch;
@@ -44,6 +45,8 @@ enum Verb {
     Watch(watch::Args),
     /// Tell a running swarm to look: open a round
     Open(open::Args),
+    /// Teach a running swarm: open rounds, and say what the gesture was
+    Teach(teach::Args),
     /// Learn a classifier from a folder of pictures
     #[cfg(feature = "opencv")]
     Train(train::Args),
@@ -75,6 +78,7 @@ impl Command {
             Verb::Swarm(args) => swarm::run(&args),
             Verb::Watch(args) => watch::run(&args),
             Verb::Open(args) => open::run(&args),
+            Verb::Teach(args) => teach::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Train(args) => train::run(args),
             #[cfg(feature = "opencv")]

@@ -105,5 +105,20 @@ fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
             &json!({"event": "alive", "robots": robots}),
             &format!("alive: {}", show::robots(robots)),
         ),
+        Event::Shared(samples) => line(
+            as_json,
+            &json!({"event": "shared", "samples": samples}),
+            &format!("shares {} samples", samples.len()),
+        ),
+        Event::Answered(instructor, answer) => line(
+            as_json,
+            &json!({"event": "answered", "instructor": instructor, "answer": answer}),
+            &format!("answers {instructor}: {}", answer.outcome.describe()),
+        ),
+        Event::Remembered(revision) => line(
+            as_json,
+            &json!({"event": "remembered", "revision": revision}),
+            &format!("remembers revision {revision}"),
+        ),
     }
 }

@@ -89,6 +89,18 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
             show::robots(&status.neighbours),
             status.alive.len()
         );
+        if let Some(learning) = &status.learning {
+            let total = |classes: &[usize]| classes.iter().sum::<usize>();
+            words.push_str(&format!(
+                ", holds {} personal, {} shared, {} external samples of {} at most (common knowledge {}, memory {})",
+                total(&learning.personal),
+                total(&learning.shared),
+                total(&learning.external),
+                learning.capacity,
+                learning.common,
+                learning.memory
+            ));
+        }
         if let Some(error) = status.errors.last() {
             words.push_str(&format!(", last error: {}", error.what));
         }

@@ -1,6 +1,7 @@
 //! What a robot is told before it starts: one commented JSON5 file.
 
 mod document;
+mod learning;
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,7 @@ use crate::link::{LinkConfig, LinkError, Scouting};
 use crate::pose::Pose;
 
 pub use document::{Document, Override};
+pub use learning::{LearnFrom, LearningSection};
 
 /// A configuration that cannot be used. Each variant names the key and the mend.
 #[derive(Debug, Error)]
@@ -71,6 +73,8 @@ pub struct Config {
     pub camera: CameraSection,
     /// The classifier.
     pub model: ModelSection,
+    /// How the robot learns from what a human says.
+    pub learning: LearningSection,
     /// How the swarm decides; the same for all its robots.
     pub rounds: MindConfig,
     /// How the robot finds others, and how many it links to.
@@ -218,7 +222,8 @@ impl Default for ScoutingSection {
 
 impl Config {
     /// The names of the sections: what a `--cfg` path can begin with, besides Zenoh's own keys.
-    pub const SECTIONS: &[&str] = &["robot", "swarm", "camera", "model", "rounds", "links", "zenoh"];
+    pub const SECTIONS: &[&str] =
+        &["robot", "swarm", "camera", "model", "learning", "rounds", "links", "zenoh"];
 
     /// Reads and checks a configuration file.
     ///
@@ -266,6 +271,16 @@ impl Config {
     pub fn validate(&self) -> Result<(), ConfigError> {
         Keys::new(&self.swarm.0).map_err(|error| ConfigError::value("swarm", error.to_string()))?;
         self.rounds.validate().map_err(|error| ConfigError::value("rounds", error.to_string()))?;
+        self.learning
+            .samples
+            .validate()
+            .map_err(|error| ConfigError::value("learning.samples", error.to_string()))?;
+        if self.learning.enabled && matches!(self.model, ModelSection::None) {
+            return Err(ConfigError::value(
+                "learning.enabled",
+                "a robot that learns needs a feature space and a list of gestures, which a model brings: set model to \"rendered\" or {file: \"FILE\"}; with learning.from: \"nothing\" its classifier is not used",
+            ));
+        }
         if !(2..=16).contains(&self.links.max_links) {
             return Err(ConfigError::value(
                 "links.max_links",
@@ -345,6 +360,9 @@ mod tests {
             ("{rounds: {rule: 'vote'}}", "rounds.rule", "log_pool"),
             ("{swarm: 'a/b'}", "swarm", "A-Z"),
             ("{robot: {id: -1}}", "robot.id", "u32"),
+            ("{learning: {samples: {capacity: 0}}}", "learning.samples", "capacity"),
+            ("{learning: {samples: {selection: 'best'}}}", "learning.samples.selection", "representativity"),
+            ("{learning: {enabled: true}}", "learning.enabled", "rendered"),
             ("{links: {max_links: 1}}", "links.max_links", "2..=16"),
             ("{camera: {source: {video: {path: 'x.mp4'}}}}", "model", "classifier"),
             ("{zenoh: {transprot: {}}}", "zenoh", "transprot"),

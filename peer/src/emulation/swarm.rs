@@ -402,6 +402,8 @@ impl<'a> Swarm<'a> {
                 self.record.close(self.now, i);
                 self.robots[i].looking = false;
             }
+            // Emulated robots do not learn yet.
+            Output::Answer(..) | Output::Train(_) | Output::Remember { .. } => {}
         }
     }
 

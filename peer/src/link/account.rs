@@ -94,6 +94,10 @@ pub(super) enum Refusal {
     Author,
     #[error("a message that does not belong on this key")]
     Kind,
+    #[error(
+        "a word without a time: let the router that the client is attached to stamp messages (timestamping)"
+    )]
+    Time,
     #[error("the queue is full; neighbours will repeat what matters")]
     Full,
     #[error("another robot of the swarm has this robot's id: give each its own, then restart one")]
@@ -112,6 +116,7 @@ impl Refusal {
             Self::Key => "key",
             Self::Author => "author",
             Self::Kind => "kind",
+            Self::Time => "time",
             Self::Full => "full",
             Self::Twin => "twin",
         }
@@ -136,6 +141,7 @@ mod tests {
             alive: Vec::new(),
             round: None,
             open: false,
+            learning: None,
             counters: BTreeMap::new(),
             errors: Vec::new(),
         };

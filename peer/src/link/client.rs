@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{DecodeError, Instruction, InstructorId, Keys, Status, Topic, decode_json};
+use gestalt_protocol::{Answer, DecodeError, Instruction, InstructorId, Keys, Status, Topic, decode_json};
 use serde::de::DeserializeOwned;
 use zenoh::Session;
 use zenoh::bytes::Encoding;
@@ -116,6 +116,35 @@ impl Client {
             .congestion_control(CongestionControl::Block)
             .await
             .map_err(|error| LinkError::open(&*error))
+    }
+
+    /// Says something about a round, and waits for the swarm's answer; `None` when none comes within `patience`.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn teach(
+        &self,
+        as_whom: &InstructorId,
+        say: &Instruction,
+        patience: Duration,
+    ) -> Result<Option<Answer>, LinkError> {
+        let answers = self
+            .session
+            .declare_subscriber(self.keys.key(&Topic::Answer(as_whom.clone())))
+            .with(RingChannel::new(MAX_WAITING))
+            .await
+            .map_err(|error| LinkError::open(&*error))?;
+        self.instruct(as_whom, say).await?;
+        let answer = async {
+            loop {
+                let sample = answers.recv_async().await.ok()?;
+                let answer = decode_json::<Answer>(&sample.payload().to_bytes()).ok();
+                if let Some(answer) = answer.filter(|answer| answer.to == *say) {
+                    return Some(answer);
+                }
+            }
+        };
+        Ok(tokio::time::timeout(patience, answer).await.ok().flatten())
     }
 
     /// Detaches.

@@ -29,6 +29,9 @@ pub struct LinkConfig {
     /// a short lease loses links that are merely slow.
     #[serde(with = "humantime_serde")]
     pub lease: Duration,
+    /// For trials of what a swarm withstands: the part of all received messages that is dropped unread. Range
+    /// `0.0..1.0`; 0 in the field.
+    pub loss: f64,
     /// Anything Zenoh's own configuration offers, verbatim; it has the last word, except for `id`.
     pub zenoh: serde_json::Map<String, Value>,
 }
@@ -57,6 +60,7 @@ impl Default for LinkConfig {
             scouting: None,
             max_links: 4,
             lease: Duration::from_secs(1),
+            loss: 0.0,
             zenoh: serde_json::Map::new(),
         }
     }
@@ -86,6 +90,12 @@ impl LinkConfig {
             return Err(LinkError::Config {
                 key: "max_links".to_owned(),
                 cause: format!("{} links connect no swarm: take 2 or more", self.max_links),
+            });
+        }
+        if !(0.0..1.0).contains(&self.loss) {
+            return Err(LinkError::Config {
+                key: "loss".to_owned(),
+                cause: format!("{} is no part below 1: take 0 but for trials", self.loss),
             });
         }
         self.with_defaults(&serde_json::json!({

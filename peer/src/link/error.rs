@@ -2,7 +2,10 @@
 
 use gestalt_protocol::SwarmNameError;
 use gestalt_strategies::mind::MindConfigError;
+use gestalt_strategies::{LearnError, LearningError};
 use thiserror::Error;
+
+use crate::memory::StoreError;
 
 /// A robot that could not be linked. Nothing is left running.
 #[derive(Debug, Error)]
@@ -18,6 +21,18 @@ pub enum LinkError {
     /// The parameters of the mind do not fit together.
     #[error(transparent)]
     Mind(#[from] MindConfigError),
+    /// The robot cannot learn as it is told to.
+    #[error("learning: {0}")]
+    Learning(#[from] LearningError),
+    /// The classifier to learn on is none to build on.
+    #[error("learning: {0}")]
+    Learner(#[from] LearnError),
+    /// The robot's memory is not its own, in use, or damaged.
+    #[error(transparent)]
+    Memory(#[from] StoreError),
+    /// The machine has no room for another thread.
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] std::io::Error),
     /// The name of the swarm cannot stand in a key.
     #[error(transparent)]
     Swarm(#[from] SwarmNameError),

@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Decision, Envelope, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, RobotId, Topic};
 use gestalt_strategies::mind::Mind;
-use gestalt_strategies::{Input, Output, Vocabulary};
+use gestalt_strategies::{Classify, Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
 use tokio::task::JoinHandle;
 use zenoh::Wait;
@@ -17,6 +17,7 @@ use zenoh::sample::Locality;
 use zenoh::time::Timestamp;
 
 use super::account::Account;
+use super::apprentice::Apprentice;
 use super::census::{keep_token, take_census};
 use super::inbox::Inbox;
 use super::keeper::Keeper;
@@ -44,12 +45,16 @@ pub(super) struct Host {
     pub(super) commands: mpsc::Receiver<Input>,
     pub(super) events: broadcast::Sender<Event>,
     pub(super) vocabulary: Option<Vocabulary>,
+    pub(super) apprentice: Option<Apprentice>,
+    /// For the program around the robot to look at.
+    pub(super) classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
 }
 
 /// A host with its keys declared.
 pub(super) struct Declared {
     host: Host,
     vote: Publisher<'static>,
+    sample: Publisher<'static>,
     held: Publisher<'static>,
     swarm: Publisher<'static>,
     last: Arc<Last>,
@@ -76,10 +81,12 @@ impl Host {
         let session = self.node.session();
         let of_interest = [
             self.keys.every_robot("vote"),
+            self.keys.every_robot("sample"),
             self.keys.key(&Topic::Repair(self.me)),
             self.keys.every_robot("decision"),
             self.keys.key(&Topic::Decision),
-            self.keys.every_instructor(),
+            self.keys.every_instructor("feedback"),
+            self.keys.every_instructor("answer"),
         ];
         for key in of_interest {
             let inbox = self.inbox.clone();
@@ -121,6 +128,11 @@ impl Host {
             .congestion_control(CongestionControl::Drop)
             .express(true)
             .await?;
+        let sample = session
+            .declare_publisher(self.keys.key(&Topic::Sample(self.me)))
+            .priority(Priority::Data)
+            .congestion_control(CongestionControl::Block)
+            .await?;
         let decision = |topic| {
             session
                 .declare_publisher(self.keys.key(&topic))
@@ -134,7 +146,7 @@ impl Host {
         let alive = self.keys.key(&Topic::Alive(self.me));
         let token = session.liveliness().declare_token(&alive).await?;
         let token = tokio::spawn(keep_token(self.node.clone(), alive, self.inbox.clone(), token));
-        Ok(Declared { host: self, vote, held, swarm, last, token, unsaid: None, said: None })
+        Ok(Declared { host: self, vote, sample, held, swarm, last, token, unsaid: None, said: None })
     }
 }
 
@@ -175,6 +187,8 @@ impl Declared {
             keeper.abort();
         }
         self.token.abort();
+        // What is still to be written is written before the robot is gone.
+        tokio::task::block_in_place(|| drop(self.host.apprentice.take()));
         self.host.node.close().await;
     }
 
@@ -190,7 +204,12 @@ impl Declared {
                 self.tell(Event::Neighbours(neighbours.clone()));
             }
             Input::Announced(decision) => self.tell(Event::Announced(self.announcement(decision))),
-            Input::Learned(classifier) => self.host.vocabulary = Some(classifier.vocabulary().clone()),
+            Input::Learned(classifier) => {
+                self.host.vocabulary = Some(classifier.vocabulary().clone());
+                *self.host.classifier.lock().unwrap_or_else(PoisonError::into_inner) =
+                    Some(classifier.clone());
+            }
+            Input::Remembered(revision) => self.tell(Event::Remembered(*revision)),
             _ => {}
         }
         let now = self.host.started.elapsed();
@@ -198,6 +217,7 @@ impl Declared {
             self.carry_out(output);
         }
         self.publish_hold();
+        self.report_learning();
         for (refusal, count) in self.host.mind.refusals().iter() {
             if count > 0 {
                 self.host.account.set(refusal.name(), count);
@@ -205,14 +225,19 @@ impl Declared {
         }
     }
 
+    /// Puts what was learned into the status, when it has changed.
+    fn report_learning(&mut self) {
+        if let Some(apprentice) = &mut self.host.apprentice
+            && apprentice.has_news(&self.host.mind)
+        {
+            let learning = apprentice.status(&self.host.mind);
+            self.host.account.lock().learning = learning;
+        }
+    }
+
     fn carry_out(&mut self, output: Output) {
         match output {
-            Output::Broadcast(envelope) => {
-                let bytes = envelope.encode();
-                self.host.inbox.said(&bytes);
-                self.host.account.sent("vote", bytes.len());
-                self.check(self.vote.put(bytes).wait());
-            }
+            Output::Broadcast(envelope) => self.broadcast(&envelope),
             Output::Tell(neighbour, envelope) => self.repair(neighbour, &envelope),
             Output::Hold(decision) => {
                 let mut status = self.host.account.lock();
@@ -239,7 +264,46 @@ impl Declared {
                 drop(status);
                 self.tell(Event::Closed(round));
             }
+            Output::Answer(instructor, answer) => self.answer(instructor, answer),
+            Output::Train(changes) => {
+                if let Some(apprentice) = &self.host.apprentice {
+                    apprentice.train(changes);
+                }
+            }
+            Output::Remember { revision, changes } => {
+                if let Some(apprentice) = &self.host.apprentice {
+                    apprentice.remember(revision, changes);
+                }
+            }
         }
+    }
+
+    fn broadcast(&self, envelope: &Envelope) {
+        let bytes = envelope.encode();
+        if let Message::Samples(samples) = &envelope.message {
+            self.host.account.sent("sample", bytes.len());
+            self.check(self.sample.put(bytes).wait());
+            return self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
+        }
+        self.host.inbox.said(&bytes);
+        self.host.account.sent("vote", bytes.len());
+        self.check(self.vote.put(bytes).wait());
+    }
+
+    fn answer(&self, instructor: InstructorId, answer: Answer) {
+        let json = serde_json::to_string(&answer).expect("an answer has a place in JSON");
+        self.host.account.sent("answer", json.len());
+        let put = self
+            .host
+            .node
+            .session()
+            .put(self.host.keys.key(&Topic::Answer(instructor.clone())), json)
+            .encoding(Encoding::APPLICATION_JSON)
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Block)
+            .wait();
+        self.check(put);
+        self.tell(Event::Answered(instructor, answer));
     }
 
     /// When a decision now held is to be published. Robots that are just settling among each other would otherwise
@@ -263,7 +327,10 @@ impl Declared {
 
     fn repair(&self, neighbour: RobotId, envelope: &Envelope) {
         let bytes = envelope.encode();
-        let kind = if matches!(envelope.message, Message::Have(_)) { "have" } else { "give" };
+        let kind = match &envelope.message {
+            Message::Have(_) | Message::Know(_) => "have",
+            Message::Vote(_) | Message::Give(_) | Message::Samples(_) | Message::Lessons(_) => "give",
+        };
         self.host.account.sent(kind, bytes.len());
         let key = self.host.keys.key(&Topic::Repair(neighbour));
         let put = self

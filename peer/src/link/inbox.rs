@@ -4,10 +4,12 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use gestalt_protocol::{
-    Decision, Envelope, Instruction, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId, Topic,
-    decode_json,
+    Answer, Decision, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message,
+    RobotId, Topic, decode_json,
 };
-use gestalt_strategies::Input;
+use gestalt_strategies::{Input, Instructed};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use tokio::sync::Notify;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::session::ZenohId;
@@ -33,6 +35,9 @@ pub(super) struct Inbox {
     keys: Keys,
     account: Arc<Account>,
     state: Mutex<State>,
+    /// For trials: the part of what arrives that is dropped, and the chance that chooses it.
+    loss: f64,
+    chance: Mutex<ChaCha8Rng>,
     ready: Notify,
     unrest: Notify,
     lost_link: Notify,
@@ -50,7 +55,7 @@ struct State {
 }
 
 impl Inbox {
-    pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>) -> Self {
+    pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>, loss: f64) -> Self {
         let state = Mutex::new(State::default());
         Self {
             me,
@@ -58,6 +63,8 @@ impl Inbox {
             keys,
             account,
             state,
+            loss,
+            chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
             unrest: Notify::new(),
             lost_link: Notify::new(),
@@ -110,18 +117,20 @@ impl Inbox {
 
     /// Whatever arrives under a key of the swarm.
     pub(super) fn on_sample(&self, sample: &Sample) {
-        if sample.kind() != SampleKind::Put {
+        if sample.kind() != SampleKind::Put || self.is_lost() {
             return;
         }
         let key = sample.key_expr().as_str();
         let (kind, taken) = match self.keys.parse(key) {
             Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample)),
+            Some(Topic::Sample(id)) => ("sample", self.on_shared(id, sample)),
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
             Some(Topic::RobotDecision(id)) => {
                 ("robot_decision", self.on_decision(sample, |decision| Input::Heard(id, decision)))
             }
             Some(Topic::Decision) => ("decision", self.on_decision(sample, Input::Announced)),
-            Some(Topic::Feedback(_)) => ("feedback", self.on_feedback(sample)),
+            Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
+            Some(Topic::Answer(to)) => ("answer", self.on_answer(to, sample)),
             _ => ("other", Err(Refusal::Key)),
         };
         let bytes = sample.payload().len();
@@ -132,6 +141,11 @@ impl Inbox {
             }
             Err(cause) => self.account.refused(kind, key, bytes, &cause),
         }
+    }
+
+    fn is_lost(&self) -> bool {
+        self.loss > 0.0
+            && self.chance.lock().unwrap_or_else(PoisonError::into_inner).random::<f64>() < self.loss
     }
 
     fn on_vote(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
@@ -159,6 +173,22 @@ impl Inbox {
         Ok(())
     }
 
+    fn on_shared(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+        let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        match &envelope.message {
+            // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
+            Message::Samples(_) if id == self.me => Ok(()),
+            Message::Samples(samples) if samples.samples.iter().all(|sample| sample.id.author == id) => {
+                self.queue(Input::Received(envelope))
+            }
+            Message::Samples(_) => Err(Refusal::Author),
+            _ => Err(Refusal::Kind),
+        }
+    }
+
     fn on_repair(&self, sample: &Sample) -> Result<(), Refusal> {
         let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
         if envelope.author == self.me {
@@ -176,9 +206,22 @@ impl Inbox {
         self.queue(input(announcement.decision))
     }
 
-    fn on_feedback(&self, sample: &Sample) -> Result<(), Refusal> {
+    fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
         let instruction: Instruction = decode_json(&payload(sample, MAX_JSON)?)?;
-        self.queue(Input::Instructed(instruction))
+        // The robot that a client is attached to stamps what the client says.
+        let at = sample.timestamp().ok_or(Refusal::Time)?.get_time().as_u64();
+        self.queue(Input::Instructed(Instructed { by, at, instruction }))
+    }
+
+    fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {
+        let answer: Answer = decode_json(&payload(sample, MAX_JSON)?)?;
+        self.queue(Input::Answered(to, answer.at, answer.robot))
+    }
+
+    /// Hands over what this robot's own threads have done. Never refused: they do one thing at a time.
+    pub(super) fn deliver(&self, input: Input) {
+        self.lock().queue.push_back(input);
+        self.ready.notify_one();
     }
 
     fn queue(&self, input: Input) -> Result<(), Refusal> {

@@ -2,6 +2,7 @@
 
 mod account;
 mod announcement;
+mod apprentice;
 mod census;
 mod client;
 mod config;
@@ -14,8 +15,10 @@ mod news;
 mod robot;
 mod session;
 mod topology;
+mod trainer;
 
 pub use announcement::Announcement;
+pub use apprentice::RobotLearning;
 pub use client::{Client, Decisions};
 pub use config::{LinkConfig, Scouting};
 pub use error::LinkError;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Decision, Keys, RobotId, RoundId, Status};
+use gestalt_protocol::{Answer, Decision, InstructorId, Keys, RobotId, RoundId, SampleId, Status};
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Classify, Input, MindConfig, Observation, Vocabulary};
 use tokio::runtime::{Handle, RuntimeFlavor};
@@ -12,6 +12,7 @@ use tokio::sync::{broadcast, mpsc};
 use tokio::task::JoinHandle;
 
 use super::account::Account;
+use super::apprentice::{Apprentice, Prepared, RobotLearning};
 use super::host::Host;
 use super::identity::swarm_checksum;
 use super::inbox::Inbox;
@@ -32,7 +33,8 @@ pub struct RobotConfig {
     pub id: RobotId,
     /// Its name for people.
     pub name: String,
-    /// Grows at every start of this robot, so that what it says outranks what it said before.
+    /// Grows at every start of this robot, so that what it says outranks what it said before. A robot with a memory
+    /// on disk counts its starts there, from this number on.
     pub boot: u32,
     /// The swarm's name: 1 to 64 of the characters `A-Z a-z 0-9 _ -`.
     pub swarm: String,
@@ -42,6 +44,8 @@ pub struct RobotConfig {
     pub link: LinkConfig,
     /// The gestures' labels, for a robot that announces decisions without a classifier of its own.
     pub vocabulary: Option<Vocabulary>,
+    /// How it learns; `None` for a robot that keeps to the classifier it is given.
+    pub learning: Option<RobotLearning>,
     /// Differs at every start, see [`fresh_nonce`](super::fresh_nonce).
     pub nonce: u64,
 }
@@ -61,6 +65,12 @@ pub enum Event {
     Neighbours(BTreeSet<RobotId>),
     /// The robots alive now, itself aside.
     Alive(BTreeSet<RobotId>),
+    /// It shared these samples.
+    Shared(Vec<SampleId>),
+    /// It answered that instructor.
+    Answered(InstructorId, Answer),
+    /// All that it knew at that revision of its memory is on the disk.
+    Remembered(u64),
 }
 
 /// A running robot. Dropping it ends it without waiting; [`Robot::stop`] waits until its session is closed.
@@ -71,6 +81,7 @@ pub struct Robot {
     events: broadcast::Sender<Event>,
     /// For the first who asks: a link may stand before there was time to.
     first_events: Mutex<Option<broadcast::Receiver<Event>>>,
+    classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
     locators: Vec<String>,
     host: JoinHandle<()>,
 }
@@ -84,8 +95,14 @@ impl Robot {
         if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
             return Err(LinkError::Runtime);
         }
-        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, nonce } = config;
-        let mind = Mind::new(id, boot, mind)?;
+        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, learning, nonce } = config;
+        let vocabulary = vocabulary.or_else(|| learning.as_ref().map(|learning| learning.vocabulary.clone()));
+        let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
+        let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
+        let mut mind = Mind::new(id, boot, mind)?;
+        if let Some(prepared) = &mut prepared {
+            mind = mind.learning(prepared.setup(id))?;
+        }
         let keys = Keys::new(&swarm)?;
         let zenoh = link.to_zenoh(id, &swarm, nonce)?;
         let started = Instant::now();
@@ -100,11 +117,21 @@ impl Robot {
             alive: vec![id],
             round: None,
             open: false,
+            learning: None,
             counters: BTreeMap::new(),
             errors: Vec::new(),
         };
         let account = Arc::new(Account::new(status, started));
-        let inbox = Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone()));
+        let inbox =
+            Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone(), link.loss));
+        let mut first_classifier = None;
+        let apprentice = match prepared {
+            Some(prepared) => {
+                first_classifier = prepared.classifier();
+                Some(Apprentice::start(prepared, &inbox, &account)?)
+            }
+            None => None,
+        };
         let on_link = {
             let inbox = inbox.clone();
             move |id, up| inbox.on_link(id, up)
@@ -116,6 +143,8 @@ impl Robot {
         let keeper = link.scouting.is_some().then(|| {
             Keeper::new(id, &swarm, link.max_links, node.clone(), inbox.clone(), account.clone(), zenoh)
         });
+        account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));
+        let classifier = Arc::new(Mutex::new(None));
         let host = Host {
             me: id,
             mind,
@@ -127,6 +156,8 @@ impl Robot {
             commands: command_queue,
             events: events.clone(),
             vocabulary,
+            apprentice,
+            classifier: classifier.clone(),
         };
         let host = match host.declare().await {
             Ok(declared) => tokio::spawn(declared.run(keeper)),
@@ -136,7 +167,11 @@ impl Robot {
             }
         };
         let first_events = Mutex::new(Some(first_events));
-        Ok(Self { account, commands, events, first_events, locators, host })
+        let robot = Self { account, commands, events, first_events, classifier, locators, host };
+        if let Some(classifier) = first_classifier {
+            robot.learned(classifier, "from before");
+        }
+        Ok(robot)
     }
 
     /// Says: a gesture is being shown now.
@@ -156,6 +191,12 @@ impl Robot {
         model.clone_into(&mut status.model);
         drop(status);
         self.tell(Input::Learned(classifier));
+    }
+
+    /// The classifier it judges with now; `None` for one that has none yet.
+    #[must_use]
+    pub fn classifier(&self) -> Option<Arc<dyn Classify>> {
+        self.classifier.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     fn tell(&self, input: Input) {

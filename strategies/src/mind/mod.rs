@@ -1,25 +1,36 @@
 //! The robot's mind: a state machine that turns what a robot sees and hears into votes and decisions.
 
 mod config;
+mod inspect;
+mod instruct;
+mod knowledge;
+mod learning;
 mod refusal;
 mod repair;
 
 use std::cmp::Ordering;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Decision, Envelope, Instruction, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Answer, Decision, Envelope, InstructorId, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 pub use config::{MindConfig, MindConfigError};
+pub use instruct::Instructed;
+use instruct::Waiting;
+use learning::Learning;
+pub use learning::{
+    Change, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory, MemoryError,
+    TrainingChange,
+};
 pub use refusal::{Refusal, Refusals};
 use repair::Repair;
 
-use crate::ballot::{Ballot, Cast, Scale};
+use crate::ballot::{Cast, Scale};
 use crate::round::Round;
-use crate::{Classify, Observation, Vocabulary};
+use crate::{Classify, Observation};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -28,8 +39,10 @@ pub enum Input {
     Tick,
     /// The robot's own motion detector (or its host's schedule) says: a gesture is being shown.
     Open,
-    /// A human says so.
-    Instructed(Instruction),
+    /// A human says something.
+    Instructed(Instructed),
+    /// That robot has answered what that instructor said at that time.
+    Answered(InstructorId, u64, RobotId),
     /// A frame showed a hand.
     Observed(Observation),
     /// A robot's message arrived, by whichever way.
@@ -44,12 +57,14 @@ pub enum Input {
     Neighbours(BTreeSet<RobotId>),
     /// A new classifier takes the place of the old one.
     Learned(Arc<dyn Classify>),
+    /// All that was to be remembered up to this revision is safe.
+    Remembered(u64),
 }
 
 /// What the mind wants done. The host carries out all of them, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
-    /// Say this to all robots (`robot/<me>/vote`): the fast way.
+    /// Say this to all robots (a vote on `robot/<me>/vote`, samples on `robot/<me>/sample`): the fast way.
     Broadcast(Envelope),
     /// Say this to one neighbour (`robot/<id>/repair`): the sure way.
     Tell(RobotId, Envelope),
@@ -61,6 +76,17 @@ pub enum Output {
     Opened(RoundId),
     /// That round is over for this robot: no further looking.
     Closed(RoundId),
+    /// Answer that instructor (`instructor/<id>/answer`).
+    Answer(InstructorId, Answer),
+    /// Make the classifier follow these changes of its samples, beside the loop; then say [`Input::Learned`].
+    Train(Vec<TrainingChange>),
+    /// Write these changes where a kill at any moment leaves all or none of them; then say [`Input::Remembered`].
+    Remember {
+        /// Counts up.
+        revision: u64,
+        /// What has changed since the one before.
+        changes: Vec<Change>,
+    },
 }
 
 /// A round this many counters ahead of the newest known is refused: nobody shows a million gestures unnoticed.
@@ -84,9 +110,17 @@ pub struct Mind {
     highest: Option<u32>,
     /// The other robots alive.
     alive: BTreeSet<RobotId>,
+    /// How many of them have a smaller id: whoever speaks for the swarm waits this many turns.
+    turns: u32,
     repair: Repair,
     refusals: Refusals,
     duplicate: Option<Stamp>,
+    learning: Option<Learning>,
+    answers: Vec<Waiting>,
+    /// The words answered last, by whomever.
+    answered: VecDeque<(InstructorId, u64)>,
+    /// The round for which this robot still looks, though it may be decided: it is to learn from it.
+    looking: Option<RoundId>,
 }
 
 impl Mind {
@@ -106,11 +140,25 @@ impl Mind {
             round: None,
             highest: None,
             alive: BTreeSet::new(),
+            turns: 0,
             repair: Repair::new(config.repair_idle),
             config,
             refusals: Refusals::default(),
             duplicate: None,
+            learning: None,
+            answers: Vec::new(),
+            answered: VecDeque::new(),
+            looking: None,
         })
+    }
+
+    /// The same mind, set up to learn: it keeps what it sees, labels it by what instructors say, shares and forgets.
+    ///
+    /// # Errors
+    /// See [`LearningError`].
+    pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
+        self.learning = Some(Learning::new(self.me, setup)?);
+        Ok(self)
     }
 
     /// Takes in one input at the time `now` and says what is to be done.
@@ -119,7 +167,9 @@ impl Mind {
         self.now = now.max(self.now);
         match input {
             Input::Tick => {}
-            Input::Open | Input::Instructed(Instruction::Open) => self.on_open(&mut out),
+            Input::Open => self.on_open(&mut out),
+            Input::Instructed(instructed) => self.on_instructed(instructed, &mut out),
+            Input::Answered(by, at, robot) => self.on_answered(&by, at, robot),
             Input::Observed(observation) => self.on_observed(&observation),
             Input::Received(envelope) => self.on_received(envelope, &mut out),
             Input::Heard(robot, decision) => self.on_heard(robot, decision, &mut out),
@@ -127,6 +177,7 @@ impl Mind {
             Input::Alive(robots) => self.on_alive(robots),
             Input::Neighbours(robots) => self.on_neighbours(robots, &mut out),
             Input::Learned(classifier) => self.on_learned(classifier),
+            Input::Remembered(revision) => self.on_remembered(revision),
         }
         self.advance(&mut out);
         out
@@ -146,6 +197,8 @@ impl Mind {
             deadline,
             self.closing(),
             self.announcement(),
+            self.looking_until(),
+            self.answer_due(),
             self.repair.due(&self.alive),
         ]
         .into_iter()
@@ -165,8 +218,17 @@ impl Mind {
     }
 
     fn on_observed(&mut self, observation: &Observation) {
+        if let (Some(learning), Some(round)) = (&mut self.learning, self.looking) {
+            learning.look(self.now, round, &observation.features);
+        }
         let Some(round) = self.round.as_mut().filter(|round| round.open) else { return };
-        let Some(classifier) = &self.classifier else { return self.refusals.add(Refusal::NoClassifier) };
+        let Some(classifier) = &self.classifier else {
+            // Who learns has none until it was taught.
+            if self.learning.is_none() {
+                self.refusals.add(Refusal::NoClassifier);
+            }
+            return;
+        };
         let classes = classifier.vocabulary().classes();
         match classifier.probabilities(&observation.features) {
             Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
@@ -192,6 +254,9 @@ impl Mind {
             }
             Message::Have(have) => self.on_have(author, &have, out),
             Message::Give(give) => self.on_give(author, give, out),
+            Message::Samples(samples) => self.on_samples(author, &samples),
+            Message::Know(know) => self.on_know(author, &know, out),
+            Message::Lessons(lessons) => self.on_lessons(&lessons.lessons),
         }
     }
 
@@ -211,6 +276,7 @@ impl Mind {
 
     fn on_alive(&mut self, mut robots: BTreeSet<RobotId>) {
         robots.remove(&self.me);
+        self.turns = u32::try_from(robots.range(..self.me).count()).unwrap_or(u32::MAX);
         self.alive = robots;
     }
 
@@ -219,7 +285,23 @@ impl Mind {
         if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary().id())) {
             round.look_afresh();
         }
+        if let Some(learning) = &mut self.learning {
+            learning.settle_aside(&*classifier);
+        }
         self.classifier = Some(classifier);
+    }
+
+    fn on_remembered(&mut self, revision: u64) {
+        if let Some(learning) = &mut self.learning {
+            learning.note_remembered(revision);
+        }
+    }
+
+    /// Chooses samples to share, as far as the bounds allow.
+    fn share(&mut self) {
+        if let Some(learning) = &mut self.learning {
+            learning.share(self.classifier.as_deref(), self.alive.is_empty());
+        }
     }
 
     /// Does whatever is due.
@@ -232,7 +314,31 @@ impl Mind {
         if self.announcement().is_some_and(|due| self.now >= due) {
             self.announce(out);
         }
+        if self.looking_until().is_some_and(|until| self.now >= until) {
+            self.stop_looking(out);
+        }
         self.repair_when_due(out);
+        self.carry_on_learning(out);
+        self.answer_when_due(out);
+    }
+
+    /// Says what is to be trained and remembered, and shares what is remembered as shared.
+    fn carry_on_learning(&mut self, out: &mut Vec<Output>) {
+        let Some(learning) = &mut self.learning else { return };
+        let changes = learning.take_training();
+        if !changes.is_empty() {
+            out.push(Output::Train(changes));
+        }
+        if let Some((revision, changes)) = learning.take_changes() {
+            out.push(Output::Remember { revision, changes });
+        }
+        while let Some(samples) = learning.take_unsent() {
+            if !samples.samples.is_empty() {
+                self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+                let message = Message::Samples(samples);
+                out.push(Output::Broadcast(Envelope { author: self.me, stamp: self.stamp, message }));
+            }
+        }
     }
 
     /// Says this robot's vote when it is due.
@@ -258,11 +364,15 @@ impl Mind {
     fn decide(&mut self, out: &mut Vec<Output>) {
         let own_scale = self.own_scale();
         let Some(round) = self.round.as_mut() else { return };
-        let scale = own_scale.or_else(|| round.ballot.prevailing_scale());
+        let concludes = round.open && round.agreement.held().is_none();
+        let scale = own_scale.or_else(|| concludes.then(|| round.ballot.prevailing_scale())?);
         round.conclude(self.now, self.me, &self.alive, scale, &self.config);
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
+            if let Some(learning) = &mut self.learning {
+                learning.decided(decision.round, decision.class);
+            }
             out.push(Output::Hold(decision.clone()));
         }
     }
@@ -276,6 +386,26 @@ impl Mind {
     fn close(&mut self, out: &mut Vec<Output>) {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.open = false;
+        }
+        if self.looking_until().is_none() {
+            self.stop_looking(out);
+        }
+    }
+
+    /// Until when this robot looks at a round that is over: it saw something, and is to learn from more of it.
+    fn looking_until(&self) -> Option<Duration> {
+        let round = self.round.as_ref().filter(|round| !round.open)?;
+        let learning = self.learning.as_ref().filter(|_| self.looking.is_some())?;
+        let (_, deadline) = round.patience_and_deadline(&self.config);
+        let more = self.now < deadline && learning.wants_more(round.id);
+        Some(if more { deadline } else { self.now })
+    }
+
+    fn stop_looking(&mut self, out: &mut Vec<Output>) {
+        if self.looking.take().is_some()
+            && let Some(round) = &self.round
+        {
+            // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
             out.push(Output::Closed(round.id));
         }
     }
@@ -283,10 +413,11 @@ impl Mind {
     /// When this robot is to announce the decision it holds: the live robot of the smallest id is the
     /// spokesrobot, each next one waits a while longer for the one before.
     fn announcement(&self) -> Option<Duration> {
-        let before_me = self.alive.range(..self.me).count();
-        let rank = u32::try_from(before_me).unwrap_or(u32::MAX);
-        let wait = self.config.settle.saturating_add(self.config.takeover.saturating_mul(rank));
-        self.round.as_ref()?.agreement.announcement(wait)
+        let agreement = &self.round.as_ref()?.agreement;
+        // Asked at every input, when there is mostly nothing to announce: robots are counted only when there is.
+        agreement.announcement(Duration::ZERO)?;
+        let wait = self.config.settle.saturating_add(self.config.takeover.saturating_mul(self.turns));
+        agreement.announcement(wait)
     }
 
     fn announce(&mut self, out: &mut Vec<Output>) {
@@ -308,8 +439,13 @@ impl Mind {
     /// Makes this the newest round known, with or without taking part in it.
     fn enter(&mut self, id: RoundId, open: bool, out: &mut Vec<Output>) {
         self.close(out);
+        self.stop_looking(out);
         self.highest = self.highest.max(Some(id.counter));
         self.round = Some(Round::new(id, self.now, open));
+        self.looking = open.then_some(id);
+        if let Some(learning) = &mut self.learning {
+            learning.live(id);
+        }
     }
 
     /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Equal counters
@@ -324,6 +460,9 @@ impl Mind {
         let order = id.counter.cmp(&round.id.counter);
         if order.is_eq() {
             round.id.opener = round.id.opener.min(id.opener);
+            if let Some(learning) = &mut self.learning {
+                learning.live(id);
+            }
         }
         Some(order)
     }
@@ -387,64 +526,6 @@ impl Mind {
     fn own_scale(&self) -> Option<Scale> {
         let vocabulary = self.classifier.as_ref()?.vocabulary();
         Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.classes() })
-    }
-}
-
-/// What a host may want to show.
-impl Mind {
-    /// Whose mind it is.
-    #[must_use]
-    pub fn me(&self) -> RobotId {
-        self.me
-    }
-
-    /// Its parameters.
-    #[must_use]
-    pub fn config(&self) -> &MindConfig {
-        &self.config
-    }
-
-    /// The newest round known.
-    #[must_use]
-    pub fn round(&self) -> Option<RoundId> {
-        self.round.as_ref().map(|round| round.id)
-    }
-
-    /// Whether this robot takes part in that round by looking and voting.
-    #[must_use]
-    pub fn is_open(&self) -> bool {
-        self.round.as_ref().is_some_and(|round| round.open)
-    }
-
-    /// The decision held for that round.
-    #[must_use]
-    pub fn held(&self) -> Option<&Decision> {
-        self.round.as_ref()?.agreement.held()
-    }
-
-    /// The votes known in that round.
-    #[must_use]
-    pub fn ballot(&self) -> Option<&Ballot> {
-        self.round.as_ref().map(|round| &round.ballot)
-    }
-
-    /// The vocabulary of its classifier.
-    #[must_use]
-    pub fn vocabulary(&self) -> Option<&Vocabulary> {
-        self.classifier.as_ref().map(|classifier| classifier.vocabulary())
-    }
-
-    /// What it refused so far, by cause.
-    #[must_use]
-    pub fn refusals(&self) -> &Refusals {
-        &self.refusals
-    }
-
-    /// The stamp on the latest message that another robot said under this robot's id: give one of the two
-    /// another id.
-    #[must_use]
-    pub fn duplicate(&self) -> Option<Stamp> {
-        self.duplicate
     }
 }
 

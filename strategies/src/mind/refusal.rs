@@ -17,13 +17,21 @@ pub enum Refusal {
     NoClassifier,
     /// A frame that the classifier could not judge, or judged with something that is no distribution.
     Unclassified,
+    /// A sample of another feature space than this robot learns in.
+    OtherSpace,
+    /// A sample whose vector has another length, or a component that is not finite.
+    BadVector,
+    /// A sample of a class that the vocabulary does not have.
+    UnknownClass,
+    /// A sample with an author or number beyond the bounds of what one robot remembers.
+    SampleNumber,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 12] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::Vocabulary,
@@ -31,6 +39,10 @@ impl Refusal {
         Self::BallotFull,
         Self::NoClassifier,
         Self::Unclassified,
+        Self::OtherSpace,
+        Self::BadVector,
+        Self::UnknownClass,
+        Self::SampleNumber,
         Self::CountersUsedUp,
     ];
 
@@ -45,6 +57,10 @@ impl Refusal {
             Self::BallotFull => "refused_ballot_full",
             Self::NoClassifier => "refused_no_classifier",
             Self::Unclassified => "refused_unclassified_frame",
+            Self::OtherSpace => "refused_sample_of_other_space",
+            Self::BadVector => "refused_sample_with_bad_vector",
+            Self::UnknownClass => "refused_sample_of_unknown_class",
+            Self::SampleNumber => "refused_sample_number",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

@@ -81,6 +81,9 @@ impl Mind {
 
     /// Hears what a neighbour has: gives what it lacks, and asks for what this robot lacks itself.
     pub(super) fn on_have(&mut self, from: RobotId, have: &Have, out: &mut Vec<Output>) {
+        if !have.answer {
+            self.compare_knowledge(from, have.knowledge, out);
+        }
         let order = match have.round {
             None => Ordering::Less,
             Some(id) => match self.place(id) {
@@ -178,12 +181,19 @@ impl Mind {
                 Some(round) if round.open => round.ballot.stamps().collect(),
                 _ => Vec::new(),
             },
+            knowledge: self.knowledge(),
             answer,
         };
         self.tell(robot, Message::Have(have), out);
     }
 
-    fn tell(&mut self, robot: RobotId, message: Message, out: &mut Vec<Output>) {
+    /// Turns to one neighbour after the other at the busy pace for a while.
+    pub(super) fn hurry_repair(&mut self) {
+        self.repair.busy_until = self.now + UNREST;
+        self.repair.hurry(self.now, &self.config);
+    }
+
+    pub(super) fn tell(&mut self, robot: RobotId, message: Message, out: &mut Vec<Output>) {
         self.stamp.sequence = self.stamp.sequence.saturating_add(1);
         out.push(Output::Tell(robot, Envelope { author: self.me, stamp: self.stamp, message }));
     }

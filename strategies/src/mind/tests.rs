@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use gestalt_protocol::{ClassId, CountedVote, FusionRule, Give, Have, HeldVote};
+use gestalt_protocol::{ClassId, CountedVote, FusionRule, Give, Have, HeldVote, Instruction};
 
 use super::*;
-use crate::ClassifyError;
+use crate::{ClassifyError, Vocabulary};
 
 /// Takes its features for the probabilities.
 #[derive(Debug)]
@@ -160,7 +160,8 @@ fn opening_says_a_null_vote_to_all_at_once() {
 fn a_request_to_open_has_no_effect_while_a_round_is_open_or_has_just_begun() {
     let mut mind = mind_with(7, MindConfig { settle: ms(0), ..MindConfig::default() });
     mind.handle(ms(0), Input::Open);
-    assert!(mind.handle(ms(5), Input::Instructed(Instruction::Open)).is_empty());
+    let instructed = Instructed { by: "ada".parse().unwrap(), at: 1, instruction: Instruction::Open };
+    assert!(mind.handle(ms(5), Input::Instructed(instructed)).is_empty());
     mind.handle(ms(10), Input::Heard(RobotId(1), decision(1, Some(0), 2, 1)));
     assert!(!mind.is_open(), "decided and closed");
     mind.handle(ms(499), Input::Open);
@@ -222,6 +223,7 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
         round: Some(round(12, 1)),
         decision: Some(decision(12, Some(1), 2, 1).rank()),
         votes: vec![],
+        knowledge: None,
         answer: false,
     };
     let out = mind.handle(ms(1), says(3, 1, Message::Have(have)));
@@ -493,6 +495,7 @@ fn have(counter: u32, known: &[(u32, u32)]) -> Have {
         round: Some(round(counter, 1)),
         decision: None,
         votes: known.iter().map(|&(robot, sequence)| (RobotId(robot), stamp(sequence))).collect(),
+        knowledge: None,
         answer: false,
     }
 }

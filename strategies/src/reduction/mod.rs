@@ -1,11 +1,14 @@
 //! Fewer components that carry almost all that the features say.
 
 mod pca;
+mod ranking;
 mod subspace;
 
 use serde::{Deserialize, Serialize};
 
 pub use pca::{Components, Pca};
+pub use ranking::Ranking;
+pub(crate) use ranking::best;
 
 /// How many scaled features become few components.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

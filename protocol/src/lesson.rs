@@ -1,0 +1,32 @@
+//! What instructors said of rounds, as robots keep it and pass it on.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{ClassId, InstructorId, RoundId};
+
+/// The most rounds of which a robot keeps what was said.
+pub const MAX_LESSONS: usize = 1024;
+
+/// One instructor's latest word on one round.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Lesson {
+    /// The round it is about.
+    pub round: RoundId,
+    /// Who said it.
+    pub instructor: InstructorId,
+    /// When, in the swarm's own time (Zenoh's NTP64 timestamp of the message): the later word replaces the earlier.
+    pub at: u64,
+    /// What was said.
+    pub word: Word,
+}
+
+/// What an instructor can say of the gesture of a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Word {
+    /// It was this one.
+    Was(ClassId),
+    /// It was any but this one.
+    Not(ClassId),
+    /// Nothing: what this instructor had said is taken back.
+    Retracted,
+}

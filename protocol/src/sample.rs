@@ -1,0 +1,168 @@
+//! The samples that robots share, and how they tell each other which they have.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    ClassId, DecodeError, FeatureSpaceId, Lesson, MAX_CLASSES, MAX_LESSONS, MAX_ROBOTS, RobotId, RoundId,
+    SampleId, Word, bounded,
+};
+
+/// The most components of a shared vector.
+pub const MAX_COMPONENTS: usize = 2048;
+
+/// The most samples in one message.
+pub const MAX_SAMPLES: usize = 4096;
+
+/// The most intervals of sample numbers that are told of one author.
+pub const MAX_INTERVALS: usize = 256;
+
+/// A feature vector as it travels. How its numbers stand for coordinates is the feature space's matter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Vector {
+    /// IEEE single precision, 4 bytes a component.
+    F32(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<f32>),
+    /// IEEE half precision, 2 bytes a component, the lower one first.
+    F16(#[serde(deserialize_with = "bounded::vec::<_, _, { 2 * MAX_COMPONENTS }>")] Vec<u8>),
+    /// 1 byte a component, scaled by how far that component spreads in its feature space.
+    I8(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<i8>),
+}
+
+impl Vector {
+    /// How many components it has.
+    #[must_use]
+    pub fn components(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::F16(bytes) => bytes.len() / 2,
+            Self::I8(values) => values.len(),
+        }
+    }
+
+    fn check(&self) -> Result<(), DecodeError> {
+        /// All exponent bits of a half: infinite, or not a number.
+        const INFINITE: u8 = 0x7c;
+        let sound = match self {
+            Self::F32(values) => values.iter().all(|value| value.is_finite()),
+            Self::F16(bytes) => {
+                bytes.len().is_multiple_of(2)
+                    && bytes.chunks_exact(2).all(|half| half[1] & INFINITE != INFINITE)
+            }
+            Self::I8(_) => true,
+        };
+        if !sound || self.components() == 0 {
+            return Err(DecodeError::Impossible("a vector that is empty, cut or not finite"));
+        }
+        Ok(())
+    }
+}
+
+/// A labelled feature vector, as shared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SharedSample {
+    /// Whose sample, and which.
+    pub id: SampleId,
+    /// The gesture it shows, as its author was told.
+    pub class: ClassId,
+    /// The round it was seen in: what an instructor says of that round later is said of this sample too.
+    pub round: RoundId,
+    /// Its coordinates.
+    pub vector: Vector,
+}
+
+/// Samples of one feature space. To all from their author, or to one neighbour that lacks them from any.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Samples {
+    /// What the vectors' components mean.
+    pub space: FeatureSpaceId,
+    /// The samples.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_SAMPLES>")]
+    pub samples: Vec<SharedSample>,
+}
+
+impl Samples {
+    pub(crate) fn check(&self) -> Result<(), DecodeError> {
+        for sample in &self.samples {
+            if sample.class.index() >= MAX_CLASSES {
+                return Err(DecodeError::Impossible("a class beyond the largest vocabulary"));
+            }
+            if sample.id.number == 0 {
+                return Err(DecodeError::Impossible("a sample of number 0"));
+            }
+            sample.vector.check()?;
+        }
+        Ok(())
+    }
+}
+
+/// What a robot knows, in two numbers: equal ones say that there is nothing to tell each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Digest {
+    /// Over the ids of all samples it ever had.
+    pub samples: u64,
+    /// Over all that instructors said.
+    pub lessons: u64,
+}
+
+/// Which samples of one author a robot ever had.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Known {
+    /// Whose samples.
+    pub author: RobotId,
+    /// Their numbers, first to last of each interval; ascending, and with gaps between them.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_INTERVALS>")]
+    pub numbers: Vec<(u32, u32)>,
+}
+
+/// To one neighbour: all that the author knows, in short, so that each can give the other what it lacks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Know {
+    /// The samples it ever had, by author, ascending.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub samples: Vec<Known>,
+    /// What instructors said of each round, as a digest.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_LESSONS>")]
+    pub lessons: Vec<(RoundId, u64)>,
+    /// Both in short. Where one of its numbers is the reader's own, the list it stands for is left out.
+    pub digest: Digest,
+    /// Whether this is itself an answer to a [`Know`]; such a one is answered with what is lacking only.
+    pub answer: bool,
+}
+
+impl Know {
+    pub(crate) fn check(&self) -> Result<(), DecodeError> {
+        let apart = |numbers: &[(u32, u32)]| {
+            numbers.iter().all(|(first, last)| (1..=*last).contains(first))
+                && numbers
+                    .windows(2)
+                    .all(|pair| pair[0].1.checked_add(1).is_some_and(|next| next < pair[1].0))
+        };
+        if !self.samples.is_sorted_by(|a, b| a.author < b.author) {
+            return Err(DecodeError::Impossible("an author twice, or out of order"));
+        }
+        if !self.samples.iter().all(|known| apart(&known.numbers)) {
+            return Err(DecodeError::Impossible("intervals of sample numbers that overlap, or none of them"));
+        }
+        Ok(())
+    }
+}
+
+/// To one neighbour: what instructors said and it has not heard.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lessons {
+    /// One for each instructor and round.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_LESSONS>")]
+    pub lessons: Vec<Lesson>,
+}
+
+impl Lessons {
+    pub(crate) fn check(&self) -> Result<(), DecodeError> {
+        let possible = |lesson: &Lesson| match lesson.word {
+            Word::Was(class) | Word::Not(class) => class.index() < MAX_CLASSES,
+            Word::Retracted => true,
+        };
+        if !self.lessons.iter().all(possible) {
+            return Err(DecodeError::Impossible("a class beyond the largest vocabulary"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,274 @@
+//! What instructors said of which round: one latest word per instructor and round, so that what is heard twice, late
+//! or in another order comes to the same.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+
+/// The most instructors of one round.
+const MAX_INSTRUCTORS: usize = 16;
+
+/// Which gestures a round may have shown, by all that was said of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nobody said anything.
+    Unsaid,
+    /// It was this one.
+    Class(ClassId),
+    /// It was one of several.
+    Among(Candidates),
+    /// All that was said was taken back.
+    Retracted,
+}
+
+/// A set of classes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Candidates(u64);
+
+impl Candidates {
+    /// All of a vocabulary of so many classes.
+    #[must_use]
+    pub fn all(classes: usize) -> Self {
+        Self(if classes >= MAX_CLASSES { u64::MAX } else { (1 << classes) - 1 })
+    }
+
+    /// Whether that class is one of them.
+    #[must_use]
+    pub fn contains(self, class: ClassId) -> bool {
+        class.index() < MAX_CLASSES && self.0 >> class.index() & 1 == 1
+    }
+
+    /// The only one, if it is one.
+    #[must_use]
+    pub fn only(self) -> Option<ClassId> {
+        (self.0.count_ones() == 1).then(|| ClassId(self.0.trailing_zeros() as u8))
+    }
+
+    fn restricted(self, word: Word) -> Self {
+        let bit = |class: ClassId| if class.index() < MAX_CLASSES { 1 << class.index() } else { 0 };
+        match word {
+            Word::Was(class) => Self(self.0 & bit(class)),
+            Word::Not(class) => Self(self.0 & !bit(class)),
+            Word::Retracted => self,
+        }
+    }
+}
+
+/// What came of a lesson.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heard {
+    /// It changed what is known.
+    New,
+    /// It, or a later word of the same instructor, was known.
+    Known,
+    /// There is no room: more instructors of one round than are kept, or a round older than all kept.
+    Full,
+}
+
+/// What every instructor said of every round, as far as it is kept: the latest [`MAX_LESSONS`] rounds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LessonBook {
+    rounds: BTreeMap<RoundId, BTreeMap<InstructorId, (u64, Word)>>,
+    digest: u64,
+}
+
+impl LessonBook {
+    /// Takes in one lesson. Of two words at one time the greater counts, so that all robots keep the same.
+    pub fn hear(&mut self, lesson: &Lesson) -> Heard {
+        let said = (lesson.at, lesson.word);
+        let words = self.rounds.get(&lesson.round);
+        match words.and_then(|words| words.get(&lesson.instructor)) {
+            Some(known) if *known >= said => return Heard::Known,
+            None if words.is_some_and(|words| words.len() >= MAX_INSTRUCTORS) => return Heard::Full,
+            _ => {}
+        }
+        let oldest = self.rounds.keys().next().copied();
+        if words.is_none() && self.rounds.len() >= MAX_LESSONS {
+            if oldest > Some(lesson.round) {
+                return Heard::Full;
+            }
+            self.forget_oldest();
+        }
+        self.digest ^= self.digest_of(lesson.round);
+        self.rounds.entry(lesson.round).or_default().insert(lesson.instructor.clone(), said);
+        self.digest ^= self.digest_of(lesson.round);
+        Heard::New
+    }
+
+    fn forget_oldest(&mut self) {
+        if let Some(oldest) = self.rounds.keys().next().copied() {
+            self.digest ^= self.digest_of(oldest);
+            self.rounds.remove(&oldest);
+        }
+    }
+
+    /// What all that was said of a round comes to, in a vocabulary of so many classes. Where instructors contradict
+    /// each other the latest word counts alone.
+    #[must_use]
+    pub fn verdict(&self, round: RoundId, classes: usize) -> Verdict {
+        let Some(words) = self.rounds.get(&round) else { return Verdict::Unsaid };
+        let valid = words.values().filter(|(_, word)| *word != Word::Retracted);
+        let Some((_, latest)) = valid.clone().max() else { return Verdict::Retracted };
+        let all = Candidates::all(classes);
+        let together = valid.fold(all, |candidates, (_, word)| candidates.restricted(*word));
+        let candidates = if together.0 == 0 { all.restricted(*latest) } else { together };
+        match candidates.only() {
+            Some(class) => Verdict::Class(class),
+            None if candidates.0 == 0 => Verdict::Unsaid,
+            None => Verdict::Among(candidates),
+        }
+    }
+
+    /// Every lesson about a round.
+    pub fn of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
+        self.rounds.get(&round).into_iter().flatten().map(move |(instructor, (at, word))| Lesson {
+            round,
+            instructor: instructor.clone(),
+            at: *at,
+            word: *word,
+        })
+    }
+
+    /// The word of one instructor on a round.
+    #[must_use]
+    pub fn word(&self, round: RoundId, instructor: &InstructorId) -> Option<Word> {
+        Some(self.rounds.get(&round)?.get(instructor)?.1)
+    }
+
+    /// The rounds of which something is known, each with a digest of what.
+    pub fn rounds(&self) -> impl Iterator<Item = (RoundId, u64)> + '_ {
+        self.rounds.keys().map(|round| (*round, self.digest_of(*round)))
+    }
+
+    /// Of how many rounds something is known.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rounds.len()
+    }
+
+    /// Whether nothing is known of any.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rounds.is_empty()
+    }
+
+    /// A digest of everything: the same lessons, heard in whatever order, give the same.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        self.digest
+    }
+
+    /// The digest of what is known of one round, 0 for nothing: FNV-1a over its words.
+    #[must_use]
+    pub fn digest_of(&self, round: RoundId) -> u64 {
+        let Some(words) = self.rounds.get(&round) else { return 0 };
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut add = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        round.counter.to_le_bytes().into_iter().chain(round.opener.0.to_le_bytes()).for_each(&mut add);
+        for (instructor, (at, word)) in words {
+            let (kind, class) = match word {
+                Word::Was(class) => (1, class.0),
+                Word::Not(class) => (2, class.0),
+                Word::Retracted => (3, 0),
+            };
+            instructor.to_string().bytes().chain(at.to_le_bytes()).chain([kind, class]).for_each(&mut add);
+        }
+        hash
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::RobotId;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn lesson(counter: u32, who: &str, at: u64, word: Word) -> Lesson {
+        let round = RoundId { counter, opener: RobotId(1) };
+        Lesson { round, instructor: who.parse().unwrap(), at, word }
+    }
+
+    fn was(class: u8) -> Word {
+        Word::Was(ClassId(class))
+    }
+
+    fn not(class: u8) -> Word {
+        Word::Not(ClassId(class))
+    }
+
+    fn verdict(words: &[(&str, u64, Word)]) -> Verdict {
+        let mut book = LessonBook::default();
+        for (who, at, word) in words {
+            book.hear(&lesson(1, who, *at, *word));
+        }
+        book.verdict(RoundId { counter: 1, opener: RobotId(1) }, 6)
+    }
+
+    #[test]
+    fn words_add_up_and_the_latest_settles_a_contradiction() {
+        let class = |class| Verdict::Class(ClassId(class));
+        assert_eq!(verdict(&[]), Verdict::Unsaid);
+        assert_eq!(verdict(&[("ada", 1, was(3))]), class(3));
+        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, was(4))]), class(4));
+        assert_eq!(verdict(&[("ada", 1, was(3)), ("bob", 2, was(4))]), class(4));
+        assert_eq!(verdict(&[("ada", 1, was(3)), ("bob", 2, not(4))]), class(3), "no contradiction");
+        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, Word::Retracted)]), Verdict::Retracted);
+        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, Word::Retracted), ("bob", 1, was(2))]), class(2));
+        let Verdict::Among(candidates) = verdict(&[("ada", 1, not(3)), ("bob", 2, not(5))]) else {
+            panic!("not one alone")
+        };
+        let left: Vec<u8> = (0..8).filter(|class| candidates.contains(ClassId(*class))).collect();
+        assert_eq!(left, [0, 1, 2, 4]);
+        let four = [("a", 1, not(0)), ("b", 1, not(1)), ("c", 1, not(2)), ("d", 1, not(3)), ("e", 1, not(5))];
+        assert_eq!(verdict(&four), class(4), "only one is left");
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_and_repetition_of_lessons_make_no_difference(
+            lessons in prop::collection::vec((0..4_u32, 0..3_usize, 0..5_u64, 0..3_u8, any::<bool>()), 0..40),
+            order in any::<prop::sample::Index>(),
+        ) {
+            let lessons: Vec<Lesson> = lessons
+                .into_iter()
+                .map(|(round, who, at, class, is)| {
+                    lesson(round, ["ada", "bob", "cyn"][who], at, if is { was(class) } else { not(class) })
+                })
+                .collect();
+            let mut forwards = LessonBook::default();
+            lessons.iter().for_each(|lesson| { forwards.hear(lesson); });
+            let mut turned = LessonBook::default();
+            let middle = order.index(lessons.len() + 1);
+            let twice = lessons[middle..].iter().chain(&lessons[..middle]).rev().chain(&lessons);
+            twice.for_each(|lesson| { turned.hear(lesson); });
+            prop_assert_eq!(forwards.digest(), turned.digest());
+            prop_assert_eq!(forwards, turned);
+        }
+    }
+
+    #[test]
+    fn the_oldest_rounds_are_forgotten_and_not_taken_up_again() {
+        let mut book = LessonBook::default();
+        for counter in 0..MAX_LESSONS as u32 + 10 {
+            assert_eq!(book.hear(&lesson(counter + 5, "ada", 1, was(1))), Heard::New);
+        }
+        assert_eq!(book.len(), MAX_LESSONS);
+        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), Heard::Full);
+        let mut fresh = LessonBook::default();
+        book.rounds.keys().for_each(|round| {
+            fresh.hear(&lesson(round.counter, "ada", 1, was(1)));
+        });
+        assert_eq!(book.digest(), fresh.digest(), "the digest is of what is kept");
+    }
+
+    #[test]
+    fn a_round_has_only_so_many_instructors() {
+        let mut book = LessonBook::default();
+        for i in 0..MAX_INSTRUCTORS {
+            assert_eq!(book.hear(&lesson(1, &format!("i{i}"), 1, was(1))), Heard::New);
+        }
+        assert_eq!(book.hear(&lesson(1, "one-more", 1, was(1))), Heard::Full);
+        assert_eq!(book.hear(&lesson(1, "i3", 2, was(2))), Heard::New, "who is known may speak again");
+    }
+}

@@ -1,0 +1,105 @@
+//! The latest rounds a robot lived through, and what it saw in them: feedback comes after the round.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, RobotId, RoundId};
+
+/// How many rounds are remembered: feedback that comes later than that labels nothing new.
+const MAX_ROUNDS: usize = 32;
+
+/// One round.
+#[derive(Clone, Debug)]
+struct Life {
+    counter: u32,
+    /// All openers it was known under: robots that open at once merge their rounds on the smallest.
+    openers: BTreeSet<RobotId>,
+    last_look: Option<Duration>,
+    looks: usize,
+    /// What was seen and has no label yet.
+    unlabelled: Vec<Vec<f32>>,
+    decision: Option<ClassId>,
+}
+
+/// The latest rounds, oldest first.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lives(VecDeque<Life>);
+
+impl Lives {
+    /// Notes a round, or another name of one; says whether it was news.
+    pub fn enter(&mut self, round: RoundId) -> bool {
+        match self.0.iter_mut().find(|life| life.counter == round.counter) {
+            Some(life) => life.openers.insert(round.opener),
+            None => {
+                self.0.push_back(Life {
+                    counter: round.counter,
+                    openers: [round.opener].into(),
+                    last_look: None,
+                    looks: 0,
+                    unlabelled: Vec::new(),
+                    decision: None,
+                });
+                if self.0.len() > MAX_ROUNDS {
+                    self.0.pop_front();
+                }
+                true
+            }
+        }
+    }
+
+    /// Keeps what was seen, up to `keep` times a round, at least `spacing` apart. Says whether it did.
+    pub fn look(
+        &mut self,
+        now: Duration,
+        round: RoundId,
+        vector: Vec<f32>,
+        keep: usize,
+        spacing: Duration,
+    ) -> bool {
+        self.enter(round);
+        let Some(life) = self.find_mut(round) else { return false };
+        if life.looks >= keep || life.last_look.is_some_and(|last| now < last + spacing) {
+            return false;
+        }
+        (life.last_look, life.looks) = (Some(now), life.looks + 1);
+        life.unlabelled.push(vector);
+        true
+    }
+
+    pub fn looks(&self, round: RoundId) -> usize {
+        self.find(round).map_or(0, |life| life.looks)
+    }
+
+    pub fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
+        self.enter(round);
+        if let Some(life) = self.find_mut(round) {
+            life.decision = class;
+        }
+    }
+
+    pub fn decision(&self, round: RoundId) -> Option<ClassId> {
+        self.find(round)?.decision
+    }
+
+    pub fn contains(&self, round: RoundId) -> bool {
+        self.find(round).is_some()
+    }
+
+    /// What was seen in that round and has no label yet; from now on it has.
+    pub fn take_unlabelled(&mut self, round: RoundId) -> Vec<Vec<f32>> {
+        self.find_mut(round).map(|life| std::mem::take(&mut life.unlabelled)).unwrap_or_default()
+    }
+
+    pub fn newest(&self) -> Option<RoundId> {
+        let life = self.0.back()?;
+        Some(RoundId { counter: life.counter, opener: *life.openers.first()? })
+    }
+
+    fn find(&self, round: RoundId) -> Option<&Life> {
+        self.0.iter().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
+    }
+
+    fn find_mut(&mut self, round: RoundId) -> Option<&mut Life> {
+        self.0.iter_mut().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
+    }
+}

@@ -1,0 +1,72 @@
+//! Robots that learn, in a feature space without pictures.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_peer::link::RobotLearning;
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{
+    Classify, Components, FeatureSpace, LearningConfig, MindConfig, Observation, ScalingMethod,
+};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use crate::Fixed;
+
+/// How many raw features there are, and how many coordinates in the space.
+const FEATURES: usize = 12;
+const COMPONENTS: usize = 8;
+
+/// What a frame of that gesture shows: its own corner of the space, and some chance.
+#[must_use]
+pub fn gesture(class: ClassId, rng: &mut impl Rng) -> Observation {
+    let features = (0..FEATURES).map(|i| {
+        let chance = (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
+        if i % 6 == class.index() { 2.0 + chance } else { chance }
+    });
+    Observation { features: features.collect(), quality: 1.0 }
+}
+
+/// The feature space of all learning robots here.
+///
+/// # Panics
+/// Never: the observations are of one length.
+#[must_use]
+pub fn space() -> Arc<FeatureSpace> {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let rows: Vec<Vec<f32>> = (0..120).map(|i| gesture(ClassId(i % 6), &mut rng).features).collect();
+    let rows = rows.iter().map(Vec::as_slice);
+    let keep = Components::Count(COMPONENTS);
+    Arc::new(FeatureSpace::fit("test", rows, ScalingMethod::PerComponent, keep, &mut rng))
+}
+
+/// How a robot learns that keeps `keep` observations of each round and shares the part `fraction` of them.
+#[must_use]
+pub fn learning(keep: usize, fraction: f64, memory: Option<PathBuf>) -> RobotLearning {
+    let config = LearningConfig {
+        keep,
+        spacing: Duration::from_millis(20),
+        share_fraction: fraction,
+        share_bytes: None,
+        ..LearningConfig::default()
+    };
+    RobotLearning {
+        config,
+        space: space(),
+        vocabulary: Fixed::default().vocabulary().clone(),
+        base: None,
+        memory,
+        seed: 1,
+    }
+}
+
+/// Short rounds: robots that know no gesture yet would wait for nothing.
+#[must_use]
+pub fn short_rounds() -> MindConfig {
+    MindConfig {
+        patience: Duration::from_millis(300),
+        deadline: Duration::from_millis(1200),
+        ..MindConfig::default()
+    }
+}
