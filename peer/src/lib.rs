@@ -21,6 +21,9 @@ pub mod confusion;
 pub mod dataset;
 pub mod emulation;
 #[cfg(feature = "opencv")]
+pub mod experiment;
+pub mod explain;
+#[cfg(feature = "opencv")]
 pub mod eye;
 #[cfg(feature = "opencv")]
 pub mod human;

@@ -5,6 +5,7 @@ mod config_args;
 mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
+mod explain;
 mod open;
 #[cfg(feature = "opencv")]
 mod peer;
@@ -55,6 +56,8 @@ enum Verb {
     Evaluate(evaluate::Args),
     /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares
     Emulate(emulate::Args),
+    /// Draw what each rule of selection or forgetting picks
+    Explain(explain::Args),
     /// Check a robot's configuration
     Config(config::Args),
 }
@@ -84,6 +87,7 @@ impl Command {
             #[cfg(feature = "opencv")]
             Verb::Evaluate(args) => evaluate::run(args),
             Verb::Emulate(args) => emulate::run(&args),
+            Verb::Explain(args) => explain::run(&args),
             Verb::Config(args) => config::run(&args),
         }
     }

@@ -4,6 +4,7 @@
 //! every machine, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
 //! shortest ways of what the robots believe to be connected, and are lost hop by hop.
 
+mod learning;
 mod network;
 mod observer;
 mod record;
@@ -15,14 +16,17 @@ mod swarm;
 mod trace;
 
 use std::io;
+use std::sync::Arc;
 
+pub use learning::{Feedback, School, Teaching};
+pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
-pub use report::{BytesPerRobot, Report, Summary, Table};
-pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Scenario, ScenarioError, View};
+pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
+pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Order, Scenario, ScenarioError, View};
 pub use statistics::{Mean, Proportion};
 pub use trace::{Brief, Happening, Trace};
 
-use gestalt_strategies::Vocabulary;
+use gestalt_strategies::{Classifier, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -31,8 +35,7 @@ use swarm::Swarm;
 /// # Errors
 /// A [`ScenarioError`] for a scenario that cannot be run.
 pub fn run(scenario: &Scenario, seed: u64) -> Result<Report, ScenarioError> {
-    scenario.validate()?;
-    let (report, _) = run_with(scenario, seed, statistical_observers(scenario)?, Trace::none())?;
+    let (report, _) = run_traced(scenario, seed, Trace::none())?;
     Ok(report)
 }
 
@@ -45,7 +48,10 @@ pub fn run_traced<'a>(
     seed: u64,
     trace: Trace<'a>,
 ) -> Result<(Report, io::Result<()>), ScenarioError> {
-    run_with(scenario, seed, statistical_observers(scenario)?, trace)
+    scenario.validate()?;
+    let mut observers = statistical_observers(scenario)?;
+    let school = school_of_scores(scenario, &mut observers)?;
+    Ok(Emulation::new(scenario, seed, observers, school, trace)?.finish())
 }
 
 /// Runs a scenario with eyes of one's own, one per robot, in place of the views it describes.
@@ -58,14 +64,76 @@ pub fn run_with<'a>(
     observers: Vec<Box<dyn Observer>>,
     trace: Trace<'a>,
 ) -> Result<(Report, io::Result<()>), ScenarioError> {
-    scenario.validate()?;
-    if observers.len() != scenario.swarm_size() {
-        let mend =
-            format!("{} robots, but {} observers: give each one", scenario.swarm_size(), observers.len());
-        return Err(ScenarioError::Value { key: "robots", mend });
+    Ok(Emulation::new(scenario, seed, observers, None, trace)?.finish())
+}
+
+/// A run of a scenario that can be looked into after each showing.
+pub struct Emulation<'a> {
+    swarm: Swarm<'a>,
+    scenario: &'a Scenario,
+    seed: u64,
+    shown: u32,
+}
+
+impl<'a> Emulation<'a> {
+    /// A run that has not begun, with one pair of eyes per robot; robots that learn need a school.
+    ///
+    /// # Errors
+    /// A [`ScenarioError`] for a scenario that cannot be run, another number of eyes than of robots, or a school
+    /// where nobody learns or none where robots do.
+    pub fn new(
+        scenario: &'a Scenario,
+        seed: u64,
+        observers: Vec<Box<dyn Observer>>,
+        school: Option<Arc<School>>,
+        trace: Trace<'a>,
+    ) -> Result<Self, ScenarioError> {
+        scenario.validate()?;
+        if observers.len() != scenario.swarm_size() {
+            let mend =
+                format!("{} robots, but {} observers: give each one", scenario.swarm_size(), observers.len());
+            return Err(ScenarioError::Value { key: "robots", mend });
+        }
+        if school.is_some() != scenario.learning.is_some() {
+            let mend = "robots learn with a school, and only then: give both or none".to_owned();
+            return Err(ScenarioError::Value { key: "learning", mend });
+        }
+        Ok(Self { swarm: Swarm::new(scenario, seed, observers, school, trace), scenario, seed, shown: 0 })
     }
-    let (record, network, written) = Swarm::new(scenario, seed, observers, trace).run();
-    Ok((Report::new(seed, &record, &network), written))
+
+    /// Shows the next gesture and runs until the one after it is due; false when there is none left.
+    pub fn show_next(&mut self) -> bool {
+        if self.shown == self.scenario.rounds {
+            return false;
+        }
+        self.shown += 1;
+        self.swarm.pass(self.scenario.showing_at(self.shown));
+        true
+    }
+
+    /// The classifier of a robot, by its position, after learning from all it holds; `None` of a robot that does not
+    /// learn, is down, or never met a sample.
+    pub fn classifier(&mut self, robot: usize) -> Option<Arc<Classifier>> {
+        self.swarm.learned(robot)
+    }
+
+    /// The samples a robot holds, by its position.
+    #[must_use]
+    pub fn training_set(&self, robot: usize) -> Option<&TrainingSet> {
+        self.swarm.mind(robot)?.training_set()
+    }
+
+    /// What a robot has sent so far, by its position.
+    #[must_use]
+    pub fn traffic(&self, robot: usize) -> Traffic {
+        self.swarm.traffic(robot)
+    }
+
+    /// Runs to the end; the second value says whether the trace could be written.
+    pub fn finish(self) -> (Report, io::Result<()>) {
+        let (record, network, learned, written) = self.swarm.run();
+        (Report::new(self.seed, &record, &network, learned), written)
+    }
 }
 
 /// Runs a scenario under each of its fusion rules (its own one if it compares none) over the same seeds, from 0:
@@ -93,9 +161,26 @@ pub fn compare(
     Ok(summaries)
 }
 
+fn school_of_scores(
+    scenario: &Scenario,
+    observers: &mut [Box<dyn Observer>],
+) -> Result<Option<Arc<School>>, ScenarioError> {
+    let Some(teaching) = &scenario.learning else { return Ok(None) };
+    let Some(seeing) = observers.iter_mut().find(|observer| observer.classifier().is_some()) else {
+        let mend = "nobody sees anything to learn from: give a group a view".to_owned();
+        return Err(ScenarioError::Value { key: "robots", mend });
+    };
+    let school = School::of_scores(&mut **seeing, vocabulary(scenario)?, teaching.robots.learner.clone())?;
+    Ok(Some(Arc::new(school)))
+}
+
+fn vocabulary(scenario: &Scenario) -> Result<Vocabulary, ScenarioError> {
+    Vocabulary::new((0..scenario.classes).map(|class| class.to_string()))
+        .map_err(|error| ScenarioError::Value { key: "classes", mend: error.to_string() })
+}
+
 fn statistical_observers(scenario: &Scenario) -> Result<Vec<Box<dyn Observer>>, ScenarioError> {
-    let vocabulary = Vocabulary::new((0..scenario.classes).map(|class| class.to_string()))
-        .map_err(|error| ScenarioError::Value { key: "classes", mend: error.to_string() })?;
+    let vocabulary = vocabulary(scenario)?;
     let eyes = |view: Option<View>| -> Box<dyn Observer> {
         match view {
             Some(view) => Box::new(StatisticalObserver::new(view, vocabulary.clone())),

@@ -1,6 +1,7 @@
 //! The links between emulated robots: what is connected, who knows it, and what a message costs on its way.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::Sum;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -28,15 +29,49 @@ pub(super) enum Change {
 
 /// Bytes a robot has put on its links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Traffic {
+pub struct Traffic {
     /// Its own votes.
     pub votes: u64,
-    /// What it tells its neighbours for repair.
+    /// What it tells its neighbours for repair, but samples.
     pub repair: u64,
     /// The decisions it holds or announces.
     pub decisions: u64,
-    /// What it passed on for others.
+    /// What instructors said through it, and its answers.
+    pub words: u64,
+    /// What it passed on for others, but samples.
     pub relayed: u64,
+    /// Its own samples, once for each link they left it by.
+    pub samples: u64,
+    /// Samples it passed on for others.
+    pub relayed_samples: u64,
+    /// Samples it told its neighbours for repair.
+    pub repair_samples: u64,
+    /// Its own samples, counted once however many links they left it by: what it published.
+    pub published_samples: u64,
+}
+
+impl Traffic {
+    /// All samples it put on its links: its own, those of others, and again for repair.
+    #[must_use]
+    pub fn samples_on_links(&self) -> u64 {
+        self.samples + self.relayed_samples + self.repair_samples
+    }
+}
+
+impl Sum for Traffic {
+    fn sum<I: Iterator<Item = Self>>(robots: I) -> Self {
+        robots.fold(Self::default(), |sum, robot| Self {
+            votes: sum.votes + robot.votes,
+            repair: sum.repair + robot.repair,
+            decisions: sum.decisions + robot.decisions,
+            words: sum.words + robot.words,
+            relayed: sum.relayed + robot.relayed,
+            samples: sum.samples + robot.samples,
+            relayed_samples: sum.relayed_samples + robot.relayed_samples,
+            repair_samples: sum.repair_samples + robot.repair_samples,
+            published_samples: sum.published_samples + robot.published_samples,
+        })
+    }
 }
 
 /// What a broadcast carries, for the accounts.
@@ -44,6 +79,8 @@ pub(super) struct Traffic {
 pub(super) enum Kind {
     Vote,
     Decision,
+    Words,
+    Samples,
 }
 
 /// Links, what robots believe of them, and the routes that follow.
@@ -52,6 +89,8 @@ pub(super) struct Network {
     rng: ChaCha8Rng,
     /// Every link there is, and whether it carries anything now.
     links: BTreeMap<Link, bool>,
+    /// Who has a link to whom, working or not.
+    adjacent: Vec<Vec<usize>>,
     presence: Vec<Presence>,
     /// Links and robots that are believed to work: what routing goes by.
     believed_links: BTreeSet<Link>,
@@ -62,9 +101,16 @@ pub(super) struct Network {
 
 impl Network {
     pub fn new(size: usize, links: Vec<Link>, model: LinkModel, rng: ChaCha8Rng) -> Self {
+        let mut adjacent = vec![Vec::new(); size];
+        for &(a, b) in &links {
+            adjacent[a].push(b);
+            adjacent[b].push(a);
+        }
+        adjacent.iter_mut().for_each(|others| others.sort_unstable());
         Self {
             model,
             rng,
+            adjacent,
             links: links.iter().map(|link| (*link, true)).collect(),
             presence: vec![Presence::Up; size],
             believed_links: links.into_iter().collect(),
@@ -125,11 +171,10 @@ impl Network {
 
     /// The robots that this one believes itself linked to.
     pub fn neighbours(&self, robot: usize) -> Vec<usize> {
-        let believed = |other: &usize| self.believed_robots[*other];
-        (0..self.size())
-            .filter(|other| self.believed_links.contains(&link(robot, *other)))
-            .filter(believed)
-            .collect()
+        let believed = |other: &usize| {
+            self.believed_robots[*other] && self.believed_links.contains(&link(robot, *other))
+        };
+        self.adjacent[robot].iter().copied().filter(believed).collect()
     }
 
     /// The robots that this one believes alive: those it can reach, itself included.
@@ -152,13 +197,19 @@ impl Network {
         let mut taken = vec![None; self.size()];
         taken[origin] = Some(Duration::ZERO);
         let mut arrivals = Vec::new();
+        if kind == Kind::Samples {
+            self.traffic[origin].published_samples += bytes as u64;
+        }
         for &(from, to) in self.route(origin).iter() {
             let Some(so_far) = taken[from] else { continue };
             let traffic = &mut self.traffic[from];
             let account = match kind {
+                Kind::Samples if from != origin => &mut traffic.relayed_samples,
                 _ if from != origin => &mut traffic.relayed,
                 Kind::Vote => &mut traffic.votes,
                 Kind::Decision => &mut traffic.decisions,
+                Kind::Words => &mut traffic.words,
+                Kind::Samples => &mut traffic.samples,
             };
             *account += bytes as u64;
             let Some(hop) = self.hop(from, to) else { continue };
@@ -171,11 +222,12 @@ impl Network {
     }
 
     /// Sends something to one neighbour: how long it takes, if it arrives.
-    pub fn tell(&mut self, from: usize, to: usize, bytes: usize) -> Option<Duration> {
+    pub fn tell(&mut self, from: usize, to: usize, bytes: usize, samples: bool) -> Option<Duration> {
         if !self.believed_links.contains(&link(from, to)) {
             return None;
         }
-        self.traffic[from].repair += bytes as u64;
+        let traffic = &mut self.traffic[from];
+        *(if samples { &mut traffic.repair_samples } else { &mut traffic.repair }) += bytes as u64;
         self.hop(from, to)
     }
 
@@ -213,6 +265,18 @@ mod tests {
     }
 
     #[test]
+    fn samples_have_an_account_of_their_own() {
+        let mut line = network(Topology::Line, 3, 0.0);
+        line.broadcast(1, 10, Kind::Samples);
+        line.broadcast(0, 1, Kind::Samples);
+        line.tell(1, 2, 100, true);
+        let middle = line.traffic[1];
+        assert_eq!((middle.samples, middle.relayed_samples, middle.repair_samples), (20, 1, 100));
+        assert_eq!((middle.published_samples, middle.samples_on_links()), (10, 121));
+        assert_eq!(Traffic { votes: 0, relayed: 0, repair: 0, ..middle }, middle);
+    }
+
+    #[test]
     fn what_a_silent_cut_swallows_is_lost_until_it_is_noticed() {
         let mut ring = network(Topology::Ring, 4, 0.0);
         ring.set_link((0, 1), false);
@@ -243,7 +307,7 @@ mod tests {
     #[test]
     fn only_a_direct_neighbour_can_be_told() {
         let mut line = network(Topology::Line, 3, 0.0);
-        assert!(line.tell(0, 1, 10).is_some());
-        assert_eq!(line.tell(0, 2, 10), None);
+        assert!(line.tell(0, 1, 10, false).is_some());
+        assert_eq!(line.tell(0, 2, 10, false), None);
     }
 }

@@ -45,6 +45,8 @@ pub struct Report {
     pub vote_bytes_per_open_second: f64,
     /// Bytes that a robot puts on its links over the whole run, on average, by purpose.
     pub bytes_per_robot: BytesPerRobot,
+    /// What robots have learned from at the end, if they learn.
+    pub learned: Option<Learned>,
 }
 
 /// Bytes that a robot puts on its links, without what the transport adds.
@@ -56,12 +58,29 @@ pub struct BytesPerRobot {
     pub repair: f64,
     /// The decisions it holds and announces.
     pub decisions: f64,
-    /// What it passes on for others.
+    /// What instructors said through it, and its answers.
+    pub words: f64,
+    /// What it passes on for others, but samples.
     pub relayed: f64,
+    /// The samples it published, whatever its number of links.
+    pub published_samples: f64,
+    /// All samples on its links: its own, those it passes on, and those told for repair.
+    pub samples_on_links: f64,
+}
+
+/// What robots have learned from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Learned {
+    /// Samples held per robot that is up.
+    pub samples: Mean,
+    /// Of them those known to all: shared by it or by others.
+    pub common: Mean,
+    /// Whether all robots that are up have the same common knowledge.
+    pub alike: bool,
 }
 
 impl Report {
-    pub(super) fn new(seed: u64, record: &Record, network: &Network) -> Self {
+    pub(super) fn new(seed: u64, record: &Record, network: &Network, learned: Option<Learned>) -> Self {
         let opened: Vec<&Showing> = record.showings.iter().filter(|s| s.counter.is_some()).collect();
         let rounds = opened.len() as u64;
         let count = |holds: &dyn Fn(&Showing) -> bool| opened.iter().filter(|s| holds(s)).count() as u64;
@@ -76,7 +95,7 @@ impl Report {
             .collect();
         let mut held = network.up().map(|robot| &record.holds[robot]);
         let first = held.next();
-        let total = sum(&network.traffic);
+        let total: Traffic = network.traffic.iter().copied().sum();
         let robots = network.size();
         let share = |bytes: u64| bytes as f64 / robots as f64;
         let ms = |showing: &Showing, at: Duration| (at - showing.at).as_secs_f64() * 1e3;
@@ -113,19 +132,14 @@ impl Report {
                 votes: share(total.votes),
                 repair: share(total.repair),
                 decisions: share(total.decisions),
+                words: share(total.words),
                 relayed: share(total.relayed),
+                published_samples: share(total.published_samples),
+                samples_on_links: share(total.samples_on_links()),
             },
+            learned,
         }
     }
-}
-
-fn sum(traffic: &[Traffic]) -> Traffic {
-    traffic.iter().fold(Traffic::default(), |sum, robot| Traffic {
-        votes: sum.votes + robot.votes,
-        repair: sum.repair + robot.repair,
-        decisions: sum.decisions + robot.decisions,
-        relayed: sum.relayed + robot.relayed,
-    })
 }
 
 fn likeliest(probabilities: &[f64]) -> Option<usize> {

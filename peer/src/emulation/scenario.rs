@@ -4,10 +4,11 @@ use std::path::Path;
 use std::time::Duration;
 
 use gestalt_protocol::{FusionRule, MAX_CLASSES, RobotId};
-use gestalt_strategies::{MindConfig, MindConfigError};
+use gestalt_strategies::{LearnError, LearningConfigError, MindConfig, MindConfigError};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::learning::Teaching;
 use crate::topology::Topology;
 
 /// A scenario that cannot be run; nothing was.
@@ -42,6 +43,12 @@ pub enum ScenarioError {
     /// Parameters no mind can work with.
     #[error("mind: {0}")]
     Mind(#[from] MindConfigError),
+    /// Parameters no robot can learn with.
+    #[error("learning.robots: {0}")]
+    Learning(#[from] LearningConfigError),
+    /// Nothing that support vector machines can be trained with.
+    #[error("learning: {0}")]
+    Learner(#[from] LearnError),
 }
 
 /// An emulated swarm and what happens to it. Times count from the start.
@@ -61,12 +68,18 @@ pub struct Scenario {
     /// How many gestures are shown.
     #[serde(default = "twenty")]
     pub rounds: u32,
+    /// Which of them when.
+    #[serde(default)]
+    pub order: Order,
     /// From one showing to the next; the first is after one interval of calm, and one follows the last.
     #[serde(default = "seven_seconds", with = "humantime_serde")]
     pub interval: Duration,
     /// How every robot takes part.
     #[serde(default)]
     pub mind: MindConfig,
+    /// How robots learn, if they do. Who has a classifier by its view then starts without it.
+    #[serde(default)]
+    pub learning: Option<Teaching>,
     /// What goes wrong, and when it is mended.
     #[serde(default)]
     pub faults: Vec<Fault>,
@@ -79,6 +92,17 @@ pub struct Scenario {
     /// How many seeds a report is made over, unless the command line says otherwise.
     #[serde(default = "twenty")]
     pub seeds: u32,
+}
+
+/// Which gesture is shown when.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// Any, each time.
+    #[default]
+    Random,
+    /// All, one after the other in an order left to chance; then all again.
+    InTurn,
 }
 
 /// Robots of one kind.
@@ -275,6 +299,12 @@ impl Scenario {
             }
         }
         self.mind.validate()?;
+        if let Some(teaching) = &self.learning {
+            teaching.robots.validate()?;
+            if teaching.after >= self.interval {
+                return wrong("learning.after", "speak before the next gesture is shown".to_owned());
+            }
+        }
         for contender in &self.compare {
             self.contending(*contender).mind.validate()?;
         }

@@ -2,18 +2,25 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, Envelope, RobotId};
-use gestalt_strategies::{Input, Mind, MindConfig, Output};
+use gestalt_protocol::{
+    Answer, ClassId, Decision, Envelope, Gesture, Instruction, InstructorId, Message, RobotId,
+};
+use gestalt_strategies::{Classifier, Classify, Input, Instructed, Mind, MindConfig, Output};
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::network::{Change, Kind, Network, Presence};
+use super::learning::{Feedback, Pupil, School};
+use super::network::{Change, Kind, Network, Presence, Traffic};
 use super::observer::Observer;
 use super::record::Record;
+use super::report::Learned;
 use super::route::link;
-use super::scenario::{Event, Scenario};
+use super::scenario::{Event, Order, Scenario};
+use super::statistics::Mean;
 use super::trace::{Happening, Trace};
 
 /// What waits for a frozen robot, at most; what comes after is lost, as in a full buffer.
@@ -22,6 +29,11 @@ const WAITING: usize = 10_000;
 /// Streams of the seed: one for the network, one for the course of events, and one for what each robot sees.
 const NETWORK: u64 = u64::MAX;
 const COURSE: u64 = u64::MAX - 1;
+/// The first of those by which robots share and forget, one for each life of each robot.
+const LEARNING: u64 = 1 << 63;
+
+/// Who teaches.
+const INSTRUCTOR: &str = "script";
 
 /// What is to happen at some time.
 enum Due {
@@ -33,6 +45,12 @@ enum Due {
     /// The next frame of that robot, as long as it looks for the `n`th time.
     Frame(usize, u32),
     Arrive(usize, Parcel),
+    /// One parcel on its way to many: when it arrives at whom, the next first.
+    Spread(VecDeque<(Duration, usize)>, Parcel),
+    /// The instructor speaks of that showing, through that robot if it is up.
+    Teach(u32, usize),
+    /// What that robot was to remember in that life, up to that revision, is on its disk.
+    Remembered(usize, u32, u64),
 }
 
 /// What travels.
@@ -41,6 +59,8 @@ enum Parcel {
     Said(Rc<Envelope>),
     Held(RobotId, Rc<Decision>),
     Announced(Rc<Decision>),
+    Instructed(Rc<Instructed>),
+    Answered(InstructorId, u64, RobotId),
 }
 
 struct Robot {
@@ -55,12 +75,15 @@ struct Robot {
     looking: bool,
     looks: u32,
     waiting: VecDeque<Parcel>,
+    /// None of a robot that does not learn.
+    pupil: Option<Pupil>,
     knows: (BTreeSet<usize>, Vec<usize>),
 }
 
 /// A run of a scenario.
 pub(super) struct Swarm<'a> {
     scenario: &'a Scenario,
+    school: Option<Arc<School>>,
     seed: u64,
     now: Duration,
     queue: BTreeMap<(Duration, u64), Due>,
@@ -69,6 +92,8 @@ pub(super) struct Swarm<'a> {
     robots: Vec<Robot>,
     course: ChaCha8Rng,
     shown: ClassId,
+    /// The gestures still to be shown before all have been.
+    turn: Vec<ClassId>,
     record: Record,
     trace: Trace<'a>,
 }
@@ -85,6 +110,7 @@ impl<'a> Swarm<'a> {
         scenario: &'a Scenario,
         seed: u64,
         observers: Vec<Box<dyn Observer>>,
+        school: Option<Arc<School>>,
         trace: Trace<'a>,
     ) -> Self {
         let mut rng = stream(seed, NETWORK);
@@ -103,12 +129,14 @@ impl<'a> Swarm<'a> {
                 looking: false,
                 looks: 0,
                 waiting: VecDeque::new(),
+                pupil: school.as_ref().map(|_| Pupil::default()),
                 knows: Default::default(),
             })
             .collect();
         let record = Record::new(robots.len());
         let mut swarm = Self {
             scenario,
+            school,
             seed,
             now: Duration::ZERO,
             queue: BTreeMap::new(),
@@ -117,6 +145,7 @@ impl<'a> Swarm<'a> {
             robots,
             course: stream(seed, COURSE),
             shown: ClassId(0),
+            turn: Vec::new(),
             record,
             trace,
         };
@@ -130,19 +159,46 @@ impl<'a> Swarm<'a> {
         swarm
     }
 
-    /// Runs to the end of the scenario: an interval after the last showing.
-    pub fn run(mut self) -> (Record, Network, std::io::Result<()>) {
-        let end = self.scenario.showing_at(self.scenario.rounds);
-        while let Some(((at, _), due)) = self.queue.pop_first() {
-            if at > end {
-                break;
-            }
+    /// Lets everything happen that is due before that time.
+    pub fn pass(&mut self, until: Duration) {
+        while let Some(next) = self.queue.first_entry().filter(|next| next.key().0 < until) {
+            let ((at, _), due) = next.remove_entry();
             self.now = at;
             self.happen(due);
         }
+    }
+
+    /// Runs to the end of the scenario: an interval after the last showing.
+    pub fn run(mut self) -> (Record, Network, Option<Learned>, std::io::Result<()>) {
+        let end = self.scenario.showing_at(self.scenario.rounds);
+        self.pass(end + Duration::from_nanos(1));
         self.now = end;
         self.end_showing();
-        (self.record, self.network, self.trace.finish())
+        let learned = self.school.is_some().then(|| self.summed_up());
+        (self.record, self.network, learned, self.trace.finish())
+    }
+
+    pub fn mind(&self, i: usize) -> Option<&Mind> {
+        self.robots[i].mind.as_ref()
+    }
+
+    pub fn traffic(&self, i: usize) -> Traffic {
+        self.network.traffic[i]
+    }
+
+    /// What that robot judges by after learning from all it holds.
+    pub fn learned(&mut self, i: usize) -> Option<Arc<Classifier>> {
+        self.train(i);
+        self.robots[i].pupil.as_ref()?.classifier().cloned()
+    }
+
+    fn summed_up(&self) -> Learned {
+        let statuses = || self.network.up().filter_map(|i| self.robots[i].mind.as_ref()?.learned());
+        let numbers = |parts: &[&[usize]]| parts.iter().flat_map(|part| part.iter()).sum::<usize>() as f64;
+        let held: Vec<f64> = statuses().map(|s| numbers(&[&s.personal, &s.shared, &s.external])).collect();
+        let common: Vec<f64> = statuses().map(|s| numbers(&[&s.shared, &s.external])).collect();
+        let alike = statuses().map(|status| status.common).collect::<BTreeSet<_>>().len() <= 1;
+        Learned { samples: Mean::of(&held), common: Mean::of(&common), alike }
     }
 
     fn happen(&mut self, due: Due) {
@@ -162,6 +218,13 @@ impl<'a> Swarm<'a> {
             }
             Due::Frame(robot, looks) => self.frame(robot, looks),
             Due::Arrive(robot, parcel) => self.arrive(robot, parcel),
+            Due::Spread(arrivals, parcel) => self.spread(arrivals, parcel),
+            Due::Teach(n, robot) => self.teach(n, robot),
+            Due::Remembered(robot, boot, revision) => {
+                if self.robots[robot].boot == boot {
+                    self.tell_mind(robot, Input::Remembered(revision));
+                }
+            }
         }
     }
 
@@ -177,7 +240,7 @@ impl<'a> Swarm<'a> {
     /// Another gesture is shown to all; one of the robots that can notices it first.
     fn show(&mut self, n: u32) {
         self.end_showing();
-        self.shown = ClassId(self.course.random_range(0..self.scenario.classes as u64) as u8);
+        self.shown = self.draw_gesture();
         let luck = self.course.random::<u64>();
         for (i, robot) in self.robots.iter_mut().enumerate() {
             // A stream of its own for each showing and robot: all fusion rules are shown the same frames.
@@ -197,6 +260,55 @@ impl<'a> Swarm<'a> {
         // A robot that is still busy with the round before does not open another.
         let opened = after.filter(|round| Some(*round) != before);
         self.record.show(self.now, self.shown, opened.map(|round| round.counter));
+        if let Some(teaching) = self.scenario.learning.as_ref().filter(|_| opened.is_some()) {
+            self.at(self.now + teaching.after, Due::Teach(n, opener));
+        }
+    }
+
+    fn draw_gesture(&mut self) -> ClassId {
+        let classes = self.scenario.classes;
+        match self.scenario.order {
+            Order::Random => ClassId(self.course.random_range(0..classes as u64) as u8),
+            Order::InTurn => {
+                if self.turn.is_empty() {
+                    self.turn = (0..classes).map(|class| ClassId(class as u8)).collect();
+                    self.turn.shuffle(&mut self.course);
+                }
+                self.turn.pop().unwrap_or(ClassId(0))
+            }
+        }
+    }
+
+    /// The instructor, who stands at that robot, says what it was that was shown.
+    fn teach(&mut self, n: u32, i: usize) {
+        let Some(teaching) = &self.scenario.learning else { return };
+        let mind = self.robots[i].mind.as_ref().filter(|_| self.network.presence(i) == Presence::Up);
+        let Some((mind, round)) = mind.and_then(|mind| Some((mind, mind.round()?))) else { return };
+        let instruction = match (teaching.feedback, mind.held().and_then(|held| held.class)) {
+            (Feedback::Full, _) => Instruction::Was { round, class: Gesture::Class(self.shown) },
+            (Feedback::Partial, Some(decided)) if decided == self.shown => Instruction::Right { round },
+            (Feedback::Partial, Some(_)) => Instruction::Wrong { round },
+            (Feedback::Partial, None) | (Feedback::None, _) => return,
+        };
+        let robot = self.robots[i].id;
+        self.note(&Happening::Instruct { robot, instruction: &instruction });
+        let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
+        let bytes = json_bytes(&instruction);
+        let instructed = Rc::new(Instructed { by, at: u64::from(n), instruction });
+        self.broadcast(i, bytes, Kind::Words, &Parcel::Instructed(instructed.clone()));
+        self.arrive(i, Parcel::Instructed(instructed));
+    }
+
+    /// Makes a robot's classifier follow its samples.
+    fn train(&mut self, i: usize) {
+        let up = self.network.presence(i) == Presence::Up;
+        let Some(pupil) = self.robots[i].pupil.as_mut().filter(|_| up) else { return };
+        if let Some(classifier) = pupil.learn() {
+            let samples =
+                self.robots[i].mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
+            self.note(&Happening::Learn { robot: self.robots[i].id, samples });
+            self.tell_mind(i, Input::Learned(classifier));
+        }
     }
 
     fn end_showing(&mut self) {
@@ -214,6 +326,7 @@ impl<'a> Swarm<'a> {
                 let i = index(robot);
                 self.robots[i].mind = None;
                 self.robots[i].waiting.clear();
+                self.robots[i].pupil.iter_mut().for_each(Pupil::stop);
                 self.record.forget(i);
                 self.change_presence(i, Presence::Down);
             }
@@ -267,9 +380,25 @@ impl<'a> Swarm<'a> {
         robot.looking = false;
         robot.knows = Default::default();
         let config: MindConfig = self.scenario.mind.clone();
-        robot.mind = Mind::new(robot.id, robot.boot, config).ok();
-        if let Some(classifier) = robot.observer.classifier() {
-            self.tell_mind(i, Input::Learned(classifier));
+        let classifier: Option<Arc<dyn Classify>> =
+            match (&mut robot.pupil, &self.school, &self.scenario.learning) {
+                (Some(pupil), Some(school), Some(teaching)) => {
+                    let life = LEARNING | u64::from(robot.boot) << 32 | i as u64;
+                    let rng = stream(self.seed, life);
+                    let me = (robot.id, robot.boot);
+                    robot.mind = Some(pupil.start(me, config, school, &teaching.robots, rng));
+                    pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>)
+                }
+                _ => {
+                    robot.mind = Mind::new(robot.id, robot.boot, config).ok();
+                    robot.observer.classifier()
+                }
+            };
+        match classifier {
+            Some(classifier) => self.tell_mind(i, Input::Learned(classifier)),
+            // What it remembers is to be trained.
+            None if self.school.is_some() => self.tell_mind(i, Input::Tick),
+            None => {}
         }
     }
 
@@ -277,7 +406,8 @@ impl<'a> Swarm<'a> {
         for parcel in std::mem::take(&mut self.robots[i].waiting) {
             self.arrive(i, parcel);
         }
-        self.tell_mind(i, Input::Tick);
+        let remembered = self.robots[i].pupil.as_ref().map(|pupil| pupil.remembered);
+        self.tell_mind(i, remembered.map_or(Input::Tick, Input::Remembered));
         self.tell_who_is_there();
     }
 
@@ -301,22 +431,39 @@ impl<'a> Swarm<'a> {
     }
 
     fn frame(&mut self, i: usize, looks: u32) {
-        let robot = &mut self.robots[i];
-        if !robot.looking || robot.looks != looks {
+        let looks_still = |robot: &Robot| robot.looking && robot.looks == looks;
+        if !looks_still(&self.robots[i]) {
             return;
         }
+        // A robot that learns does so before it looks again, not sooner: nobody asks before.
+        self.train(i);
+        let robot = &mut self.robots[i];
         let next = self.now + Duration::from_secs_f64(robot.observer.period());
         if self.network.presence(i) == Presence::Up
             && let Some(observation) = robot.observer.frame(&mut robot.rng)
         {
-            if let Some(p) =
-                robot.observer.classifier().and_then(|c| c.probabilities(&observation.features).ok())
-            {
+            let classifier: Option<Arc<dyn Classify>> = match &robot.pupil {
+                Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
+                None => robot.observer.classifier(),
+            };
+            if let Some(p) = classifier.and_then(|c| c.probabilities(&observation.features).ok()) {
                 self.record.frame(&p, self.shown);
             }
             self.tell_mind(i, Input::Observed(observation));
         }
         self.at(next, Due::Frame(i, looks));
+    }
+
+    /// Lets a parcel arrive where it is due, and waits for the rest: of a broadcast to a thousand robots one event is
+    /// queued, not a thousand.
+    fn spread(&mut self, mut arrivals: VecDeque<(Duration, usize)>, parcel: Parcel) {
+        while let Some((at, to)) = arrivals.pop_front() {
+            if at > self.now {
+                arrivals.push_front((at, to));
+                return self.at(at, Due::Spread(arrivals, parcel));
+            }
+            self.arrive(to, parcel.clone());
+        }
     }
 
     fn arrive(&mut self, i: usize, parcel: Parcel) {
@@ -333,6 +480,8 @@ impl<'a> Swarm<'a> {
                     Parcel::Said(envelope) => Input::Received((*envelope).clone()),
                     Parcel::Held(robot, decision) => Input::Heard(robot, (*decision).clone()),
                     Parcel::Announced(decision) => Input::Announced((*decision).clone()),
+                    Parcel::Instructed(instructed) => Input::Instructed((*instructed).clone()),
+                    Parcel::Answered(by, at, robot) => Input::Answered(by, at, robot),
                 };
                 self.tell_mind(i, input);
             }
@@ -363,13 +512,16 @@ impl<'a> Swarm<'a> {
         match output {
             Output::Broadcast(envelope) => {
                 let (envelope, bytes) = over_the_wire(&envelope);
-                let reaches = self.broadcast(i, bytes, Kind::Vote, &Parcel::Said(envelope));
+                let samples = matches!(envelope.message, Message::Samples(_));
+                let kind = if samples { Kind::Samples } else { Kind::Vote };
+                let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope));
                 self.note(&Happening::Broadcast { robot, bytes, reaches });
             }
             Output::Tell(to, envelope) => {
                 let (envelope, bytes) = over_the_wire(&envelope);
                 let target = to.0 as usize - 1;
-                let taken = self.network.tell(i, target, bytes);
+                let samples = matches!(envelope.message, Message::Samples(_));
+                let taken = self.network.tell(i, target, bytes, samples);
                 self.note(&Happening::Tell { robot, to, bytes, arrives: taken.is_some() });
                 if let Some(taken) = taken {
                     self.at(self.now + taken, Due::Arrive(target, Parcel::Said(envelope)));
@@ -402,16 +554,34 @@ impl<'a> Swarm<'a> {
                 self.record.close(self.now, i);
                 self.robots[i].looking = false;
             }
-            // Emulated robots do not learn yet.
-            Output::Answer(..) | Output::Train(_) | Output::Remember { .. } => {}
+            Output::Answer(by, answer) => {
+                let Answer { at, outcome, samples, .. } = answer;
+                self.note(&Happening::Answer { robot, outcome, samples });
+                let bytes = json_bytes(&answer);
+                self.broadcast(i, bytes, Kind::Words, &Parcel::Answered(by, at, robot));
+            }
+            Output::Train(changes) => {
+                if let Some(pupil) = &mut self.robots[i].pupil {
+                    pupil.train_later(changes);
+                }
+            }
+            Output::Remember { revision, changes } => {
+                let boot = self.robots[i].boot;
+                if let Some(pupil) = &mut self.robots[i].pupil {
+                    pupil.remember(revision, changes);
+                    self.at(self.now, Due::Remembered(i, boot, revision));
+                }
+            }
         }
     }
 
     fn broadcast(&mut self, i: usize, bytes: usize, kind: Kind, parcel: &Parcel) -> usize {
         let arrivals = self.network.broadcast(i, bytes, kind);
         let reaches = arrivals.len();
-        for (to, taken) in arrivals {
-            self.at(self.now + taken, Due::Arrive(to, parcel.clone()));
+        let mut arrivals: Vec<_> = arrivals.into_iter().map(|(to, taken)| (self.now + taken, to)).collect();
+        arrivals.sort_unstable();
+        if let Some((first, _)) = arrivals.first() {
+            self.at(*first, Due::Spread(arrivals.into(), parcel.clone()));
         }
         reaches
     }
@@ -422,6 +592,10 @@ fn over_the_wire(envelope: &Envelope) -> (Rc<Envelope>, usize) {
     let bytes = envelope.encode();
     let read = Envelope::decode(&bytes).expect("what a mind says can be read");
     (Rc::new(read), bytes.len())
+}
+
+fn json_bytes(value: &impl serde::Serialize) -> usize {
+    serde_json::to_vec(value).expect("what people say holds nothing that JSON cannot").len()
 }
 
 /// The same for a decision, which travels as JSON.

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Decision, Instruction, Outcome, RobotId, RoundId};
 use serde::Serialize;
 
 use super::scenario::Event;
@@ -64,6 +64,29 @@ pub enum Happening<'a> {
         robot: RobotId,
         /// What, in short.
         decision: Brief,
+    },
+    /// An instructor says something.
+    Instruct {
+        /// Through which robot.
+        robot: RobotId,
+        /// What.
+        instruction: &'a Instruction,
+    },
+    /// A robot answers.
+    Answer {
+        /// Who.
+        robot: RobotId,
+        /// What became of the instructor's word.
+        outcome: Outcome,
+        /// How many samples of that round it holds.
+        samples: u32,
+    },
+    /// A robot has learned from what has changed since the last time.
+    Learn {
+        /// Who.
+        robot: RobotId,
+        /// How many samples it holds.
+        samples: usize,
     },
     /// A decision is announced for the swarm.
     Announce {

@@ -1,0 +1,177 @@
+//! One setting of an experiment: a swarm, what it is shown, and how it learns.
+
+use std::time::Duration;
+
+use gestalt_protocol::MAX_CLASSES;
+use gestalt_strategies::{LearningConfig, MindConfig, Ranking};
+use serde::{Deserialize, Serialize};
+
+use super::ExperimentError;
+use crate::emulation::{Feedback, Group, Order, Scenario, Teaching};
+use crate::topology::Topology;
+
+/// A swarm that learns, and everything that an experiment may vary. What is left out is the default.
+///
+/// | name | default | meaning |
+/// |---|---|---|
+/// | `robots` | 10 | how many |
+/// | `rounds` | 12 | gestures shown, one after the other in a random order, then all again |
+/// | `topology` | ring | who is linked to whom |
+/// | `start` | nothing | what robots know before |
+/// | `reduction` | pca | from 110 features to few |
+/// | `components` | 24 | how few; at most as many as there are |
+/// | `moments` | own | whether robots look at the hand at the same moments |
+/// | `drift` | none | what changes half-way |
+/// | `feedback` | full | what the instructor says |
+/// | `learning` | | how robots keep, share, forget and train |
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Setting {
+    /// How many robots, `1..=1000`.
+    pub robots: usize,
+    /// How many gestures are shown.
+    pub rounds: u32,
+    /// Who is linked to whom.
+    pub topology: Topology,
+    /// What robots know before.
+    pub start: Start,
+    /// From many features to few.
+    pub reduction: Method,
+    /// How few.
+    pub components: usize,
+    /// When robots look.
+    pub moments: Moments,
+    /// What changes half-way.
+    pub drift: Drift,
+    /// What the instructor says.
+    pub feedback: Feedback,
+    /// How robots keep, share, forget and train.
+    pub learning: LearningConfig,
+}
+
+/// What robots know before the first round.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// No gesture. Their feature space is fitted on rendered hands.
+    #[default]
+    Nothing,
+    /// A classifier, trained on other hands; their feature space is fitted on these too.
+    Model,
+}
+
+/// How many features become few.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The principal components of most variance.
+    #[default]
+    Pca,
+    /// The features of most information gain.
+    InformationGain,
+    /// The features of greatest gain ratio.
+    GainRatio,
+}
+
+impl Method {
+    /// The ranking of those that rank.
+    #[must_use]
+    pub fn ranking(self) -> Option<Ranking> {
+        match self {
+            Self::Pca => None,
+            Self::InformationGain => Some(Ranking::InformationGain),
+            Self::GainRatio => Some(Ranking::GainRatio),
+        }
+    }
+}
+
+/// Whether two robots see the same picture of a hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Moments {
+    /// Each looks at its own times: two robots see two pictures of the gesture.
+    #[default]
+    Own,
+    /// All look at once: they see one picture, each from its place.
+    Common,
+}
+
+/// What changes for good after half of the rounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drift {
+    /// Nothing.
+    #[default]
+    None,
+    /// The light: it gets dim and warm.
+    Light,
+    /// The people who show gestures.
+    Person,
+}
+
+impl Default for Setting {
+    fn default() -> Self {
+        Self {
+            robots: 10,
+            rounds: 12,
+            topology: Topology::Ring,
+            start: Start::default(),
+            reduction: Method::default(),
+            components: 24,
+            moments: Moments::default(),
+            drift: Drift::default(),
+            feedback: Feedback::default(),
+            learning: LearningConfig::default(),
+        }
+    }
+}
+
+impl Setting {
+    /// The scenario that is emulated: whole minds on a network that loses nothing, and that says little beside samples.
+    ///
+    /// # Errors
+    /// Values that no swarm can have.
+    pub fn scenario(&self, classes: usize) -> Result<Scenario, ExperimentError> {
+        if self.components == 0 || !(2..=MAX_CLASSES).contains(&classes) {
+            return Err(ExperimentError::Setting("components is 0: choose at least 1".to_owned()));
+        }
+        let seconds = Duration::from_secs;
+        let mind = MindConfig {
+            // All look for as long; nobody needs to vote twice, and what nothing loses needs no hurried repair.
+            vote_interval: seconds(2),
+            vote_repeat: seconds(30),
+            patience: seconds(2),
+            deadline: seconds(4),
+            repair_busy: seconds(20),
+            repair_idle: seconds(120),
+            ..MindConfig::default()
+        };
+        let scenario = Scenario {
+            robots: vec![Group { name: "robot".to_owned(), count: self.robots, view: None }],
+            topology: self.topology,
+            link: crate::emulation::LinkModel::default(),
+            classes,
+            rounds: self.rounds,
+            order: Order::InTurn,
+            interval: seconds(8),
+            mind,
+            learning: Some(Teaching {
+                feedback: self.feedback,
+                after: seconds(6),
+                robots: self.learning.clone(),
+            }),
+            faults: Vec::new(),
+            churn: None,
+            compare: Vec::new(),
+            seeds: 1,
+        };
+        scenario.validate()?;
+        Ok(scenario)
+    }
+
+    /// The time between two frames, in seconds: as slow as a Foot-bot's, unless more are to be kept of a round.
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        (3.0 / self.learning.keep as f64).min(0.5)
+    }
+}

@@ -1,0 +1,214 @@
+//! One run: a setting, a seed, and how well robots judge after each round.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use gestalt_protocol::{ClassId, FusionRule};
+use gestalt_strategies::{Classifier, Classify, fusion};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::ExperimentError;
+use super::eyes::{PoolEyes, Split};
+use super::pool::{Moment, Pool};
+use super::setting::{Drift, Setting};
+use crate::emulation::{Emulation, Observer, School, Trace};
+
+/// The most held-out moments that are judged after each round.
+const JUDGED: usize = 60;
+
+/// A robot's evidence is bounded to this, as in a vote.
+const CLIP: f64 = 6.0;
+
+/// How a swarm stands after a round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing {
+    /// How many rounds there were.
+    pub round: u32,
+    /// The share of held-out views that the robot which sees them judges rightly, over all robots.
+    pub single: f64,
+    /// The share of held-out moments that all robots' views together, in a logarithmic pool, are right about.
+    pub swarm: f64,
+    /// The same by majority.
+    pub majority: f64,
+    /// Bytes of samples that a robot published so far, on average.
+    pub published: f64,
+    /// Bytes of samples that a robot put on its links so far, on average: its own, those it relays, repair.
+    pub on_links: f64,
+    /// Samples that a robot holds, on average.
+    pub samples: f64,
+}
+
+/// Runs a setting with a seed. Two settings with the same seed and number of robots are shown the same.
+///
+/// # Errors
+/// A setting that cannot be emulated.
+pub fn run(
+    setting: &Setting,
+    school: &Arc<School>,
+    pool: &Arc<Pool>,
+    seed: u64,
+) -> Result<Vec<Standing>, ExperimentError> {
+    let scenario = setting.scenario(pool.gestures.len())?;
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let split = Arc::new(split(pool, &mut rng)?);
+    let places = places(pool.places, setting.robots, &mut rng);
+    let drift_after = (setting.drift != Drift::None).then_some(setting.rounds / 2);
+    let eyes = |place: &usize| -> Box<dyn Observer> {
+        Box::new(PoolEyes {
+            pool: pool.clone(),
+            split: split.clone(),
+            place: *place,
+            moments: setting.moments,
+            drift_after,
+            seed,
+            period: setting.period(),
+            shown: (0, ClassId(0), 0),
+        })
+    };
+    let observers = places.iter().map(eyes).collect();
+    let mut emulation = Emulation::new(&scenario, seed, observers, Some(school.clone()), Trace::none())?;
+    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], &places));
+    let mut standings = vec![exams[0].sit(&mut emulation, 0)];
+    while emulation.show_next() {
+        let round = standings.len() as u32;
+        let after = usize::from(drift_after.is_some_and(|last| round > last));
+        standings.push(exams[after].sit(&mut emulation, round));
+    }
+    Ok(standings)
+}
+
+/// Draws where robots stand: no two at one place, as long as there are places.
+fn places(places: usize, robots: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    let mut drawn = Vec::with_capacity(robots);
+    while drawn.len() < robots {
+        let mut all: Vec<usize> = (0..places).collect();
+        all.shuffle(rng);
+        drawn.extend(all.into_iter().take(robots - drawn.len()));
+    }
+    drawn
+}
+
+/// Draws half of the people to be held out; of a gesture that fewer than four show, half of the moments.
+fn split(pool: &Pool, rng: &mut ChaCha8Rng) -> Result<Split, ExperimentError> {
+    let mut split = Split::default();
+    for after in [false, true] {
+        let moments = || pool.moments.iter().enumerate().filter(|(_, moment)| moment.after == after);
+        let mut people: Vec<u32> = moments().filter_map(|(_, moment)| moment.person).collect();
+        people.sort_unstable();
+        people.dedup();
+        people.shuffle(rng);
+        let by_person = people.len() >= 8;
+        let held_out_people = &people[..people.len() / 2];
+        let mut held_out: Vec<Vec<usize>> = Vec::new();
+        for class in 0..pool.gestures.len() {
+            let of_class: Vec<(usize, &Moment)> =
+                moments().filter(|(_, moment)| moment.class.index() == class).collect();
+            let (held, taught): (Vec<usize>, Vec<usize>) = if by_person {
+                let is_held = |moment: &Moment| moment.person.is_some_and(|p| held_out_people.contains(&p));
+                let (held, taught): (Vec<_>, Vec<_>) =
+                    of_class.into_iter().partition(|(_, moment)| is_held(moment));
+                (held.into_iter().map(|(n, _)| n).collect(), taught.into_iter().map(|(n, _)| n).collect())
+            } else {
+                let mut all: Vec<usize> = of_class.into_iter().map(|(n, _)| n).collect();
+                all.shuffle(rng);
+                let half = all.len() / 2;
+                (all[..half].to_vec(), all[half..].to_vec())
+            };
+            if (held.is_empty() || taught.is_empty()) && moments().next().is_some() {
+                return Err(ExperimentError::Setting(format!(
+                    "too few hands show '{}' to teach with some and to judge others: take more",
+                    pool.gestures[class]
+                )));
+            }
+            split.taught[usize::from(after)].push(taught);
+            held_out.push(held);
+        }
+        let each = JUDGED / pool.gestures.len().max(1);
+        for mut class in held_out {
+            class.shuffle(rng);
+            split.held_out[usize::from(after)].extend(class.into_iter().take(each.max(1)));
+        }
+    }
+    Ok(split)
+}
+
+/// Held-out moments as all robots see them, in the space they learn in. Robots at one place see the same.
+struct Exam {
+    classes: usize,
+    robots: usize,
+    /// What is right, and the coordinates from each place.
+    questions: Vec<(ClassId, BTreeMap<usize, Vec<f32>>)>,
+    places: Vec<usize>,
+}
+
+impl Exam {
+    fn new(pool: &Pool, school: &School, moments: &[usize], places: &[usize]) -> Self {
+        let question = |moment: &usize| {
+            let seen = places.iter().filter_map(|place| {
+                let (features, _) = pool.features(*moment, *place)?;
+                Some((*place, school.space().project(features).ok()?))
+            });
+            (pool.moments[*moment].class, seen.collect())
+        };
+        let questions = moments.iter().map(question).collect();
+        Self { classes: pool.gestures.len(), robots: places.len(), questions, places: places.to_vec() }
+    }
+
+    fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
+        let classifiers: Vec<Option<Arc<Classifier>>> =
+            (0..self.robots).map(|robot| emulation.classifier(robot)).collect();
+        let chance = 1.0 / self.classes as f64;
+        let (mut single, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0);
+        for (class, views) in &self.questions {
+            let mut evidence: Vec<Vec<f32>> = Vec::new();
+            for (place, classifier) in self.places.iter().zip(&classifiers) {
+                let Some(view) = views.get(place) else { continue };
+                seen += 1.0;
+                let judged =
+                    classifier.as_ref().and_then(|classifier| classifier.probabilities_in_space(view));
+                match judged {
+                    None => single += chance,
+                    Some(p) => {
+                        single += f64::from(u8::from(top(&p) == class.index()));
+                        evidence.push(centred(&p));
+                    }
+                }
+            }
+            let pooled = |rule| {
+                let rows = evidence.iter().map(Vec::as_slice);
+                fusion::fuse(rule, CLIP, self.classes, rows)
+                    .map_or(chance, |fused| f64::from(u8::from(fused.top == *class)))
+            };
+            swarm += pooled(FusionRule::LogPool);
+            majority += pooled(FusionRule::Majority);
+        }
+        let questions = self.questions.len().max(1) as f64;
+        let robots = self.robots as f64;
+        let traffic = (0..self.robots).map(|robot| emulation.traffic(robot));
+        let traffic: crate::emulation::Traffic = traffic.sum();
+        let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
+        Standing {
+            round,
+            single: single / f64::max(seen, 1.0),
+            swarm: swarm / questions,
+            majority: majority / questions,
+            published: traffic.published_samples as f64 / robots,
+            on_links: traffic.samples_on_links() as f64 / robots,
+            samples: samples.sum::<usize>() as f64 / robots,
+        }
+    }
+}
+
+/// The likeliest class; of equals the first.
+fn top(p: &[f64]) -> usize {
+    (1..p.len()).fold(0, |best, k| if p[k] > p[best] { k } else { best })
+}
+
+/// Log-evidence: log p(k) − mean log p.
+fn centred(p: &[f64]) -> Vec<f32> {
+    let logs: Vec<f64> = p.iter().map(|p| p.max(1e-6).ln()).collect();
+    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+    logs.iter().map(|log| (log - mean) as f32).collect()
+}
