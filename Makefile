@@ -23,12 +23,13 @@ endef
 packages:
 	@$(call install,$(PACKAGES))
 
-# A heterogeneous swarm of real Zenoh peers looks at gestures and decides. Leaves its picture in out/. One build
-# serves the demo and the tests: the dev profile is optimised.
+# A heterogeneous swarm of real Zenoh peers that knows no gesture looks, decides, is told what it was, and learns.
+# Leaves its pictures in out/. One build serves the demo and the tests: the dev profile is optimised.
 demo: packages
 	cargo build --workspace --bins
 	mkdir -p out
-	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 12 --picture out/round.png
+	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
+	  --learn nothing --picture out/round.png --curve out/curve.png
 
 # One test after the other: whole swarms measure time, and share the processor.
 test: packages

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{ClassId, Decision, FusionRule, Instruction, InstructorId, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Decision, FusionRule, Gesture, Instruction, InstructorId, RobotId, RoundId};
 use gestalt_strategies::Proportion;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -14,14 +14,17 @@ use super::progress::bar;
 use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::body::Body;
-use crate::config::{CameraSection, Config, ModelSection, RenderedSection, SourceSection};
+use crate::config::{
+    CameraSection, Config, LearnFrom, LearningSection, ModelSection, RenderedSection, SourceSection,
+};
+use crate::experiment::rasterise;
 use crate::eye::likeliest;
 use crate::human::Human;
 use crate::link::{Announcement, Client, LinkConfig, News};
 use crate::model::RobotModel;
 use crate::picture::{self, Panel};
 use crate::pose::place;
-use crate::swarm::{Members, Roster, Score, Tally};
+use crate::swarm::{Members, Roster, Score, Tally, curve};
 use crate::topology::Topology;
 
 /// Runs a swarm of robots with rendered cameras around one human, as real Zenoh peers.
@@ -51,6 +54,15 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
+    /// Let the robots learn: `nothing` starts them without knowing any gesture, `model` from the classifier. After each
+    /// round a scripted instructor says what the gesture was
+    #[arg(long, value_name = "nothing|model", value_parser = learn_from)]
+    learn: Option<LearnFrom>,
+
+    /// Keep each robot's memory in this folder, and take up what is there
+    #[arg(long, value_name = "DIR", requires = "learn")]
+    memory: Option<PathBuf>,
+
     /// Places the robots, links them, and chooses the gestures
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -62,6 +74,10 @@ pub struct Args {
     /// Write a picture of what every robot saw in the round they disagreed most about
     #[arg(long, value_name = "FILE.png", conflicts_with = "processes")]
     picture: Option<PathBuf>,
+
+    /// Draw how the swarm got better, as SVG or PNG by the name's ending
+    #[arg(long, value_name = "FILE.svg|FILE.png", requires = "learn")]
+    curve: Option<PathBuf>,
 
     /// The swarm's name
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
@@ -76,6 +92,10 @@ fn rule(text: &str) -> Result<FusionRule, String> {
     serde_json::from_value(json!(text)).map_err(|error| error.to_string())
 }
 
+fn learn_from(text: &str) -> Result<LearnFrom, String> {
+    serde_json::from_value(json!(text)).map_err(|error| error.to_string())
+}
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -84,6 +104,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(picture) = &args.picture {
         // Found out now, not after the last round.
         picture::writable(picture)?;
+    }
+    if let Some(curve) = &args.curve {
+        chart_writable(curve)?;
     }
     let section = args.model.clone().map_or(ModelSection::Rendered, ModelSection::File);
     let training = bar("learning", 0);
@@ -130,10 +153,53 @@ async fn show_gestures(args: &Args, model: &RobotModel) -> Result<(), Failure> {
             endpoints.first().map_or("none of them", String::as_str)
         ),
     )?;
-    let score = rounds(args, &configs, &members, model, &client, &mut news).await;
+    let tally = rounds(args, &configs, &members, &client, &mut news).await;
     client.close().await;
     members.stop().await;
-    say_score(args, &configs, &score?)
+    let tally = tally?;
+    if let Some(path) = &args.curve {
+        draw_curve(args, path, configs.len(), &tally)?;
+    }
+    say_score(args, &configs, &tally.score())
+}
+
+/// Whether a chart can be written there, found out before the work is done.
+fn chart_writable(path: &Path) -> Result<(), Failure> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("png") => Ok(picture::writable(path)?),
+        Some("svg") => match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            Some(folder) if !folder.is_dir() => {
+                Err(format!("--curve: no folder {}", folder.display()).into())
+            }
+            _ => Ok(()),
+        },
+        _ => Err(format!("--curve {}: end its name in .svg or .png", path.display()).into()),
+    }
+}
+
+fn draw_curve(args: &Args, path: &Path, robots: usize, tally: &Tally) -> Result<(), Failure> {
+    let from = match args.learn {
+        Some(LearnFrom::Model) => "from a model",
+        _ => "from nothing",
+    };
+    let svg = curve::svg(tally, &format!("{robots} robots learn {from}"))?;
+    if path.extension().is_some_and(|extension| extension == "png") {
+        picture::write_png(path, &rasterise(&svg)?)?;
+    } else {
+        std::fs::write(path, svg).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    let (single, swarm) = curve::latest(tally);
+    line(
+        args.json,
+        &json!({"event": "curve", "file": path, "rounds": tally.history()}),
+        &format!(
+            "how the swarm got better: {} · over the last {} rounds a single robot {:.0} %, the swarm {:.0} %",
+            path.display(),
+            curve::WINDOW,
+            100.0 * single,
+            100.0 * swarm
+        ),
+    )
 }
 
 /// One configuration for each robot: all around one human, listening on a free port of this machine.
@@ -151,6 +217,16 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
         };
         config.model = ModelSection::Rendered;
         config.rounds.rule = args.rule;
+        if let Some(from) = args.learn {
+            let memory = args.memory.as_ref().map(|folder| folder.join(format!("robot-{id}.memory")));
+            config.learning = LearningSection {
+                enabled: true,
+                from,
+                memory,
+                seed: args.seed,
+                ..LearningSection::default()
+            };
+        }
         config.links.scouting.enabled = false;
         config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));
         if !args.processes {
@@ -203,10 +279,9 @@ async fn rounds(
     args: &Args,
     configs: &[Config],
     members: &Members,
-    model: &RobotModel,
     client: &Client,
     news: &mut News,
-) -> Result<Score, Failure> {
+) -> Result<Tally, Failure> {
     let human = Human::new(args.seed);
     let mut tally = Tally::new(configs.iter().map(|config| config.robot.id));
     let mut most_disputed = 0;
@@ -232,11 +307,14 @@ async fn rounds(
             ),
         )?;
         if let Some(path) = &args.picture {
-            let disputed = 1 + dissenters(members.bodies(), model, decision);
+            let disputed = 1 + dissenters(members.bodies(), decision);
             if disputed > most_disputed {
                 most_disputed = disputed;
-                draw(path, configs, members.bodies(), model, decision, truth)?;
+                draw(path, configs, members.bodies(), decision, truth)?;
             }
+        }
+        if args.learn.is_some() {
+            teach(args, client, decision.round, truth).await?;
         }
     }
     if let Some(path) = &args.picture {
@@ -246,14 +324,17 @@ async fn rounds(
             &format!("what every robot saw: {}", path.display()),
         )?;
     }
-    Ok(tally.score())
+    Ok(tally)
 }
+
+/// The name that the gestures' shower speaks under.
+const INSTRUCTOR: &str = "gestalt-swarm";
 
 /// Has a round opened, and waits for its decision.
 async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement, Failure> {
     /// Far beyond any deadline: a round that takes longer will never end.
     const PATIENCE: Duration = Duration::from_secs(30);
-    let instructor: InstructorId = "gestalt-swarm".parse()?;
+    let instructor: InstructorId = INSTRUCTOR.parse()?;
     let before = news.newest();
     client.instruct(&instructor, &Instruction::Open).await?;
     tokio::time::timeout(PATIENCE, news.decision_after(before))
@@ -262,11 +343,25 @@ async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement,
         .ok_or_else(|| "the session has ended".into())
 }
 
+/// Says what the gesture was, and waits until that is learned.
+async fn teach(args: &Args, client: &Client, round: RoundId, truth: ClassId) -> Result<(), Failure> {
+    const PATIENCE: Duration = Duration::from_secs(10);
+    let instructor: InstructorId = INSTRUCTOR.parse()?;
+    let was = Instruction::Was { round, class: Gesture::Class(truth) };
+    let answer = client.teach(&instructor, &was, PATIENCE).await?;
+    let answer = answer.ok_or_else(|| format!("nobody answered what was said of round {round}"))?;
+    line(
+        args.json,
+        &json!({"event": "taught", "answer": answer}),
+        &format!("  taught: {}", answer.outcome.describe()),
+    )
+}
+
 /// How many robots see it otherwise than the swarm.
-fn dissenters(bodies: &[Body], model: &RobotModel, decision: &Decision) -> usize {
+fn dissenters(bodies: &[Body], decision: &Decision) -> usize {
     let own = |body: &Body| {
         let seen = body.seen().filter(|seen| seen.round.counter == decision.round.counter)?;
-        likeliest(&seen.probabilities(&*model.classifier))
+        likeliest(&seen.probabilities(&*body.robot().classifier()?))
     };
     bodies.iter().filter(|body| own(body).map(|(class, _)| class) != decision.class).count()
 }
@@ -276,18 +371,19 @@ fn draw(
     path: &Path,
     configs: &[Config],
     bodies: &[Body],
-    model: &RobotModel,
     decision: &Decision,
     truth: ClassId,
 ) -> Result<(), Failure> {
     let RoundId { counter, .. } = decision.round;
     let seen: Vec<_> =
-        bodies.iter().zip(configs).filter_map(|(body, config)| Some((config, body.seen()?))).collect();
+        bodies.iter().zip(configs).filter_map(|(body, config)| Some((config, body, body.seen()?))).collect();
     let panels: Vec<Panel<'_>> = seen
         .iter()
-        .filter(|(_, seen)| seen.round.counter == counter)
-        .map(|(config, seen)| {
-            let probabilities = seen.probabilities(&*model.classifier);
+        .filter(|(_, _, seen)| seen.round.counter == counter)
+        .map(|(config, body, seen)| {
+            let classifier = body.robot().classifier();
+            let probabilities =
+                classifier.map(|classifier| seen.probabilities(&*classifier)).unwrap_or_default();
             let opinion = likeliest(&probabilities);
             let by_class = (0u8..).zip(probabilities);
             Panel {

@@ -13,6 +13,16 @@ pub struct Tally {
     right: u64,
     undecided: u64,
     robots: BTreeMap<RobotId, u64>,
+    history: Vec<Round>,
+}
+
+/// What came of one round.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Round {
+    /// The part of the robots whose own vote was right.
+    pub single: f64,
+    /// Whether the swarm was.
+    pub right: bool,
 }
 
 /// How often the robots were right.
@@ -44,11 +54,21 @@ impl Tally {
             Some(_) => {}
             None => self.undecided += 1,
         }
+        let mut alone = 0;
         for vote in decision.certificate.votes.iter().filter(|vote| vote.class == truth) {
             if let Some(right) = self.robots.get_mut(&vote.robot) {
                 *right += 1;
+                alone += 1;
             }
         }
+        let single = f64::from(alone) / self.robots.len().max(1) as f64;
+        self.history.push(Round { single, right: decision.class == Some(truth) });
+    }
+
+    /// Every round so far.
+    #[must_use]
+    pub fn history(&self) -> &[Round] {
+        &self.history
     }
 
     /// The score so far.
