@@ -4,6 +4,7 @@ use gestalt_protocol::{ClassId, FeatureSpaceId};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::fnv::Fnv1a;
 use crate::reduction::best;
 use crate::{ClassifyError, Components, Pca, Ranking, Reduction, Scaling, ScalingMethod};
 
@@ -152,15 +153,13 @@ impl FeatureSpace {
     /// factors, the reduction and the spreads, all numbers as little-endian 32 bits.
     #[must_use]
     pub fn id(&self) -> FeatureSpaceId {
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        let mut add = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        self.feature_set.bytes().for_each(&mut add);
-        add(0);
+        let mut fnv = Fnv1a::default();
+        fnv.add(self.feature_set.bytes().chain([0]));
         let numbers = [&self.scaling.mean, &self.scaling.factor].into_iter().flatten();
-        numbers.flat_map(|value| value.to_le_bytes()).for_each(&mut add);
-        self.reduction.bytes().for_each(&mut add);
-        self.spread.iter().flat_map(|value| value.to_le_bytes()).for_each(&mut add);
-        FeatureSpaceId(hash)
+        fnv.add(numbers.flat_map(|value| value.to_le_bytes()));
+        fnv.add(self.reduction.bytes());
+        fnv.add(self.spread.iter().flat_map(|value| value.to_le_bytes()));
+        FeatureSpaceId(fnv.hash())
     }
 
     /// Whether all dimensions agree, and all numbers lie where sums of them stay finite.

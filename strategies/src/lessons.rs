@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
 
+use crate::fnv::Fnv1a;
+
 /// The most instructors of one round.
 const MAX_INSTRUCTORS: usize = 16;
 
@@ -82,9 +84,8 @@ impl LessonBook {
             None if words.is_some_and(|words| words.len() >= MAX_INSTRUCTORS) => return Heard::Full,
             _ => {}
         }
-        let oldest = self.rounds.keys().next().copied();
         if words.is_none() && self.rounds.len() >= MAX_LESSONS {
-            if oldest > Some(lesson.round) {
+            if self.oldest() > Some(lesson.round) {
                 return Heard::Full;
             }
             self.forget_oldest();
@@ -96,7 +97,7 @@ impl LessonBook {
     }
 
     fn forget_oldest(&mut self) {
-        if let Some(oldest) = self.rounds.keys().next().copied() {
+        if let Some(oldest) = self.oldest() {
             self.digest ^= self.digest_of(oldest);
             self.rounds.remove(&oldest);
         }
@@ -140,6 +141,18 @@ impl LessonBook {
         self.rounds.keys().map(|round| (*round, self.digest_of(*round)))
     }
 
+    /// The oldest round of which something is known.
+    #[must_use]
+    pub fn oldest(&self) -> Option<RoundId> {
+        self.rounds.keys().next().copied()
+    }
+
+    /// Whether anything is known of a round.
+    #[must_use]
+    pub fn contains(&self, round: RoundId) -> bool {
+        self.rounds.contains_key(&round)
+    }
+
     /// Of how many rounds something is known.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -162,18 +175,17 @@ impl LessonBook {
     #[must_use]
     pub fn digest_of(&self, round: RoundId) -> u64 {
         let Some(words) = self.rounds.get(&round) else { return 0 };
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        let mut add = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        round.counter.to_le_bytes().into_iter().chain(round.opener.0.to_le_bytes()).for_each(&mut add);
+        let mut fnv = Fnv1a::default();
+        fnv.add(round.counter.to_le_bytes().into_iter().chain(round.opener.0.to_le_bytes()));
         for (instructor, (at, word)) in words {
             let (kind, class) = match word {
                 Word::Was(class) => (1, class.0),
                 Word::Not(class) => (2, class.0),
                 Word::Retracted => (3, 0),
             };
-            instructor.to_string().bytes().chain(at.to_le_bytes()).chain([kind, class]).for_each(&mut add);
+            fnv.add(instructor.to_string().bytes().chain(at.to_le_bytes()).chain([kind, class]));
         }
-        hash
+        fnv.hash()
     }
 }
 

@@ -19,6 +19,7 @@ mod coding;
 mod evaluation;
 mod evidence;
 mod feature_space;
+mod fnv;
 pub mod forgetting;
 pub mod fusion;
 mod learner;

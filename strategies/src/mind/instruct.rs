@@ -52,15 +52,14 @@ impl Mind {
         if !learning.knows(round) {
             return Outcome::UnknownRound;
         }
-        let decided = learning.decision(round);
         let word = match &instructed.instruction {
             Instruction::Open => return Outcome::UnknownRound,
             Instruction::Retract { .. } => Word::Retracted,
-            Instruction::Right { .. } | Instruction::Wrong { .. } if decided.is_none() => {
-                return Outcome::NoDecision;
+            Instruction::Right { .. } | Instruction::Wrong { .. } => {
+                let Some(decided) = learning.decision(round) else { return Outcome::NoDecision };
+                let right = matches!(instructed.instruction, Instruction::Right { .. });
+                if right { Word::Was(decided) } else { Word::Not(decided) }
             }
-            Instruction::Right { .. } => decided.map_or(Word::Retracted, Word::Was),
-            Instruction::Wrong { .. } => decided.map_or(Word::Retracted, Word::Not),
             Instruction::Was { class, .. } => {
                 let class = match class {
                     Gesture::Class(class) => Some(*class),
@@ -129,19 +128,18 @@ impl Mind {
 
     /// When the next answer is to be given, if what it says is remembered by then.
     pub(super) fn answer_due(&self) -> Option<Duration> {
-        let remembered = |waiting: &&Waiting| {
-            self.learning.as_ref().is_none_or(|learning| learning.is_remembered(waiting.revision))
-        };
-        self.answers.iter().filter(remembered).map(|waiting| waiting.due).min()
+        self.answers.iter().filter(|waiting| self.may_say(waiting)).map(|waiting| waiting.due).min()
+    }
+
+    fn may_say(&self, waiting: &Waiting) -> bool {
+        self.learning.as_ref().is_none_or(|learning| learning.is_remembered(waiting.revision))
     }
 
     pub(super) fn answer_when_due(&mut self, out: &mut Vec<Output>) {
-        while self.answer_due().is_some_and(|due| self.now >= due) {
-            let ready = |waiting: &Waiting| {
-                self.now >= waiting.due
-                    && self.learning.as_ref().is_none_or(|learning| learning.is_remembered(waiting.revision))
-            };
-            let Some(position) = self.answers.iter().position(ready) else { return };
+        let ready = |mind: &Self| {
+            mind.answers.iter().position(|waiting| mind.now >= waiting.due && mind.may_say(waiting))
+        };
+        while let Some(position) = ready(self) {
             let Waiting { by, answer, .. } = self.answers.remove(position);
             self.note_answered(by.clone(), answer.at);
             out.push(Output::Answer(by, answer));

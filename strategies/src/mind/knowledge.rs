@@ -4,12 +4,13 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{
-    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, Message, RobotId, RoundId, SampleId, Samples,
+    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, Message, RobotId, RoundId, Samples,
 };
 
 use super::learning::Declined;
 use super::{Mind, Output, Refusal};
-use crate::VectorError;
+use crate::training_set::MAX_GAPS;
+use crate::{Seen, VectorError};
 
 /// About how many bytes of samples one message takes, so that a vote never waits long behind it.
 const CHUNK: usize = 16 * 1024;
@@ -20,6 +21,9 @@ const MAX_CHUNKS: usize = 32;
 /// The most lessons in one message.
 const MAX_TOLD: usize = 256;
 
+// What is kept of an author can be told.
+const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
+
 impl Mind {
     /// What this robot knows, in two numbers.
     pub(super) fn knowledge(&self) -> Option<Digest> {
@@ -28,13 +32,10 @@ impl Mind {
 
     /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length.
     pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
-        let (Some(theirs), Some(mine)) = (theirs, self.knowledge()) else { return };
-        if let Some(learning) = &mut self.learning
-            && theirs == mine
-        {
+        let (Some(theirs), Some(learning)) = (theirs, &mut self.learning) else { return };
+        if theirs == learning.digest() {
             learning.note_heard_from_others();
-        }
-        if theirs != mine {
+        } else {
             self.tell_know(from, theirs, false, out);
         }
     }
@@ -46,12 +47,7 @@ impl Mind {
         let samples = if mine.samples == theirs.samples {
             Vec::new()
         } else {
-            let known = |author| {
-                let intervals = seen.intervals(author);
-                // Of a set in pieces the newest are told; the older ones are given again, and known.
-                let newest = &intervals[intervals.len().saturating_sub(MAX_INTERVALS)..];
-                Known { author, numbers: newest.to_vec() }
-            };
+            let known = |author| Known { author, numbers: seen.intervals(author).to_vec() };
             seen.authors().map(known).collect()
         };
         let lessons =
@@ -61,52 +57,36 @@ impl Mind {
 
     /// A neighbour says what it knows: gives what it lacks, and asks for what this robot lacks.
     pub(super) fn on_know(&mut self, from: RobotId, know: &Know, out: &mut Vec<Output>) {
-        let Some(mine) = self.knowledge() else { return };
+        let Some(learning) = &self.learning else { return };
+        let mine = learning.digest();
         let mut lacking_here = false;
+        let mut given = Vec::new();
         if mine.samples != know.digest.samples {
-            lacking_here |= self.lacks_samples(&know.samples);
-            self.give_samples(from, &know.samples, out);
+            let theirs = know.samples.iter().map(|known| (known.author, known.numbers.clone()));
+            let Ok(theirs) = Seen::from_intervals(theirs) else {
+                return self.refusals.add(Refusal::SampleNumber);
+            };
+            lacking_here |= learning.set().seen().lacks(&theirs);
+            let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
+            given.extend(lacking.take(MAX_CHUNKS).map(Message::Samples));
         }
         if mine.lessons != know.digest.lessons {
-            let Some(learning) = &self.learning else { return };
             let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
             let book = learning.lessons();
             lacking_here |= theirs.iter().any(|(round, digest)| book.digest_of(*round) != *digest);
             let lacking = book.rounds().filter(|(round, digest)| theirs.get(round) != Some(digest));
             let lessons: Vec<Lesson> = lacking.flat_map(|(round, _)| book.of(round)).take(MAX_TOLD).collect();
             if !lessons.is_empty() {
-                self.tell(from, Message::Lessons(Lessons { lessons }), out);
+                given.push(Message::Lessons(Lessons { lessons }));
             }
+        }
+        for message in given {
+            self.tell(from, message, out);
         }
         if lacking_here && !know.answer {
             self.tell_know(from, know.digest, true, out);
         } else if let Some(learning) = &mut self.learning {
             learning.note_heard_from_others();
-        }
-    }
-
-    fn lacks_samples(&self, theirs: &[Known]) -> bool {
-        let Some(learning) = &self.learning else { return false };
-        let seen = learning.set().seen();
-        theirs.iter().any(|known| {
-            let mine = seen.intervals(known.author);
-            let covered = |first: u32, last: u32| mine.iter().any(|(from, to)| *from <= first && last <= *to);
-            !known.numbers.iter().all(|(first, last)| covered(*first, *last))
-        })
-    }
-
-    fn give_samples(&mut self, to: RobotId, theirs: &[Known], out: &mut Vec<Output>) {
-        let Some(learning) = &self.learning else { return };
-        let known: BTreeMap<RobotId, &[(u32, u32)]> =
-            theirs.iter().map(|known| (known.author, known.numbers.as_slice())).collect();
-        let lacks = move |id: SampleId| {
-            let numbers = known.get(&id.author).copied().unwrap_or_default();
-            let after = numbers.partition_point(|(_, last)| *last < id.number);
-            numbers.get(after).is_none_or(|(first, _)| *first > id.number)
-        };
-        let told: Vec<Samples> = learning.lacking(lacks, CHUNK).take(MAX_CHUNKS).collect();
-        for samples in told {
-            self.tell(to, Message::Samples(samples), out);
         }
     }
 

@@ -332,13 +332,18 @@ impl Mind {
         if let Some((revision, changes)) = learning.take_changes() {
             out.push(Output::Remember { revision, changes });
         }
-        while let Some(samples) = learning.take_unsent() {
+        while let Some(samples) = self.learning.as_mut().and_then(Learning::take_unsent) {
             if !samples.samples.is_empty() {
-                self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-                let message = Message::Samples(samples);
-                out.push(Output::Broadcast(Envelope { author: self.me, stamp: self.stamp, message }));
+                let envelope = self.stamped(Message::Samples(samples));
+                out.push(Output::Broadcast(envelope));
             }
         }
+    }
+
+    /// A message as this robot's next.
+    fn stamped(&mut self, message: Message) -> Envelope {
+        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+        Envelope { author: self.me, stamp: self.stamp, message }
     }
 
     /// Says this robot's vote when it is due.
@@ -413,11 +418,8 @@ impl Mind {
     /// When this robot is to announce the decision it holds: the live robot of the smallest id is the
     /// spokesrobot, each next one waits a while longer for the one before.
     fn announcement(&self) -> Option<Duration> {
-        let agreement = &self.round.as_ref()?.agreement;
-        // Asked at every input, when there is mostly nothing to announce: robots are counted only when there is.
-        agreement.announcement(Duration::ZERO)?;
         let wait = self.config.settle.saturating_add(self.config.takeover.saturating_mul(self.turns));
-        agreement.announcement(wait)
+        self.round.as_ref()?.agreement.announcement(wait)
     }
 
     fn announce(&mut self, out: &mut Vec<Output>) {

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, Give, Have, Message, RobotId, Stamp};
+use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
 
 use super::{Mind, MindConfig, Output};
 
@@ -194,7 +194,7 @@ impl Mind {
     }
 
     pub(super) fn tell(&mut self, robot: RobotId, message: Message, out: &mut Vec<Output>) {
-        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-        out.push(Output::Tell(robot, Envelope { author: self.me, stamp: self.stamp, message }));
+        let envelope = self.stamped(message);
+        out.push(Output::Tell(robot, envelope));
     }
 }

@@ -23,6 +23,7 @@ use lived::Lives;
 pub use memory::{Change, Memory, MemoryError};
 use memory::{Counters, Item, Owner};
 
+use crate::fnv::Fnv1a;
 use crate::{
     FeatureSpace, Heard, HeldSample, LearnError, Learner, LessonBook, Part, Receipt, RestoreError, SetChange,
     TrainingSet, VectorError, Verdict, Vocabulary, decode_vector,
@@ -227,7 +228,7 @@ impl Learning {
 
     /// Whether this robot knows anything of a round.
     pub fn knows(&self, round: RoundId) -> bool {
-        self.lives.contains(round) || self.lessons.digest_of(round) != 0 || self.held_of(round) > 0
+        self.lives.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
     }
 
     /// How many samples of that round are held.
@@ -253,13 +254,12 @@ impl Learning {
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
     pub fn hear(&mut self, lesson: &Lesson) -> Heard {
-        let known: BTreeSet<RoundId> = self.lessons.rounds().map(|(round, _)| round).collect();
+        let oldest = self.lessons.oldest();
         let heard = self.lessons.hear(lesson);
         if heard == Heard::New {
             self.dirty.insert(Item::Lessons(lesson.round));
-            if self.lessons.len() <= known.len() && !known.contains(&lesson.round) {
-                self.dirty.extend(known.first().copied().map(Item::Lessons));
-            }
+            let forgotten = oldest.filter(|round| !self.lessons.contains(*round));
+            self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
         }
         heard
@@ -274,12 +274,17 @@ impl Learning {
             return Err(Declined::Class);
         }
         let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
-        let SharedSample { id, class, round, .. } = *sample;
+        let SharedSample { id, round, .. } = *sample;
+        let verdict = self.verdict(round);
+        let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
             Receipt::New(changes) => {
                 self.dirty.insert(Item::Seen(id.author));
                 self.absorb(changes);
-                self.apply_to_round(round);
+                // A class is what it was taken under; anything else concerns all samples of the round.
+                if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
+                    self.apply_to_round(round);
+                }
                 Ok(true)
             }
             Receipt::Known => Ok(false),
@@ -382,15 +387,11 @@ impl Learning {
     pub fn status(&self) -> Status {
         let classes = (0..self.vocabulary.classes()).map(|class| ClassId(class as u8));
         let counts = |part: Part| classes.clone().map(|class| self.set.count(part, class)).collect();
-        let mut ids = BTreeMap::new();
-        self.set.common().filter_map(|sample| Some((sample.id?, sample.class))).for_each(|(id, class)| {
-            ids.insert(id, class);
-        });
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        let mut add = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        for (id, class) in ids {
+        let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
+        let mut fnv = Fnv1a::default();
+        for (id, class) in common.collect::<BTreeMap<_, _>>() {
             let number = id.author.0.to_le_bytes().into_iter().chain(id.number.to_le_bytes());
-            number.chain([class.0]).for_each(&mut add);
+            fnv.add(number.chain([class.0]));
         }
         Status {
             space: self.space_id.to_string(),
@@ -399,7 +400,7 @@ impl Learning {
             shared: counts(Part::Shared),
             external: counts(Part::External),
             aside: self.aside.len(),
-            common: format!("{hash:016x}"),
+            common: format!("{:016x}", fnv.hash()),
             lessons: self.lessons.len(),
             memory: String::new(),
             trainings: 0,
