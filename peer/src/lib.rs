@@ -44,3 +44,4 @@ pub mod survey;
 #[cfg(feature = "opencv")]
 pub mod swarm;
 pub mod topology;
+mod worker;

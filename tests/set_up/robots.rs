@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
 use gestalt_protocol::{ClassId, Decision, RobotId};
-use gestalt_strategies::{Classify, MindConfig};
+use gestalt_strategies::{Classify, MindConfig, Observation};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use tokio::sync::broadcast;
@@ -58,7 +58,13 @@ pub async fn start(config: RobotConfig, sees: Option<ClassId>) -> Watched {
     let events = robot.events();
     let looking = sees.map(|class| {
         robot.learned(Arc::new(Fixed::default()), "fixed");
-        tokio::spawn(look_when_open(Arc::downgrade(&robot), class))
+        let frame = move || look(class, 0.9);
+        tokio::spawn(look_when_open(
+            Arc::downgrade(&robot),
+            robot.events(),
+            Duration::from_millis(100),
+            frame,
+        ))
     });
     Watched { robot, events, looking }
 }
@@ -71,19 +77,21 @@ pub async fn start_learning(config: RobotConfig, shown: Arc<AtomicU8>) -> Watche
     let seed = u64::from(config.id.0) << 32 | u64::from(config.nonce as u32);
     let robot = Arc::new(Robot::start(config).await.expect("the robot starts"));
     let (events, of_eye) = (robot.events(), robot.events());
-    let looking = tokio::spawn(look_at(Arc::downgrade(&robot), of_eye, shown, seed));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let frame = move || gesture(ClassId(shown.load(Ordering::Relaxed)), &mut rng);
+    let period = Duration::from_millis(20);
+    let looking = tokio::spawn(look_when_open(Arc::downgrade(&robot), of_eye, period, frame));
     Watched { robot, events, looking: Some(looking) }
 }
 
-/// Looks fifty times a second while the robot wants to see.
-async fn look_at(
+/// Shows the robot a frame every `period` while it wants to see.
+async fn look_when_open(
     robot: Weak<Robot>,
     mut events: broadcast::Receiver<Event>,
-    shown: Arc<AtomicU8>,
-    seed: u64,
+    period: Duration,
+    mut frame: impl FnMut() -> Observation,
 ) {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut frames = tokio::time::interval(Duration::from_millis(20));
+    let mut frames = tokio::time::interval(period);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut open = false;
     loop {
@@ -96,28 +104,7 @@ async fn look_at(
             },
             _ = frames.tick(), if open => {
                 let Some(robot) = robot.upgrade() else { return };
-                robot.observe(gesture(ClassId(shown.load(Ordering::Relaxed)), &mut rng));
-            }
-        }
-    }
-}
-
-async fn look_when_open(robot: Weak<Robot>, class: ClassId) {
-    let Some(mut events) = robot.upgrade().map(|robot| robot.events()) else { return };
-    let mut frames = tokio::time::interval(Duration::from_millis(100));
-    frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut open = false;
-    loop {
-        tokio::select! {
-            event = events.recv() => match event {
-                Ok(Event::Opened(_)) => open = true,
-                Ok(Event::Closed(_)) => open = false,
-                Err(broadcast::error::RecvError::Closed) => return,
-                _ => {}
-            },
-            _ = frames.tick(), if open => {
-                let Some(robot) = robot.upgrade() else { return };
-                robot.observe(look(class, 0.9));
+                robot.observe(frame());
             }
         }
     }

@@ -24,7 +24,10 @@ use std::io::{self, Write};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
+use gestalt_protocol::{Instruction, InstructorId};
 use tracing_subscriber::EnvFilter;
+
+use crate::link::{Announcement, Client, News};
 
 /// A swarm of robots that reads hand gestures together.
 #[derive(Debug, Parser)]
@@ -104,6 +107,23 @@ pub fn start_log() {
 /// Zenoh needs a runtime with several threads.
 fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
     Ok(tokio::runtime::Builder::new_multi_thread().enable_all().build()?)
+}
+
+/// Has a round opened in the name of an instructor, and waits for the decision of one after `before`; `None` when there
+/// is none within `patience`.
+async fn open_round(
+    client: &Client,
+    news: &mut News,
+    instructor: &InstructorId,
+    before: Option<u32>,
+    patience: Duration,
+) -> Result<Option<Announcement>, Failure> {
+    client.instruct(instructor, &Instruction::Open).await?;
+    match tokio::time::timeout(patience, news.decision_after(before)).await {
+        Ok(Some(decided)) => Ok(Some(decided)),
+        Ok(None) => Err("the session has ended".into()),
+        Err(_) => Ok(None),
+    }
 }
 
 /// Ctrl-C; where signals cannot be had, never.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Instruction, InstructorId};
+use gestalt_protocol::InstructorId;
 use serde_json::json;
 
 use super::Failure;
@@ -39,14 +39,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let client = Client::open(&swarm, &link).await?;
         let mut news = client.news().await?;
         let before = client.last_decision(super::ANSWER).await?.map(|last| last.decision.round.counter);
-        client.instruct(&args.instructor, &Instruction::Open).await?;
-        let decided = tokio::time::timeout(args.patience, news.decision_after(before)).await;
+        let decided = super::open_round(&client, &mut news, &args.instructor, before, args.patience).await;
         client.close().await;
-        let decided = decided
-            .map_err(|_| {
-                format!("no decision within {:?}: is a robot of swarm '{swarm}' alive?", args.patience)
-            })?
-            .ok_or("the session has ended")?;
+        let decided = decided?.ok_or_else(|| {
+            format!("no decision within {:?}: is a robot of swarm '{swarm}' alive?", args.patience)
+        })?;
         let words = show::decision(&decided.decision, decided.label.as_deref());
         line(args.json, &json!({"event": "decision", "decision": decided}), &words)
     })

@@ -336,11 +336,8 @@ async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement,
     const PATIENCE: Duration = Duration::from_secs(30);
     let instructor: InstructorId = INSTRUCTOR.parse()?;
     let before = news.newest();
-    client.instruct(&instructor, &Instruction::Open).await?;
-    tokio::time::timeout(PATIENCE, news.decision_after(before))
-        .await
-        .map_err(|_| format!("no decision within {PATIENCE:?}"))?
-        .ok_or_else(|| "the session has ended".into())
+    let decided = super::open_round(client, news, &instructor, before, PATIENCE).await?;
+    decided.ok_or_else(|| format!("no decision within {PATIENCE:?}").into())
 }
 
 /// Says what the gesture was, and waits until that is learned.

@@ -169,12 +169,9 @@ impl Lesson<'_> {
 
     async fn open(&mut self) -> Result<(), Failure> {
         let before = self.news.newest().max(self.last.map(|round| round.counter));
-        self.client.instruct(&self.args.instructor, &Instruction::Open).await?;
-        let patience = self.args.patience;
-        let decided = tokio::time::timeout(patience, self.news.decision_after(before))
-            .await
-            .map_err(|_| format!("no decision within {patience:?}: is a robot alive?"))?
-            .ok_or("the session has ended")?;
+        let (instructor, patience) = (&self.args.instructor, self.args.patience);
+        let decided = super::open_round(&self.client, &mut self.news, instructor, before, patience).await?;
+        let decided = decided.ok_or_else(|| format!("no decision within {patience:?}: is a robot alive?"))?;
         self.last = Some(decided.decision.round);
         line(
             self.args.json,

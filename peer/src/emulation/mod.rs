@@ -21,6 +21,8 @@ use std::sync::Arc;
 pub use learning::{Feedback, School, Teaching};
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
+#[cfg(feature = "opencv")]
+pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
 pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Order, Scenario, ScenarioError, View};
 pub use statistics::{Mean, Proportion};

@@ -142,7 +142,8 @@ impl Report {
     }
 }
 
-fn likeliest(probabilities: &[f64]) -> Option<usize> {
+/// The likeliest class; of equals the first, as a fusion takes it.
+pub(crate) fn likeliest(probabilities: &[f64]) -> Option<usize> {
     // Reversed, because of equal maxima the last one is returned and a fusion takes the first.
     let ranked = probabilities.iter().enumerate().rev();
     ranked.max_by(|a, b| a.1.total_cmp(b.1)).map(|(class, _)| class)

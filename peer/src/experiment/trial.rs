@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use gestalt_protocol::{ClassId, FusionRule};
-use gestalt_strategies::{Classifier, Classify, fusion};
+use gestalt_strategies::{Classifier, Classify, Evidence, fusion};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,7 @@ use super::ExperimentError;
 use super::eyes::{PoolEyes, Split};
 use super::pool::{Moment, Pool};
 use super::setting::{Drift, Setting};
-use crate::emulation::{Emulation, Observer, School, Trace};
+use crate::emulation::{Emulation, Observer, School, Trace, likeliest};
 
 /// The most held-out moments that are judged after each round.
 const JUDGED: usize = 60;
@@ -171,8 +172,8 @@ impl Exam {
                 match judged {
                     None => single += chance,
                     Some(p) => {
-                        single += f64::from(u8::from(top(&p) == class.index()));
-                        evidence.push(centred(&p));
+                        single += f64::from(u8::from(likeliest(&p) == Some(class.index())));
+                        evidence.push(evidence_of(&p));
                     }
                 }
             }
@@ -201,14 +202,9 @@ impl Exam {
     }
 }
 
-/// The likeliest class; of equals the first.
-fn top(p: &[f64]) -> usize {
-    (1..p.len()).fold(0, |best, k| if p[k] > p[best] { k } else { best })
-}
-
-/// Log-evidence: log p(k) − mean log p.
-fn centred(p: &[f64]) -> Vec<f32> {
-    let logs: Vec<f64> = p.iter().map(|p| p.max(1e-6).ln()).collect();
-    let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-    logs.iter().map(|log| (log - mean) as f32).collect()
+/// What one look at a hand says, as a vote would carry it.
+fn evidence_of(p: &[f64]) -> Vec<f32> {
+    let mut evidence = Evidence::new(p.len());
+    evidence.add(Duration::ZERO, p, 1.0, Duration::from_secs(1));
+    evidence.clipped(CLIP)
 }

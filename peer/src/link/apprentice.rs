@@ -94,7 +94,8 @@ pub(super) struct Apprentice {
     scribe: Option<Arc<Scribe>>,
     trainings: Arc<AtomicU64>,
     memory: Arc<Mutex<String>>,
-    reported: Option<(u64, usize, Digest, u64, String)>,
+    /// What the status says: keys used, samples held, digest, trainings; and of the memory.
+    reported: Option<((u64, usize, Digest, u64), String)>,
 }
 
 impl Apprentice {
@@ -154,10 +155,13 @@ impl Apprentice {
     /// Whether there is anything that the status does not say yet.
     pub fn has_news(&mut self, mind: &Mind) -> bool {
         let Some((keys, held, digest)) = mind.learned_so_far() else { return false };
-        let now = Some((keys, held, digest, self.trainings.load(Ordering::Relaxed), self.memory()));
-        let news = self.reported != now;
-        self.reported = now;
-        news
+        let now = (keys, held, digest, self.trainings.load(Ordering::Relaxed));
+        let memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.reported.as_ref().is_some_and(|(before, known)| *before == now && *known == *memory) {
+            return false;
+        }
+        self.reported = Some((now, memory.clone()));
+        true
     }
 
     pub fn status(&self, mind: &Mind) -> Option<Learning> {

@@ -1,28 +1,20 @@
 //! The thread that writes a robot's memory, so that a slow disk never delays a vote.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_strategies::{Change, Classifier};
 
 use super::{Store, StoreError};
+use crate::worker::{Desk, Worker};
 
 /// How long after a failure the disk is tried again.
 const RETRY: Duration = Duration::from_secs(2);
 
-/// Writes what it is given, in order, many changes at once when they come faster than the disk takes them.
-pub(crate) struct Scribe {
-    desk: Arc<Desk>,
-    thread: Option<JoinHandle<()>>,
-}
-
-#[derive(Default)]
-struct Desk {
-    pending: Mutex<Pending>,
-    changed: Condvar,
-}
+/// Writes what it is given, in order, many changes at once when they come faster than the disk takes them. Dropping it
+/// waits until what was handed over is written, or has failed once more.
+pub(crate) struct Scribe(Worker<Pending>);
 
 /// What is still to be written: the latest value of each record, so that a disk that fails for hours costs no more
 /// memory than the robot's own.
@@ -31,12 +23,11 @@ struct Pending {
     records: BTreeMap<Vec<u8>, Option<Vec<u8>>>,
     revision: u64,
     classifier: Option<Arc<Classifier>>,
-    ended: bool,
 }
 
-impl Desk {
-    fn lock(&self) -> MutexGuard<'_, Pending> {
-        self.pending.lock().unwrap_or_else(PoisonError::into_inner)
+impl Pending {
+    fn is_work(&self) -> bool {
+        !self.records.is_empty() || self.classifier.is_some()
     }
 }
 
@@ -48,80 +39,58 @@ impl Scribe {
         wrote: impl Fn(u64) + Send + 'static,
         failed: impl Fn(&StoreError) + Send + 'static,
     ) -> std::io::Result<Self> {
-        let desk = Arc::new(Desk::default());
-        let of_thread = desk.clone();
-        let thread = std::thread::Builder::new()
-            .name("memory".to_owned())
-            .spawn(move || write_all(&of_thread, store, &wrote, &failed))?;
-        Ok(Self { desk, thread: Some(thread) })
+        Worker::start("memory", move |desk| write_all(desk, store, &wrote, &failed)).map(Self)
     }
 
     /// Hands over changes, which `wrote` will name by their revision.
     pub fn remember(&self, revision: u64, changes: Vec<Change>) {
-        let mut pending = self.desk.lock();
-        pending.records.extend(changes.into_iter().map(|change| (change.key, change.value)));
-        pending.revision = revision;
-        self.desk.changed.notify_one();
+        self.0.hand_over(|pending| {
+            pending.records.extend(changes.into_iter().map(|change| (change.key, change.value)));
+            pending.revision = revision;
+        });
     }
 
     /// Hands over a new classifier.
     pub fn remember_classifier(&self, classifier: Arc<Classifier>) {
-        self.desk.lock().classifier = Some(classifier);
-        self.desk.changed.notify_one();
+        self.0.hand_over(|pending| pending.classifier = Some(classifier));
     }
 }
 
-impl Drop for Scribe {
-    /// Waits until what was handed over is written, or has failed once more.
-    fn drop(&mut self) {
-        self.desk.lock().ended = true;
-        self.desk.changed.notify_one();
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            tracing::error!("the thread that writes the memory ended badly");
-        }
-    }
-}
-
-fn write_all(desk: &Desk, store: Store, wrote: &impl Fn(u64), failed: &impl Fn(&StoreError)) {
+fn write_all(desk: &Desk<Pending>, store: Store, wrote: &impl Fn(u64), failed: &impl Fn(&StoreError)) {
     let (path, boot) = (store.path().to_owned(), store.boot());
     let mut store = Some(store);
+    // A classifier alone is written under the revision before.
+    let mut latest = 0;
     loop {
-        let mut pending = desk.lock();
-        while pending.records.is_empty() && pending.classifier.is_none() && !pending.ended {
-            pending = desk.changed.wait(pending).unwrap_or_else(PoisonError::into_inner);
-        }
-        let (records, classifier) = (std::mem::take(&mut pending.records), pending.classifier.take());
-        let (revision, ended) = (pending.revision, pending.ended);
-        drop(pending);
-        if ended && records.is_empty() && classifier.is_none() {
+        let (pending, ended) = desk.take(Pending::is_work);
+        if ended && !pending.is_work() {
             return;
         }
+        let Pending { records, revision, classifier } = pending;
+        latest = revision.max(latest);
         let changes: Vec<Change> = records.into_iter().map(|(key, value)| Change { key, value }).collect();
         let opened = store.take().map_or_else(|| Store::reopen(&path, boot), Ok);
         let written = opened.and_then(|open| open.write(&changes, classifier.as_deref()).map(|()| open));
         match written {
             Ok(open) => {
                 store = Some(open);
-                wrote(revision);
+                wrote(latest);
             }
             Err(error) => {
                 failed(&error);
-                let mut pending = desk.lock();
-                for Change { key, value } in changes {
-                    pending.records.entry(key).or_insert(value);
-                }
-                pending.classifier = pending.classifier.take().or(classifier);
-                if pending.ended {
+                // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
+                let ended = desk.put_back(
+                    |pending| {
+                        for Change { key, value } in changes {
+                            pending.records.entry(key).or_insert(value);
+                        }
+                        pending.classifier = pending.classifier.take().or(classifier);
+                    },
+                    RETRY,
+                );
+                if ended {
                     return;
                 }
-                // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
-                let (pending, _) = desk
-                    .changed
-                    .wait_timeout_while(pending, RETRY, |pending| !pending.ended)
-                    .unwrap_or_else(PoisonError::into_inner);
-                drop(pending);
             }
         }
     }
