@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use gestalt_protocol::CameraState;
 use gestalt_strategies::Classify;
 use thiserror::Error;
 use tokio::task::JoinHandle;
@@ -64,7 +65,10 @@ impl Body {
         }
         let seen = Arc::new(Mutex::new(None));
         let looking = eye.map(|eye| {
-            robot.set_camera(eye.describe());
+            robot.update_camera(|camera| {
+                camera.source = eye.describe();
+                camera.state = CameraState::Opening;
+            });
             tokio::spawn(look(eye, Arc::downgrade(&robot), robot.events(), seen.clone()))
         });
         Ok(Self { robot, looking, seen })

@@ -1,10 +1,10 @@
 //! A robot's eye: frames in, observations out, while a round is open.
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use gestalt_protocol::{ClassId, RobotId, RoundId};
-use gestalt_strategies::{Classify, Observation};
+use gestalt_protocol::{CameraState, ClassId, RobotId, RoundId};
+use gestalt_strategies::Classify;
 use opencv::core::Mat;
 use thiserror::Error;
 use tokio::sync::broadcast::Receiver;
@@ -14,7 +14,8 @@ use crate::config::{CameraSection, SourceSection};
 use crate::human::Human;
 use crate::link::{Event, Robot};
 use crate::model::RobotModel;
-use crate::perception::{HandConfig, NoObservation, Perception, PerceptionError};
+use crate::perception::PerceptionError;
+use crate::sight::{Sight, Taken};
 use crate::source::{Glove, ImageFolder, RenderedSource, Source, SourceError, Video};
 
 /// Why an eye cannot open.
@@ -31,18 +32,8 @@ pub enum EyeError {
 /// An open eye.
 pub struct Eye {
     source: Box<dyn Source>,
-    perception: Perception,
+    sight: Sight,
     human: Human,
-}
-
-/// What one look gave.
-pub enum Glance {
-    /// A hand.
-    Hand(Observation),
-    /// A frame without a hand, or one that cannot be judged.
-    NoHand(NoObservation),
-    /// No frame.
-    NoFrame(SourceError),
 }
 
 /// A frame, and what perception made of it.
@@ -96,8 +87,8 @@ impl Eye {
             SourceSection::Images(files) => Box::new(ImageFolder::open(&files.path, period, files.repeat)?),
             SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
         };
-        let perception = Perception::new(model.features, HandConfig::default())?;
-        Ok(Some(Self { source, perception, human }))
+        let sight = Sight::new(camera, model.features)?;
+        Ok(Some(Self { source, sight, human }))
     }
 
     /// What it looks through, in words.
@@ -107,19 +98,21 @@ impl Eye {
     }
 
     /// Takes one look. `seen` receives the frame.
-    fn look(&mut self, now: Duration, round: RoundId, seen: &Mutex<Option<Seen>>) -> Glance {
-        let frame = match self.source.next_frame(now, &self.human.shows(round)) {
-            Ok(frame) => frame,
-            Err(error) => return Glance::NoFrame(error),
+    fn look(
+        &mut self,
+        now: Duration,
+        round: RoundId,
+        seen: &Mutex<Option<Seen>>,
+    ) -> Result<Taken, SourceError> {
+        let frame = self.source.next_frame(now, &self.human.shows(round))?;
+        let taken = self.sight.take(&frame, true);
+        let features = match &taken.observation {
+            Some(Ok(observation)) => Some(observation.features.clone()),
+            _ => None,
         };
-        let observation = self.perception.observe(&frame.image);
-        let features = observation.as_ref().ok().map(|observation| observation.features.clone());
         *seen.lock().unwrap_or_else(PoisonError::into_inner) =
             Some(Seen { round, image: frame.image, features });
-        match observation {
-            Ok(observation) => Glance::Hand(observation),
-            Err(none) => Glance::NoHand(none),
-        }
+        Ok(taken)
     }
 }
 
@@ -131,7 +124,7 @@ pub(crate) async fn look(
     mut events: Receiver<Event>,
     seen: Arc<Mutex<Option<Seen>>>,
 ) {
-    let started = Instant::now();
+    let Some(started) = robot.upgrade().map(|robot| robot.started()) else { return };
     let period = eye.source.period();
     let mut round = None;
     let mut next = tokio::time::Instant::now();
@@ -159,19 +152,15 @@ pub(crate) async fn look(
                 eye = returned;
                 let Some(robot) = robot.upgrade() else { return };
                 match glance {
-                    Glance::Hand(observation) => {
-                        robot.count("frames_with_a_hand");
-                        robot.observe(observation);
-                    }
-                    Glance::NoHand(none) => {
-                        robot.count("frames_without_a_hand");
-                        tracing::debug!("{none}");
-                    },
-                    Glance::NoFrame(error) => {
+                    Ok(taken) => taken.tell(&robot, started),
+                    Err(error) => {
                         robot.count("frames_failed");
                         robot.report_error(&error.to_string());
                         if matches!(error, SourceError::Ended(_)) {
-                            robot.set_camera(error.to_string());
+                            robot.update_camera(|camera| {
+                                camera.state = CameraState::Ended;
+                                camera.trouble = error.to_string();
+                            });
                             return;
                         }
                     }

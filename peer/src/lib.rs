@@ -38,6 +38,8 @@ pub mod perception;
 pub mod picture;
 pub mod pose;
 #[cfg(feature = "opencv")]
+pub mod sight;
+#[cfg(feature = "opencv")]
 pub mod source;
 #[cfg(feature = "opencv")]
 pub mod survey;

@@ -35,4 +35,4 @@ pub use message::{Give, Have, HeldVote, MAX_CLASSES, MAX_ROBOTS, Message, Vote};
 pub use sample::{
     Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
-pub use status::{Learning, Reported, Status};
+pub use status::{Camera, CameraState, Learning, Motion, MotionState, Opinion, Reported, Status};

@@ -15,8 +15,8 @@ pub struct Status {
     pub name: String,
     /// How often it has started.
     pub boot: u32,
-    /// Its camera, in words: `rendered`, `video hand.mp4`, `none`, or what is wrong with it.
-    pub camera: String,
+    /// What it sees with, and how that goes.
+    pub camera: Camera,
     /// Its classifier, in words; `none` when it has none.
     pub model: String,
     /// The labels of the gestures it can tell, by class.
@@ -35,6 +35,79 @@ pub struct Status {
     pub counters: BTreeMap<String, u64>,
     /// The latest errors, newest last, at most sixteen.
     pub errors: Vec<Reported>,
+}
+
+/// What a robot sees with, and how that goes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// What it is, in words: `rendered`, `video hand.mp4`, `none`.
+    pub source: String,
+    /// How it goes.
+    pub state: CameraState,
+    /// What is wrong with it, and the mend; empty when nothing is.
+    pub trouble: String,
+    /// Width and height of the frames it delivers, in pixels; zero before the first.
+    pub size: [u32; 2],
+    /// Frames per second it delivered lately.
+    pub fps: f32,
+    /// Milliseconds from a frame's being taken to its being judged, lately.
+    pub delay_ms: f32,
+    /// What moves before it; absent when motion is not watched.
+    pub motion: Option<Motion>,
+    /// What its last frame with a hand showed, in its own opinion.
+    pub opinion: Option<Opinion>,
+}
+
+/// How a camera goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraState {
+    /// There is none.
+    #[default]
+    None,
+    /// It was opened and has not delivered a frame yet.
+    Opening,
+    /// It delivers.
+    Live,
+    /// It delivers nothing any more, or the same picture over and over.
+    Frozen,
+    /// It delivers what is no picture, or nothing but errors; it is tried again.
+    Failing,
+    /// It has come to its end.
+    Ended,
+}
+
+/// What moves before a camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// What it sees now.
+    pub state: MotionState,
+    /// How late a change of state is noticed at the camera's rate, in milliseconds.
+    pub delay_ms: f32,
+}
+
+/// What a motion detector sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionState {
+    /// Nobody is there.
+    #[default]
+    Empty,
+    /// Somebody moves.
+    Moving,
+    /// Somebody is there and holds still.
+    Still,
+}
+
+/// What one robot takes a gesture for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Opinion {
+    /// Its label.
+    pub gesture: String,
+    /// Its probability, `0.0..=1.0`.
+    pub probability: f32,
+    /// When, in milliseconds since the robot's start.
+    pub at_ms: u64,
 }
 
 /// What a robot has learned from.

@@ -22,6 +22,8 @@ pub(crate) struct Round {
     pub agreement: Agreement,
     evidence: Option<Evidence>,
     said: Option<Said>,
+    /// When it ends undecided, if before its deadline.
+    ends: Option<Duration>,
 }
 
 /// This robot's vote as it was last said.
@@ -43,6 +45,7 @@ impl Round {
             agreement: Agreement::default(),
             evidence: None,
             said: None,
+            ends: None,
         }
     }
 
@@ -97,7 +100,13 @@ impl Round {
 
     /// When this robot stops waiting for live robots that have not seen anything, and when it gives up.
     pub fn patience_and_deadline(&self, config: &MindConfig) -> (Duration, Duration) {
-        (self.since + config.patience, self.since + config.deadline)
+        let deadline = self.since + config.deadline;
+        (self.since + config.patience, self.ends.map_or(deadline, |ends| ends.min(deadline)))
+    }
+
+    /// Nothing more can be seen of the gesture: what is still to be heard of it is on its way.
+    pub fn end_early(&mut self, now: Duration, config: &MindConfig) {
+        self.ends.get_or_insert(now + config.patience);
     }
 
     /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline.

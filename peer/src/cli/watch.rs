@@ -84,7 +84,7 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
             "{} {}: camera {}, model {}, {state}, linked to {}, {} alive",
             status.robot,
             status.name,
-            status.camera,
+            status.camera.source,
             status.model,
             show::robots(&status.neighbours),
             status.alive.len()

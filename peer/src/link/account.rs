@@ -125,7 +125,7 @@ impl Refusal {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::RobotId;
+    use gestalt_protocol::{Camera, RobotId};
 
     use super::*;
 
@@ -134,7 +134,7 @@ mod tests {
             robot: RobotId(1),
             name: "one".to_owned(),
             boot: 1,
-            camera: "none".to_owned(),
+            camera: Camera::default(),
             model: "none".to_owned(),
             vocabulary: Vec::new(),
             neighbours: Vec::new(),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Answer, Decision, InstructorId, Keys, RobotId, RoundId, SampleId, Status};
+use gestalt_protocol::{Answer, Camera, Decision, InstructorId, Keys, RobotId, RoundId, SampleId, Status};
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Classify, Input, MindConfig, Observation, Vocabulary};
 use tokio::runtime::{Handle, RuntimeFlavor};
@@ -77,6 +77,7 @@ pub enum Event {
 #[derive(Debug)]
 pub struct Robot {
     account: Arc<Account>,
+    started: Instant,
     commands: mpsc::Sender<Input>,
     events: broadcast::Sender<Event>,
     /// For the first who asks: a link may stand before there was time to.
@@ -110,7 +111,7 @@ impl Robot {
             robot: id,
             name,
             boot,
-            camera: "none".to_owned(),
+            camera: Camera { source: "none".to_owned(), ..Camera::default() },
             model: "none".to_owned(),
             vocabulary: vocabulary.as_ref().map(|v| v.labels().to_vec()).unwrap_or_default(),
             neighbours: Vec::new(),
@@ -167,7 +168,7 @@ impl Robot {
             }
         };
         let first_events = Mutex::new(Some(first_events));
-        let robot = Self { account, commands, events, first_events, classifier, locators, host };
+        let robot = Self { account, started, commands, events, first_events, classifier, locators, host };
         if let Some(classifier) = first_classifier {
             robot.learned(classifier, "from before");
         }
@@ -177,6 +178,22 @@ impl Robot {
     /// Says: a gesture is being shown now.
     pub fn open_round(&self) {
         self.tell(Input::Open);
+    }
+
+    /// Says: a hand moved from `began` on, and now holds still. See [`Input::Shown`].
+    pub fn shown(&self, began: Instant) {
+        self.tell(Input::Shown(began.saturating_duration_since(self.started)));
+    }
+
+    /// Says: the hand that held still is moving again, or gone. See [`Input::Left`].
+    pub fn left(&self) {
+        self.tell(Input::Left);
+    }
+
+    /// When it started: the zero of its own time.
+    #[must_use]
+    pub fn started(&self) -> Instant {
+        self.started
     }
 
     /// Hands over what a frame showed.
@@ -219,9 +236,9 @@ impl Robot {
         self.account.lock().clone()
     }
 
-    /// Says in the status what camera it has, or what is wrong with it.
-    pub fn set_camera(&self, camera: String) {
-        self.account.lock().camera = camera;
+    /// Changes what the status says of its camera.
+    pub fn update_camera(&self, change: impl FnOnce(&mut Camera)) {
+        change(&mut self.account.lock().camera);
     }
 
     /// Puts an error of the program around it into its status.

@@ -37,8 +37,14 @@ use crate::{Classify, Observation};
 pub enum Input {
     /// Time has passed; the host owes one at [`Mind::next_wake`], more do no harm.
     Tick,
-    /// The robot's own motion detector (or its host's schedule) says: a gesture is being shown.
+    /// The robot's host says, by a schedule or for other reasons of its own: a gesture is being shown.
     Open,
+    /// The robot's own motion detector says: a hand moved from that time on, and now holds still. Opens a round, unless
+    /// the newest one was opened after the hand had begun to move: that one is about this gesture.
+    Shown(Duration),
+    /// The robot's own motion detector says: the hand that held still is moving again, or gone. What was shown can be seen
+    /// no more, so this robot's round ends early.
+    Left,
     /// A human says something.
     Instructed(Instructed),
     /// That robot has answered what that instructor said at that time.
@@ -121,6 +127,8 @@ pub struct Mind {
     answered: VecDeque<(InstructorId, u64)>,
     /// The round for which this robot still looks, though it may be decided: it is to learn from it.
     looking: Option<RoundId>,
+    /// Since when the hand had moved that now holds still and has had no round yet.
+    shown: Option<Duration>,
 }
 
 impl Mind {
@@ -149,6 +157,7 @@ impl Mind {
             answers: Vec::new(),
             answered: VecDeque::new(),
             looking: None,
+            shown: None,
         })
     }
 
@@ -168,6 +177,8 @@ impl Mind {
         match input {
             Input::Tick => {}
             Input::Open => self.on_open(&mut out),
+            Input::Shown(began) => self.shown = Some(began.min(self.now)),
+            Input::Left => self.on_left(),
             Input::Instructed(instructed) => self.on_instructed(instructed, &mut out),
             Input::Answered(by, at, robot) => self.on_answered(&by, at, robot),
             Input::Observed(observation) => self.on_observed(&observation),
@@ -198,6 +209,7 @@ impl Mind {
             self.closing(),
             self.announcement(),
             self.looking_until(),
+            self.showing(),
             self.answer_due(),
             self.repair.due(&self.alive),
         ]
@@ -207,13 +219,33 @@ impl Mind {
     }
 
     fn on_open(&mut self, out: &mut Vec<Output>) {
-        let settled = |round: &Round| !round.open && self.now >= round.since + self.config.refractory;
-        if !self.round.as_ref().is_none_or(settled) {
+        if self.round.as_ref().is_some_and(|round| round.open) || self.now < self.refractory_until() {
             return;
         }
         match self.highest.map_or(Some(1), |highest| highest.checked_add(1)) {
             Some(counter) => self.join(RoundId { counter, opener: self.me }, out),
             None => self.refusals.add(Refusal::CountersUsedUp),
+        }
+    }
+
+    /// Until when a request to open a round may be a copy of the one for the newest round.
+    fn refractory_until(&self) -> Duration {
+        self.round.as_ref().map_or(Duration::ZERO, |round| round.since + self.config.refractory)
+    }
+
+    /// When a round is to be opened for the gesture shown; never for one that has had its round, and not before the
+    /// round of an earlier gesture is over.
+    fn showing(&self) -> Option<Duration> {
+        let began = self.shown?;
+        let round = self.round.as_ref();
+        let waits = round.is_none_or(|round| !round.open && round.since < began);
+        waits.then(|| self.refractory_until())
+    }
+
+    fn on_left(&mut self) {
+        self.shown = None;
+        if let Some(round) = self.round.as_mut().filter(|round| round.open) {
+            round.end_early(self.now, &self.config);
         }
     }
 
@@ -310,6 +342,10 @@ impl Mind {
         self.decide(out);
         if self.closing().is_some_and(|due| self.now >= due) {
             self.close(out);
+        }
+        if self.showing().is_some_and(|due| self.now >= due) {
+            self.on_open(out);
+            self.shown = None;
         }
         if self.announcement().is_some_and(|due| self.now >= due) {
             self.announce(out);

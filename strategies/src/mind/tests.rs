@@ -650,3 +650,47 @@ mod order {
         }
     }
 }
+
+#[test]
+fn a_gesture_shown_opens_one_round_however_many_robots_saw_it() {
+    let mut slow = mind(2);
+    // Another saw the hand hold still at 900 ms; this one, of a slow camera, at 1,300.
+    slow.handle(ms(900), votes(1, 1, vote(1, 0, SURE)));
+    slow.handle(ms(1000), Input::Tick);
+    let opened = |out: &[Output]| out.iter().any(|output| matches!(output, Output::Opened(_)));
+    assert!(!opened(&slow.handle(ms(1300), Input::Shown(ms(500)))), "that gesture has its round");
+    for at in (1400..9000).step_by(100) {
+        assert!(!opened(&slow.handle(ms(at), Input::Tick)), "{at}");
+    }
+    slow.handle(ms(9000), Input::Left);
+    assert!(opened(&slow.handle(ms(10_000), Input::Shown(ms(9100)))), "this is the next");
+}
+
+#[test]
+fn a_gesture_shown_while_the_last_is_undecided_has_its_round_afterwards() {
+    let mut robot = mind(1);
+    robot.handle(ms(0), Input::Open);
+    robot.handle(ms(3000), Input::Shown(ms(2000)));
+    let opened: Vec<u64> = (3100..7000)
+        .step_by(100)
+        .filter(|at| robot.handle(ms(*at), Input::Tick).contains(&Output::Opened(round(2, 1))))
+        .collect();
+    assert_eq!(opened, [5200], "after the deadline, and the time decisions have to meet");
+    // One that is gone by then has none.
+    let mut robot = mind(1);
+    robot.handle(ms(0), Input::Open);
+    robot.handle(ms(3000), Input::Shown(ms(2000)));
+    robot.handle(ms(4000), Input::Left);
+    for at in (4000..9000).step_by(100) {
+        assert!(!robot.handle(ms(at), Input::Tick).contains(&Output::Opened(round(2, 1))));
+    }
+}
+
+#[test]
+fn a_round_ends_early_when_the_hand_has_left() {
+    let mut mind = mind(1);
+    mind.handle(ms(0), Input::Shown(ms(0)));
+    mind.handle(ms(1500), Input::Left);
+    assert!(holds(&mind.handle(ms(2400), Input::Tick)).is_empty(), "votes may still be on their way");
+    assert_eq!(holds(&mind.handle(ms(2500), Input::Tick)), [None], "and not only at the deadline");
+}
