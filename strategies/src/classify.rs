@@ -44,4 +44,11 @@ pub trait Classify: Debug + Send + Sync {
         let _ = coordinates;
         None
     }
+
+    /// Where a feature vector lies among all views, in units such that two at a distance of 1 are wrong together about as
+    /// often as not: nearer ones repeat each other. `None` for a classifier that cannot say, whose every look is new.
+    fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
+        let _ = features;
+        None
+    }
 }

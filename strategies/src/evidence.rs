@@ -5,48 +5,129 @@ use std::time::Duration;
 /// The least probability taken seriously: below it, a classifier speaks of its own limits, not of the gesture.
 const FLOOR: f64 = 1e-6;
 
-/// Log-evidence for each class: ℓ(k) = Σ w (log p(k) − mean log p), over the frames so far.
+/// The most looks that later ones are compared with.
+const MAX_VIEWS: usize = 32;
+
+/// The part of τ by which a camera's frame may come early and still begin the next look.
+const JITTER: f64 = 0.1;
+
+/// A frame, as evidence takes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Look<'a> {
+    /// When it was taken.
+    pub at: Duration,
+    /// The probability of each class.
+    pub probabilities: &'a [f64],
+    /// How far it is to be trusted, `0.0..=1.0`.
+    pub quality: f64,
+    /// Where it lies among all views, see [`Classify::view`](crate::Classify::view); empty when that is not known.
+    pub view: &'a [f32],
+}
+
+/// Log-evidence for each class, ℓ(k) = Σ w (log p(k) − mean log p), over the looks so far.
 ///
-/// A frame weighs w = quality · min(1, Δt / τ), Δt since the frame before: frames that repeat each other count as
-/// one look, so that a camera of 30 frames per second does not outvote one of 2 by showing the same picture.
+/// Frames are no independent witnesses: thirty in a second show the same picture. So the frames within τ make **one look**,
+/// of their mean log-probabilities; and a look weighs w = quality · (1 − s), s = max exp(−‖v − v′‖²) over the looks
+/// before, v being the mean view: **what looks the same counts once**, however long it is looked at. A camera of 30
+/// frames per second with one bad view does not outvote ten of 2 with good ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
+    /// Of the looks that are over.
     sums: Vec<f64>,
-    looks: f64,
-    latest: Option<Duration>,
+    weight: f64,
+    views: Vec<Vec<f64>>,
+    current: Option<Current>,
+}
+
+/// The look that frames are still added to. All sums are weighted by quality.
+#[derive(Clone, Debug, PartialEq)]
+struct Current {
+    began: Duration,
+    frames: f64,
+    quality: f64,
+    logs: Vec<f64>,
+    view: Vec<f64>,
+    /// 1 − s.
+    novelty: f64,
+}
+
+impl Current {
+    /// w: what it weighs so far.
+    fn weight(&self) -> f64 {
+        self.novelty * self.quality / self.frames
+    }
+
+    /// What it adds to the evidence for a class.
+    fn part(&self, class: usize) -> f64 {
+        self.weight() * self.logs[class] / self.quality
+    }
 }
 
 impl Evidence {
     /// No evidence yet over that many classes.
     #[must_use]
     pub fn new(classes: usize) -> Self {
-        Self { sums: vec![0.0; classes], looks: 0.0, latest: None }
+        Self { sums: vec![0.0; classes], weight: 0.0, views: Vec::new(), current: None }
     }
 
-    /// Counts a frame seen at `now` with these class probabilities; `decorrelation` is τ, above zero. Says whether
-    /// the frame weighed anything.
-    pub fn add(
-        &mut self,
-        now: Duration,
-        probabilities: &[f64],
-        quality: f64,
-        decorrelation: Duration,
-    ) -> bool {
-        let fresh = self
-            .latest
-            .map_or(1.0, |before| now.saturating_sub(before).as_secs_f64() / decorrelation.as_secs_f64());
-        let weight = quality * fresh.min(1.0);
-        if !(weight > 0.0 && weight.is_finite()) {
+    /// Counts a frame over as many classes; `decorrelation` is τ, above zero. Says whether it weighed anything.
+    pub fn add(&mut self, look: Look<'_>, decorrelation: Duration) -> bool {
+        if !(look.quality > 0.0 && look.quality.is_finite()) {
             return false;
         }
-        let logs: Vec<f64> = probabilities.iter().map(|p| p.max(FLOOR).ln()).collect();
-        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-        for (sum, log) in self.sums.iter_mut().zip(logs) {
-            *sum += weight * (log - mean);
+        let next = self.current.as_ref().and_then(|current| {
+            let due = current.began + decorrelation;
+            (look.at >= due.saturating_sub(decorrelation.mul_f64(JITTER))).then_some(due)
+        });
+        if let Some(due) = next {
+            self.end_look();
+            // On the grid of τ, unless there was a pause: so that no rate of frames gains or loses by rounding.
+            let began = if look.at < due + decorrelation { due } else { look.at };
+            self.begin_look(began, look);
+        } else if self.current.is_none() {
+            self.begin_look(look.at, look);
         }
-        self.looks += weight;
-        self.latest = Some(now);
-        true
+        let Some(current) = &mut self.current else { return false };
+        current.frames += 1.0;
+        current.quality += look.quality;
+        let logs: Vec<f64> = look.probabilities.iter().map(|p| p.max(FLOOR).ln()).collect();
+        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+        for (sum, log) in current.logs.iter_mut().zip(logs) {
+            *sum += look.quality * (log - mean);
+        }
+        for (sum, x) in current.view.iter_mut().zip(look.view) {
+            *sum += look.quality * f64::from(*x);
+        }
+        let view: Vec<f64> = current.view.iter().map(|sum| sum / current.quality).collect();
+        let alike = |other: &Vec<f64>| {
+            let distance: f64 = view.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum();
+            if view.is_empty() || other.len() != view.len() { 0.0 } else { (-distance).exp() }
+        };
+        current.novelty = 1.0 - self.views.iter().map(alike).fold(0.0, f64::max);
+        current.novelty > 0.0
+    }
+
+    fn begin_look(&mut self, began: Duration, look: Look<'_>) {
+        self.current = Some(Current {
+            began,
+            frames: 0.0,
+            quality: 0.0,
+            logs: vec![0.0; self.sums.len()],
+            view: vec![0.0; look.view.len()],
+            novelty: 1.0,
+        });
+    }
+
+    fn end_look(&mut self) {
+        let Some(current) = self.current.take() else { return };
+        for (class, sum) in self.sums.iter_mut().enumerate() {
+            *sum += current.part(class);
+        }
+        self.weight += current.weight();
+        if self.views.len() == MAX_VIEWS {
+            self.views.remove(0);
+        }
+        self.views.push(current.view.iter().map(|sum| sum / current.quality).collect());
     }
 
     /// How many classes it is about.
@@ -58,16 +139,15 @@ impl Evidence {
     /// Σ w: the number of independent looks.
     #[must_use]
     pub fn looks(&self) -> f64 {
-        self.looks
+        self.weight + self.current.as_ref().map_or(0.0, Current::weight)
     }
 
     /// The sums as a vote carries them, clipped to ±`clip`; empty when nothing was seen.
     #[must_use]
     pub fn clipped(&self, clip: f64) -> Vec<f32> {
-        if self.latest.is_none() {
-            return Vec::new();
-        }
-        self.sums.iter().map(|sum| sum.min(clip).max(-clip) as f32).collect()
+        let Some(current) = &self.current else { return Vec::new() };
+        let total = |(class, sum): (usize, &f64)| sum + current.part(class);
+        self.sums.iter().enumerate().map(|sum| total(sum).min(clip).max(-clip) as f32).collect()
     }
 }
 
@@ -81,10 +161,14 @@ mod tests {
         Duration::from_millis(ms)
     }
 
+    fn look(ms: u64, probabilities: &[f64], quality: f64) -> Look<'_> {
+        Look { at: at(ms), probabilities, quality, view: &[] }
+    }
+
     #[test]
     fn evidence_is_the_centred_log_probability() {
         let mut evidence = Evidence::new(3);
-        evidence.add(at(0), &[0.5, 0.25, 0.25], 1.0, TAU);
+        evidence.add(look(0, &[0.5, 0.25, 0.25], 1.0), TAU);
         let third = 2f32.ln() / 3.0;
         for (found, expected) in evidence.clipped(6.0).iter().zip([2.0 * third, -third, -third]) {
             assert!((found - expected).abs() < 1e-6);
@@ -92,44 +176,91 @@ mod tests {
         assert_eq!(evidence.looks(), 1.0);
     }
 
+    /// Evidence of three seconds, a frame every so many milliseconds; `view` is what is seen at a time.
+    fn watched(period_ms: u64, view: impl Fn(u64) -> Vec<f32>) -> Evidence {
+        let mut evidence = Evidence::new(2);
+        for t in (0..=3000).step_by(period_ms as usize) {
+            evidence.add(Look { view: &view(t), ..look(t, &[0.6, 0.4], 1.0) }, TAU);
+        }
+        evidence
+    }
+
     #[test]
     fn thirty_frames_a_second_weigh_what_two_do() {
-        let look = |period_ms: u64| {
-            let mut evidence = Evidence::new(2);
-            for t in (0..=3000).step_by(period_ms as usize) {
-                evidence.add(at(t), &[0.6, 0.4], 1.0, TAU);
-            }
-            evidence
-        };
-        let (slow, fast) = (look(500), look(30));
-        assert!((slow.looks() - fast.looks()).abs() < 1e-9, "{} {}", slow.looks(), fast.looks());
-        assert!((slow.clipped(60.0)[0] - fast.clipped(60.0)[0]).abs() < 1e-5);
+        for period in [30, 33, 40, 66, 100, 495] {
+            let (slow, fast) = (watched(500, |_| Vec::new()), watched(period, |_| Vec::new()));
+            assert_eq!(slow.looks(), 7.0);
+            assert!((fast.looks() - 7.0).abs() < 1e-9, "{period} ms: {}", fast.looks());
+            assert!((slow.clipped(60.0)[0] - fast.clipped(60.0)[0]).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn what_looks_the_same_counts_once_at_any_rate_and_what_changes_counts_anew() {
+        for period in [33, 500] {
+            let same = watched(period, |_| vec![0.3, 0.2]);
+            assert!((same.looks() - 1.0).abs() < 1e-9, "{period} ms: {}", same.looks());
+            // Every half second, somewhere else.
+            let other = watched(period, |t| vec![(t / 500) as f32 * 4.0, 0.0]);
+            assert!((6.0..=7.0).contains(&other.looks()), "{period} ms: {}", other.looks());
+            let slowly = watched(period, |t| vec![t as f32 / 1000.0, 0.0]);
+            assert!((1.5..5.0).contains(&slowly.looks()), "{period} ms: {}", slowly.looks());
+        }
+    }
+
+    #[test]
+    fn a_view_seen_before_is_known_again() {
+        let mut evidence = Evidence::new(2);
+        for (t, x) in [(0, 0.0), (500, 5.0), (1000, 0.0)] {
+            evidence.add(Look { view: &[x], ..look(t, &[0.6, 0.4], 1.0) }, TAU);
+        }
+        assert!((evidence.looks() - 2.0).abs() < 1e-6, "{}", evidence.looks());
+    }
+
+    #[test]
+    fn the_frames_of_one_look_are_averaged() {
+        let mut evidence = Evidence::new(2);
+        evidence.add(look(0, &[0.8, 0.2], 1.0), TAU);
+        evidence.add(look(100, &[0.2, 0.8], 1.0), TAU);
+        assert!(evidence.clipped(6.0)[0].abs() < 1e-6, "one for, one against");
+        assert_eq!(evidence.looks(), 1.0);
     }
 
     #[test]
     fn a_pause_makes_no_frame_weigh_more_than_one_look() {
         let mut evidence = Evidence::new(2);
-        evidence.add(at(0), &[0.6, 0.4], 1.0, TAU);
-        evidence.add(at(60_000), &[0.6, 0.4], 1.0, TAU);
+        evidence.add(look(0, &[0.6, 0.4], 1.0), TAU);
+        evidence.add(look(60_000, &[0.6, 0.4], 1.0), TAU);
+        evidence.add(look(60_400, &[0.6, 0.4], 1.0), TAU);
         assert_eq!(evidence.looks(), 2.0);
     }
 
     #[test]
     fn quality_scales_a_frame_and_none_discards_it() {
         let mut evidence = Evidence::new(2);
-        assert!(!evidence.add(at(0), &[0.9, 0.1], 0.0, TAU));
+        assert!(!evidence.add(look(0, &[0.9, 0.1], 0.0), TAU));
         assert!(evidence.clipped(6.0).is_empty(), "nothing seen, nothing said");
-        assert!(evidence.add(at(10), &[0.9, 0.1], 0.25, TAU));
+        assert!(evidence.add(look(10, &[0.9, 0.1], 0.25), TAU));
         assert_eq!(evidence.looks(), 0.25);
-        assert!(!evidence.add(at(600), &[0.9, 0.1], f64::NAN, TAU));
+        assert!(!evidence.add(look(600, &[0.9, 0.1], f64::NAN), TAU));
     }
 
     #[test]
     fn a_probability_of_zero_is_floored_and_the_sum_clipped() {
         let mut evidence = Evidence::new(2);
-        evidence.add(at(0), &[1.0, 0.0], 1.0, TAU);
+        evidence.add(look(0, &[1.0, 0.0], 1.0), TAU);
         let half = (FLOOR.ln() / -2.0) as f32;
         assert_eq!(evidence.clipped(100.0), [half, -half]);
         assert_eq!(evidence.clipped(6.0), [6.0, -6.0]);
+    }
+
+    #[test]
+    fn what_is_remembered_of_a_long_round_is_bounded() {
+        let mut evidence = Evidence::new(2);
+        for t in 0..10_000 {
+            evidence.add(Look { view: &[t as f32 * 10.0], ..look(t * 500, &[0.6, 0.4], 1.0) }, TAU);
+        }
+        assert_eq!(evidence.views.len(), MAX_VIEWS);
+        assert_eq!(evidence.looks(), 10_000.0);
     }
 }

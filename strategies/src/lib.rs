@@ -39,7 +39,7 @@ pub use classifier::{Classifier, MAX_MODEL, ModelError};
 pub use classify::{Classify, ClassifyError};
 pub use coding::{Precision, VectorError, decode_vector};
 pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
-pub use evidence::Evidence;
+pub use evidence::{Evidence, Look};
 pub use feature_space::FeatureSpace;
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use learner::{LearnError, Learner, LearnerOptions};

@@ -7,7 +7,7 @@ use gestalt_protocol::{Certificate, Decision, Envelope, RobotId, RoundId, Vocabu
 
 use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
-use crate::evidence::Evidence;
+use crate::evidence::{Evidence, Look};
 use crate::mind::MindConfig;
 
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
@@ -49,13 +49,14 @@ impl Round {
         }
     }
 
-    /// Counts a frame with these class probabilities.
-    pub fn look(&mut self, now: Duration, probabilities: &[f64], quality: f64, config: &MindConfig) {
-        let evidence = self.evidence.get_or_insert_with(|| Evidence::new(probabilities.len()));
-        if evidence.classes() != probabilities.len() {
-            *evidence = Evidence::new(probabilities.len());
+    /// Counts a frame.
+    pub fn look(&mut self, look: Look<'_>, config: &MindConfig) {
+        let classes = look.probabilities.len();
+        let evidence = self.evidence.get_or_insert_with(|| Evidence::new(classes));
+        if evidence.classes() != classes {
+            *evidence = Evidence::new(classes);
         }
-        if evidence.add(now, probabilities, quality, config.decorrelation)
+        if evidence.add(look, config.decorrelation)
             && let Some(said) = &mut self.said
         {
             said.outdated = true;

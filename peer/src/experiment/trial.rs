@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, FusionRule};
-use gestalt_strategies::{Classifier, Classify, Evidence, fusion};
+use gestalt_strategies::{Classifier, Classify, Evidence, Look, fusion};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -205,6 +205,7 @@ impl Exam {
 /// What one look at a hand says, as a vote would carry it.
 fn evidence_of(p: &[f64]) -> Vec<f32> {
     let mut evidence = Evidence::new(p.len());
-    evidence.add(Duration::ZERO, p, 1.0, Duration::from_secs(1));
+    evidence
+        .add(Look { at: Duration::ZERO, probabilities: p, quality: 1.0, view: &[] }, Duration::from_secs(1));
     evidence.clipped(CLIP)
 }

@@ -28,6 +28,9 @@ use crate::{Classify, ClassifyError, FeatureSpace, Vocabulary};
 /// Coordinates of support vectors lie within ± this, so that their squared distances are finite.
 pub(crate) const MAX_COORDINATE: f32 = 1e6;
 
+/// The squared distance of two views that count as half repeated, in units of the space's variance.
+const REPEATS: f64 = 0.25;
+
 /// A trained classifier. [`crate::train`] and [`crate::Learner`] make one, [`Classifier::decode`] reads one.
 ///
 /// It need not have met all gestures of its vocabulary. After n samples, one that it has never met gets the
@@ -108,6 +111,13 @@ impl Classify for Classifier {
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
         Ok(self.judge(&self.space.project(features)?))
+    }
+
+    fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
+        let unit = (REPEATS * self.space.variance()).sqrt() as f32;
+        let mut view = self.space.project(features).ok().filter(|_| unit > 0.0)?;
+        view.iter_mut().for_each(|coordinate| *coordinate /= unit);
+        Some(view)
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {

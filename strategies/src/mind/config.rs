@@ -50,9 +50,11 @@ pub struct MindConfig {
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
-    /// τ: how long until a view has changed enough to count as another look.
+    /// τ: how long until a view may have changed enough to count as another look; frames closer in time are one.
     #[serde(with = "humantime_serde")]
     pub decorrelation: Duration,
+    /// Whether a look counts for less, the more it resembles an earlier one of the round.
+    pub discount_repeats: bool,
     /// How long a round waits for live robots that have not seen anything yet, before it decides without them. A robot
     /// that never sees makes every round last this long.
     #[serde(with = "humantime_serde")]
@@ -93,6 +95,7 @@ impl Default for MindConfig {
             liars: 0,
             clip: 6.0,
             decorrelation: Duration::from_millis(500),
+            discount_repeats: true,
             patience: Duration::from_millis(1000),
             deadline: Duration::from_secs(5),
             refractory: Duration::from_millis(500),

@@ -30,7 +30,7 @@ use repair::Repair;
 
 use crate::ballot::{Cast, Scale};
 use crate::round::Round;
-use crate::{Classify, Observation};
+use crate::{Classify, Look, Observation};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -265,7 +265,13 @@ impl Mind {
         match classifier.probabilities(&observation.features) {
             Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
                 let quality = f64::from(observation.quality.clamp(0.0, 1.0));
-                round.look(self.now, &p, quality, &self.config);
+                let view = if self.config.discount_repeats {
+                    classifier.view(&observation.features).unwrap_or_default()
+                } else {
+                    Vec::new()
+                };
+                let look = Look { at: self.now, probabilities: &p, quality, view: &view };
+                round.look(look, &self.config);
             }
             Ok(_) | Err(_) => self.refusals.add(Refusal::Unclassified),
         }
