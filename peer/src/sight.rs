@@ -45,8 +45,8 @@ impl Sight {
     /// # Errors
     /// See [`PerceptionError`].
     pub fn new(camera: &CameraSection, features: FeatureSet) -> Result<Self, PerceptionError> {
-        let _ = camera;
-        Ok(Self { perception: Perception::new(features, HandConfig::default())? })
+        let (hand, model) = (HandConfig::default(), camera.model.properties());
+        Ok(Self { perception: Perception::for_camera(features, hand, camera.layer, &model)? })
     }
 
     /// Takes in the next frame; `judge`: also says what hand it shows. Frames between which no round is open are taken

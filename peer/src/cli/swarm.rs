@@ -214,6 +214,7 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
         config.camera = CameraSection {
             model: camera.clone(),
             source: SourceSection::Rendered(RenderedSection { pose, seed: args.seed }),
+            ..CameraSection::default()
         };
         config.model = ModelSection::Rendered;
         config.rounds.rule = args.rule;

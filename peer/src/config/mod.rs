@@ -1,6 +1,7 @@
 //! What a robot is told before it starts: one commented JSON5 file.
 
 mod document;
+mod layer;
 mod learning;
 
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use crate::link::{LinkConfig, LinkError, Scouting};
 use crate::pose::Pose;
 
 pub use document::{Document, Override};
+pub use layer::LayerConfig;
 pub use learning::{LearnFrom, LearningSection};
 
 /// A configuration that cannot be used. Each variant names the key and the mend.
@@ -116,6 +118,8 @@ impl Default for SwarmName {
 pub struct CameraSection {
     /// What the camera does to a picture, and how often it takes one.
     pub model: CameraChoice,
+    /// Which stages make its frames like those of other cameras.
+    pub layer: LayerConfig,
     /// Where the frames come from.
     pub source: SourceSection,
 }

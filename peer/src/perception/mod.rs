@@ -16,6 +16,7 @@ mod features;
 mod frame;
 mod hand;
 mod hog;
+mod layer;
 mod ring;
 
 use std::str::FromStr;
@@ -26,11 +27,14 @@ use opencv::objdetect::HOGDescriptor;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::camera_model::CameraModel;
+
 use canonical::Canonical;
 use colour::ColourModel;
 pub use features::{FEATURES, Feature, features};
 use frame::View;
 use hand::HandFinder;
+pub use layer::LayerConfig;
 
 /// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
 const GLANCE: Size = Size { width: 160, height: 120 };
@@ -218,6 +222,8 @@ pub enum NoHand {
 /// Sees hands. Owns every buffer it needs, so that a frame allocates next to nothing.
 pub struct Perception {
     set: FeatureSet,
+    layer: LayerConfig,
+    camera: Option<CameraModel>,
     glance: View,
     close: View,
     colours: ColourModel,
@@ -228,7 +234,7 @@ pub struct Perception {
 }
 
 impl Perception {
-    /// Eyes that compute this feature set.
+    /// Eyes that compute this feature set, of frames of any camera.
     ///
     /// # Errors
     /// See [`PerceptionError`].
@@ -236,6 +242,8 @@ impl Perception {
         config.validate()?;
         Ok(Self {
             set,
+            layer: LayerConfig::ALL,
+            camera: None,
             glance: View::new(GLANCE),
             close: View::new(CLOSE),
             colours: ColourModel::new(config.minimum_contrast),
@@ -244,6 +252,25 @@ impl Perception {
             hog: hog::descriptor()?,
             descriptors: Vector::new(),
         })
+    }
+
+    /// Eyes that compute this feature set, of the frames of this camera, with these stages of the layer.
+    ///
+    /// # Errors
+    /// See [`PerceptionError`].
+    pub fn for_camera(
+        set: FeatureSet,
+        hand: HandConfig,
+        layer: LayerConfig,
+        camera: &CameraModel,
+    ) -> Result<Self, PerceptionError> {
+        Ok(Self { layer, camera: Some(camera.clone()), ..Self::new(set, hand)? })
+    }
+
+    /// Which stages of the layer are on.
+    #[must_use]
+    pub fn layer(&self) -> LayerConfig {
+        self.layer
     }
 
     /// Which feature set this computes.
@@ -257,7 +284,23 @@ impl Perception {
     /// # Errors
     /// See [`NoObservation`]; a frame without a hand is [`NoObservation::NoHand`].
     pub fn observe(&mut self, bgr: &Mat) -> Result<Observation, NoObservation> {
+        self.observe_before(bgr, None)
+    }
+
+    /// Looks at one frame of a scene that is known without anyone in it: `background`, 8-bit BGR of any size, of the
+    /// frame's aspect.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    pub fn observe_before(
+        &mut self,
+        bgr: &Mat,
+        background: Option<&Mat>,
+    ) -> Result<Observation, NoObservation> {
         frame::check(bgr)?;
+        if let Some(background) = background {
+            frame::check(background)?;
+        }
         self.glance.look(bgr, Rect::new(0, 0, bgr.cols(), bgr.rows()))?;
         self.colours.learn(&self.glance)?;
         self.colours.mark(&mut self.glance)?;
