@@ -51,7 +51,7 @@ impl Body {
                 // Starts that are counted on disk begin at one.
                 boot: if learning.as_ref().is_some_and(|l| l.memory.is_some()) { 1 } else { boot },
                 swarm: config.swarm.0.clone(),
-                mind: config.rounds.clone(),
+                mind: config.mind(),
                 link: config.link(),
                 vocabulary: None,
                 learning: learning.clone(),

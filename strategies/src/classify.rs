@@ -45,8 +45,8 @@ pub trait Classify: Debug + Send + Sync {
         None
     }
 
-    /// Where a feature vector lies among all views, in units such that two at a distance of 1 are wrong together about as
-    /// often as not: nearer ones repeat each other. `None` for a classifier that cannot say, whose every look is new.
+    /// Where a feature vector lies among all views, in units such that errors about two views correlate by exp(−d²) at a
+    /// distance of d: near ones repeat each other. `None` for a classifier that cannot say, whose every look is new.
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
         let _ = features;
         None

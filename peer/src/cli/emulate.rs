@@ -11,6 +11,8 @@ use thiserror::Error;
 use super::{Failure, progress};
 use crate::emulation::{self, Scenario, ScenarioError, Table, Trace};
 #[cfg(feature = "opencv")]
+use crate::experiment::recognition::{self, Recognition};
+#[cfg(feature = "opencv")]
 use crate::experiment::{self, Experiment, Materials, Progress};
 
 /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares; or an
@@ -54,7 +56,7 @@ pub enum EmulateError {
         source: io::Error,
     },
     /// A scenario where an experiment is wanted.
-    #[error("{} is no experiment (it has no axis): leave out --out, or see configs/experiments/", .0.display())]
+    #[error("{} is no experiment (it has neither an axis nor swarms): leave out --out, or see configs/experiments/", .0.display())]
     NoExperiment(PathBuf),
     /// An experiment without a place for its results.
     #[error("{} is an experiment: say with --out DIR where its results go", .0.display())]
@@ -85,7 +87,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         );
     }
     #[cfg(feature = "opencv")]
-    if std::fs::read_to_string(&args.scenario).is_ok_and(|text| Experiment::is_one(&text)) {
+    if std::fs::read_to_string(&args.scenario)
+        .is_ok_and(|text| Experiment::is_one(&text) || Recognition::is_one(&text))
+    {
         return Err(EmulateError::NoOut(args.scenario.clone()).into());
     }
     let scenario = Scenario::load(&args.scenario)?;
@@ -117,19 +121,23 @@ fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
     let path = &args.scenario;
     let text =
         std::fs::read_to_string(path).map_err(|source| EmulateError::Read { path: path.clone(), source })?;
-    if !Experiment::is_one(&text) {
-        return Err(EmulateError::NoExperiment(path.clone()).into());
-    }
-    let materials = Materials { dataset: args.dataset.clone(), start: args.start_dataset.clone() };
     let (looking, running) = (progress::bar("looking", 0), progress::bar("runs", 0));
-    let table = experiment::conduct((&text, path), &materials, folder, args.seeds, |progress| {
+    let report = |progress| {
         let (bar, done, total) = match progress {
             Progress::Looked(done, total) => (&looking, done, total),
             Progress::Ran(done, total) => (&running, done, total),
         };
         bar.set_length(total as u64);
         bar.set_position(done as u64);
-    })?;
+    };
+    let table = if Recognition::is_one(&text) {
+        recognition::conduct((&text, path), folder, args.seeds, report)?
+    } else if Experiment::is_one(&text) {
+        let materials = Materials { dataset: args.dataset.clone(), start: args.start_dataset.clone() };
+        experiment::conduct((&text, path), &materials, folder, args.seeds, report)?
+    } else {
+        return Err(EmulateError::NoExperiment(path.clone()).into());
+    };
     looking.finish_and_clear();
     running.finish_and_clear();
     super::say(&table)

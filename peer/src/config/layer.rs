@@ -1,5 +1,8 @@
 //! What is done to frames so that different cameras show the same hand alike.
 
+use std::time::Duration;
+
+use gestalt_strategies::MindConfig;
 use serde::{Deserialize, Serialize};
 
 /// The stages of the heterogeneity layer, each on unless switched off: an ablation, never an improvement.
@@ -24,6 +27,14 @@ impl LayerConfig {
     pub const ALL: Self = Self { geometry: true, colour: true, resolution: true, time: true };
     /// Every stage off.
     pub const NONE: Self = Self { geometry: false, colour: false, resolution: false, time: false };
+
+    /// Makes a mind weigh what it sees as the stage of time has it: with it off, every frame is a look of its own.
+    pub fn weigh(self, mind: &mut MindConfig) {
+        if !self.time {
+            mind.decorrelation = Duration::from_nanos(1);
+            mind.discount_repeats = false;
+        }
+    }
 }
 
 impl Default for LayerConfig {

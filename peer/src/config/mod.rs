@@ -256,6 +256,14 @@ impl Config {
         }
     }
 
+    /// How this robot decides: as its swarm does, with the evidence of its own camera weighed as the layer says.
+    #[must_use]
+    pub fn mind(&self) -> MindConfig {
+        let mut mind = self.rounds.clone();
+        self.camera.layer.weigh(&mut mind);
+        mind
+    }
+
     /// How this robot is linked.
     #[must_use]
     pub fn link(&self) -> LinkConfig {

@@ -36,25 +36,33 @@ const PANEL_HEIGHT: u32 = 430;
 const LEGEND_ROW: u32 = 24;
 
 /// A figure: panels side by side, with one legend.
-struct Figure {
-    title: String,
-    x: String,
+pub struct Figure {
+    /// What it shows.
+    pub title: String,
+    /// What runs along the x axis.
+    pub x: String,
     /// Where the x axis has its marks, if not anywhere.
-    marks: Option<Vec<f64>>,
+    pub marks: Option<Vec<f64>>,
     /// Whether x grows by factors.
-    logarithmic: bool,
-    panels: Vec<Panel>,
+    pub logarithmic: bool,
+    /// Side by side.
+    pub panels: Vec<Panel>,
 }
 
-struct Panel {
-    y: &'static str,
-    lines: Vec<Line>,
+/// Lines over one pair of axes.
+pub struct Panel {
+    /// What runs along the y axis.
+    pub y: &'static str,
+    /// At most nine.
+    pub lines: Vec<Line>,
 }
 
 /// A line of means over x.
-struct Line {
-    name: String,
-    points: Vec<(f64, Mean)>,
+pub struct Line {
+    /// For the legend.
+    pub name: String,
+    /// In the order of x; shares, drawn in percent.
+    pub points: Vec<(f64, Mean)>,
 }
 
 type Measure = fn(&Curves) -> &Vec<Mean>;
@@ -70,10 +78,18 @@ const PANELS: [(&str, Measure); 2] = [
 /// # Errors
 /// [`ExperimentError::Draw`] and [`ExperimentError::Write`].
 pub fn draw_all(summary: &Summary, folder: &Path) -> Result<(), ExperimentError> {
-    for (name, figure) in figures(summary) {
+    draw_into(folder, &figures(summary))
+}
+
+/// Draws figures into a folder, each as SVG and PNG of its name.
+///
+/// # Errors
+/// [`ExperimentError::Draw`] and [`ExperimentError::Write`].
+pub fn draw_into(folder: &Path, figures: &[(&str, Figure)]) -> Result<(), ExperimentError> {
+    for (name, figure) in figures {
         let path = folder.join(format!("{name}.svg"));
         let failed = |cause: String| ExperimentError::Draw { path: folder.join(name), cause };
-        let svg = svg(&figure).map_err(|cause| failed(cause.to_string()))?;
+        let svg = svg(figure).map_err(|cause| failed(cause.to_string()))?;
         std::fs::write(&path, &svg).map_err(|source| ExperimentError::Write { path, source })?;
         let picture = rasterise(&svg).map_err(|cause| failed(cause.to_string()))?;
         let path = folder.join(format!("{name}.png"));

@@ -11,6 +11,7 @@ mod eyes;
 mod plan;
 mod pool;
 mod raster;
+pub mod recognition;
 mod results;
 mod runner;
 mod school;
