@@ -218,6 +218,29 @@ mod tests {
     }
 
     #[test]
+    fn a_fast_robot_with_one_bad_view_does_not_outvote_ten_slow_ones_with_good_views() {
+        let good = [0.5, 0.25, 0.25];
+        let bad = [0.04, 0.92, 0.04];
+        let watch = |period: u64, p: &[f64], bearing: f32| {
+            let mut evidence = Evidence::new(3);
+            for t in (0..3000).step_by(period as usize) {
+                // Ten that sway a little, one that stands like a rock.
+                let view = [bearing + if period == 500 { (t / 500) as f32 * 0.5 } else { 0.0 }];
+                evidence.add(Look { view: &view, ..look(t, p, 1.0) }, TAU);
+            }
+            // No bound on what one robot may say.
+            evidence.clipped(1e9)
+        };
+        let votes: Vec<Vec<f32>> =
+            (0..10).map(|n| watch(500, &good, n as f32)).chain([watch(33, &bad, 99.0)]).collect();
+        let total = |class: usize| votes.iter().map(|vote| vote[class]).sum::<f32>();
+        assert!(total(0) > total(1) + 3.0, "{} {}", total(0), total(1));
+        // Counted by the frame, the one would have won.
+        let by_the_frame = |p: &[f64; 3], frames: f64| frames * (p[0] / p[1]).ln();
+        assert!(10.0 * by_the_frame(&good, 6.0) + by_the_frame(&bad, 91.0) < -100.0);
+    }
+
+    #[test]
     fn the_frames_of_one_look_are_averaged() {
         let mut evidence = Evidence::new(2);
         evidence.add(look(0, &[0.8, 0.2], 1.0), TAU);
