@@ -63,6 +63,7 @@ impl Body {
         if let Some(model) = model.filter(|_| learning.is_none()) {
             robot.learned(model.classifier, &model.name);
         }
+        robot.blind(eye.is_none());
         let seen = Arc::new(Mutex::new(None));
         let looking = eye.map(|eye| {
             robot.update_camera(|camera| {

@@ -153,6 +153,11 @@ impl fmt::Display for SampleId {
 #[serde(transparent)]
 pub struct VocabularyId(pub u32);
 
+impl VocabularyId {
+    /// Of no list: in a vote, its author cannot tell any gesture, for want of a classifier or of a camera that shows anything.
+    pub const NONE: Self = Self(0);
+}
+
 /// Names what the components of a feature vector mean: the list of features, their scaling and their reduction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]

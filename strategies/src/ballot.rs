@@ -64,10 +64,12 @@ impl Ballot {
         self.votes.is_empty()
     }
 
-    /// Whether that robot has seen something, on whatever scale.
+    /// Whether that robot has said what it can: it has seen something, on whatever scale, or says that it cannot see.
     #[must_use]
-    pub fn has_evidence(&self, robot: RobotId) -> bool {
-        self.votes.get(&robot).is_some_and(|(_, vote)| !vote.evidence.is_empty())
+    pub fn has_spoken(&self, robot: RobotId) -> bool {
+        self.votes
+            .get(&robot)
+            .is_some_and(|(_, vote)| !vote.evidence.is_empty() || vote.vocabulary == VocabularyId::NONE)
     }
 
     /// Which vote of that robot is held.
@@ -173,7 +175,7 @@ mod tests {
     fn a_null_vote_takes_part_without_counting() {
         let mut ballot = Ballot::default();
         ballot.cast(RobotId(1), stamp(1, 1), vote(&[]));
-        assert!(!ballot.has_evidence(RobotId(1)));
+        assert!(!ballot.has_spoken(RobotId(1)));
         assert_eq!(ballot.len(), 1);
         assert_eq!(ballot.contributors(SCALE), 0);
         assert_eq!(ballot.prevailing_scale(), None);

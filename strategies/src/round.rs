@@ -63,9 +63,21 @@ impl Round {
         }
     }
 
+    /// This robot's vote has to be said anew, though it saw nothing new.
+    pub fn outdate(&mut self) {
+        if let Some(said) = &mut self.said {
+            said.outdated = true;
+        }
+    }
+
     /// Forgets what was seen so far: it was judged by another vocabulary.
     pub fn look_afresh(&mut self) {
         self.evidence = None;
+    }
+
+    /// Whether this robot has seen anything.
+    pub fn has_evidence(&self) -> bool {
+        self.evidence.is_some()
     }
 
     /// This robot's evidence as a vote.
@@ -131,7 +143,7 @@ impl Round {
         }
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
         // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
-        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.has_evidence(*robot));
+        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.has_spoken(*robot));
         if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
             return;
         }
@@ -158,7 +170,7 @@ impl Round {
             confidence,
             author: me,
             certificate: Certificate {
-                vocabulary: scale.map_or(VocabularyId(0), |scale| scale.vocabulary),
+                vocabulary: scale.map_or(VocabularyId::NONE, |scale| scale.vocabulary),
                 rule: config.rule,
                 probabilities,
                 votes,

@@ -190,6 +190,11 @@ impl Robot {
         self.tell(Input::Left);
     }
 
+    /// Says whether its camera shows anything at all, see [`Input::Blind`].
+    pub fn blind(&self, blind: bool) {
+        self.tell(Input::Blind(blind));
+    }
+
     /// When it started: the zero of its own time.
     #[must_use]
     pub fn started(&self) -> Instant {

@@ -45,6 +45,9 @@ pub enum Input {
     /// The robot's own motion detector says: the hand that held still is moving again, or gone. What was shown can be seen
     /// no more, so this robot's round ends early.
     Left,
+    /// Whether the robot's camera shows anything at all. One that is blind takes part, and says that it need not be waited
+    /// for. Until told otherwise, a robot sees.
+    Blind(bool),
     /// A human says something.
     Instructed(Instructed),
     /// That robot has answered what that instructor said at that time.
@@ -129,6 +132,7 @@ pub struct Mind {
     looking: Option<RoundId>,
     /// Since when the hand had moved that now holds still and has had no round yet.
     shown: Option<Duration>,
+    blind: bool,
 }
 
 impl Mind {
@@ -158,6 +162,7 @@ impl Mind {
             answered: VecDeque::new(),
             looking: None,
             shown: None,
+            blind: false,
         })
     }
 
@@ -179,6 +184,7 @@ impl Mind {
             Input::Open => self.on_open(&mut out),
             Input::Shown(began) => self.shown = Some(began.min(self.now)),
             Input::Left => self.on_left(),
+            Input::Blind(blind) => self.on_blind(blind),
             Input::Instructed(instructed) => self.on_instructed(instructed, &mut out),
             Input::Answered(by, at, robot) => self.on_answered(&by, at, robot),
             Input::Observed(observation) => self.on_observed(&observation),
@@ -247,6 +253,15 @@ impl Mind {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.end_early(self.now, &self.config);
         }
+    }
+
+    fn on_blind(&mut self, blind: bool) {
+        if self.blind != blind
+            && let Some(round) = &mut self.round
+        {
+            round.outdate();
+        }
+        self.blind = blind;
     }
 
     fn on_observed(&mut self, observation: &Observation) {
@@ -398,7 +413,8 @@ impl Mind {
             out.push(Output::Broadcast(repeated));
             return;
         }
-        let vocabulary = self.classifier.as_ref().map_or(VocabularyId(0), |c| c.vocabulary().id());
+        let classifier = self.classifier.as_ref().filter(|_| !self.blind || round.has_evidence());
+        let vocabulary = classifier.map_or(VocabularyId::NONE, |c| c.vocabulary().id());
         let vote = round.vote(vocabulary, self.config.clip);
         self.stamp.sequence = self.stamp.sequence.saturating_add(1);
         round.ballot.cast(self.me, self.stamp, vote.clone());

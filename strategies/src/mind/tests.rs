@@ -694,3 +694,20 @@ fn a_round_ends_early_when_the_hand_has_left() {
     assert!(holds(&mind.handle(ms(2400), Input::Tick)).is_empty(), "votes may still be on their way");
     assert_eq!(holds(&mind.handle(ms(2500), Input::Tick)), [None], "and not only at the deadline");
 }
+
+#[test]
+fn nobody_waits_for_a_robot_that_says_it_is_blind() {
+    let mut blinded = mind(2);
+    blinded.handle(ms(0), Input::Blind(true));
+    let said = blinded.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
+    let [theirs] = broadcast(&said)[..] else { panic!("{said:?}") };
+    let mut other = mind(7);
+    other.handle(ms(0), Input::Alive(robots([1, 2])));
+    other.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
+    assert_eq!(other.held(), None);
+    assert_eq!(holds(&other.handle(ms(20), votes(2, 1, theirs.clone()))), [Some(0)]);
+    // It sees again: in the same round it is a voter like any other.
+    let mut out = blinded.handle(ms(20), Input::Blind(false));
+    out.extend(blinded.handle(ms(400), saw([0.2, 0.7, 0.1])));
+    assert!(broadcast(&out).iter().any(|vote| vote.vocabulary == vocabulary().id()), "{out:?}");
+}
