@@ -30,6 +30,10 @@ pub enum Topic {
     Status(RobotId),
     /// `robot/<id>/alive`: a liveliness token.
     Alive(RobotId),
+    /// `robot/<id>/frame`: what the robot's camera sees, a picture with a [`FrameHeader`](crate::FrameHeader) attached.
+    Frame(RobotId),
+    /// `robot/<id>/taken`: who looks for the robot took a frame, a [`FrameTaken`](crate::FrameTaken).
+    Taken(RobotId),
     /// `decision`: the swarm's decision, one message each, JSON; also a queryable for the last one.
     Decision,
     /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON.
@@ -65,6 +69,8 @@ impl Keys {
             Topic::RobotDecision(id) => format!("{prefix}robot/{id}/decision"),
             Topic::Status(id) => format!("{prefix}robot/{id}/status"),
             Topic::Alive(id) => format!("{prefix}robot/{id}/alive"),
+            Topic::Frame(id) => format!("{prefix}robot/{id}/frame"),
+            Topic::Taken(id) => format!("{prefix}robot/{id}/taken"),
             Topic::Decision => format!("{prefix}decision"),
             Topic::Feedback(id) => format!("{prefix}instructor/{id}/feedback"),
             Topic::Answer(id) => format!("{prefix}instructor/{id}/answer"),
@@ -98,6 +104,8 @@ impl Keys {
                     "decision" => Topic::RobotDecision(id),
                     "status" => Topic::Status(id),
                     "alive" => Topic::Alive(id),
+                    "frame" => Topic::Frame(id),
+                    "taken" => Topic::Taken(id),
                     _ => return None,
                 }
             }
@@ -123,6 +131,8 @@ mod tests {
             Topic::RobotDecision(RobotId(3)),
             Topic::Status(RobotId(4)),
             Topic::Alive(RobotId(u32::MAX)),
+            Topic::Frame(RobotId(5)),
+            Topic::Taken(RobotId(6)),
             Topic::Decision,
             Topic::Feedback("ada".parse().unwrap()),
             Topic::Answer("ada".parse().unwrap()),
@@ -143,7 +153,7 @@ mod tests {
             "gestalt/demo/robot/1/vote/x",
             "gestalt/demo/robot/01/vote",
             "gestalt/demo/robot/*/vote",
-            "gestalt/demo/robot/1/frame",
+            "gestalt/demo/robot/1/frames",
         ] {
             assert_eq!(keys.parse(key), None, "{key}");
         }
