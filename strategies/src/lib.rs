@@ -33,6 +33,7 @@ pub mod selection;
 mod training;
 pub mod training_set;
 mod vocabulary;
+mod voter;
 
 pub use ballot::Ballot;
 pub use classifier::{Classifier, MAX_MODEL, ModelError};
@@ -55,3 +56,4 @@ pub use selection::{Selection, SelectionRule};
 pub use training::{Folding, MIN_SAMPLES, Progress, Sample, TrainError, TrainOptions, Trained, train};
 pub use training_set::{HeldSample, Part, Receipt, RestoreError, Seen, SeenError, SetChange, TrainingSet};
 pub use vocabulary::{Vocabulary, VocabularyError};
+pub use voter::Voter;

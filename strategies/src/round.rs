@@ -3,12 +3,15 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use gestalt_protocol::{Certificate, Decision, Envelope, RobotId, RoundId, VocabularyId, Vote};
+use gestalt_protocol::{
+    Certificate, Decision, Envelope, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+};
 
 use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
 use crate::evidence::{Evidence, Look};
 use crate::mind::MindConfig;
+use crate::{Classify, Observation};
 
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
 #[derive(Clone, Debug)]
@@ -49,8 +52,32 @@ impl Round {
         }
     }
 
+    /// Judges a frame and counts it; `false` when the classifier could not judge it, or gave no distribution.
+    pub fn observe(
+        &mut self,
+        now: Duration,
+        observation: &Observation,
+        classifier: &dyn Classify,
+        config: &MindConfig,
+    ) -> bool {
+        let classes = classifier.vocabulary().classes();
+        match classifier.probabilities(&observation.features) {
+            Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
+                let quality = f64::from(observation.quality.clamp(0.0, 1.0));
+                let view = if config.discount_repeats {
+                    classifier.view(&observation.features).unwrap_or_default()
+                } else {
+                    Vec::new()
+                };
+                self.look(Look { at: now, probabilities: &p, quality, view: &view }, config);
+                true
+            }
+            Ok(_) | Err(_) => false,
+        }
+    }
+
     /// Counts a frame.
-    pub fn look(&mut self, look: Look<'_>, config: &MindConfig) {
+    fn look(&mut self, look: Look<'_>, config: &MindConfig) {
         let classes = look.probabilities.len();
         let evidence = self.evidence.get_or_insert_with(|| Evidence::new(classes));
         if evidence.classes() != classes {
@@ -76,17 +103,43 @@ impl Round {
     }
 
     /// Whether this robot has seen anything.
-    pub fn has_evidence(&self) -> bool {
+    fn has_evidence(&self) -> bool {
         self.evidence.is_some()
     }
 
     /// This robot's evidence as a vote.
-    pub fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
+    fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
         let (evidence, looks) = match &self.evidence {
             Some(evidence) => (evidence.clipped(clip), evidence.looks() as f32),
             None => (Vec::new(), 0.0),
         };
         Vote { round: self.id, vocabulary, evidence, looks }
+    }
+
+    /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next. `stamp` is that of
+    /// the last message said; `vocabulary` is the classifier's; `blind`: who has seen nothing says that it cannot.
+    pub fn speak(
+        &mut self,
+        now: Duration,
+        me: RobotId,
+        stamp: &mut Stamp,
+        vocabulary: Option<VocabularyId>,
+        blind: bool,
+        config: &MindConfig,
+    ) -> Option<Envelope> {
+        if self.vote_due(config).is_none_or(|due| now < due) {
+            return None;
+        }
+        if let Some(repeated) = self.repeat(now) {
+            return Some(repeated);
+        }
+        let vocabulary = vocabulary.filter(|_| !blind || self.has_evidence());
+        let vote = self.vote(vocabulary.unwrap_or(VocabularyId::NONE), config.clip);
+        stamp.sequence = stamp.sequence.saturating_add(1);
+        self.ballot.cast(me, *stamp, vote.clone());
+        let envelope = Envelope { author: me, stamp: *stamp, message: Message::Vote(vote) };
+        self.said = Some(Said { at: now, envelope: envelope.clone(), outdated: false });
+        Some(envelope)
     }
 
     /// When this robot's vote is to be said (again).
@@ -100,15 +153,10 @@ impl Round {
     }
 
     /// What to say again: the vote said last, when nothing was seen since.
-    pub fn repeat(&mut self, now: Duration) -> Option<Envelope> {
+    fn repeat(&mut self, now: Duration) -> Option<Envelope> {
         let said = self.said.as_mut().filter(|said| !said.outdated)?;
         said.at = now;
         Some(said.envelope.clone())
-    }
-
-    /// Notes that this vote was said.
-    pub fn note_said(&mut self, now: Duration, envelope: Envelope) {
-        self.said = Some(Said { at: now, envelope, outdated: false });
     }
 
     /// When this robot stops waiting for live robots that have not seen anything, and when it gives up.

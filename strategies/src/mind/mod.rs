@@ -13,9 +13,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{
-    Answer, Decision, Envelope, InstructorId, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
-};
+use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Message, RobotId, RoundId, Stamp, Vote};
 
 pub use config::{MindConfig, MindConfigError};
 pub use instruct::Instructed;
@@ -30,7 +28,7 @@ use repair::Repair;
 
 use crate::ballot::{Cast, Scale};
 use crate::round::Round;
-use crate::{Classify, Look, Observation};
+use crate::{Classify, Observation};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -62,6 +60,8 @@ pub enum Input {
     Announced(Decision),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
     Alive(BTreeSet<RobotId>),
+    /// The robots that see and vote through this robot's host, and leave deciding and announcing to this mind.
+    Guests(BTreeSet<RobotId>),
     /// The robots this one is directly linked to now.
     Neighbours(BTreeSet<RobotId>),
     /// A new classifier takes the place of the old one.
@@ -117,10 +117,11 @@ pub struct Mind {
     round: Option<Round>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
     highest: Option<u32>,
-    /// The other robots alive.
+    /// The other robots alive, guests among them.
     alive: BTreeSet<RobotId>,
     /// How many of them have a smaller id: whoever speaks for the swarm waits this many turns.
     turns: u32,
+    guests: BTreeSet<RobotId>,
     repair: Repair,
     refusals: Refusals,
     duplicate: Option<Stamp>,
@@ -153,6 +154,7 @@ impl Mind {
             highest: None,
             alive: BTreeSet::new(),
             turns: 0,
+            guests: BTreeSet::new(),
             repair: Repair::new(config.repair_idle),
             config,
             refusals: Refusals::default(),
@@ -192,6 +194,7 @@ impl Mind {
             Input::Heard(robot, decision) => self.on_heard(robot, decision, &mut out),
             Input::Announced(decision) => self.on_announced(decision, &mut out),
             Input::Alive(robots) => self.on_alive(robots),
+            Input::Guests(robots) => self.on_guests(robots),
             Input::Neighbours(robots) => self.on_neighbours(robots, &mut out),
             Input::Learned(classifier) => self.on_learned(classifier),
             Input::Remembered(revision) => self.on_remembered(revision),
@@ -276,19 +279,8 @@ impl Mind {
             }
             return;
         };
-        let classes = classifier.vocabulary().classes();
-        match classifier.probabilities(&observation.features) {
-            Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
-                let quality = f64::from(observation.quality.clamp(0.0, 1.0));
-                let view = if self.config.discount_repeats {
-                    classifier.view(&observation.features).unwrap_or_default()
-                } else {
-                    Vec::new()
-                };
-                let look = Look { at: self.now, probabilities: &p, quality, view: &view };
-                round.look(look, &self.config);
-            }
-            Ok(_) | Err(_) => self.refusals.add(Refusal::Unclassified),
+        if !round.observe(self.now, observation, &**classifier, &self.config) {
+            self.refusals.add(Refusal::Unclassified);
         }
     }
 
@@ -327,10 +319,18 @@ impl Mind {
         }
     }
 
-    fn on_alive(&mut self, mut robots: BTreeSet<RobotId>) {
-        robots.remove(&self.me);
-        self.turns = u32::try_from(robots.range(..self.me).count()).unwrap_or(u32::MAX);
-        self.alive = robots;
+    fn on_alive(&mut self, robots: BTreeSet<RobotId>) {
+        self.alive = &robots | &self.guests;
+        self.alive.remove(&self.me);
+        // This mind speaks for its guests too: its turn is that of the smallest of them all.
+        let first = self.guests.first().map_or(self.me, |guest| self.me.min(*guest));
+        self.turns = u32::try_from(self.alive.range(..first).count()).unwrap_or(u32::MAX);
+    }
+
+    fn on_guests(&mut self, robots: BTreeSet<RobotId>) {
+        let others: BTreeSet<RobotId> = self.alive.difference(&self.guests).copied().collect();
+        self.guests = robots;
+        self.on_alive(others);
     }
 
     fn on_learned(&mut self, classifier: Arc<dyn Classify>) {
@@ -405,22 +405,10 @@ impl Mind {
 
     /// Says this robot's vote when it is due.
     fn speak(&mut self, out: &mut Vec<Output>) {
+        let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary().id());
         let Some(round) = self.round.as_mut() else { return };
-        if round.vote_due(&self.config).is_none_or(|due| self.now < due) {
-            return;
-        }
-        if let Some(repeated) = round.repeat(self.now) {
-            out.push(Output::Broadcast(repeated));
-            return;
-        }
-        let classifier = self.classifier.as_ref().filter(|_| !self.blind || round.has_evidence());
-        let vocabulary = classifier.map_or(VocabularyId::NONE, |c| c.vocabulary().id());
-        let vote = round.vote(vocabulary, self.config.clip);
-        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-        round.ballot.cast(self.me, self.stamp, vote.clone());
-        let envelope = Envelope { author: self.me, stamp: self.stamp, message: Message::Vote(vote) };
-        round.note_said(self.now, envelope.clone());
-        out.push(Output::Broadcast(envelope));
+        let said = round.speak(self.now, self.me, &mut self.stamp, vocabulary, self.blind, &self.config);
+        out.extend(said.map(Output::Broadcast));
     }
 
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.

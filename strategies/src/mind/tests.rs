@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gestalt_protocol::{ClassId, CountedVote, FusionRule, Give, Have, HeldVote, Instruction};
+use gestalt_protocol::{ClassId, CountedVote, FusionRule, Give, Have, HeldVote, Instruction, VocabularyId};
 
 use super::*;
 use crate::{ClassifyError, Vocabulary};
@@ -474,6 +474,39 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
     };
     assert_eq!(next(true), []);
     assert_eq!(next(false), [ms(200 + 2 * 400)]);
+}
+
+#[test]
+fn who_has_guests_speaks_for_them_too() {
+    let mut host = mind(8);
+    host.handle(ms(0), Input::Guests(robots([2, 3])));
+    host.handle(ms(0), Input::Alive(robots([1, 5])));
+    host.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(1), 2, 5)));
+    let times = (1..40).map(|k| ms(k * 50));
+    let announced = |mind: &mut Mind, mut times: Box<dyn Iterator<Item = Duration>>| {
+        times.find(|at| announces(&mind.handle(*at, Input::Tick)) > 0)
+    };
+    // Robot 1 comes first, guests wait for nobody but it.
+    assert_eq!(announced(&mut host, Box::new(times.clone())), Some(ms(600)));
+    let mut host = mind(8);
+    host.handle(ms(0), Input::Alive(robots([2, 5])));
+    host.handle(ms(0), Input::Guests(robots([2])));
+    host.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(1), 2, 5)));
+    assert_eq!(announced(&mut host, Box::new(times)), Some(ms(200)));
+}
+
+#[test]
+fn a_round_waits_for_guests_as_for_all_the_living() {
+    let mut host = blind(8);
+    host.handle(ms(0), Input::Guests(robots([2, 3])));
+    let out = host.handle(ms(10), votes(2, 1, vote(1, 0, SURE)));
+    assert_eq!(holds(&out), []);
+    let out = host.handle(ms(20), votes(3, 1, vote(1, 0, SURE)));
+    assert_eq!(holds(&out), [Some(0)]);
+    let mut host = blind(8);
+    host.handle(ms(0), Input::Guests(robots([2, 3])));
+    host.handle(ms(10), votes(2, 1, vote(1, 0, SURE)));
+    assert_eq!(holds(&host.handle(ms(20), Input::Guests(robots([2])))), [Some(0)], "one has left");
 }
 
 #[test]
