@@ -25,6 +25,18 @@ impl Account {
         self.status.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The zero of the robot's own time.
+    pub(super) fn started(&self) -> Instant {
+        self.started
+    }
+
+    /// Reports what Zenoh refused to send.
+    pub(super) fn check(&self, put: zenoh::Result<()>) {
+        if let Err(error) = put {
+            self.error(&format!("Zenoh refused to send: {error}"));
+        }
+    }
+
     pub(super) fn sent(&self, kind: &str, bytes: usize) {
         self.message("sent", kind, bytes);
     }

@@ -8,6 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Keys, RobotId, Topic};
+use tokio::sync::watch;
+use zenoh::Session;
 use zenoh::liveliness::LivelinessToken;
 
 use super::inbox::Inbox;
@@ -46,14 +48,19 @@ pub(super) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) {
 /// Keeps a robot's liveliness token declared, and declares it anew some time after it lost a link: of a robot that
 /// was frozen or cut off and came back, some others were measured never to learn again, in about one case of eight,
 /// neither by Zenoh's news nor by a query, until the token was new. Runs until it is aborted.
-pub(super) async fn keep_token(node: Node, key: String, inbox: Arc<Inbox>, mut token: LivelinessToken) {
-    loop {
-        inbox.lost_link().await;
+pub(super) async fn keep_token(
+    session: Session,
+    key: String,
+    mut lost_links: watch::Receiver<u64>,
+    mut token: LivelinessToken,
+) {
+    // An error says that the robot has gone.
+    while lost_links.changed().await.is_ok() {
         tokio::time::sleep(REDECLARE).await;
         if let Err(error) = token.undeclare().await {
             tracing::debug!("withdrawing the liveliness token: {error}");
         }
-        match node.session().liveliness().declare_token(&key).await {
+        match session.liveliness().declare_token(&key).await {
             Ok(anew) => token = anew,
             // The session is closed, and this task about to end.
             Err(error) => return tracing::debug!("declaring the liveliness token: {error}"),

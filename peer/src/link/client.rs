@@ -20,8 +20,8 @@ const MAX_WAITING: usize = 1024;
 /// A session in client mode, attached to any one robot; it attaches again when that robot goes and comes back.
 #[derive(Debug)]
 pub struct Client {
-    session: Session,
-    keys: Keys,
+    pub(super) session: Session,
+    pub(super) keys: Keys,
 }
 
 /// The swarm's decisions, as they are announced.

@@ -51,6 +51,9 @@ pub enum LinkError {
         /// Zenoh's reason.
         cause: String,
     },
+    /// A robot that is there already cannot be a guest.
+    #[error("robot {0} is here already: give each robot an id of its own")]
+    Guest(gestalt_protocol::RobotId),
     /// Zenoh refused to build the session or one of its subscriptions.
     #[error("cannot open the Zenoh session: {0}")]
     Open(String),

@@ -1,5 +1,6 @@
 //! The one task that owns a robot's mind: what arrives goes in, what comes out is carried out.
 
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -7,7 +8,6 @@ use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, 
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Classify, Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
-use tokio::task::JoinHandle;
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
@@ -18,14 +18,13 @@ use zenoh::time::Timestamp;
 
 use super::account::Account;
 use super::apprentice::Apprentice;
-use super::census::{keep_token, take_census};
+use super::census::take_census;
+use super::guest::Guests;
 use super::inbox::Inbox;
 use super::keeper::Keeper;
+use super::presence::Presence;
 use super::session::Node;
 use super::{Announcement, Event, LinkError};
-
-/// When a new robot asks whether its id is taken: late enough that its links stand.
-const TWIN_CHECK: Duration = Duration::from_secs(3);
 
 /// A robot that draws another decision of the same round within this time says so only once.
 const OWN_HOLD_INTERVAL: Duration = Duration::from_millis(50);
@@ -43,6 +42,7 @@ pub(super) struct Host {
     pub(super) inbox: Arc<Inbox>,
     pub(super) account: Arc<Account>,
     pub(super) commands: mpsc::Receiver<Input>,
+    pub(super) guests: Arc<Guests>,
     pub(super) events: broadcast::Sender<Event>,
     pub(super) vocabulary: Option<Vocabulary>,
     pub(super) apprentice: Option<Apprentice>,
@@ -53,13 +53,11 @@ pub(super) struct Host {
 /// A host with its keys declared.
 pub(super) struct Declared {
     host: Host,
-    vote: Publisher<'static>,
+    presence: Presence,
     sample: Publisher<'static>,
     held: Publisher<'static>,
     swarm: Publisher<'static>,
     last: Arc<Last>,
-    /// Keeps the liveliness token declared, and takes it along when it ends.
-    token: JoinHandle<()>,
     /// The decision still to be published on `robot/<me>/decision`, and when.
     unsaid: Option<(Announcement, Instant)>,
     /// The round of the decision published last, and when.
@@ -105,12 +103,6 @@ impl Host {
             .callback(move |sample| inbox.on_liveliness(&sample))
             .background()
             .await?;
-        let (account, me) = (self.account.clone(), self.node.id().to_string());
-        session
-            .declare_queryable(self.keys.key(&Topic::Status(self.me)))
-            .callback(move |query| on_status(&account, &me, &query))
-            .background()
-            .await?;
         let last = last.clone();
         session
             .declare_queryable(self.keys.key(&Topic::Decision))
@@ -122,12 +114,6 @@ impl Host {
 
     async fn announce_itself(self, last: Arc<Last>) -> zenoh::Result<Declared> {
         let session = self.node.session();
-        let vote = session
-            .declare_publisher(self.keys.key(&Topic::Vote(self.me)))
-            .priority(Priority::DataHigh)
-            .congestion_control(CongestionControl::Drop)
-            .express(true)
-            .await?;
         let sample = session
             .declare_publisher(self.keys.key(&Topic::Sample(self.me)))
             .priority(Priority::Data)
@@ -143,10 +129,9 @@ impl Host {
         };
         let held = decision(Topic::RobotDecision(self.me)).await?;
         let swarm = decision(Topic::Decision).await?;
-        let alive = self.keys.key(&Topic::Alive(self.me));
-        let token = session.liveliness().declare_token(&alive).await?;
-        let token = tokio::spawn(keep_token(self.node.clone(), alive, self.inbox.clone(), token));
-        Ok(Declared { host: self, vote, sample, held, swarm, last, token, unsaid: None, said: None })
+        let (account, lost_links) = (self.account.clone(), self.inbox.lost_links());
+        let presence = Presence::declare(session, &self.keys, self.me, account, lost_links).await?;
+        Ok(Declared { host: self, presence, sample, held, swarm, last, unsaid: None, said: None })
     }
 }
 
@@ -154,17 +139,12 @@ impl Declared {
     /// Serves the mind until the robot's handle is gone, then leaves the swarm.
     pub(super) async fn run(mut self, keeper: Option<Keeper>) {
         let keeper = keeper.map(|keeper| tokio::spawn(keeper.run()));
-        let twin_check = tokio::spawn(ask_for_twin(
-            self.host.node.clone(),
-            self.host.keys.key(&Topic::Status(self.host.me)),
-            self.host.account.clone(),
-        ));
         let census = tokio::spawn(take_census(
             self.host.node.clone(),
             self.host.keys.clone(),
             self.host.inbox.clone(),
         ));
-        let inbox = self.host.inbox.clone();
+        let (inbox, guests) = (self.host.inbox.clone(), self.host.guests.clone());
         loop {
             let wake = self.host.mind.next_wake().map(|wake| self.host.started + wake);
             let wake = wake.into_iter().chain(self.unsaid.as_ref().map(|(_, due)| *due)).min();
@@ -178,15 +158,15 @@ impl Declared {
                     Some(input) => self.step(input),
                     None => break,
                 },
+                () = guests.changed() => self.step(Input::Guests(guests.present())),
                 () = sleep_until(wake) => self.step(Input::Tick),
             }
         }
-        twin_check.abort();
         census.abort();
         if let Some(keeper) = keeper {
             keeper.abort();
         }
-        self.token.abort();
+        drop(self.presence);
         // What is still to be written is written before the robot is gone.
         tokio::task::block_in_place(|| drop(self.host.apprentice.take()));
         self.host.node.close().await;
@@ -195,9 +175,11 @@ impl Declared {
     fn step(&mut self, input: Input) {
         match &input {
             Input::Alive(alive) => {
-                self.host.account.lock().alive =
-                    alive.iter().copied().filter(|id| *id != self.host.me).chain([self.host.me]).collect();
-                self.tell(Event::Alive(alive.clone()));
+                self.tell_alive(alive | &self.host.guests.present());
+            }
+            Input::Guests(guests) => {
+                let tokens = self.host.inbox.tokens();
+                self.tell_alive(&tokens | guests);
             }
             Input::Neighbours(neighbours) => {
                 self.host.account.lock().neighbours = neighbours.iter().copied().collect();
@@ -223,6 +205,12 @@ impl Declared {
                 self.host.account.set(refusal.name(), count);
             }
         }
+    }
+
+    fn tell_alive(&self, mut alive: BTreeSet<RobotId>) {
+        alive.remove(&self.host.me);
+        self.host.account.lock().alive = alive.iter().copied().chain([self.host.me]).collect();
+        self.tell(Event::Alive(alive));
     }
 
     /// Puts what was learned into the status, when it has changed.
@@ -279,15 +267,14 @@ impl Declared {
     }
 
     fn broadcast(&self, envelope: &Envelope) {
-        let bytes = envelope.encode();
         if let Message::Samples(samples) = &envelope.message {
+            let bytes = envelope.encode();
             self.host.account.sent("sample", bytes.len());
-            self.check(self.sample.put(bytes).wait());
+            self.host.account.check(self.sample.put(bytes).wait());
             return self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
         }
+        let bytes = self.presence.vote(envelope);
         self.host.inbox.said(&bytes);
-        self.host.account.sent("vote", bytes.len());
-        self.check(self.vote.put(bytes).wait());
     }
 
     fn answer(&self, instructor: InstructorId, answer: Answer) {
@@ -302,7 +289,7 @@ impl Declared {
             .priority(Priority::InteractiveHigh)
             .congestion_control(CongestionControl::Block)
             .wait();
-        self.check(put);
+        self.host.account.check(put);
         self.tell(Event::Answered(instructor, answer));
     }
 
@@ -342,14 +329,14 @@ impl Declared {
             .congestion_control(CongestionControl::Drop)
             .express(true)
             .wait();
-        self.check(put);
+        self.host.account.check(put);
     }
 
     fn publish(&self, kind: &str, publisher: &Publisher<'_>, announcement: &Announcement) -> String {
         let json = serde_json::to_string(announcement)
             .expect("every field of a decision, with string keys and finite numbers, has a place in JSON");
         self.host.account.sent(kind, json.len());
-        self.check(publisher.put(json.as_str()).wait());
+        self.host.account.check(publisher.put(json.as_str()).wait());
         json
     }
 
@@ -359,19 +346,13 @@ impl Declared {
         Announcement { decision: decision.clone(), label }
     }
 
-    fn check(&self, put: zenoh::Result<()>) {
-        if let Err(error) = put {
-            self.host.account.error(&format!("Zenoh refused to send: {error}"));
-        }
-    }
-
     fn tell(&self, event: Event) {
         // An error says that nobody listens, which is fine.
         let _ = self.host.events.send(event);
     }
 }
 
-async fn sleep_until(wake: Option<Instant>) {
+pub(super) async fn sleep_until(wake: Option<Instant>) {
     match wake {
         Some(wake) => tokio::time::sleep_until(wake.into()).await,
         None => std::future::pending().await,
@@ -389,29 +370,6 @@ impl Last {
             let key = query.key_expr().clone();
             // A client that has gone meanwhile is no error of this robot's.
             let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(at).wait();
-        }
-    }
-}
-
-/// Answers a query for the status; one that a robot of the same id sends is a twin's.
-fn on_status(account: &Account, me: &str, query: &Query) {
-    if query.parameters().get("from").is_some_and(|from| from != me) {
-        account.twin();
-    }
-    let json = serde_json::to_string(&*account.lock())
-        .expect("every field of a status, with string keys and finite numbers, has a place in JSON");
-    account.sent("status", json.len());
-    let _ = query.reply(query.key_expr().clone(), json).encoding(Encoding::APPLICATION_JSON).wait();
-}
-
-/// Asks once whether anyone else answers to this robot's id.
-async fn ask_for_twin(node: Node, status_key: String, account: Arc<Account>) {
-    tokio::time::sleep(TWIN_CHECK).await;
-    let query = format!("{status_key}?from={}", node.id());
-    let Ok(replies) = node.session().get(query).allowed_destination(Locality::Remote).await else { return };
-    while let Ok(reply) = replies.recv_async().await {
-        if reply.result().is_ok() {
-            account.twin();
         }
     }
 }

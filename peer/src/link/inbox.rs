@@ -10,7 +10,7 @@ use gestalt_protocol::{
 use gestalt_strategies::{Input, Instructed};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::session::ZenohId;
 
@@ -40,7 +40,7 @@ pub(super) struct Inbox {
     chance: Mutex<ChaCha8Rng>,
     ready: Notify,
     unrest: Notify,
-    lost_link: Notify,
+    lost_links: watch::Sender<u64>,
 }
 
 #[derive(Debug, Default)]
@@ -67,7 +67,7 @@ impl Inbox {
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
             unrest: Notify::new(),
-            lost_link: Notify::new(),
+            lost_links: watch::Sender::new(0),
         }
     }
 
@@ -85,9 +85,9 @@ impl Inbox {
         self.unrest.notified().await;
     }
 
-    /// Waits until a link has gone since the last time.
-    pub(super) async fn lost_link(&self) {
-        self.lost_link.notified().await;
+    /// Tells how many links have gone so far.
+    pub(super) fn lost_links(&self) -> watch::Receiver<u64> {
+        self.lost_links.subscribe()
     }
 
     /// Takes everything that has arrived, changes of the neighbourhood first.
@@ -279,7 +279,7 @@ impl Inbox {
             state.links.insert(id, robot);
         } else {
             state.links.remove(&id);
-            self.lost_link.notify_one();
+            self.lost_links.send_modify(|lost| *lost += 1);
         }
         state.links_changed = true;
         self.ready.notify_one();

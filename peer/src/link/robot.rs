@@ -8,11 +8,13 @@ use gestalt_protocol::{Answer, Camera, Decision, InstructorId, Keys, RobotId, Ro
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Classify, Input, MindConfig, Observation, Vocabulary};
 use tokio::runtime::{Handle, RuntimeFlavor};
-use tokio::sync::{broadcast, mpsc};
+use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
+use zenoh::Session;
 
 use super::account::Account;
 use super::apprentice::{Apprentice, Prepared, RobotLearning};
+use super::guest::Guests;
 use super::host::Host;
 use super::identity::swarm_checksum;
 use super::inbox::Inbox;
@@ -21,10 +23,10 @@ use super::session::Node;
 use super::{Announcement, LinkConfig, LinkError};
 
 /// How many observations and instructions of the program may wait for the robot's task.
-const MAX_COMMANDS: usize = 1024;
+pub(super) const MAX_COMMANDS: usize = 1024;
 
 /// How many events a receiver may lag behind before it misses some.
-const MAX_EVENTS: usize = 1024;
+pub(super) const MAX_EVENTS: usize = 1024;
 
 /// Everything a robot needs to take part in a swarm.
 #[derive(Clone, Debug)]
@@ -76,15 +78,20 @@ pub enum Event {
 /// A running robot. Dropping it ends it without waiting; [`Robot::stop`] waits until its session is closed.
 #[derive(Debug)]
 pub struct Robot {
-    account: Arc<Account>,
-    started: Instant,
-    commands: mpsc::Sender<Input>,
-    events: broadcast::Sender<Event>,
+    pub(super) account: Arc<Account>,
+    pub(super) started: Instant,
+    pub(super) commands: mpsc::Sender<Input>,
+    pub(super) events: broadcast::Sender<Event>,
     /// For the first who asks: a link may stand before there was time to.
-    first_events: Mutex<Option<broadcast::Receiver<Event>>>,
-    classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
-    locators: Vec<String>,
-    host: JoinHandle<()>,
+    pub(super) first_events: Mutex<Option<broadcast::Receiver<Event>>>,
+    pub(super) classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
+    pub(super) locators: Vec<String>,
+    pub(super) host: JoinHandle<()>,
+    pub(super) session: Session,
+    pub(super) keys: Keys,
+    pub(super) rounds: MindConfig,
+    pub(super) lost_links: watch::Receiver<u64>,
+    pub(super) guests: Arc<Guests>,
 }
 
 impl Robot {
@@ -100,7 +107,8 @@ impl Robot {
         let vocabulary = vocabulary.or_else(|| learning.as_ref().map(|learning| learning.vocabulary.clone()));
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
-        let mut mind = Mind::new(id, boot, mind)?;
+        let rounds = mind;
+        let mut mind = Mind::new(id, boot, rounds.clone())?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
         }
@@ -146,15 +154,18 @@ impl Robot {
         });
         account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));
         let classifier = Arc::new(Mutex::new(None));
+        let guests = Arc::<Guests>::default();
+        let (session, lost_links) = (node.session().clone(), inbox.lost_links());
         let host = Host {
             me: id,
             mind,
             started,
             node: node.clone(),
-            keys,
+            keys: keys.clone(),
             inbox,
             account: account.clone(),
             commands: command_queue,
+            guests: guests.clone(),
             events: events.clone(),
             vocabulary,
             apprentice,
@@ -168,7 +179,21 @@ impl Robot {
             }
         };
         let first_events = Mutex::new(Some(first_events));
-        let robot = Self { account, started, commands, events, first_events, classifier, locators, host };
+        let robot = Self {
+            account,
+            started,
+            commands,
+            events,
+            first_events,
+            classifier,
+            locators,
+            host,
+            session,
+            keys,
+            rounds,
+            lost_links,
+            guests,
+        };
         if let Some(classifier) = first_classifier {
             robot.learned(classifier, "from before");
         }
@@ -235,6 +260,13 @@ impl Robot {
         first.unwrap_or_else(|| self.events.subscribe())
     }
 
+    /// The round that it takes part in now.
+    #[must_use]
+    pub fn open(&self) -> Option<RoundId> {
+        let status = self.account.lock();
+        status.round.filter(|_| status.open)
+    }
+
     /// Its account of itself, as the query on `robot/<id>/status` gives it.
     #[must_use]
     pub fn status(&self) -> Status {
@@ -254,6 +286,11 @@ impl Robot {
     /// Adds to a counter of its status, by name.
     pub fn count(&self, name: &str) {
         self.account.count(name);
+    }
+
+    /// Sets a counter of its status that is kept elsewhere, by name.
+    pub fn set(&self, name: &str, value: u64) {
+        self.account.set(name, value);
     }
 
     /// The endpoints it listens on, with the ports it was given.

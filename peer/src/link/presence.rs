@@ -1,0 +1,96 @@
+//! What makes one robot known to the swarm: that it is alive, how it is, and its votes.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{Envelope, Keys, RobotId, Topic};
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+use zenoh::bytes::Encoding;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::{Query, Queryable};
+use zenoh::sample::Locality;
+use zenoh::{Session, Wait};
+
+use super::account::Account;
+use super::census::keep_token;
+
+/// When a new robot asks whether its id is taken: late enough that its links stand.
+const TWIN_CHECK: Duration = Duration::from_secs(3);
+
+/// A robot's declarations on a session. Dropping it withdraws them.
+pub(super) struct Presence {
+    vote: Publisher<'static>,
+    account: Arc<Account>,
+    _status: Queryable<()>,
+    /// One keeps the liveliness token declared, and takes it along when it ends; one asks for a twin.
+    tasks: [JoinHandle<()>; 2],
+}
+
+impl Presence {
+    pub async fn declare(
+        session: &Session,
+        keys: &Keys,
+        me: RobotId,
+        account: Arc<Account>,
+        lost_links: watch::Receiver<u64>,
+    ) -> zenoh::Result<Self> {
+        let status_key = keys.key(&Topic::Status(me));
+        let (of_status, node) = (account.clone(), session.zid().to_string());
+        let status = session
+            .declare_queryable(&status_key)
+            .callback(move |query| on_status(&of_status, &node, &query))
+            .await?;
+        let vote = session
+            .declare_publisher(keys.key(&Topic::Vote(me)))
+            .priority(Priority::DataHigh)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .await?;
+        let alive = keys.key(&Topic::Alive(me));
+        let token = session.liveliness().declare_token(&alive).await?;
+        let tasks = [
+            tokio::spawn(keep_token(session.clone(), alive, lost_links, token)),
+            tokio::spawn(ask_for_twin(session.clone(), status_key, account.clone())),
+        ];
+        Ok(Self { vote, account, _status: status, tasks })
+    }
+
+    /// Says a vote to all.
+    pub fn vote(&self, envelope: &Envelope) -> Vec<u8> {
+        let bytes = envelope.encode();
+        self.account.sent("vote", bytes.len());
+        self.account.check(self.vote.put(bytes.as_slice()).wait());
+        bytes
+    }
+}
+
+impl Drop for Presence {
+    fn drop(&mut self) {
+        self.tasks.iter().for_each(JoinHandle::abort);
+    }
+}
+
+/// Answers a query for the status; one that a robot of the same id sends is a twin's.
+fn on_status(account: &Account, node: &str, query: &Query) {
+    if query.parameters().get("from").is_some_and(|from| from != node) {
+        account.twin();
+    }
+    let json = serde_json::to_string(&*account.lock())
+        .expect("every field of a status, with string keys and finite numbers, has a place in JSON");
+    account.sent("status", json.len());
+    let _ = query.reply(query.key_expr().clone(), json).encoding(Encoding::APPLICATION_JSON).wait();
+}
+
+/// Asks once whether anyone else answers to this robot's id.
+async fn ask_for_twin(session: Session, status_key: String, account: Arc<Account>) {
+    tokio::time::sleep(TWIN_CHECK).await;
+    let query = format!("{status_key}?from={}", session.zid());
+    let Ok(replies) = session.get(query).allowed_destination(Locality::Remote).await else { return };
+    while let Ok(reply) = replies.recv_async().await {
+        if reply.result().is_ok() {
+            account.twin();
+        }
+    }
+}
