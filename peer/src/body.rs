@@ -64,6 +64,9 @@ impl Body {
             robot.learned(model.classifier, &model.name);
         }
         robot.blind(eye.is_none());
+        if let Some(inlet) = eye.as_ref().and_then(Eye::inlet) {
+            inlet.open(&robot).await?;
+        }
         let seen = Arc::new(Mutex::new(None));
         let looking = eye.map(|eye| {
             robot.update_camera(|camera| {

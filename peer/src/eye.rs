@@ -17,6 +17,7 @@ use crate::model::RobotModel;
 use crate::perception::PerceptionError;
 use crate::sight::{Sight, Taken};
 use crate::source::{Glove, ImageFolder, RenderedSource, Source, SourceError, Video};
+use crate::stream::{Inlet, StreamSource};
 
 /// Why an eye cannot open.
 #[derive(Debug, Error)]
@@ -34,6 +35,7 @@ pub struct Eye {
     source: Box<dyn Source>,
     sight: Sight,
     human: Human,
+    inlet: Option<Arc<Inlet>>,
 }
 
 /// A frame, and what perception made of it.
@@ -63,6 +65,32 @@ pub fn likeliest(probabilities: &[f64]) -> Option<(ClassId, f64)> {
     by_class.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
+/// Opens the source of frames at this robot that a configuration describes, and says who stands before a rendered one;
+/// `None` for a robot without a camera, or with one that is somewhere else.
+///
+/// # Errors
+/// See [`SourceError`].
+pub fn open_source(
+    camera: &CameraSection,
+    robot: RobotId,
+) -> Result<Option<(Box<dyn Source>, Human)>, SourceError> {
+    let properties = camera.model.properties();
+    let period = properties.period();
+    let mut human = Human::new(0);
+    let source: Box<dyn Source> = match &camera.source {
+        SourceSection::None | SourceSection::Stream(_) => return Ok(None),
+        SourceSection::Rendered(rendered) => {
+            human = Human::new(rendered.seed);
+            // Every robot has a noise of its own, of the same scene.
+            let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
+            Box::new(RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?)
+        }
+        SourceSection::Images(files) => Box::new(ImageFolder::open(&files.path, period, files.repeat)?),
+        SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
+    };
+    Ok(Some((source, human)))
+}
+
 impl Eye {
     /// Opens the eye a configuration describes; `None` for a robot without one.
     ///
@@ -73,22 +101,25 @@ impl Eye {
         model: &RobotModel,
         robot: RobotId,
     ) -> Result<Option<Self>, EyeError> {
-        let properties = camera.model.properties();
-        let period = properties.period();
-        let mut human = Human::new(0);
-        let source: Box<dyn Source> = match &camera.source {
-            SourceSection::None => return Ok(None),
-            SourceSection::Rendered(rendered) => {
-                human = Human::new(rendered.seed);
-                // Every robot has a noise of its own, of the same scene.
-                let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
-                Box::new(RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?)
+        let (source, human, inlet): (Box<dyn Source>, _, _) = match &camera.source {
+            SourceSection::Stream(stream) => {
+                let inlet = Inlet::new(stream.robot.unwrap_or(robot));
+                let period = camera.model.properties().period();
+                (Box::new(StreamSource::new(inlet.clone(), period)), Human::new(0), Some(inlet))
             }
-            SourceSection::Images(files) => Box::new(ImageFolder::open(&files.path, period, files.repeat)?),
-            SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
+            _ => match open_source(camera, robot)? {
+                Some((source, human)) => (source, human, None),
+                None => return Ok(None),
+            },
         };
         let sight = Sight::new(camera, model.features)?;
-        Ok(Some(Self { source, sight, human }))
+        Ok(Some(Self { source, sight, human, inlet }))
+    }
+
+    /// Where its frames come in, if they come from another machine: to be opened at the robot's session.
+    #[must_use]
+    pub fn inlet(&self) -> Option<Arc<Inlet>> {
+        self.inlet.clone()
     }
 
     /// What it looks through, in words.

@@ -15,6 +15,8 @@
 #[cfg(feature = "opencv")]
 pub mod body;
 pub mod camera_model;
+#[cfg(feature = "opencv")]
+pub mod center;
 pub mod cli;
 pub mod config;
 pub mod confusion;
@@ -41,6 +43,8 @@ pub mod pose;
 pub mod sight;
 #[cfg(feature = "opencv")]
 pub mod source;
+#[cfg(feature = "opencv")]
+pub mod stream;
 #[cfg(feature = "opencv")]
 pub mod survey;
 #[cfg(feature = "opencv")]

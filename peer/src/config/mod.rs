@@ -1,5 +1,6 @@
 //! What a robot is told before it starts: one commented JSON5 file.
 
+mod center;
 mod document;
 mod layer;
 mod learning;
@@ -16,6 +17,7 @@ use crate::camera_model::CameraModel;
 use crate::link::{LinkConfig, LinkError, Scouting};
 use crate::pose::Pose;
 
+pub use center::{CenterSection, Fuse, StreamingSection};
 pub use document::{Document, Override};
 pub use layer::LayerConfig;
 pub use learning::{LearnFrom, LearningSection};
@@ -79,6 +81,8 @@ pub struct Config {
     pub learning: LearningSection,
     /// How the swarm decides; the same for all its robots.
     pub rounds: MindConfig,
+    /// For a fusion centre: how it serves robots that only stream.
+    pub center: CenterSection,
     /// How the robot finds others, and how many it links to.
     pub links: LinksSection,
     /// Zenoh's own configuration, verbatim; it wins over what Gestalt sets, key by key.
@@ -152,6 +156,16 @@ pub enum SourceSection {
     Images(FilesSection),
     /// A video file.
     Video(FilesSection),
+    /// What `gestalt stream` sends from another machine.
+    Stream(StreamSection),
+}
+
+/// Frames from another machine.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StreamSection {
+    /// Whose frames; `null`: those sent in this robot's own name.
+    pub robot: Option<RobotId>,
 }
 
 /// A drawn hand before a robot that stands somewhere.
@@ -227,7 +241,7 @@ impl Default for ScoutingSection {
 impl Config {
     /// The names of the sections: what a `--cfg` path can begin with, besides Zenoh's own keys.
     pub const SECTIONS: &[&str] =
-        &["robot", "swarm", "camera", "model", "learning", "rounds", "links", "zenoh"];
+        &["robot", "swarm", "camera", "model", "learning", "rounds", "center", "links", "zenoh"];
 
     /// Reads and checks a configuration file.
     ///
@@ -293,6 +307,7 @@ impl Config {
                 "a robot that learns needs a feature space and a list of gestures, which a model brings: set model to \"rendered\" or {file: \"FILE\"}; with learning.from: \"nothing\" its classifier is not used",
             ));
         }
+        self.center.validate()?;
         if !(2..=16).contains(&self.links.max_links) {
             return Err(ConfigError::value(
                 "links.max_links",
@@ -302,9 +317,7 @@ impl Config {
                 ),
             ));
         }
-        if let CameraChoice::Custom(model) = &self.camera.model {
-            model.validate().map_err(|error| ConfigError::value("camera.model.custom", error.to_string()))?;
-        }
+        self.camera.model.validate("camera.model")?;
         let sees = !matches!(self.camera.source, SourceSection::None);
         if sees && matches!(self.model, ModelSection::None) {
             return Err(ConfigError::value(
@@ -320,6 +333,26 @@ impl Config {
 }
 
 impl CameraChoice {
+    /// The camera of that name; `None` for a name that is none.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "footbot" => Some(Self::Footbot),
+            "parrot" => Some(Self::Parrot),
+            "laptop" => Some(Self::Laptop),
+            _ => None,
+        }
+    }
+
+    fn validate(&self, key: &str) -> Result<(), ConfigError> {
+        match self {
+            Self::Custom(model) => model
+                .validate()
+                .map_err(|error| ConfigError::value(&format!("{key}.custom"), error.to_string())),
+            Self::Footbot | Self::Parrot | Self::Laptop => Ok(()),
+        }
+    }
+
     /// The properties of the chosen camera.
     #[must_use]
     pub fn properties(&self) -> CameraModel {

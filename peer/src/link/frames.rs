@@ -86,10 +86,15 @@ impl Robot {
 }
 
 impl FrameGate {
-    /// Says to a robot's camera that this frame was taken, so that the next one may come. `round` is the one it is judged
-    /// for.
-    pub fn taken(&self, robot: RobotId, frame: &FrameHeader, round: Option<RoundId>) {
-        let taken = FrameTaken { nonce: frame.nonce, sequence: frame.sequence, round };
+    /// The round that the robot takes part in now at whose session the frames come in.
+    #[must_use]
+    pub fn round(&self) -> Option<RoundId> {
+        let status = self.account.lock();
+        status.round.filter(|_| status.open)
+    }
+
+    /// Says to a robot's camera that a frame was taken, so that the next one may come.
+    pub fn taken(&self, robot: RobotId, taken: &FrameTaken) {
         let bytes = taken.encode();
         self.account.sent("taken", bytes.len());
         let put = self

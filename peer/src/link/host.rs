@@ -8,13 +8,13 @@ use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, 
 use gestalt_strategies::mind::Mind;
 use gestalt_strategies::{Classify, Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
-use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 use zenoh::sample::Locality;
 use zenoh::time::Timestamp;
+use zenoh::{Session, Wait};
 
 use super::account::Account;
 use super::apprentice::Apprentice;
@@ -71,45 +71,12 @@ struct Last(Mutex<Option<(String, Option<Timestamp>)>>);
 impl Host {
     pub(super) async fn declare(self) -> Result<Declared, LinkError> {
         let last = Arc::new(Last::default());
-        self.listen(&last).await.map_err(|error| LinkError::open(&*error))?;
+        // Not of `self`: a mind is not to be shared between threads, and this future may move between them.
+        let (session, keys) = (self.node.session().clone(), self.keys.clone());
+        listen(&session, &keys, self.me, &self.inbox.clone(), &last)
+            .await
+            .map_err(|error| LinkError::open(&*error))?;
         self.announce_itself(last).await.map_err(|error| LinkError::open(&*error))
-    }
-
-    async fn listen(&self, last: &Arc<Last>) -> zenoh::Result<()> {
-        let session = self.node.session();
-        let of_interest = [
-            self.keys.every_robot("vote"),
-            self.keys.every_robot("sample"),
-            self.keys.key(&Topic::Repair(self.me)),
-            self.keys.every_robot("decision"),
-            self.keys.key(&Topic::Decision),
-            self.keys.every_instructor("feedback"),
-            self.keys.every_instructor("answer"),
-        ];
-        for key in of_interest {
-            let inbox = self.inbox.clone();
-            session
-                .declare_subscriber(key)
-                .allowed_origin(Locality::Remote)
-                .callback(move |sample| inbox.on_sample(&sample))
-                .background()
-                .await?;
-        }
-        let inbox = self.inbox.clone();
-        session
-            .liveliness()
-            .declare_subscriber(self.keys.every_robot("alive"))
-            .history(true)
-            .callback(move |sample| inbox.on_liveliness(&sample))
-            .background()
-            .await?;
-        let last = last.clone();
-        session
-            .declare_queryable(self.keys.key(&Topic::Decision))
-            .callback(move |query| last.on_query(&query))
-            .background()
-            .await?;
-        Ok(())
     }
 
     async fn announce_itself(self, last: Arc<Last>) -> zenoh::Result<Declared> {
@@ -133,6 +100,49 @@ impl Host {
         let presence = Presence::declare(session, &self.keys, self.me, account, lost_links).await?;
         Ok(Declared { host: self, presence, sample, held, swarm, last, unsaid: None, said: None })
     }
+}
+
+/// Takes in everything that concerns a robot.
+async fn listen(
+    session: &Session,
+    keys: &Keys,
+    me: RobotId,
+    inbox: &Arc<Inbox>,
+    last: &Arc<Last>,
+) -> zenoh::Result<()> {
+    let of_interest = [
+        keys.every_robot("vote"),
+        keys.every_robot("sample"),
+        keys.key(&Topic::Repair(me)),
+        keys.every_robot("decision"),
+        keys.key(&Topic::Decision),
+        keys.every_instructor("feedback"),
+        keys.every_instructor("answer"),
+    ];
+    for key in of_interest {
+        let inbox = inbox.clone();
+        session
+            .declare_subscriber(key)
+            .allowed_origin(Locality::Remote)
+            .callback(move |sample| inbox.on_sample(&sample))
+            .background()
+            .await?;
+    }
+    let inbox = inbox.clone();
+    session
+        .liveliness()
+        .declare_subscriber(keys.every_robot("alive"))
+        .history(true)
+        .callback(move |sample| inbox.on_liveliness(&sample))
+        .background()
+        .await?;
+    let last = last.clone();
+    session
+        .declare_queryable(keys.key(&Topic::Decision))
+        .callback(move |query| last.on_query(&query))
+        .background()
+        .await?;
+    Ok(())
 }
 
 impl Declared {

@@ -48,6 +48,19 @@ impl ImageFolder {
         images.sort();
         Ok(Self { folder: folder.into(), images, next: 0, period, looping })
     }
+
+    /// The file of the next frame.
+    ///
+    /// # Errors
+    /// [`SourceError::Ended`].
+    pub fn next_file(&mut self) -> Result<&Path, SourceError> {
+        if self.next == self.images.len() && self.looping {
+            self.next = 0;
+        }
+        let path = self.images.get(self.next).ok_or_else(|| SourceError::Ended(self.describe()))?;
+        self.next += 1;
+        Ok(path)
+    }
 }
 
 fn has_image_name(path: &Path) -> bool {
@@ -65,12 +78,7 @@ impl Source for ImageFolder {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
-        if self.next == self.images.len() && self.looping {
-            self.next = 0;
-        }
-        let path = self.images.get(self.next).ok_or_else(|| SourceError::Ended(self.describe()))?;
-        self.next += 1;
-        Ok(Frame { image: read_image(path)?, at: now })
+        Ok(Frame { image: read_image(self.next_file()?)?, at: now })
     }
 }
 

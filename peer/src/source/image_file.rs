@@ -7,9 +7,10 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-use opencv::core::{Mat, Vector};
+use opencv::core::Mat;
 use opencv::imgcodecs;
 use opencv::prelude::*;
+use thiserror::Error;
 
 use super::SourceError;
 
@@ -25,23 +26,65 @@ pub const MAX_IMAGE_BYTES: u64 = 64 << 20;
 /// [`SourceError`] names the file and what is wrong with it.
 pub fn read_image(path: &Path) -> Result<Mat, SourceError> {
     let bytes = read_bounded(path)?;
-    let too_large = |size: String| SourceError::TooLarge {
-        path: path.into(),
-        size,
-        limit: format!("{MAX_MEGAPIXELS} megapixels"),
-    };
-    let (width, height) = match inspect(&bytes) {
-        Ok(size) => size,
-        Err(Flaw::Unknown) => return Err(SourceError::NotAnImage(path.into())),
-        Err(Flaw::Truncated) => return Err(SourceError::Truncated(path.into())),
-    };
-    if f64::from(width) * f64::from(height) > MAX_MEGAPIXELS * 1e6 {
-        return Err(too_large(format!("{width}×{height} pixels")));
+    let mut image = Mat::default();
+    match decode(&bytes, MAX_MEGAPIXELS, &mut image) {
+        Ok(()) => Ok(image),
+        Err(PictureError::NotAnImage) => Err(SourceError::NotAnImage(path.into())),
+        Err(PictureError::Truncated) => Err(SourceError::Truncated(path.into())),
+        Err(PictureError::TooLarge { width, height, .. }) => Err(SourceError::TooLarge {
+            path: path.into(),
+            size: format!("{width}×{height} pixels"),
+            limit: format!("{MAX_MEGAPIXELS} megapixels"),
+        }),
+    }
+}
+
+/// Reads a file of at most `limit` bytes that is a whole JPEG, as it is; `None` for any other.
+///
+/// # Errors
+/// [`SourceError`] when it cannot be read.
+pub fn read_jpeg(path: &Path, limit: usize) -> Result<Option<Vec<u8>>, SourceError> {
+    let bytes = read_bounded(path)?;
+    let is_jpeg = bytes.len() <= limit && bytes.starts_with(b"\xff\xd8\xff") && inspect(&bytes).is_ok();
+    Ok(is_jpeg.then_some(bytes))
+}
+
+/// Encoded bytes that are no picture, or none to be decoded.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PictureError {
+    /// Neither JPEG nor PNG, or a damaged one.
+    #[error("no JPEG or PNG picture that can be decoded")]
+    NotAnImage,
+    /// The end is missing. (A decoder would fill the rest with grey and say nothing.)
+    #[error("a picture cut short: its end is missing")]
+    Truncated,
+    /// More pixels than allowed; it was not decoded.
+    #[error("a picture of {width}×{height} pixels: at most {limit} megapixels are decoded")]
+    TooLarge {
+        /// In pixels.
+        width: u32,
+        /// In pixels.
+        height: u32,
+        /// In millions of pixels.
+        limit: f64,
+    },
+}
+
+/// Decodes a JPEG or PNG picture as BGR, 8 bits, upright, into a buffer that is reused where its size fits.
+///
+/// # Errors
+/// See [`PictureError`]; the buffer then holds anything.
+pub fn decode(bytes: &[u8], megapixels: f64, image: &mut Mat) -> Result<(), PictureError> {
+    let (width, height) = inspect(bytes)?;
+    if f64::from(width) * f64::from(height) > megapixels * 1e6 {
+        return Err(PictureError::TooLarge { width, height, limit: megapixels });
     }
     // OpenCV says "cannot decode" with an empty image or with an error, depending on the decoder.
-    match imgcodecs::imdecode(&Vector::from_slice(&bytes), imgcodecs::IMREAD_COLOR) {
-        Ok(image) if !image.empty() => Ok(image),
-        _ => Err(SourceError::NotAnImage(path.into())),
+    let decoded = Mat::from_slice(bytes)
+        .and_then(|bytes| imgcodecs::imdecode_to(&bytes, imgcodecs::IMREAD_COLOR, image));
+    match decoded {
+        Ok(decoded) if !decoded.empty() => Ok(()),
+        _ => Err(PictureError::NotAnImage),
     }
 }
 
@@ -71,38 +114,31 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, SourceError> {
     Ok(bytes)
 }
 
-/// What is wrong with an image file.
-#[derive(Debug, PartialEq, Eq)]
-enum Flaw {
-    /// Neither JPEG nor PNG.
-    Unknown,
-    /// Its end is missing.
-    Truncated,
-}
-
 /// The width and height that a whole JPEG or PNG file claims.
-fn inspect(bytes: &[u8]) -> Result<(u32, u32), Flaw> {
+fn inspect(bytes: &[u8]) -> Result<(u32, u32), PictureError> {
     if let Some(rest) = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n") {
         inspect_png(rest)
     } else if let Some(rest) = bytes.strip_prefix(b"\xff\xd8\xff") {
         // The third byte belongs to the first marker.
         inspect_jpeg(&bytes[bytes.len() - rest.len() - 1..])
     } else {
-        Err(Flaw::Unknown)
+        Err(PictureError::NotAnImage)
     }
 }
 
 /// Walks the chunks (length, type, data, checksum) up to the end chunk.
-fn inspect_png(mut rest: &[u8]) -> Result<(u32, u32), Flaw> {
+fn inspect_png(mut rest: &[u8]) -> Result<(u32, u32), PictureError> {
     let size = match rest.get(8..16) {
         Some(fields) => (big_endian(&fields[..4]), big_endian(&fields[4..])),
-        None => return Err(Flaw::Truncated),
+        None => return Err(PictureError::Truncated),
     };
     loop {
-        let (Some(length), Some(kind)) = (rest.get(..4), rest.get(4..8)) else { return Err(Flaw::Truncated) };
+        let (Some(length), Some(kind)) = (rest.get(..4), rest.get(4..8)) else {
+            return Err(PictureError::Truncated);
+        };
         let end = (big_endian(length) as usize).saturating_add(12);
         if rest.len() < end {
-            return Err(Flaw::Truncated);
+            return Err(PictureError::Truncated);
         }
         if kind == b"IEND" {
             return Ok(size);
@@ -112,34 +148,36 @@ fn inspect_png(mut rest: &[u8]) -> Result<(u32, u32), Flaw> {
 }
 
 /// Walks the marker segments, and through the scans between them, up to the end-of-image marker (ITU-T T.81, B.1).
-fn inspect_jpeg(mut rest: &[u8]) -> Result<(u32, u32), Flaw> {
+fn inspect_jpeg(mut rest: &[u8]) -> Result<(u32, u32), PictureError> {
     const START_OF_SCAN: u8 = 0xda;
     const END_OF_IMAGE: u8 = 0xd9;
     let mut size = None;
     loop {
         // A marker is 0xff, any number of times, and a code.
-        let Some(fill) = rest.iter().position(|byte| *byte != 0xff) else { return Err(Flaw::Truncated) };
+        let Some(fill) = rest.iter().position(|byte| *byte != 0xff) else {
+            return Err(PictureError::Truncated);
+        };
         if fill == 0 {
-            return Err(Flaw::Unknown);
+            return Err(PictureError::NotAnImage);
         }
         let marker = rest[fill];
         rest = &rest[fill + 1..];
         if marker == END_OF_IMAGE {
-            return size.ok_or(Flaw::Unknown);
+            return size.ok_or(PictureError::NotAnImage);
         }
-        let Some(length) = rest.get(..2) else { return Err(Flaw::Truncated) };
+        let Some(length) = rest.get(..2) else { return Err(PictureError::Truncated) };
         let length = big_endian(length) as usize;
-        let Some(segment) = rest.get(..length) else { return Err(Flaw::Truncated) };
+        let Some(segment) = rest.get(..length) else { return Err(PictureError::Truncated) };
         // Start of frame, of any coding: C0 to CF but for tables (C4, C8, CC).
         if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
-            let fields = segment.get(3..7).ok_or(Flaw::Unknown)?;
+            let fields = segment.get(3..7).ok_or(PictureError::NotAnImage)?;
             size = Some((big_endian(&fields[2..]), big_endian(&fields[..2])));
         }
         rest = &rest[length..];
         if marker == START_OF_SCAN {
             // In coded data 0xff is followed by a zero (stuffing) or a restart marker; anything else ends it.
             let coded = |pair: &[u8]| pair[0] != 0xff || matches!(pair[1], 0x00 | 0xd0..=0xd7);
-            let end = rest.windows(2).position(|pair| !coded(pair)).ok_or(Flaw::Truncated)?;
+            let end = rest.windows(2).position(|pair| !coded(pair)).ok_or(PictureError::Truncated)?;
             rest = &rest[end..];
         }
     }
@@ -151,7 +189,7 @@ fn big_endian(bytes: &[u8]) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use opencv::core::{self, Scalar};
+    use opencv::core::{self, Scalar, Vector};
 
     use super::*;
 
@@ -186,7 +224,7 @@ mod tests {
         for extension in [".jpg", ".png"] {
             let whole = encoded(extension, 40, 30);
             for length in 12..whole.len() {
-                assert_eq!(inspect(&whole[..length]), Err(Flaw::Truncated), "{extension} {length}");
+                assert_eq!(inspect(&whole[..length]), Err(PictureError::Truncated), "{extension} {length}");
             }
             let half = read(&whole[..whole.len() / 2]);
             assert!(matches!(&half, Err(SourceError::Truncated(_))), "{extension}: {half:?}");
@@ -214,6 +252,20 @@ mod tests {
         bomb[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
         let error = read(&bomb).unwrap_err();
         assert!(error.to_string().contains("16384×16384"), "{error}");
+    }
+
+    #[test]
+    fn a_buffer_of_the_right_size_is_reused() {
+        let (first, second) = (encoded(".jpg", 40, 30), encoded(".jpg", 40, 30));
+        let mut image = Mat::default();
+        decode(&first, MAX_MEGAPIXELS, &mut image).unwrap();
+        let data = image.data();
+        decode(&second, MAX_MEGAPIXELS, &mut image).unwrap();
+        assert_eq!(image.data(), data);
+        assert_eq!(
+            decode(&first, 0.001, &mut image),
+            Err(PictureError::TooLarge { width: 40, height: 30, limit: 0.001 })
+        );
     }
 
     #[test]

@@ -11,6 +11,7 @@ use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use gestalt_protocol::RobotId;
 use opencv::core::Mat;
 use thiserror::Error;
 
@@ -19,7 +20,7 @@ use crate::pose::PoseError;
 
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
-pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image};
+pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, read_image, read_jpeg};
 pub use rendered::{Glove, RenderedSource};
 pub use sensor::Sensor;
 pub use video::Video;
@@ -98,6 +99,17 @@ pub enum SourceError {
         size: String,
         /// How large it may be.
         limit: String,
+    },
+    /// A stream that has run dry.
+    #[error("no frames of robot {0} arrive: start `gestalt stream` on it, and check its way here")]
+    NoFrames(RobotId),
+    /// A frame of a stream that is no picture.
+    #[error("robot {robot} streams {cause}")]
+    Garbled {
+        /// Whose stream.
+        robot: RobotId,
+        /// What it is.
+        cause: PictureError,
     },
     /// A folder with nothing to show.
     #[error("the folder {} holds no images (*.jpg, *.jpeg, *.png)", .0.display())]

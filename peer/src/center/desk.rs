@@ -1,0 +1,281 @@
+//! Which frame is looked at next, and which camera may send: the newest frame of each robot, robots in turn.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+use gestalt_protocol::{FrameTaken, RobotId, RoundId};
+
+use crate::link::FrameArrival;
+
+/// A frame that can be acknowledged.
+pub(super) trait Acknowledge {
+    /// What to say to its camera.
+    fn taken(&self, round: Option<RoundId>) -> FrameTaken;
+}
+
+/// Whoever looks for a robot.
+pub(super) trait Look {
+    /// The round that is judged now.
+    fn round(&self) -> Option<RoundId>;
+}
+
+/// The newest frame of each robot, until a worker takes it.
+///
+/// A camera sends its next frame when the one before was acknowledged, which happens as it is taken. When as many frames
+/// wait as the workers need to be busy, acknowledgements wait too, and go to the robots in the order in which they were
+/// served: then every camera sends its frame just before its turn, and overload makes frames fewer, not older.
+#[derive(Debug)]
+pub(super) struct Desk<S, F> {
+    state: Mutex<State<S, F>>,
+    changed: Condvar,
+    /// How many frames may wait before acknowledgements do.
+    ahead: usize,
+}
+
+#[derive(Debug)]
+struct State<S, F> {
+    slots: BTreeMap<RobotId, Slot<S, F>>,
+    turn: u64,
+    closed: bool,
+}
+
+#[derive(Debug)]
+struct Slot<S, F> {
+    seat: Arc<S>,
+    newest: Option<F>,
+    /// A worker looks at a frame of this robot: the next one waits for it.
+    busy: bool,
+    /// The turn in which it was served last.
+    served: u64,
+    /// The acknowledgement it has not been given yet.
+    owed: Option<FrameTaken>,
+    count: Count,
+}
+
+/// What became of a robot's frames so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Count {
+    pub received: u64,
+    pub overwritten: u64,
+}
+
+/// What became of a frame that was put on the desk.
+#[derive(Debug)]
+pub(super) enum Put<F> {
+    /// It waits.
+    Waits,
+    /// It is of a robot that is not served; here it is back.
+    Unknown(F),
+}
+
+impl<S: Look, F: Acknowledge> Desk<S, F> {
+    pub fn new(ahead: usize) -> Self {
+        let state = State { slots: BTreeMap::new(), turn: 0, closed: false };
+        Self { state: Mutex::new(state), changed: Condvar::new(), ahead }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<S, F>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Serves that robot from now on; one that is served already keeps its seat.
+    pub fn admit(&self, robot: RobotId, seat: Arc<S>) {
+        let mut state = self.lock();
+        let served = state.turn;
+        let slot = Slot { seat, newest: None, busy: false, served, owed: None, count: Count::default() };
+        state.slots.entry(robot).or_insert(slot);
+    }
+
+    /// Serves that robot no more.
+    pub fn dismiss(&self, robot: RobotId) -> Option<Arc<S>> {
+        self.lock().slots.remove(&robot).map(|slot| slot.seat)
+    }
+
+    /// The robots served, in order.
+    pub fn seats(&self) -> Vec<(RobotId, Arc<S>)> {
+        self.lock().slots.iter().map(|(robot, slot)| (*robot, slot.seat.clone())).collect()
+    }
+
+    /// What became of that robot's frames so far.
+    pub fn count(&self, robot: RobotId) -> Count {
+        self.lock().slots.get(&robot).map(|slot| slot.count).unwrap_or_default()
+    }
+
+    /// Puts a frame in the place of an older one.
+    pub fn put(&self, robot: RobotId, frame: F) -> Put<F> {
+        let mut state = self.lock();
+        let Some(slot) = state.slots.get_mut(&robot) else { return Put::Unknown(frame) };
+        slot.count.received += 1;
+        slot.count.overwritten += u64::from(slot.newest.replace(frame).is_some());
+        drop(state);
+        self.changed.notify_one();
+        Put::Waits
+    }
+
+    /// Waits for a frame: of those waiting, the one of the robot that was served least recently. [`Desk::done`] must follow.
+    /// `grant` is told which frames are to be acknowledged meanwhile. `None` once the desk is closed.
+    pub fn next(&self, grant: impl Fn(RobotId, FrameTaken)) -> Option<(RobotId, Arc<S>, F)> {
+        let mut state = self.lock();
+        loop {
+            if state.closed {
+                return None;
+            }
+            let taken = state.take();
+            // Nothing to do: whoever can send shall.
+            let ahead = if taken.is_some() { self.ahead } else { usize::MAX };
+            let granted = state.grants(ahead);
+            if taken.is_none() && granted.is_empty() {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            // Not under the lock: Zenoh's threads put frames here.
+            drop(state);
+            granted.into_iter().for_each(|(robot, taken)| grant(robot, taken));
+            if taken.is_some() {
+                return taken;
+            }
+            state = self.lock();
+        }
+    }
+
+    /// The frame of that robot was looked at.
+    pub fn done(&self, robot: RobotId) {
+        if let Some(slot) = self.lock().slots.get_mut(&robot) {
+            slot.busy = false;
+        }
+        self.changed.notify_one();
+    }
+
+    /// Ends the waiting of all workers.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
+}
+
+impl<S: Look, F: Acknowledge> State<S, F> {
+    fn take(&mut self) -> Option<(RobotId, Arc<S>, F)> {
+        let waiting = self.slots.iter_mut().filter(|(_, slot)| slot.newest.is_some() && !slot.busy);
+        let (robot, slot) = waiting.min_by_key(|(_, slot)| slot.served)?;
+        let frame = slot.newest.take()?;
+        self.turn += 1;
+        (slot.busy, slot.served) = (true, self.turn);
+        slot.owed = Some(frame.taken(slot.seat.round()));
+        Some((*robot, slot.seat.clone(), frame))
+    }
+
+    /// The acknowledgements to be given, as long as fewer than `ahead` frames wait.
+    fn grants(&mut self, ahead: usize) -> Vec<(RobotId, FrameTaken)> {
+        let waiting = self.slots.values().filter(|slot| slot.newest.is_some()).count();
+        let mut owed: Vec<_> = self.slots.iter_mut().filter(|(_, slot)| slot.owed.is_some()).collect();
+        owed.sort_by_key(|(_, slot)| slot.served);
+        let first = owed.into_iter().take(ahead.saturating_sub(waiting));
+        first.filter_map(|(robot, slot)| Some((*robot, slot.owed.take()?))).collect()
+    }
+}
+
+impl Acknowledge for FrameArrival {
+    fn taken(&self, round: Option<RoundId>) -> FrameTaken {
+        FrameTaken { nonce: self.header.nonce, sequence: self.header.sequence, round }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use super::*;
+
+    #[derive(Debug)]
+    struct Blind;
+
+    impl Look for Blind {
+        fn round(&self) -> Option<RoundId> {
+            None
+        }
+    }
+
+    impl Acknowledge for u32 {
+        fn taken(&self, round: Option<RoundId>) -> FrameTaken {
+            FrameTaken { nonce: 1, sequence: *self, round }
+        }
+    }
+
+    fn desk(robots: u32, ahead: usize) -> Desk<Blind, u32> {
+        let desk = Desk::new(ahead);
+        (0..robots).for_each(|robot| desk.admit(RobotId(robot), Arc::new(Blind)));
+        desk
+    }
+
+    /// Takes one frame; says whose, and who was granted the next.
+    fn take(desk: &Desk<Blind, u32>) -> (u32, u32, Vec<u32>) {
+        let granted = RefCell::new(Vec::new());
+        let (robot, _, frame) = desk.next(|robot, _| granted.borrow_mut().push(robot.0)).unwrap();
+        desk.done(robot);
+        (robot.0, frame, granted.into_inner())
+    }
+
+    #[test]
+    fn the_newest_frame_replaces_the_one_before() {
+        let desk = desk(1, 4);
+        desk.put(RobotId(0), 1);
+        desk.put(RobotId(0), 2);
+        assert_eq!(take(&desk), (0, 2, vec![0]));
+        assert_eq!(desk.count(RobotId(0)), Count { received: 2, overwritten: 1 });
+        assert!(matches!(desk.put(RobotId(9), 3), Put::Unknown(3)));
+    }
+
+    #[test]
+    fn the_robot_served_least_recently_is_next() {
+        let desk = desk(3, 4);
+        let mut order = Vec::new();
+        // All have a frame waiting all the time, the last one most of all.
+        for frame in 0..6 {
+            (0..3).rev().for_each(|robot| drop(desk.put(RobotId(robot), frame)));
+            order.push(take(&desk).0);
+        }
+        assert_eq!(order, [0, 1, 2, 0, 1, 2]);
+    }
+
+    #[test]
+    fn frames_of_one_robot_are_looked_at_one_by_one() {
+        let desk = desk(2, 4);
+        desk.put(RobotId(0), 1);
+        let (busy, ..) = desk.next(|_, _| {}).unwrap();
+        desk.put(RobotId(0), 2);
+        desk.put(RobotId(1), 3);
+        assert_eq!(take(&desk).0, 1, "0 waits for its own");
+        desk.done(busy);
+        assert_eq!(take(&desk).0, 0);
+    }
+
+    #[test]
+    fn when_frames_wait_cameras_wait_for_their_turn_to_send() {
+        let desk = desk(5, 2);
+        (0..5).for_each(|robot| drop(desk.put(RobotId(robot), 1)));
+        assert_eq!(take(&desk), (0, 1, vec![]), "four others wait");
+        assert_eq!(take(&desk), (1, 1, vec![]));
+        assert_eq!(take(&desk), (2, 1, vec![]));
+        assert_eq!(take(&desk), (3, 1, vec![0]), "one waits, one more may");
+        desk.put(RobotId(0), 2);
+        assert_eq!(take(&desk), (4, 1, vec![1]));
+        assert_eq!(take(&desk), (0, 2, vec![2, 3]));
+    }
+
+    #[test]
+    fn nobody_is_kept_waiting_by_cameras_that_stay_silent() {
+        let desk = desk(5, 1);
+        (0..5).for_each(|robot| drop(desk.put(RobotId(robot), 1)));
+        (0..5).for_each(|_| drop(take(&desk)));
+        let granted = RefCell::new(Vec::new());
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(std::time::Duration::from_millis(50));
+                desk.close();
+            });
+            assert!(desk.next(|robot, _| granted.borrow_mut().push(robot.0)).is_none());
+        });
+        // The last one taken had granted 0.
+        assert_eq!(granted.into_inner(), [1, 2, 3, 4]);
+    }
+}

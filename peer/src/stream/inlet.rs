@@ -1,0 +1,117 @@
+//! The frames of one robot, received at a peer: its camera is somewhere else.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::{FrameHeader, FrameTaken, RobotId};
+use opencv::core::Mat;
+
+use crate::link::{FrameArrival, FrameGate, LinkError, Robot};
+use crate::source::{Frame, PictureError, Scene, Source, SourceError, decode};
+
+/// The largest streamed picture that is decoded, in millions of pixels: 3840×2160.
+pub const MAX_MEGAPIXELS: f64 = 8.3;
+
+/// How long the next frame is waited for.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// Where the newest frame of a robot waits.
+#[derive(Debug)]
+pub struct Inlet {
+    robot: RobotId,
+    newest: Mutex<Option<FrameArrival>>,
+    arrived: Condvar,
+    gate: OnceLock<FrameGate>,
+    overwritten: AtomicU64,
+}
+
+impl Inlet {
+    /// For the frames of that robot.
+    #[must_use]
+    pub fn new(robot: RobotId) -> Arc<Self> {
+        Arc::new(Self {
+            robot,
+            newest: Mutex::new(None),
+            arrived: Condvar::new(),
+            gate: OnceLock::new(),
+            overwritten: AtomicU64::new(0),
+        })
+    }
+
+    /// Opens it at that robot's session.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn open(self: &Arc<Self>, at: &Robot) -> Result<(), LinkError> {
+        let inlet = Arc::downgrade(self);
+        let on_frame = move |frame| {
+            if let Some(inlet) = inlet.upgrade() {
+                inlet.put(frame);
+            }
+        };
+        let gate = at.receive_frames(Some(self.robot), on_frame).await?;
+        // One that is open already keeps its gate.
+        let _ = self.gate.set(gate);
+        Ok(())
+    }
+
+    fn put(&self, frame: FrameArrival) {
+        let before = self.newest.lock().unwrap_or_else(PoisonError::into_inner).replace(frame);
+        if before.is_some() {
+            self.overwritten.fetch_add(1, Ordering::Relaxed);
+        }
+        self.arrived.notify_one();
+    }
+
+    /// Takes the newest frame, when one comes in time, and asks for the next.
+    fn take(&self) -> Option<FrameArrival> {
+        let newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let (mut newest, _) = self
+            .arrived
+            .wait_timeout_while(newest, PATIENCE, |newest| newest.is_none())
+            .unwrap_or_else(PoisonError::into_inner);
+        let frame = newest.take()?;
+        drop(newest);
+        if let Some(gate) = self.gate.get() {
+            let FrameHeader { nonce, sequence, .. } = frame.header;
+            gate.taken(self.robot, &FrameTaken { nonce, sequence, round: gate.round() });
+        }
+        Some(frame)
+    }
+}
+
+/// A camera that is somewhere else: the frames that `gestalt stream` sends.
+#[derive(Debug)]
+pub struct StreamSource {
+    inlet: Arc<Inlet>,
+    period: Duration,
+}
+
+impl StreamSource {
+    /// The frames that come in there, one every `period`, or as they come.
+    #[must_use]
+    pub fn new(inlet: Arc<Inlet>, period: Duration) -> Self {
+        Self { inlet, period }
+    }
+}
+
+impl Source for StreamSource {
+    fn describe(&self) -> String {
+        format!("stream of robot {}", self.inlet.robot)
+    }
+
+    fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        let called = Instant::now();
+        let arrival = self.inlet.take().ok_or(SourceError::NoFrames(self.inlet.robot))?;
+        let mut image = Mat::default();
+        decode(&arrival.picture(), MAX_MEGAPIXELS, &mut image)
+            .map_err(|cause: PictureError| SourceError::Garbled { robot: self.inlet.robot, cause })?;
+        let age = Duration::from_micros(u64::from(arrival.header.age_us)) + arrival.at.elapsed();
+        Ok(Frame { image, at: (now + called.elapsed()).saturating_sub(age) })
+    }
+}

@@ -1,0 +1,244 @@
+//! The thin client: it sends what its camera sees, and hears what the swarm decides.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::{DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId};
+use opencv::core::{Mat, Vector, VectorToVec};
+use opencv::imgcodecs::{IMWRITE_JPEG_QUALITY, imencode};
+use tokio::sync::mpsc;
+use tokio::time::MissedTickBehavior;
+
+use super::credit::Credit;
+use super::feed::{Content, Feed};
+use super::lens::{Lens, Shot};
+use crate::link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
+use crate::source::SourceError;
+
+/// How many acknowledgements wait to be read: one is expected, more are somebody's nonsense.
+const MAX_WAITING: usize = 16;
+
+/// Looks this often whether it is still attached.
+const LOOKOUT: Duration = Duration::from_secs(1);
+
+/// Attached to nobody for so many lookouts in a row, it opens a session anew. (Zenoh dials endpoints that were given again
+/// and again by itself, but never a router that it found by scouting.)
+const PATIENCE: u32 = 3;
+
+/// Where a thin client sends its frames, and how.
+#[derive(Clone, Debug)]
+pub struct SenderConfig {
+    /// The swarm's name.
+    pub swarm: String,
+    /// How it reaches a robot or a centre.
+    pub link: LinkConfig,
+    /// Whose frames they are.
+    pub robot: RobotId,
+    /// Which camera, in words: `footbot`, `parrot`, `laptop`, or any other.
+    pub camera: String,
+    /// JPEG quality, `1..=100`.
+    pub quality: i32,
+}
+
+/// What happens to a thin client.
+#[derive(Debug)]
+pub enum StreamEvent {
+    /// It is attached to a robot or a centre.
+    Attached,
+    /// It is attached to nobody, and tries again.
+    Detached {
+        /// Why, and the mend.
+        cause: String,
+    },
+    /// The swarm decided.
+    Decided(Box<Announcement>),
+    /// A picture could not be taken or sent, or something arrived that is no acknowledgement.
+    Failed {
+        /// Why, and the mend.
+        cause: String,
+    },
+    /// How it goes, once a second: since the start, frames sent, acknowledged, and overwritten by newer ones unsent.
+    Count {
+        /// Frames sent.
+        sent: u64,
+        /// Frames acknowledged.
+        taken: u64,
+        /// Frames overwritten.
+        overwritten: u64,
+    },
+}
+
+/// Sends the frames of one camera.
+pub struct Sender {
+    config: SenderConfig,
+    lens: Arc<Lens>,
+    fps: f32,
+    nonce: u64,
+    sent: u64,
+    taken: u64,
+    encoded: Vector<u8>,
+}
+
+/// Why a sender stops.
+enum End {
+    Detached,
+    CameraEnded,
+}
+
+impl Sender {
+    /// Starts the camera.
+    ///
+    /// # Errors
+    /// [`LinkError::Thread`] when the machine has no room for one more.
+    pub fn start(config: SenderConfig, feed: Feed) -> Result<Self, LinkError> {
+        let fps = 1.0 / feed.period().as_secs_f32().max(0.001);
+        let lens = Lens::open(feed)?;
+        Ok(Self { config, lens, fps, nonce: fresh_nonce(), sent: 0, taken: 0, encoded: Vector::new() })
+    }
+
+    /// Sends, and tells of what happens, until the camera has come to its end. It stays through whatever becomes of the robot
+    /// it is attached to.
+    ///
+    /// # Errors
+    /// What no waiting mends: see [`LinkError`].
+    pub async fn run(mut self, mut tell: impl FnMut(StreamEvent)) -> Result<(), LinkError> {
+        let mut credit = Credit::new(self.nonce);
+        loop {
+            let client = match Client::open(&self.config.swarm, &self.config.link).await {
+                Ok(client) => client,
+                Err(LinkError::Open(cause)) => {
+                    tell(StreamEvent::Detached { cause });
+                    tokio::time::sleep(LOOKOUT).await;
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let end = self.serve(&client, &mut credit, &mut tell).await;
+            client.close().await;
+            match end {
+                Ok(End::CameraEnded) => return Ok(()),
+                Ok(End::Detached) => {}
+                Err(error) => tell(StreamEvent::Failed { cause: error.to_string() }),
+            }
+        }
+    }
+
+    /// Sends over one session, as long as that is attached.
+    async fn serve(
+        &mut self,
+        client: &Client,
+        credit: &mut Credit,
+        tell: &mut impl FnMut(StreamEvent),
+    ) -> Result<End, LinkError> {
+        let (acknowledge, mut acknowledged) = mpsc::channel(MAX_WAITING);
+        let sender = client
+            .stream(self.config.robot, move |taken| {
+                // More than were sent cannot all be meant.
+                let _ = acknowledge.try_send(taken);
+            })
+            .await?;
+        let mut decisions = client.decisions().await?;
+        let mut lookout = tokio::time::interval(LOOKOUT);
+        lookout.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let (mut attached, mut missed) = (false, 0);
+        let lens = self.lens.clone();
+        loop {
+            let picture = async {
+                if let Some(waits) = credit.waits_until() {
+                    tokio::time::sleep_until(waits.into()).await;
+                }
+                lens.newest().await
+            };
+            tokio::select! {
+                shot = picture => {
+                    if let Err(SourceError::Ended(_)) = shot.content {
+                        return Ok(End::CameraEnded);
+                    }
+                    if let Err(cause) = self.send(&sender, credit, shot).await {
+                        tell(StreamEvent::Failed { cause });
+                    }
+                }
+                Some(taken) = acknowledged.recv() => self.on_taken(taken, credit, tell),
+                decision = next(&mut decisions) => match decision {
+                    Some(decision) => tell(StreamEvent::Decided(Box::new(decision))),
+                    None => return Ok(End::Detached),
+                },
+                _ = lookout.tick() => {
+                    let now = client.is_attached().await;
+                    if now != attached {
+                        attached = now;
+                        tell(if now {
+                            StreamEvent::Attached
+                        } else {
+                            let cause = "the robot or centre it was attached to is gone; it is tried again".to_owned();
+                            StreamEvent::Detached { cause }
+                        });
+                    }
+                    missed = if now { 0 } else { missed + 1 };
+                    if missed > PATIENCE {
+                        return Ok(End::Detached);
+                    }
+                    let (sent, taken, overwritten) = (self.sent, self.taken, lens.overwritten());
+                    tell(StreamEvent::Count { sent, taken, overwritten });
+                }
+            }
+        }
+    }
+
+    fn on_taken(
+        &mut self,
+        taken: Result<FrameTaken, DecodeError>,
+        credit: &mut Credit,
+        tell: &mut impl FnMut(StreamEvent),
+    ) {
+        match taken {
+            Ok(taken) if credit.taken(&taken) => {
+                self.taken += 1;
+                self.lens.look_for(taken.round);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                tell(StreamEvent::Failed { cause: format!("an acknowledgement that is none: {error}") })
+            }
+        }
+    }
+
+    async fn send(&mut self, sender: &FrameSender, credit: &mut Credit, shot: Shot) -> Result<(), String> {
+        let Shot { content, at } = shot;
+        let jpeg = match content.map_err(|error| error.to_string())? {
+            Content::Encoded(jpeg) => jpeg,
+            Content::Picture(picture) => tokio::task::block_in_place(|| self.encode(&picture))?,
+        };
+        let header = FrameHeader {
+            nonce: self.nonce,
+            sequence: credit.sent(Instant::now()),
+            age_us: u32::try_from(at.elapsed().as_micros()).unwrap_or(u32::MAX),
+            encoding: ImageEncoding::Jpeg,
+            fps: self.fps,
+            camera: self.config.camera.clone(),
+        };
+        self.sent += 1;
+        sender.send(&header, jpeg).await.map_err(|error| error.to_string())
+    }
+
+    fn encode(&mut self, picture: &Mat) -> Result<Vec<u8>, String> {
+        let quality = Vector::from_slice(&[IMWRITE_JPEG_QUALITY, self.config.quality]);
+        imencode(".jpg", picture, &mut self.encoded, &quality).map_err(|error| format!("OpenCV: {error}"))?;
+        match self.encoded.len() {
+            length if length > MAX_FRAME => {
+                Err(format!("a picture of {length} bytes, at most {MAX_FRAME} may be sent: lower --quality"))
+            }
+            _ => Ok(self.encoded.to_vec()),
+        }
+    }
+}
+
+/// The next decision; what is none is passed over.
+async fn next(decisions: &mut Decisions) -> Option<Announcement> {
+    loop {
+        match decisions.next().await? {
+            Ok(decision) => return Some(decision),
+            Err(error) => tracing::warn!("on the key of decisions: {error}"),
+        }
+    }
+}
