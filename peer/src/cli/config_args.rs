@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::config::{Config, ConfigError, Document, Override};
+use crate::config::{Config, ConfigError, Document, ModelSection, Override};
 use crate::link::LinkConfig;
 
 /// Which configuration, and what to change in it.
@@ -54,16 +54,24 @@ impl ConfigArgs {
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
     pub fn client(&self) -> Result<(String, LinkConfig), ConfigError> {
-        let config = self.load()?;
-        let mut link = config.link();
-        link.zenoh.remove("listen");
-        let endpoints = link.zenoh.get("connect").and_then(|connect| connect.get("endpoints"));
-        if endpoints.is_some_and(|endpoints| !endpoints.as_array().is_some_and(Vec::is_empty)) {
-            link.scouting = None;
-        } else {
-            link.zenoh.remove("connect");
-        }
-        Ok((config.swarm.0, link))
+        Ok(client_of(&self.load()?))
+    }
+
+    /// The configuration of a robot that only streams: it needs no classifier, and how it reaches the others is a client's
+    /// way.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file or a flag, by key.
+    pub fn streaming(&self) -> Result<(Config, LinkConfig), ConfigError> {
+        let mut config: Config = self.document()?.meaning()?;
+        // What concerns a mind is that of whoever looks for it.
+        config.model = ModelSection::None;
+        config.learning.enabled = false;
+        let source = std::mem::take(&mut config.camera.source);
+        config.validate()?;
+        config.camera.source = source;
+        let (_, link) = client_of(&config);
+        Ok((config, link))
     }
 
     fn document(&self) -> Result<Document, ConfigError> {
@@ -92,4 +100,17 @@ impl ConfigArgs {
         }
         Ok(document)
     }
+}
+
+/// The swarm, and how a client reaches it.
+fn client_of(config: &Config) -> (String, LinkConfig) {
+    let mut link = config.link();
+    link.zenoh.remove("listen");
+    let endpoints = link.zenoh.get("connect").and_then(|connect| connect.get("endpoints"));
+    if endpoints.is_some_and(|endpoints| !endpoints.as_array().is_some_and(Vec::is_empty)) {
+        link.scouting = None;
+    } else {
+        link.zenoh.remove("connect");
+    }
+    (config.swarm.0.clone(), link)
 }

@@ -1,5 +1,7 @@
 //! The verbs of the command line, one file each.
 
+#[cfg(feature = "opencv")]
+mod center;
 mod config;
 mod config_args;
 mod emulate;
@@ -13,6 +15,8 @@ mod progress;
 #[cfg(feature = "opencv")]
 mod report;
 mod show;
+#[cfg(feature = "opencv")]
+mod stream;
 #[cfg(feature = "opencv")]
 mod swarm;
 mod teach;
@@ -42,6 +46,12 @@ enum Verb {
     #[cfg(feature = "opencv")]
     /// Run one robot
     Peer(peer::Args),
+    /// Stream a robot's camera to a fusion centre
+    #[cfg(feature = "opencv")]
+    Stream(stream::Args),
+    /// Run a fusion centre, which looks through the cameras of robots that stream
+    #[cfg(feature = "opencv")]
+    Center(center::Args),
     #[cfg(feature = "opencv")]
     /// Run a whole swarm on this machine, show it gestures, and keep the score
     Swarm(swarm::Args),
@@ -80,6 +90,10 @@ impl Command {
         match self.verb {
             #[cfg(feature = "opencv")]
             Verb::Peer(args) => peer::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Stream(args) => stream::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Center(args) => center::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Swarm(args) => swarm::run(&args),
             Verb::Watch(args) => watch::run(&args),

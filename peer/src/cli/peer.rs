@@ -77,7 +77,7 @@ async fn tick(schedule: &mut Option<tokio::time::Interval>) {
     }
 }
 
-fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
+pub(super) fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
     match event {
         Event::Opened(round) => {
             line(as_json, &json!({"event": "opened", "round": round}), &format!("round {round} opens"))
