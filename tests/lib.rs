@@ -11,9 +11,12 @@ mod namespaces;
 mod process;
 #[path = "set_up/robots.rs"]
 mod robots;
+#[path = "set_up/streaming.rs"]
+mod streaming;
 
 pub use classifier::{Fixed, look};
 pub use learning::{gesture, learning, short_rounds, space};
 pub use namespaces::{Namespaces, not_permitted};
 pub use process::Process;
 pub use robots::{Watched, config, start, start_learning, unique};
+pub use streaming::{Hands, center_config, sender_config};

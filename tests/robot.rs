@@ -6,10 +6,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use gestalt_peer::body::boot_number;
+use gestalt_peer::center::Center;
+use gestalt_peer::config::ModelSection;
 use gestalt_peer::link::{Client, Event, LinkConfig, Robot, RobotConfig};
+use gestalt_peer::model::RobotModel;
+use gestalt_peer::stream::{Sender, StreamEvent};
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId, RoundId};
 use gestalt_strategies::MindConfig;
-use gestalt_tests::{Fixed, config, gesture, learning, look, short_rounds};
+use gestalt_tests::{Fixed, center_config, config, gesture, learning, look, sender_config, short_rounds};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
@@ -37,6 +42,13 @@ fn main() {
 }
 
 async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
+    // {"serve": {…}}: a fusion centre; {"stream": {…}}: a camera whose frames are looked at elsewhere.
+    if orders["serve"].is_object() {
+        return serve(orders, stdin).await;
+    }
+    if orders["stream"].is_object() {
+        return stream(orders, stdin).await;
+    }
     let id = orders["id"].as_u64().and_then(|id| u32::try_from(id).ok()).expect("\"id\": a number");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name");
     let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
@@ -111,6 +123,57 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     robot.stop().await;
 }
 
+/// Runs a fusion centre with the classifier of a file.
+async fn serve(orders: &Value, mut stdin: mpsc::Receiver<String>) {
+    let config = center_config(orders);
+    let model = ModelSection::File(orders["serve"]["model"].as_str().expect("\"model\": a file").into());
+    let model = RobotModel::load(&model, |_, _| {}).expect("a model").expect("a model");
+    let boot = boot_number(SystemTime::now());
+    let center = Center::start(&config, model, boot).await.expect("the centre starts");
+    let id = config.robot.id.0;
+    let mut events = center.robot().events();
+    say(id, json!({"event": "started", "locators": center.robot().locators()}));
+    loop {
+        tokio::select! {
+            event = events.recv() => {
+                if let Ok(event) = event {
+                    say(id, described(&event));
+                }
+            }
+            line = stdin.recv() => match line.as_deref() {
+                Some("open") => center.robot().open_round(),
+                Some("status") => {
+                    let (status, served) = (center.robot().status(), center.served());
+                    say(id, json!({"event": "status", "status": status, "served": served}));
+                }
+                _ => break,
+            },
+        }
+    }
+    center.stop().await;
+}
+
+/// Streams the pictures of a folder.
+async fn stream(orders: &Value, mut stdin: mpsc::Receiver<String>) {
+    let (config, feed) = sender_config(orders);
+    let id = config.robot.0;
+    let sender = Sender::start(config, feed).expect("a thread for the camera");
+    say(id, json!({"event": "started"}));
+    let sending = sender.run(|event| match event {
+        StreamEvent::Attached => say(id, json!({"event": "attached"})),
+        StreamEvent::Detached { cause } => say(id, json!({"event": "detached", "cause": cause})),
+        StreamEvent::Failed { cause } => say(id, json!({"event": "failed", "cause": cause})),
+        StreamEvent::Decided(announced) => say(id, outcome("announced", &announced.decision)),
+        StreamEvent::Count { sent, taken, .. } => {
+            say(id, json!({"event": "count", "sent": sent, "taken": taken}));
+        }
+    });
+    tokio::select! {
+        ended = sending => ended.expect("a camera that goes on for ever"),
+        _ = stdin.recv() => {}
+    }
+}
+
 /// Attaches a client to this robot for as long as it takes to say what the gesture of a round was.
 fn teach(swarm: String, connect: Vec<String>, round: RoundId, class: ClassId) {
     tokio::spawn(async move {
@@ -144,6 +207,7 @@ fn outcome(event: &str, decision: &Decision) -> Value {
         "class": decision.class.map(|class| class.0),
         "author": decision.author.0,
         "votes": decision.certificate.votes.len(),
+        "voters": ids(decision.certificate.votes.iter().map(|vote| &vote.robot)),
     })
 }
 

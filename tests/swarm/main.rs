@@ -1,5 +1,6 @@
 //! Whole swarms on real Zenoh, one scenario a file. Run them one after the other: they measure time.
 
+mod center;
 mod churn;
 mod clients;
 mod field;
@@ -10,4 +11,5 @@ mod line;
 mod memory;
 mod ring;
 mod scouting;
+mod stream;
 mod trouble;

@@ -19,7 +19,7 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::Status;
 use gestalt_strategies::Classify;
 use serde_json::{Value, json};
 use thiserror::Error;
@@ -122,10 +122,10 @@ impl Center {
         &self.robot
     }
 
-    /// The robots it serves now.
+    /// The account of every robot it serves now, by robot.
     #[must_use]
-    pub fn served(&self) -> Vec<RobotId> {
-        self.desk.seats().into_iter().map(|(robot, _)| robot).collect()
+    pub fn served(&self) -> Vec<Status> {
+        self.desk.seats().into_iter().map(|(_, seat)| seat.status()).collect()
     }
 
     /// Lets all robots leave the swarm, then the centre, and waits until that is done.

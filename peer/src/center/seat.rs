@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, RoundId};
+use gestalt_protocol::{CameraState, RoundId, Status};
 use opencv::core::Mat;
 use opencv::prelude::*;
 
@@ -105,6 +105,11 @@ impl Seat {
             self.robot.set(name, value);
         }
         silent
+    }
+
+    /// The robot's account of itself.
+    pub fn status(&self) -> Status {
+        self.robot.status()
     }
 
     /// Lets the robot leave the swarm, and waits until it has.

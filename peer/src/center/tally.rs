@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// How many of the latest delays are kept.
-const KEPT: usize = 1024;
+/// How many of the latest delays are kept: ten seconds of a fast camera.
+const KEPT: usize = 300;
 
 /// The score of one robot's frames.
 #[derive(Debug)]

@@ -1,0 +1,100 @@
+//! Cameras whose frames are looked at elsewhere: pictures of drawn hands, and a classifier for them.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use gestalt_peer::camera_model::CameraModel;
+use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, ModelSection, SourceSection};
+use gestalt_peer::link::LinkConfig;
+use gestalt_peer::model::RobotModel;
+use gestalt_peer::picture::write_png;
+use gestalt_peer::pose::Pose;
+use gestalt_peer::source::{Glove, RenderedSource, Scene, Source};
+use gestalt_peer::stream::{Feed, SenderConfig};
+use gestalt_protocol::RobotId;
+use serde_json::{Value, json};
+
+/// A folder of pictures of one gesture, and a file with the classifier that tells it.
+pub struct Hands {
+    folder: tempfile::TempDir,
+}
+
+impl Hands {
+    /// Draws a hand that shows so many fingers, and trains the classifier; takes some seconds.
+    ///
+    /// # Panics
+    /// When there is no room for files.
+    #[must_use]
+    pub fn new(fingers: u8) -> Self {
+        let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
+        let model = RobotModel::load(&ModelSection::Rendered, |_, _| {}).expect("it can be trained");
+        model.expect("one is asked for").write(&hands.model()).expect("the model is written");
+        let images = hands.images();
+        std::fs::create_dir(&images).expect("a folder for the pictures");
+        let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)
+            .expect("the preset is a valid camera");
+        for k in 0..4 {
+            let scene = Scene { gesture: Some(fingers), seed: 3 };
+            let frame = source.next_frame(Duration::ZERO, &scene).expect("a hand can be drawn");
+            // PNG, so that the sender has something to encode.
+            write_png(&images.join(format!("{k}.png")), &frame.image).expect("the picture is written");
+        }
+        hands
+    }
+
+    /// The folder of pictures.
+    #[must_use]
+    pub fn images(&self) -> PathBuf {
+        self.folder.path().join("images")
+    }
+
+    /// The file with the classifier.
+    #[must_use]
+    pub fn model(&self) -> PathBuf {
+        self.folder.path().join("hands.model")
+    }
+}
+
+/// The configuration of a centre, from a process's orders: `{"id": 9, "swarm": "demo", "link": {…}, "serve": {"fuse":
+/// "central", "workers": 1}}`.
+///
+/// # Panics
+/// When they are no orders.
+#[must_use]
+pub fn center_config(orders: &Value) -> Config {
+    let mut config = Config::default();
+    config.robot.id = serde_json::from_value(orders["id"].clone()).expect("\"id\": a number");
+    orders["swarm"].as_str().expect("\"swarm\": a name").clone_into(&mut config.swarm.0);
+    config.links.scouting.enabled = false;
+    for key in ["listen", "connect"] {
+        let endpoints = orders["link"].get(key).cloned().unwrap_or_else(|| json!([]));
+        config.zenoh.insert(key.to_owned(), json!({ "endpoints": endpoints }));
+    }
+    let serve = &orders["serve"];
+    if !serve["fuse"].is_null() {
+        config.center.fuse =
+            serde_json::from_value(serve["fuse"].clone()).expect("\"fuse\": central or swarm");
+    }
+    config.center.workers = serve["workers"].as_u64().and_then(|workers| usize::try_from(workers).ok());
+    config.center.gone_after = Duration::from_secs(4);
+    config
+}
+
+/// A Parrot that sends the pictures of a folder, from a process's orders: `{"id": 3, "swarm": "demo", "link": {…}, "stream":
+/// {"images": "DIR"}}`.
+///
+/// # Panics
+/// When they are no orders, or there are no pictures.
+#[must_use]
+pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
+    let robot: RobotId = serde_json::from_value(orders["id"].clone()).expect("\"id\": a number");
+    let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
+    let path = orders["stream"]["images"].as_str().expect("\"images\": a folder").into();
+    let camera = CameraSection {
+        model: CameraChoice::Parrot,
+        source: SourceSection::Images(FilesSection { path, repeat: true }),
+    };
+    let feed = Feed::open(&camera, robot).expect("the pictures are there").expect("a camera");
+    let swarm = orders["swarm"].as_str().expect("\"swarm\": a name").to_owned();
+    (SenderConfig { swarm, link, robot, camera: "parrot".to_owned(), quality: 80 }, feed)
+}

@@ -1,0 +1,222 @@
+//! Frames on Zenoh: at most one under way, stale ones dropped evenly, nonsense counted.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use gestalt_peer::body::{Body, boot_number};
+use gestalt_peer::center::Center;
+use gestalt_peer::config::{ModelSection, SourceSection, StreamSection};
+use gestalt_peer::link::{Event, Robot};
+use gestalt_peer::model::RobotModel;
+use gestalt_peer::stream::{Sender, StreamEvent};
+use gestalt_protocol::{
+    CameraState, ClassId, FrameHeader, FrameTaken, ImageEncoding, Keys, RobotId, Status, Topic,
+};
+use gestalt_tests::{Hands, center_config, config, sender_config, unique};
+use serde_json::json;
+
+const PATIENCE: Duration = Duration::from_secs(15);
+
+fn model(hands: &Hands) -> RobotModel {
+    RobotModel::load(&ModelSection::File(hands.model()), |_, _| {}).unwrap().unwrap()
+}
+
+async fn center(swarm: &str, hands: &Hands, workers: usize) -> Center {
+    let orders = json!({
+        "id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": {"workers": workers},
+    });
+    Center::start(&center_config(&orders), model(hands), boot_number(SystemTime::now())).await.unwrap()
+}
+
+/// A Parrot that streams to `locators` until it is aborted.
+fn parrot(id: u32, swarm: &str, locators: &[String], hands: &Hands) -> Sender {
+    let orders = json!({
+        "id": id, "swarm": swarm, "link": {"connect": locators}, "stream": {"images": hands.images()},
+    });
+    let (config, feed) = sender_config(&orders);
+    Sender::start(config, feed).unwrap()
+}
+
+async fn wait_for<T>(what: &str, mut pick: impl FnMut() -> Option<T>) -> T {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        if let Some(found) = pick() {
+            return found;
+        }
+        assert!(Instant::now() < deadline, "no {what} within {PATIENCE:?}");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second() {
+    let hands = Hands::new(2);
+    let swarm = unique("credit");
+    let robot = Robot::start(config(1, &swarm, &[])).await.unwrap();
+    let arrived = Arc::new(AtomicU64::new(0));
+    let (frames, counted) = (tokio::sync::mpsc::unbounded_channel(), arrived.clone());
+    let (sender, mut headers) = frames;
+    let gate = robot
+        .receive_frames(None, move |frame| {
+            counted.fetch_add(1, Ordering::Relaxed);
+            let _ = sender.send(frame.header);
+        })
+        .await
+        .unwrap();
+    let streaming = tokio::spawn(parrot(7, &swarm, robot.locators(), &hands).run(|_| {}));
+    headers.recv().await.unwrap();
+    tokio::time::sleep(Duration::from_millis(2500)).await;
+    let unanswered = arrived.load(Ordering::Relaxed);
+    assert!((2..=4).contains(&unanswered), "{unanswered} frames, none of them answered");
+    // Every answer brings one more, at once.
+    let answered = tokio::time::timeout(Duration::from_secs(3), async {
+        while let Ok(header) = headers.try_recv() {
+            drop(header);
+        }
+        for _ in 0..40 {
+            let FrameHeader { nonce, sequence, .. } = headers.recv().await.unwrap();
+            assert!(headers.is_empty(), "another frame before the answer to this one");
+            gate.taken(RobotId(7), &FrameTaken { nonce, sequence, round: None });
+        }
+    });
+    assert!(answered.await.is_ok(), "answers bring frames at the camera's rate");
+    streaming.abort();
+    robot.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_peer_looks_through_a_camera_that_is_elsewhere() {
+    let hands = Hands::new(4);
+    let swarm = unique("elsewhere");
+    let orders = json!({"id": 7, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": {}});
+    let mut config = center_config(&orders);
+    config.camera.source = SourceSection::Stream(StreamSection { robot: None });
+    let body = Body::start(&config, Some(model(&hands)), 1).await.unwrap();
+    let mut events = body.robot().events();
+    let streaming = tokio::spawn(parrot(7, &swarm, body.robot().locators(), &hands).run(|_| {}));
+    body.robot().open_round();
+    let decided = tokio::time::timeout(PATIENCE, async {
+        loop {
+            if let Event::Held(decision) = events.recv().await.unwrap() {
+                return decision;
+            }
+        }
+    });
+    assert_eq!(decided.await.expect("a decision").class, Some(ClassId(4)));
+    streaming.abort();
+    body.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
+    let hands = Hands::new(1);
+    let swarm = unique("nonsense");
+    let center = center(&swarm, &hands, 1).await;
+    let mut zenoh = zenoh::Config::default();
+    zenoh.insert_json5("mode", "\"client\"").unwrap();
+    zenoh.insert_json5("connect/endpoints", &json!(center.robot().locators()).to_string()).unwrap();
+    zenoh.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    let vandal = zenoh::open(zenoh).await.unwrap();
+    let keys = Keys::new(&swarm).unwrap();
+    let failed = Arc::new(AtomicU64::new(0));
+    let counted = failed.clone();
+    let sender = parrot(7, &swarm, center.robot().locators(), &hands);
+    let streaming = tokio::spawn(sender.run(move |event| {
+        if let StreamEvent::Failed { .. } = event {
+            counted.fetch_add(1, Ordering::Relaxed);
+        }
+    }));
+    let live = |center: &Center| center.served().iter().any(|s| s.camera.state == CameraState::Live);
+    wait_for("served robot", || live(&center).then_some(())).await;
+    let header = FrameHeader {
+        nonce: 1,
+        sequence: 1,
+        age_us: u32::MAX,
+        encoding: ImageEncoding::Jpeg,
+        fps: 30.0,
+        camera: "vandal".to_owned(),
+    };
+    // No header, a bad one, an empty picture, and one that is too large.
+    for robot in [7, 8] {
+        let key = keys.key(&Topic::Frame(RobotId(robot)));
+        vandal.put(&key, vec![1; 100]).await.unwrap();
+        vandal.put(&key, vec![1; 100]).attachment(vec![9; 400]).await.unwrap();
+        vandal.put(&key, Vec::<u8>::new()).attachment(header.encode()).await.unwrap();
+        vandal.put(&key, vec![1; 5_000_000]).attachment(header.encode()).await.unwrap();
+        vandal.put(keys.key(&Topic::Taken(RobotId(robot))), vec![3; 77]).await.unwrap();
+    }
+    // Pictures that are none, in the name of a robot that is served, and of one that is not.
+    let mut bomb = vec![0xff, 0xd8, 0xff, 0xc0, 0, 11, 8, 0xff, 0xff, 0xff, 0xff, 1, 1, 0x11, 0];
+    bomb.extend([0xff, 0xd9]);
+    for picture in [vec![1; 100], bomb] {
+        for robot in [7, 8] {
+            let key = keys.key(&Topic::Frame(RobotId(robot)));
+            vandal.put(&key, picture.clone()).attachment(header.encode()).await.unwrap();
+            tokio::time::sleep(Duration::from_millis(300)).await;
+        }
+    }
+    let status = center.robot().status();
+    let refused = status.counters.iter().filter(|(name, _)| name.starts_with("refused_frame_"));
+    assert_eq!(refused.map(|(_, count)| count).sum::<u64>(), 8, "{:?}", status.counters);
+    assert_eq!(failed.load(Ordering::Relaxed), 1, "one of the acknowledgements was for the Parrot");
+    let of = |id: u32| -> Status {
+        center.served().into_iter().find(|status| status.robot == RobotId(id)).expect("it is served")
+    };
+    wait_for("failing camera", || (of(8).camera.state == CameraState::Failing).then_some(())).await;
+    assert!(of(8).camera.trouble.contains("65535×65535"), "{:?}", of(8).camera);
+    assert!(of(7).counters["frames_failed"] >= 1, "{:?}", of(7).counters);
+    // The Parrot is served as ever, and the vandal's robot is let go.
+    wait_for("live camera", || (of(7).camera.state == CameraState::Live).then_some(())).await;
+    wait_for("leave of the vandal's robot", || (center.served().len() == 1).then_some(())).await;
+    vandal.close().await.unwrap();
+    streaming.abort();
+    center.stop().await;
+}
+
+/// Memory of this process, in MB.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok()).unwrap_or_default() / 1024.0
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
+    const PARROTS: u32 = 14;
+    let hands = Hands::new(3);
+    let swarm = unique("slow");
+    let center = center(&swarm, &hands, 1).await;
+    let mut streaming = tokio::task::JoinSet::new();
+    for id in 1..=PARROTS {
+        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands).run(|_| {}));
+    }
+    wait_for("Parrots", || (center.served().len() == PARROTS as usize).then_some(())).await;
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let long = std::env::var_os("GESTALT_LONG").is_some();
+    let time = Duration::from_secs(if long { 600 } else { 20 });
+    let (before, memory, began) = (center.served(), resident(), Instant::now());
+    // Rounds go on meanwhile: every frame of them is judged.
+    while began.elapsed() < time {
+        center.robot().open_round();
+        tokio::time::sleep(Duration::from_millis(500)).await;
+    }
+    let (after, seconds) = (center.served(), began.elapsed().as_secs_f64());
+    let grown = resident() - memory;
+    let served = |status: &Status| status.counters["frames_received"] - status.counters["frames_overwritten"];
+    let rates: Vec<f64> = before
+        .iter()
+        .zip(&after)
+        .map(|(before, after)| (served(after) - served(before)) as f64 / seconds)
+        .collect();
+    let (least, most) = rates.iter().fold((f64::MAX, 0.0_f64), |(a, b), rate| (a.min(*rate), b.max(*rate)));
+    let p99 = after.iter().map(|status| status.counters["frame_delay_p99_us"]).max().unwrap_or_default();
+    eprintln!(
+        "one worker, {PARROTS} Parrots for {seconds:.0} s: {least:.1} to {most:.1} fps each, p99 {} ms, {grown:+.1} MB",
+        p99 / 1000
+    );
+    assert!(least > 1.0 && most < 1.2 * least, "{rates:?}");
+    assert!(grown < 16.0, "{grown:.1} MB more");
+    streaming.shutdown().await;
+    center.stop().await;
+}
