@@ -187,6 +187,7 @@ async fn run(parrots: u32, model: &RobotModel, pictures: &Path, time: Duration) 
         let camera = CameraSection {
             model: CameraChoice::Parrot,
             source: SourceSection::Images(FilesSection { path: pictures.to_owned(), repeat: true }),
+            ..CameraSection::default()
         };
         let feed = Feed::open(&camera, RobotId(id)).expect("the pictures are there").expect("a camera");
         let config = SenderConfig {

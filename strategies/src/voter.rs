@@ -30,7 +30,14 @@ impl Voter {
     /// [`MindConfigError`] for a configuration that [`MindConfig::validate`] refuses.
     pub fn new(me: RobotId, boot: u32, config: MindConfig) -> Result<Self, MindConfigError> {
         config.validate()?;
-        Ok(Self { me, config, classifier: None, stamp: Stamp { boot, sequence: 0 }, round: None, blind: false })
+        Ok(Self {
+            me,
+            config,
+            classifier: None,
+            stamp: Stamp { boot, sequence: 0 },
+            round: None,
+            blind: false,
+        })
     }
 
     /// It votes in that round from now on; an older one is over.

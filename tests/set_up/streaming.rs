@@ -93,6 +93,7 @@ pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
     let camera = CameraSection {
         model: CameraChoice::Parrot,
         source: SourceSection::Images(FilesSection { path, repeat: true }),
+        ..CameraSection::default()
     };
     let feed = Feed::open(&camera, robot).expect("the pictures are there").expect("a camera");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name").to_owned();

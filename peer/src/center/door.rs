@@ -143,7 +143,7 @@ impl Door {
                     name,
                     boot,
                     swarm: self.config.swarm.0.clone(),
-                    mind: self.config.rounds.clone(),
+                    mind: self.config.mind(),
                     link,
                     vocabulary: Some(self.model.classifier.vocabulary().clone()),
                     learning: None,

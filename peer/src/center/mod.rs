@@ -86,7 +86,7 @@ impl Center {
                 name: config.name(),
                 boot,
                 swarm: config.swarm.0.clone(),
-                mind: config.rounds.clone(),
+                mind: config.mind(),
                 link: link(config),
                 vocabulary: Some(model.classifier.vocabulary().clone()),
                 learning: None,
@@ -94,6 +94,7 @@ impl Center {
             })
             .await?,
         );
+        robot.blind(true);
         let workers = config.center.workers.unwrap_or_else(cores);
         let desk = Arc::new(Frames::new(2 * workers.max(2)));
         let (knock, knocks) = mpsc::channel(MAX_WAITING);

@@ -70,6 +70,7 @@ impl Seat {
             return;
         }
         state.camera = camera;
+        self.robot.blind(camera != CameraState::Live);
         let size = [state.frame.image.cols(), state.frame.image.rows()];
         self.robot.update_camera(|status| {
             status.state = camera;

@@ -260,6 +260,7 @@ impl Guest {
                 self.voter.learned(classifier.clone());
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier);
             }
+            Input::Blind(blind) => self.voter.blind(blind),
             Input::Shown(_) => {
                 self.departure.guests.shown(self.departure.guest);
                 self.tell_host(command).await;
