@@ -21,11 +21,12 @@ use gestalt_peer::model::RobotModel;
 use gestalt_peer::perception::FeatureSet;
 use gestalt_peer::pose::Pose;
 use gestalt_peer::sight::Sight;
-use gestalt_peer::source::{Frame, Glove, MAX_MEGAPIXELS, RenderedSource, Scene, Source, decode};
+use gestalt_peer::source::{
+    Frame, Glove, MAX_MEGAPIXELS, RenderedSource, Scene, Source, decode, encode_jpeg,
+};
 use gestalt_peer::stream::{Feed, Sender, SenderConfig};
 use gestalt_protocol::{RobotId, Status};
-use opencv::core::{Mat, Vector};
-use opencv::imgcodecs::{IMWRITE_JPEG_QUALITY, imwrite};
+use opencv::core::Mat;
 
 const FPS: f64 = 30.0;
 const SWARM: &str = "bench-center";
@@ -73,14 +74,14 @@ fn main() {
 fn pictures(folder: &Path) -> Vec<Vec<u8>> {
     let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)
         .expect("the preset is a valid camera");
-    let quality = Vector::from_slice(&[IMWRITE_JPEG_QUALITY, 80]);
     (0..6)
         .map(|k| {
             let scene = Scene { gesture: Some(k), seed: 3 };
             let frame = source.next_frame(Duration::ZERO, &scene).expect("a hand can be drawn");
             let path = folder.join(format!("{k}.jpg"));
-            assert!(imwrite(&path, &frame.image, &quality).expect("a picture is written"));
-            std::fs::read(path).expect("the picture was written")
+            let jpeg = encode_jpeg(&frame.image, 80).expect("a picture");
+            std::fs::write(path, &jpeg).expect("a picture is written");
+            jpeg
         })
         .collect()
 }

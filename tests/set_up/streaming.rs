@@ -9,7 +9,7 @@ use gestalt_peer::link::LinkConfig;
 use gestalt_peer::model::RobotModel;
 use gestalt_peer::picture::write_png;
 use gestalt_peer::pose::Pose;
-use gestalt_peer::source::{Glove, RenderedSource, Scene, Source};
+use gestalt_peer::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
 use gestalt_peer::stream::{Feed, SenderConfig};
 use gestalt_protocol::RobotId;
 use serde_json::{Value, json};
@@ -29,17 +29,27 @@ impl Hands {
         let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
         let model = RobotModel::load(&ModelSection::Rendered, |_, _| {}).expect("it can be trained");
         model.expect("one is asked for").write(&hands.model()).expect("the model is written");
-        let images = hands.images();
-        std::fs::create_dir(&images).expect("a folder for the pictures");
+        std::fs::create_dir(hands.images()).expect("a folder for the pictures");
+        std::fs::create_dir(hands.encoded()).expect("a folder for the pictures");
         let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)
             .expect("the preset is a valid camera");
         for k in 0..4 {
             let scene = Scene { gesture: Some(fingers), seed: 3 };
             let frame = source.next_frame(Duration::ZERO, &scene).expect("a hand can be drawn");
             // PNG, so that the sender has something to encode.
-            write_png(&images.join(format!("{k}.png")), &frame.image).expect("the picture is written");
+            write_png(&hands.images().join(format!("{k}.png")), &frame.image)
+                .expect("the picture is written");
+            let jpeg = hands.encoded().join(format!("{k}.jpg"));
+            let encoded = encode_jpeg(&frame.image, 80).expect("a picture");
+            std::fs::write(jpeg, encoded).expect("the picture is written");
         }
         hands
+    }
+
+    /// The folder of the same pictures as JPEG files, which are sent as they are.
+    #[must_use]
+    pub fn encoded(&self) -> PathBuf {
+        self.folder.path().join("encoded")
     }
 
     /// The folder of pictures.

@@ -1,5 +1,6 @@
 //! Frames on Zenoh: at most one under way, stale ones dropped evenly, nonsense counted.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
@@ -30,9 +31,9 @@ async fn center(swarm: &str, hands: &Hands, workers: usize) -> Center {
 }
 
 /// A Parrot that streams to `locators` until it is aborted.
-fn parrot(id: u32, swarm: &str, locators: &[String], hands: &Hands) -> Sender {
+fn parrot(id: u32, swarm: &str, locators: &[String], pictures: &Path) -> Sender {
     let orders = json!({
-        "id": id, "swarm": swarm, "link": {"connect": locators}, "stream": {"images": hands.images()},
+        "id": id, "swarm": swarm, "link": {"connect": locators}, "stream": {"images": pictures},
     });
     let (config, feed) = sender_config(&orders);
     Sender::start(config, feed).unwrap()
@@ -64,7 +65,7 @@ async fn one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second() {
         })
         .await
         .unwrap();
-    let streaming = tokio::spawn(parrot(7, &swarm, robot.locators(), &hands).run(|_| {}));
+    let streaming = tokio::spawn(parrot(7, &swarm, robot.locators(), &hands.images()).run(|_| {}));
     headers.recv().await.unwrap();
     tokio::time::sleep(Duration::from_millis(2500)).await;
     let unanswered = arrived.load(Ordering::Relaxed);
@@ -94,7 +95,7 @@ async fn a_peer_looks_through_a_camera_that_is_elsewhere() {
     config.camera.source = SourceSection::Stream(StreamSection { robot: None });
     let body = Body::start(&config, Some(model(&hands)), 1).await.unwrap();
     let mut events = body.robot().events();
-    let streaming = tokio::spawn(parrot(7, &swarm, body.robot().locators(), &hands).run(|_| {}));
+    let streaming = tokio::spawn(parrot(7, &swarm, body.robot().locators(), &hands.images()).run(|_| {}));
     body.robot().open_round();
     let decided = tokio::time::timeout(PATIENCE, async {
         loop {
@@ -121,7 +122,7 @@ async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
     let keys = Keys::new(&swarm).unwrap();
     let failed = Arc::new(AtomicU64::new(0));
     let counted = failed.clone();
-    let sender = parrot(7, &swarm, center.robot().locators(), &hands);
+    let sender = parrot(7, &swarm, center.robot().locators(), &hands.encoded());
     let streaming = tokio::spawn(sender.run(move |event| {
         if let StreamEvent::Failed { .. } = event {
             counted.fetch_add(1, Ordering::Relaxed);
@@ -189,7 +190,7 @@ async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
     let center = center(&swarm, &hands, 1).await;
     let mut streaming = tokio::task::JoinSet::new();
     for id in 1..=PARROTS {
-        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands).run(|_| {}));
+        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));
     }
     wait_for("Parrots", || (center.served().len() == PARROTS as usize).then_some(())).await;
     tokio::time::sleep(Duration::from_secs(3)).await;

@@ -3,12 +3,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, RoundId, Status};
+use gestalt_protocol::{CameraState, Opinion, RoundId, Status};
 use opencv::core::Mat;
 use opencv::prelude::*;
 
 use super::desk::{Count, Look};
 use super::tally::{Lately, Tally};
+use crate::eye::likeliest;
 use crate::link::{FrameArrival, Robot};
 use crate::sight::Sight;
 use crate::source::{Frame, decode};
@@ -27,14 +28,18 @@ struct State {
     tally: Tally,
     heard: Instant,
     camera: CameraState,
+    trouble: String,
     judged: u64,
+    /// The hand it saw last, and when, since its robot's start.
+    hand: Option<(Vec<f32>, Duration)>,
 }
 
 impl Seat {
     pub fn new(robot: Arc<Robot>, sight: Sight, now: Instant) -> Self {
         let frame = Frame { image: Mat::default(), at: Duration::ZERO };
         let tally = Tally::new(now);
-        let state = State { sight, frame, tally, heard: now, camera: CameraState::Opening, judged: 0 };
+        let (camera, trouble) = (CameraState::Opening, String::new());
+        let state = State { sight, frame, tally, heard: now, camera, trouble, judged: 0, hand: None };
         Self { robot, state: Mutex::new(state) }
     }
 
@@ -59,6 +64,9 @@ impl Seat {
         state.frame.at = at.max(state.frame.at);
         let judge = self.round().is_some();
         let taken = state.sight.take(&state.frame, judge);
+        if let Some(Ok(observation)) = &taken.observation {
+            state.hand = Some((observation.features.clone(), taken.at));
+        }
         taken.tell(&self.robot, zero);
         state.judged += u64::from(judge);
         state.tally.served(age + arrival.at.elapsed());
@@ -66,10 +74,11 @@ impl Seat {
     }
 
     fn note(&self, state: &mut State, camera: CameraState, trouble: &str) {
-        if state.camera == camera {
+        if state.camera == camera && state.trouble == trouble {
             return;
         }
         state.camera = camera;
+        trouble.clone_into(&mut state.trouble);
         self.robot.blind(camera != CameraState::Live);
         let size = [state.frame.image.cols(), state.frame.image.rows()];
         self.robot.update_camera(|status| {
@@ -89,7 +98,9 @@ impl Seat {
             self.note(&mut state, CameraState::Frozen, trouble);
         }
         let size = [state.frame.image.cols(), state.frame.image.rows()];
+        let opinion = state.hand.take().and_then(|(features, at)| self.opinion(&features, at));
         self.robot.update_camera(|status| {
+            status.opinion = opinion.or(status.opinion.take());
             status.fps = fps_served as f32;
             status.delay_ms = delay.0.as_secs_f32() * 1e3;
             status.size = size.map(i32::unsigned_abs);
@@ -106,6 +117,15 @@ impl Seat {
             self.robot.set(name, value);
         }
         silent
+    }
+
+    /// What the robot takes a hand for.
+    fn opinion(&self, features: &[f32], at: Duration) -> Option<Opinion> {
+        let classifier = self.robot.classifier()?;
+        let (class, probability) = likeliest(&classifier.probabilities(features).ok()?)?;
+        let gesture = classifier.vocabulary().label(class)?.to_owned();
+        let at_ms = u64::try_from(at.as_millis()).unwrap_or(u64::MAX);
+        Some(Opinion { gesture, probability: probability as f32, at_ms })
     }
 
     /// The robot's account of itself.

@@ -14,6 +14,7 @@ mod peer;
 mod progress;
 #[cfg(feature = "opencv")]
 mod report;
+mod robots;
 mod show;
 #[cfg(feature = "opencv")]
 mod stream;

@@ -1,8 +1,13 @@
 //! `gestalt watch`: decisions and robots of a running swarm, live.
 
+use std::io::IsTerminal;
+use std::time::Duration;
+
 use serde_json::json;
+use tokio::time::MissedTickBehavior;
 
 use super::config_args::ConfigArgs;
+use super::robots::table;
 use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::link::{Client, Heard, News};
@@ -21,6 +26,10 @@ pub struct Args {
     #[arg(long)]
     status: bool,
 
+    /// Show all robots, anew every second: camera, frames a second, delay, motion, opinion
+    #[arg(long, conflicts_with_all = ["status", "count"])]
+    robots: bool,
+
     /// Print one JSON object a line
     #[arg(long)]
     json: bool,
@@ -36,6 +45,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let client = Client::open(&swarm, &link).await?;
         if args.status {
             statuses(args.json, &client).await?;
+        } else if args.robots {
+            tokio::select! {
+                () = interrupted() => {}
+                shown = robots(args.json, &client) => shown?,
+            }
         } else {
             let mut news = client.news().await?;
             tokio::select! {
@@ -73,18 +87,35 @@ async fn watch(args: &Args, news: &mut News) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Shows how all robots are, again and again.
+async fn robots(as_json: bool, client: &Client) -> Result<(), Failure> {
+    let on_screen = !as_json && std::io::stdout().is_terminal();
+    let mut seconds = tokio::time::interval(Duration::from_secs(1));
+    seconds.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        seconds.tick().await;
+        let statuses = client.statuses(super::ANSWER).await?;
+        if as_json {
+            line(true, &json!({"event": "robots", "robots": statuses}), "")?;
+            continue;
+        }
+        // On a screen each table takes the place of the one before: to the top, and clear below it.
+        let mut shown = if on_screen { "\x1b[H\x1b[J".to_owned() } else { String::new() };
+        shown.push_str(&table(&statuses, true).join("\n"));
+        super::say(&format!("{shown}\n{}", if on_screen { "" } else { "\n" }))?;
+    }
+}
+
 async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
-    for status in client.statuses(super::ANSWER).await? {
+    let statuses = client.statuses(super::ANSWER).await?;
+    for (status, camera) in statuses.iter().zip(table(&statuses, false)) {
         let state = match (status.round, status.open) {
             (Some(round), true) => format!("round {round} open"),
             (Some(round), false) => format!("round {round} over"),
             (None, _) => "no round yet".to_owned(),
         };
         let mut words = format!(
-            "{} {}: camera {}, model {}, {state}, linked to {}, {} alive",
-            status.robot,
-            status.name,
-            status.camera.source,
+            "{camera}  model {}, {state}, linked to {}, {} alive",
             status.model,
             show::robots(&status.neighbours),
             status.alive.len()

@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-use opencv::core::Mat;
+use opencv::core::{Mat, Vector};
 use opencv::imgcodecs;
 use opencv::prelude::*;
 use thiserror::Error;
@@ -86,6 +86,17 @@ pub fn decode(bytes: &[u8], megapixels: f64, image: &mut Mat) -> Result<(), Pict
         Ok(decoded) if !decoded.empty() => Ok(()),
         _ => Err(PictureError::NotAnImage),
     }
+}
+
+/// Encodes a picture, blue, green, red, 8 bits, as JPEG of that quality, `1..=100`.
+///
+/// # Errors
+/// OpenCV's, for a picture of another kind or without pixels.
+pub fn encode_jpeg(picture: &Mat, quality: i32) -> Result<Vec<u8>, opencv::Error> {
+    let quality = Vector::from_slice(&[imgcodecs::IMWRITE_JPEG_QUALITY, quality]);
+    let mut encoded = Vector::new();
+    imgcodecs::imencode(".jpg", picture, &mut encoded, &quality)?;
+    Ok(encoded.to_vec())
 }
 
 /// Checks that a path is a readable file with something in it, and gives its size in bytes.
@@ -189,7 +200,7 @@ fn big_endian(bytes: &[u8]) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use opencv::core::{self, Scalar, Vector};
+    use opencv::core::{self, Scalar};
 
     use super::*;
 

@@ -20,7 +20,9 @@ use crate::pose::PoseError;
 
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
-pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, read_image, read_jpeg};
+pub use image_file::{
+    MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, encode_jpeg, read_image, read_jpeg,
+};
 pub use rendered::{Glove, RenderedSource};
 pub use sensor::Sensor;
 pub use video::Video;

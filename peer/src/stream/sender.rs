@@ -4,8 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId};
-use opencv::core::{Mat, Vector, VectorToVec};
-use opencv::imgcodecs::{IMWRITE_JPEG_QUALITY, imencode};
+use opencv::core::Mat;
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
@@ -13,7 +12,7 @@ use super::credit::Credit;
 use super::feed::{Content, Feed};
 use super::lens::{Lens, Shot};
 use crate::link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
-use crate::source::SourceError;
+use crate::source::{SourceError, encode_jpeg};
 
 /// How many acknowledgements wait to be read: one is expected, more are somebody's nonsense.
 const MAX_WAITING: usize = 16;
@@ -76,7 +75,6 @@ pub struct Sender {
     nonce: u64,
     sent: u64,
     taken: u64,
-    encoded: Vector<u8>,
 }
 
 /// Why a sender stops.
@@ -93,7 +91,7 @@ impl Sender {
     pub fn start(config: SenderConfig, feed: Feed) -> Result<Self, LinkError> {
         let fps = 1.0 / feed.period().as_secs_f32().max(0.001);
         let lens = Lens::open(feed)?;
-        Ok(Self { config, lens, fps, nonce: fresh_nonce(), sent: 0, taken: 0, encoded: Vector::new() })
+        Ok(Self { config, lens, fps, nonce: fresh_nonce(), sent: 0, taken: 0 })
     }
 
     /// Sends, and tells of what happens, until the camera has come to its end. It stays through whatever becomes of the robot
@@ -221,14 +219,13 @@ impl Sender {
         sender.send(&header, jpeg).await.map_err(|error| error.to_string())
     }
 
-    fn encode(&mut self, picture: &Mat) -> Result<Vec<u8>, String> {
-        let quality = Vector::from_slice(&[IMWRITE_JPEG_QUALITY, self.config.quality]);
-        imencode(".jpg", picture, &mut self.encoded, &quality).map_err(|error| format!("OpenCV: {error}"))?;
-        match self.encoded.len() {
+    fn encode(&self, picture: &Mat) -> Result<Vec<u8>, String> {
+        let jpeg = encode_jpeg(picture, self.config.quality).map_err(|error| format!("OpenCV: {error}"))?;
+        match jpeg.len() {
             length if length > MAX_FRAME => {
                 Err(format!("a picture of {length} bytes, at most {MAX_FRAME} may be sent: lower --quality"))
             }
-            _ => Ok(self.encoded.to_vec()),
+            _ => Ok(jpeg),
         }
     }
 }
