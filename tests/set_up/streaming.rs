@@ -1,6 +1,7 @@
 //! Cameras whose frames are looked at elsewhere: pictures of drawn hands, and a classifier for them.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use gestalt_peer::camera_model::CameraModel;
@@ -20,15 +21,18 @@ pub struct Hands {
 }
 
 impl Hands {
-    /// Draws a hand that shows so many fingers, and trains the classifier; takes some seconds.
+    /// Draws a hand that shows so many fingers, and trains the classifier, which takes some seconds the first time.
     ///
     /// # Panics
     /// When there is no room for files.
     #[must_use]
     pub fn new(fingers: u8) -> Self {
         let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
-        let model = RobotModel::load(&ModelSection::Rendered, |_, _| {}).expect("it can be trained");
-        model.expect("one is asked for").write(&hands.model()).expect("the model is written");
+        // The same for all scenarios of this process.
+        static MODEL: OnceLock<RobotModel> = OnceLock::new();
+        let train = || RobotModel::load(&ModelSection::Rendered, |_, _| {}).ok().flatten();
+        let model = MODEL.get_or_init(|| train().expect("it can be trained"));
+        model.write(&hands.model()).expect("the model is written");
         std::fs::create_dir(hands.images()).expect("a folder for the pictures");
         std::fs::create_dir(hands.encoded()).expect("a folder for the pictures");
         let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)

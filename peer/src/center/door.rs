@@ -118,6 +118,8 @@ impl Door {
             camera.source = "stream".to_owned();
             camera.state = CameraState::Opening;
         });
+        // Until a picture of it was seen.
+        robot.blind(true);
         robot.learned(self.model.classifier.clone(), &self.model.name);
         self.desk.admit(id, Arc::new(Seat::new(Arc::new(robot), sight, Instant::now())));
         Ok(())
