@@ -1,13 +1,18 @@
-//! The picture of one round: what every robot saw, what it made of it, and what the swarm decided.
+//! Pictures for people: of one round, with what every robot saw and what the swarm decided; and, in [`stages`], of
+//! one frame on its way through perception.
+
+mod canvas;
+pub mod stages;
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use opencv::core::{self, Mat, Point, Rect, Scalar, Size, Vector};
-use opencv::prelude::*;
-use opencv::{imgcodecs, imgproc};
+use opencv::core::{self, Mat, Point, Rect, Size, Vector};
+use opencv::imgcodecs;
 use thiserror::Error;
+
+use canvas::{AGREES, BACKGROUND, CARD, DIFFERS, MUTED, TEXT, TRACK, centre, colour, fill, fit, write};
 
 /// One robot's part of the picture.
 #[derive(Clone, Debug)]
@@ -59,20 +64,6 @@ const VIEW_HEIGHT: i32 = 300;
 const OPINION_HEIGHT: i32 = 96;
 const PANEL_HEIGHT: i32 = TITLE_HEIGHT + VIEW_HEIGHT + OPINION_HEIGHT;
 const BORDER: i32 = 4;
-
-/// A colour as 0xRRGGBB.
-fn colour(rgb: u32) -> Scalar {
-    let [_, red, green, blue] = rgb.to_be_bytes();
-    Scalar::new(blue.into(), green.into(), red.into(), 0.0)
-}
-
-const BACKGROUND: u32 = 0x16_1a_20;
-const CARD: u32 = 0x24_2a_33;
-const TRACK: u32 = 0x38_40_4c;
-const TEXT: u32 = 0xf2_f4_f7;
-const MUTED: u32 = 0x9a_a5_b4;
-const AGREES: u32 = 0x3f_b9_7f;
-const DIFFERS: u32 = 0xf0_7a_52;
 
 /// Draws the panels in a grid under a headline. The first line of the headline is large, the others are small.
 ///
@@ -200,78 +191,11 @@ fn draw_bars(picture: &mut Mat, panel: &Panel<'_>, place: Rect, tone: u32) -> op
     Ok(())
 }
 
-/// Copies an image into a place of the picture, as large as it fits, in its own proportions.
-fn fit(picture: &mut Mat, image: &Mat, place: Rect) -> opencv::Result<()> {
-    let scale = f64::min(
-        f64::from(place.width) / f64::from(image.cols().max(1)),
-        f64::from(place.height) / f64::from(image.rows().max(1)),
-    );
-    let side = |length: i32, limit: i32| ((f64::from(length) * scale).round() as i32).clamp(1, limit);
-    let size = Size::new(side(image.cols(), place.width), side(image.rows(), place.height));
-    let mut scaled = Mat::default();
-    let how = if scale < 1.0 { imgproc::INTER_AREA } else { imgproc::INTER_CUBIC };
-    imgproc::resize(image, &mut scaled, size, 0.0, 0.0, how)?;
-    let corner =
-        Point::new(place.x + (place.width - size.width) / 2, place.y + (place.height - size.height) / 2);
-    let mut target = Mat::roi_mut(picture, Rect::from_point_size(corner, size))?;
-    scaled.copy_to(&mut target)
-}
-
-fn fill(picture: &mut Mat, place: Rect, tone: u32) -> opencv::Result<()> {
-    if place.width <= 0 || place.height <= 0 {
-        return Ok(());
-    }
-    Mat::roi_mut(picture, place)?.set_to(&colour(tone), &core::no_array()).map(drop)
-}
-
-const FONT: i32 = imgproc::FONT_HERSHEY_DUPLEX;
-
-/// Writes text with its baseline at `at`, shortened to the width.
-fn write(picture: &mut Mat, text: &str, at: Point, scale: f64, tone: u32, width: i32) -> opencv::Result<()> {
-    let text = fitting(text, scale, width)?;
-    // Large letters need a thicker pen.
-    let pen = if scale > 1.0 { 2 } else { 1 };
-    imgproc::put_text(picture, &text, at, FONT, scale, colour(tone), pen, imgproc::LINE_AA, false)
-}
-
-/// Writes text centred over a width that begins at `at`.
-fn centre(
-    picture: &mut Mat,
-    text: &str,
-    at: Point,
-    width: i32,
-    scale: f64,
-    tone: u32,
-    limit: i32,
-) -> opencv::Result<()> {
-    let text = fitting(text, scale, limit)?;
-    let offset = (width - text_width(&text, scale)?) / 2;
-    write(picture, &text, Point::new(at.x + offset, at.y), scale, tone, limit)
-}
-
-fn text_width(text: &str, scale: f64) -> opencv::Result<i32> {
-    Ok(imgproc::get_text_size(text, FONT, scale, 1, &mut 0)?.width)
-}
-
-/// The text in what OpenCV's font has (ASCII), cut to a width.
-fn fitting(text: &str, scale: f64, width: i32) -> opencv::Result<String> {
-    let printable = |character: char| match character {
-        '×' => 'x',
-        '–' | '—' => '-',
-        ' '..='~' => character,
-        _ => '?',
-    };
-    // No text of more characters fits any picture.
-    let mut text: String = text.chars().take(400).map(printable).collect();
-    while text_width(&text, scale)? > width && text.len() > 2 {
-        text.truncate(text.len() - if text.ends_with("..") { 3 } else { 1 });
-        text.push_str("..");
-    }
-    Ok(text)
-}
-
 #[cfg(test)]
 mod tests {
+    use opencv::core::Scalar;
+    use opencv::prelude::*;
+
     use super::*;
 
     fn view(grey: f64) -> Mat {

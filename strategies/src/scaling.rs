@@ -67,7 +67,7 @@ impl Scaling {
     }
 
     /// Writes the scaled `features`, of [`Self::width`] components, over `scaled`; each within ±[`LIMIT`].
-    pub(crate) fn apply(&self, features: &[f32], scaled: &mut Vec<f32>) {
+    pub fn apply(&self, features: &[f32], scaled: &mut Vec<f32>) {
         scaled.clear();
         let components = features.iter().zip(&self.mean).zip(&self.factor);
         scaled.extend(components.map(|((&x, &mean), &factor)| {

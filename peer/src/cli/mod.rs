@@ -8,6 +8,8 @@ mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod explain;
+#[cfg(feature = "opencv")]
+mod look;
 mod open;
 #[cfg(feature = "opencv")]
 mod peer;
@@ -68,6 +70,9 @@ enum Verb {
     /// Measure a classifier on a folder of pictures
     #[cfg(feature = "opencv")]
     Evaluate(evaluate::Args),
+    /// Show what perception makes of one frame, stage by stage
+    #[cfg(feature = "opencv")]
+    Look(look::Args),
     /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares
     Emulate(emulate::Args),
     /// Draw what each rule of selection or forgetting picks
@@ -104,6 +109,8 @@ impl Command {
             Verb::Train(args) => train::run(args),
             #[cfg(feature = "opencv")]
             Verb::Evaluate(args) => evaluate::run(args),
+            #[cfg(feature = "opencv")]
+            Verb::Look(args) => look::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
             Verb::Config(args) => config::run(&args),

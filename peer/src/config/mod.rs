@@ -388,6 +388,23 @@ mod tests {
     }
 
     #[test]
+    fn the_shipped_cameras_are_the_presets_with_the_whole_layer_on() {
+        for preset in CameraModel::presets() {
+            let file = format!("{}/../configs/{}.json5", env!("CARGO_MANIFEST_DIR"), preset.name);
+            let camera = Config::read(Path::new(&file)).unwrap().camera;
+            assert!(matches!(camera.model, CameraChoice::Custom(_)), "{file} names every property");
+            assert_eq!((camera.model.properties(), camera.layer), (preset, LayerConfig::ALL), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_stage_of_the_layer_is_switched_off_by_itself() {
+        let camera = config("{camera: {model: 'parrot', layer: {colour: false}}}").unwrap().camera;
+        assert_eq!(camera.layer, LayerConfig { colour: false, ..LayerConfig::ALL });
+        assert!(config("{camera: {layer: {color: false}}}").unwrap_err().to_string().contains("colour"));
+    }
+
+    #[test]
     fn nothing_said_is_a_relay_that_finds_others_by_itself() {
         let config = config("{}").unwrap();
         assert!(matches!(config.camera.source, SourceSection::None));

@@ -60,13 +60,14 @@ impl BlobFinder {
     }
 
     /// Draws a blob found last, white on a black mask of `size`, and collects its holes that are no noise,
-    /// largest first.
+    /// largest first. A `solid` one has none.
     pub fn draw(
         &self,
         blob: &Blob,
         size: Size,
         mask: &mut Mat,
         holes: &mut Vec<Hole>,
+        solid: bool,
     ) -> Result<(), opencv::Error> {
         if mask.size()? == size {
             mask.set_to(&Scalar::all(0.0), &no_array())?;
@@ -75,8 +76,11 @@ impl BlobFinder {
         }
         // Outline and holes in one call: even and odd nesting leaves the holes black and the pixels around them
         // whole.
-        self.fill(mask, blob.index, i32::MAX)?;
+        self.fill(mask, blob.index, if solid { 0 } else { i32::MAX })?;
         holes.clear();
+        if solid {
+            return Ok(());
+        }
         let mut child = blob.first_hole;
         while let Ok(hole) = usize::try_from(child) {
             let outline = self.contours.get(hole)?;

@@ -1,28 +1,41 @@
 //! Which pixels have the colour of the hand: a colour model learned anew from every frame.
 //!
-//! Colours are compared as logarithms of channel ratios, log(R/G) and log(B/G). There a change of the light's
-//! colour or of the camera's white balance is a shift, common to all pixels, and a change of its strength (a
-//! shadow, a vignette) is none at all; so what is measured relative to the frame's own background needs no
-//! further colour constancy. The hand is what differs most from the frame's border, and Fisher's linear
-//! discriminant (R. A. Fisher, 1936) between the two says along which direction of colour to look, be it skin
-//! or a glove of any colour.
+//! Colours are compared as logarithms of channel ratios, log(R/G) and log(B/G), relative to the balanced background.
+//! There a change of the light's colour or of the camera's white balance is a shift, common to all pixels, and a change
+//! of its strength (a shadow, a vignette) is none at all. The hand is what differs most from the background, and
+//! Fisher's linear discriminant (R. A. Fisher, 1936) between the two says along which direction of colour to look, be
+//! it skin or a glove of any colour.
+//!
+//! Two cases need no discriminant, only a distance from grey: a background so bright that anything of a colour stands
+//! out from it; and the stage of colour switched off, where a fixed threshold takes the camera's colours at their word.
 
 use opencv::core::{BORDER_DEFAULT, CV_8U, Mat, MatTraitConst, MatTraitConstManual, MatTraitManual};
 use opencv::core::{Scalar, Size};
-use opencv::imgproc::{INTER_AREA, THRESH_BINARY, gaussian_blur, resize, threshold};
+use opencv::imgproc::{
+    INTER_AREA, MORPH_CLOSE, MORPH_ELLIPSE, THRESH_BINARY, gaussian_blur, get_structuring_element_def,
+    morphology_ex_def, resize, threshold,
+};
 
+use super::background::{cast, unchanged};
 use super::frame::View;
+use super::white_balance::{Channels, WhiteBalance, is_full};
 use super::{NoHand, NoObservation};
 
 /// The model is learned on a thumbnail smaller than the glance by this factor.
 const THUMBNAIL: i32 = 2;
-/// Rows and columns of the thumbnail's border that are taken for background.
-const BORDER: usize = 2;
 /// Where between the means of background (0) and hand (1) the boundary lies: nearer to the background, which
 /// varies less.
 const BOUNDARY: f32 = 0.38;
-/// Added to a channel before the logarithm, so that the noise of dark pixels stays small.
-const DARK: f32 = 8.0;
+/// Before a background without colour or texture, this much colour is a hand's, nats.
+const OFF_WHITE: f32 = 0.03;
+/// A pixel with a full channel that may be this near to the background is background, nats.
+const NEAR_BACKGROUND: f32 = 0.05;
+/// The fewest pixels of the thumbnail that are a hand.
+const FEWEST: usize = 8;
+/// With the stage of colour off, this much colour is a hand's, nats: half of what skin has in an even light.
+const OFF_GREY: f32 = 0.35;
+/// Side of the gaps closed in a hand with overexposed patches, pixels.
+const PATCH: i32 = 5;
 /// Variance of a colour coordinate that is always assumed, nats²: quantisation, and no division by zero.
 const NOISE: f32 = 7.5e-4;
 /// Bins of the histogram of colour distances, and their width in nats.
@@ -37,18 +50,35 @@ const FRACTION: i32 = 6;
 /// log(R/G) and log(B/G) of a pixel.
 type Chroma = [f32; 2];
 
+fn chroma([blue, green, red]: Channels) -> Chroma {
+    [red - green, blue - green]
+}
+
 /// Finds the pixels that have the colour of the hand.
 pub struct ColourModel {
     minimum_contrast: f32,
-    logarithm: [f32; 256],
+    /// Whether a discriminant is learned at all.
+    relative: bool,
+    balance: WhiteBalance,
     thumbnail: Mat,
+    before: Mat,
+    /// Of each pixel of the thumbnail: its colour, how much it stands out, and whether it may be a hand at all.
     chroma: Vec<Chroma>,
+    distance: Vec<f32>,
+    changed: Vec<bool>,
     is_hand: Vec<bool>,
-    border: Vec<f32>,
-    background: Chroma,
-    /// What each value of blue, green and red adds to the score of a pixel.
-    tables: [[i32; 256]; 3],
+    rule: Rule,
+    /// How much brighter each channel is than in the scene without anyone, nats; `None` without such a scene.
+    cast: Option<Channels>,
     separation: f32,
+}
+
+/// What makes a pixel one of the hand.
+enum Rule {
+    /// The sum of what its blue, green and red values add to the score.
+    Score { tables: Box<[[i32; 256]; 3]>, model: Discriminant },
+    /// That much colour, nats.
+    Colourful(f32),
 }
 
 /// A pixel belongs to the hand where `weights · chroma > boundary`.
@@ -56,24 +86,54 @@ pub struct ColourModel {
 struct Discriminant {
     weights: Chroma,
     boundary: f32,
+    /// The hand's mean.
+    hand: Chroma,
     /// Distance of the two means along the weights' direction, nats.
     contrast: f32,
     /// The same in standard deviations (of both sides added).
     separation: f32,
 }
 
+impl Discriminant {
+    /// The score of a pixel: [`ZERO_SCORE`] on the boundary, more inside the hand's colours.
+    fn score(&self, chroma: Chroma) -> f32 {
+        ZERO_SCORE as f32 + (dot(self.weights, chroma) - self.boundary) * self.unit()
+    }
+
+    /// The score of a pixel with a full channel, which may be brighter than it looks: how near it may be to the
+    /// background, against how near it may be to the hand.
+    fn score_of_full(&self, bgr: [u8; 3], balance: &WhiteBalance) -> f32 {
+        let near_background = magnitude(chroma(balance.relative(bgr)));
+        if near_background < NEAR_BACKGROUND {
+            return 0.0;
+        }
+        let [red, blue] = self.hand;
+        let apart = chroma(balance.relative_to(bgr, [blue, 0.0, red]));
+        let near_hand = magnitude([apart[0] - red, apart[1] - blue]);
+        let share = near_background / (near_background + near_hand);
+        ZERO_SCORE as f32 + (share - BOUNDARY) * CONTRAST_SCORE
+    }
+
+    fn unit(&self) -> f32 {
+        CONTRAST_SCORE / self.contrast
+    }
+}
+
 impl ColourModel {
-    pub fn new(minimum_contrast: f32) -> Self {
-        let logarithm = std::array::from_fn(|value| (value as f32 + DARK).ln());
+    /// A model of colours relative to the balanced background, or with `relative` false, as the camera gives them.
+    pub fn new(minimum_contrast: f32, relative: bool, period: Option<f32>) -> Self {
         Self {
             minimum_contrast,
-            logarithm,
+            relative,
+            balance: WhiteBalance::new(relative, period),
             thumbnail: Mat::default(),
+            before: Mat::default(),
             chroma: Vec::new(),
+            distance: Vec::new(),
+            changed: Vec::new(),
             is_hand: Vec::new(),
-            border: Vec::new(),
-            background: [0.0; 2],
-            tables: [[0; 256]; 3],
+            rule: Rule::Colourful(OFF_GREY),
+            cast: None,
             separation: 0.0,
         }
     }
@@ -84,111 +144,172 @@ impl ColourModel {
         ((self.separation - 0.8) / 1.2).clamp(0.0, 1.0)
     }
 
+    /// The white balance of the last frame.
+    pub fn balance(&self) -> &WhiteBalance {
+        &self.balance
+    }
+
     /// Learns the hand's colour from the frame at a glance.
     pub fn learn(&mut self, glance: &View) -> Result<(), NoObservation> {
-        self.take_thumbnail(&glance.image)?;
+        if !self.relative {
+            self.separation = 2.0;
+            return Ok(());
+        }
+        self.take_thumbnail(glance)?;
+        if self.balance.overexposed() {
+            if self.distance.iter().filter(|&&distance| distance > OFF_WHITE).count() < FEWEST {
+                let contrast = self.distance.iter().copied().fold(0.0, f32::max);
+                return Err(NoHand::NothingStandsOut { contrast }.into());
+            }
+            self.rule = Rule::Colourful(OFF_WHITE);
+            // Half plausible: parts of the hand may be as white as the wall.
+            self.separation = 1.4;
+            return Ok(());
+        }
         let found = self.discriminate();
         let Some(model) = found.filter(|model| model.contrast >= self.minimum_contrast) else {
             let contrast = found.map_or(0.0, |model| model.contrast);
             return Err(NoHand::NothingStandsOut { contrast }.into());
         };
         self.separation = model.separation;
-        self.tabulate(&model);
+        self.rule = Rule::Score { tables: self.tabulate(&model), model };
         Ok(())
     }
 
-    /// Marks the pixels of a view that have the colour learned.
+    /// Marks the pixels of a view that have the colour learned, and were not there before.
     pub fn mark(&self, view: &mut View) -> Result<(), opencv::Error> {
         let size = view.image.size()?;
         if view.score.size()? != size {
             view.score = Mat::new_size_with_default(size, CV_8U, Scalar::all(0.0))?;
         }
-        let [b, g, r] = &self.tables;
-        let pixels = view.image.data_bytes()?.chunks_exact(3);
-        for (score, bgr) in view.score.data_bytes_mut()?.iter_mut().zip(pixels) {
-            let sum = b[usize::from(bgr[0])] + g[usize::from(bgr[1])] + r[usize::from(bgr[2])];
-            *score = (sum >> FRACTION).clamp(0, 255) as u8;
+        let pixels = view.image.data_bytes()?.chunks_exact(3).map(|bgr| [bgr[0], bgr[1], bgr[2]]);
+        let scores = view.score.data_bytes_mut()?;
+        match &self.rule {
+            Rule::Score { tables, model } => {
+                let [b, g, r] = &**tables;
+                for (score, bgr) in scores.iter_mut().zip(pixels) {
+                    let sum = b[usize::from(bgr[0])] + g[usize::from(bgr[1])] + r[usize::from(bgr[2])];
+                    *score = (sum >> FRACTION).clamp(0, 255) as u8;
+                    if is_full(bgr) {
+                        *score = model.score_of_full(bgr, &self.balance) as u8;
+                    }
+                }
+                if let Some(cast) = self.cast {
+                    let before =
+                        view.before.data_bytes()?.chunks_exact(3).map(|bgr| [bgr[0], bgr[1], bgr[2]]);
+                    let pixels = view.image.data_bytes()?.chunks_exact(3).map(|bgr| [bgr[0], bgr[1], bgr[2]]);
+                    for ((score, bgr), before) in scores.iter_mut().zip(pixels).zip(before) {
+                        if f64::from(*score) > ZERO_SCORE {
+                            let then = brighter(self.balance.relative(before), cast);
+                            let was_alike = f64::from(model.score(chroma(then))) > ZERO_SCORE;
+                            if was_alike && unchanged(self.balance.relative(bgr), then) {
+                                *score = 0;
+                            }
+                        }
+                    }
+                }
+            }
+            Rule::Colourful(least) => {
+                for (score, bgr) in scores.iter_mut().zip(pixels) {
+                    let colour = magnitude(chroma(self.balance.relative(bgr)));
+                    *score = (ZERO_SCORE as f32 * colour / least) as u8;
+                }
+            }
         }
         gaussian_blur(&view.score, &mut view.blurred, Size::new(3, 3), 0.0, 0.0, BORDER_DEFAULT)?;
         threshold(&view.blurred, &mut view.mask, ZERO_SCORE, 255.0, THRESH_BINARY)?;
+        view.patchy = self.balance.overexposed();
+        if view.patchy {
+            let patch = get_structuring_element_def(MORPH_ELLIPSE, Size::new(PATCH, PATCH))?;
+            std::mem::swap(&mut view.mask, &mut view.blurred);
+            morphology_ex_def(&view.blurred, &mut view.mask, MORPH_CLOSE, &patch)?;
+        }
         Ok(())
     }
 }
 
 impl ColourModel {
     /// The frame's colours, small enough to learn from at once.
-    fn take_thumbnail(&mut self, glance: &Mat) -> Result<(), opencv::Error> {
-        let size = glance.size()?;
+    fn take_thumbnail(&mut self, glance: &View) -> Result<(), NoObservation> {
+        let size = glance.image.size()?;
         let small = Size::new(size.width / THUMBNAIL, size.height / THUMBNAIL);
-        resize(glance, &mut self.thumbnail, small, 0.0, 0.0, INTER_AREA)?;
-        let log = &self.logarithm;
+        resize(&glance.image, &mut self.thumbnail, small, 0.0, 0.0, INTER_AREA)?;
+        self.cast = None;
+        if !glance.before.empty() {
+            resize(&glance.before, &mut self.before, small, 0.0, 0.0, INTER_AREA)?;
+            self.cast = cast(&self.thumbnail, &self.before)?;
+        }
+        match self.cast {
+            Some(cast) => self.balance.estimate(&self.before, cast)?,
+            None => self.balance.estimate(&self.thumbnail, [0.0; 3])?,
+        }
+        let balance = &self.balance;
+        let levels = |image: &Mat| -> Result<Vec<Channels>, opencv::Error> {
+            let pixels = image.data_bytes()?.chunks_exact(3);
+            Ok(pixels.map(|bgr| balance.relative([bgr[0], bgr[1], bgr[2]])).collect())
+        };
+        let seen = levels(&self.thumbnail)?;
         self.chroma.clear();
-        self.chroma.extend(self.thumbnail.data_bytes()?.chunks_exact(3).map(|bgr| {
-            let [b, g, r] = [0, 1, 2].map(|channel| log[usize::from(bgr[channel])]);
-            [r - g, b - g]
-        }));
-        let background = self.border_median(small.width as usize, small.height as usize);
-        self.background = background;
-        for chroma in &mut self.chroma {
-            chroma[0] -= background[0];
-            chroma[1] -= background[1];
+        self.chroma.extend(seen.iter().map(|&levels| chroma(levels)));
+        self.distance.clear();
+        self.distance.extend(self.chroma.iter().map(|&chroma| magnitude(chroma)));
+        self.changed.clear();
+        self.changed.resize(seen.len(), true);
+        if let Some(cast) = self.cast {
+            let before = levels(&self.before)?;
+            for (i, (seen, before)) in seen.iter().zip(before).enumerate() {
+                let then = brighter(before, cast);
+                let ([red, blue], [red_then, blue_then]) = (chroma(*seen), chroma(then));
+                // What stands out from the border, and was not there before.
+                let change = magnitude([red - red_then, blue - blue_then]);
+                self.distance[i] = self.distance[i].min(change);
+                self.changed[i] = !unchanged(*seen, then);
+            }
         }
         Ok(())
-    }
-
-    /// The median colour of the thumbnail's border.
-    fn border_median(&mut self, width: usize, height: usize) -> Chroma {
-        let (chroma, border) = (&self.chroma, &mut self.border);
-        [0, 1].map(|coordinate| {
-            border.clear();
-            for (y, row) in chroma.chunks_exact(width).enumerate() {
-                let values = row.iter().map(|c| c[coordinate]);
-                if y < BORDER || y + BORDER >= height {
-                    border.extend(values);
-                } else {
-                    border.extend(values.clone().take(BORDER).chain(values.skip(width - BORDER)));
-                }
-            }
-            let middle = border.len() / 2;
-            *border.select_nth_unstable_by(middle, f32::total_cmp).1
-        })
     }
 
     /// Finds the discriminant: seeds by Otsu's threshold of the distance to the background, then a few rounds
     /// of Fisher's discriminant on the pixels that the last round took for the hand. `None` where all pixels
     /// are alike.
     fn discriminate(&mut self) -> Option<Discriminant> {
-        let distance = |c: &Chroma| c[0].abs() + c[1].abs();
         let mut histogram = [0u32; BINS];
-        for chroma in &self.chroma {
-            histogram[bin(distance(chroma))] += 1;
+        for &distance in &self.distance {
+            histogram[bin(distance)] += 1;
         }
         let seed = otsu(&histogram);
         self.is_hand.clear();
-        self.is_hand.extend(self.chroma.iter().map(|chroma| bin(distance(chroma)) > seed));
+        self.is_hand.extend(self.distance.iter().map(|&distance| bin(distance) > seed));
         let mut learned = None;
         for _ in 0..3 {
             let model = fisher(&self.chroma, &self.is_hand)?;
-            for (is_hand, chroma) in self.is_hand.iter_mut().zip(&self.chroma) {
-                *is_hand = dot(model.weights, *chroma) > model.boundary;
+            for ((is_hand, chroma), changed) in self.is_hand.iter_mut().zip(&self.chroma).zip(&self.changed) {
+                *is_hand = *changed && dot(model.weights, *chroma) > model.boundary;
             }
             learned = Some(model);
         }
         learned
     }
 
-    /// Prepares the scores: [`ZERO_SCORE`] on the boundary, more inside the hand's colours. They are linear in
-    /// the logarithms of the channels, so one table per channel holds them exactly.
-    fn tabulate(&mut self, model: &Discriminant) {
+    /// Prepares the scores. They are linear in the logarithms of the channels, so one table per channel holds them
+    /// exactly.
+    fn tabulate(&self, model: &Discriminant) -> Box<[[i32; 256]; 3]> {
         let [red, blue] = model.weights;
-        let unit = CONTRAST_SCORE / model.contrast;
-        let offset = ZERO_SCORE as f32 - (dot(model.weights, self.background) + model.boundary) * unit;
-        let scale = f32::from(1u16 << FRACTION);
-        let table = |weight: f32, offset: f32| {
-            self.logarithm.map(|logarithm| ((weight * unit * logarithm + offset) * scale) as i32)
+        let [b, g, r] = self.balance.tables();
+        let (offset, scale) = (model.score([0.0; 2]), f32::from(1u16 << FRACTION));
+        let table = |logarithms: &[f32; 256], weight: f32, offset: f32| {
+            logarithms.map(|logarithm| ((weight * model.unit() * logarithm + offset) * scale) as i32)
         };
-        self.tables = [table(blue, 0.0), table(-red - blue, offset), table(red, 0.0)];
+        Box::new([table(b, blue, 0.0), table(g, -red - blue, offset), table(r, red, 0.0)])
     }
+}
+
+fn brighter(levels: Channels, cast: Channels) -> Channels {
+    std::array::from_fn(|channel| levels[channel] + cast[channel])
+}
+
+fn magnitude([red, blue]: Chroma) -> f32 {
+    red.abs() + blue.abs()
 }
 
 fn dot(a: Chroma, b: Chroma) -> f32 {
@@ -238,7 +359,6 @@ fn statistics(chroma: &[Chroma], chosen: impl Iterator<Item = bool>) -> (Chroma,
 
 /// Fisher's linear discriminant between the pixels of the hand and the others; `None` when either are too few.
 fn fisher(chroma: &[Chroma], is_hand: &[bool]) -> Option<Discriminant> {
-    const FEWEST: usize = 8;
     let (hand, hand_spread, hand_count) = statistics(chroma, is_hand.iter().copied());
     let (other, other_spread, other_count) = statistics(chroma, is_hand.iter().map(|hand| !hand));
     if hand_count < FEWEST || other_count < FEWEST {
@@ -262,5 +382,5 @@ fn fisher(chroma: &[Chroma], is_hand: &[bool]) -> Option<Discriminant> {
         (a * a * xx + 2.0 * a * b * xy + b * b * yy + NOISE).max(NOISE).sqrt()
     };
     let separation = contrast / (deviation(hand_spread) + deviation(other_spread));
-    Some(Discriminant { weights, boundary: low + BOUNDARY * contrast, contrast, separation })
+    Some(Discriminant { weights, boundary: low + BOUNDARY * contrast, hand, contrast, separation })
 }

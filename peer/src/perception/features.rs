@@ -60,6 +60,16 @@ static TABLE: [Feature; FEATURES] = {
     table
 };
 
+/// The names of the groups of features, and how many each has, in the order of the vector.
+pub const GROUPS: [(&str, usize); 6] = [
+    ("blob", blob::TABLE.len()),
+    ("palm", palm::TABLE.len()),
+    ("finger gaps", defects::TABLE.len()),
+    ("fingers", fingers::TABLE.len()),
+    ("rings", rings::TABLE.len()),
+    ("moments", moments::TABLE.len()),
+];
+
 /// The documentation of the 110 features, in the order of the vector.
 #[must_use]
 pub fn features() -> &'static [Feature] {

@@ -22,49 +22,64 @@ pub fn check(frame: &Mat) -> Result<(), NoObservation> {
 
 /// A part of a frame, scaled to a size of our own choice.
 pub struct View {
-    limit: Size,
+    limit: Option<Size>,
     /// The part of the frame that is seen, in pixels of the frame.
     pub region: Rect,
     /// The frame's size.
     pub frame: Size,
     /// What is seen.
     pub image: Mat,
+    /// The same part of the scene without anyone; empty when that is not known.
+    pub before: Mat,
     /// Its pixels (255; others 0) that have the colour of the hand, and the steps on the way there.
     pub mask: Mat,
     pub score: Mat,
     pub blurred: Mat,
+    /// Whether the hand may have holes that it does not have: where it is as white as the background.
+    pub patchy: bool,
 }
 
 impl View {
-    /// Views are the largest images of their region's aspect ratio within this limit.
-    pub fn new(limit: Size) -> Self {
+    /// Views are the largest images of their region's aspect ratio within this limit; without one, they have the
+    /// frame's own pixels.
+    pub fn new(limit: Option<Size>) -> Self {
         Self {
             limit,
             region: Rect::default(),
             frame: Size::default(),
             image: Mat::default(),
+            before: Mat::default(),
             mask: Mat::default(),
             score: Mat::default(),
             blurred: Mat::default(),
+            patchy: false,
         }
     }
 
-    /// Looks at a region of the frame.
+    /// Looks at a region of the frame, and at the same region of the scene without anyone, where that is known.
     ///
     /// Nothing is padded: a margin of one colour would pass for background.
-    pub fn look(&mut self, frame: &Mat, region: Rect) -> Result<(), NoObservation> {
-        let fit = |limit: i32, side: i32| f64::from(limit) / f64::from(side);
-        let scale = fit(self.limit.width, region.width).min(fit(self.limit.height, region.height));
+    pub fn look(&mut self, frame: &Mat, before: Option<&Mat>, region: Rect) -> Result<(), NoObservation> {
+        let scale = self.limit.map_or(1.0, |limit| {
+            let fit = |limit: i32, side: i32| f64::from(limit) / f64::from(side);
+            fit(limit.width, region.width).min(fit(limit.height, region.height))
+        });
         let scaled = |side: i32| (f64::from(side) * scale).round() as i32;
         let size = Size::new(scaled(region.width), scaled(region.height));
         if size.width.min(size.height) < SHORTEST {
             return Err(NoObservation::TooNarrow { width: region.width, height: region.height });
         }
-        // Area averaging when shrinking: it also makes the noise of large and small cameras comparable.
-        let interpolation = if scale < 1.0 { INTER_AREA } else { INTER_LINEAR };
-        resize(&Mat::roi(frame, region)?, &mut self.image, size, 0.0, 0.0, interpolation)?;
+        scale_part(frame, region, size, &mut self.image)?;
         self.region = region;
         self.frame = frame.size()?;
+        match before {
+            Some(before) => {
+                let whole = before.size()?;
+                let part = within(region, self.frame, whole);
+                scale_part(before, part, size, &mut self.before)?;
+            }
+            None => self.before = Mat::default(),
+        }
         Ok(())
     }
 
@@ -72,4 +87,24 @@ impl View {
     pub fn scale(&self) -> f32 {
         self.image.cols() as f32 / self.region.width as f32
     }
+}
+
+/// A part of an image at that size. Area averaging when shrinking: it also makes the noise of large and small cameras
+/// comparable.
+fn scale_part(image: &Mat, part: Rect, size: Size, out: &mut Mat) -> Result<(), opencv::Error> {
+    let interpolation = if size.width < part.width { INTER_AREA } else { INTER_LINEAR };
+    resize(&Mat::roi(image, part)?, out, size, 0.0, 0.0, interpolation)
+}
+
+/// A region of the frame, in the pixels of another image of the same scene.
+fn within(region: Rect, frame: Size, other: Size) -> Rect {
+    let span = |start: i32, length: i32, from: i32, to: i32| {
+        let scale = f64::from(to) / f64::from(from);
+        let first = ((f64::from(start) * scale).round() as i32).min(to - 1);
+        let end = (f64::from(start + length) * scale).round() as i32;
+        (first, (end.min(to) - first).max(1))
+    };
+    let (x, width) = span(region.x, region.width, frame.width, other.width);
+    let (y, height) = span(region.y, region.height, frame.height, other.height);
+    Rect::new(x, y, width, height)
 }

@@ -135,7 +135,7 @@ impl HandFinder {
         let view = close.mask.size()?;
         let size = Size::new(view.width + 2 * MARGIN, view.height + 2 * MARGIN);
         let arm = self.blobs.largest(&close.mask, MARGIN)?.ok_or(nothing)?;
-        self.blobs.draw(&arm, size, &mut self.mask, &mut self.holes)?;
+        self.blobs.draw(&arm, size, &mut self.mask, &mut self.holes, close.patchy)?;
         let (palm, radius) = self.palm(&arm.contour)?;
         let up = match from_edge(&arm.contour, close, palm, radius) {
             Some(up) => up,
@@ -144,7 +144,7 @@ impl HandFinder {
         self.cut_forearm(palm, radius, up)?;
 
         let hand = self.blobs.largest(&self.mask, 0)?.ok_or(nothing)?;
-        self.blobs.draw(&hand, size, &mut self.mask, &mut self.holes)?;
+        self.blobs.draw(&hand, size, &mut self.mask, &mut self.holes, close.patchy)?;
         self.contour = hand.contour;
         let bounds = bounding_rect(&self.contour)?;
         let moments = moments(&Mat::roi(&self.mask, bounds)?, true)?;

@@ -9,6 +9,7 @@
 //! distances comparable, colours are judged relative to the background of the same frame, and every feature is
 //! a ratio, an angle or a count.
 
+mod background;
 mod blob;
 mod canonical;
 mod colour;
@@ -17,12 +18,15 @@ mod frame;
 mod hand;
 mod hog;
 mod layer;
+mod resolution;
 mod ring;
+mod white_balance;
 
 use std::str::FromStr;
 
 use gestalt_strategies::Observation;
 use opencv::core::{Mat, MatTraitConst, Rect, Size, Vector};
+use opencv::imgproc::{INTER_AREA, resize};
 use opencv::objdetect::HOGDescriptor;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -31,13 +35,16 @@ use crate::camera_model::CameraModel;
 
 use canonical::Canonical;
 use colour::ColourModel;
-pub use features::{FEATURES, Feature, features};
+pub use features::{FEATURES, Feature, GROUPS, features};
 use frame::View;
 use hand::HandFinder;
-pub use layer::LayerConfig;
+pub use layer::{CameraMismatch, LayerConfig};
+use resolution::Resolution;
 
 /// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
 const GLANCE: Size = Size { width: 160, height: 120 };
+/// The size that every frame is squeezed to with the stage of geometry off.
+const CANVAS: Size = Size { width: 320, height: 240 };
 /// The size of the close view of the hand: enough for the shape of its fingers.
 const CLOSE: Size = Size { width: 192, height: 192 };
 
@@ -224,37 +231,33 @@ pub struct Perception {
     set: FeatureSet,
     layer: LayerConfig,
     camera: Option<CameraModel>,
+    mismatch: Option<CameraMismatch>,
+    canvas: Mat,
+    canvas_before: Mat,
     glance: View,
-    close: View,
     colours: ColourModel,
+    close: View,
+    resolution: Resolution,
+    region: Rect,
     finder: HandFinder,
+    balanced: Mat,
     canonical: Canonical,
     hog: HOGDescriptor,
     descriptors: Vector<f32>,
 }
 
 impl Perception {
-    /// Eyes that compute this feature set, of frames of any camera.
+    /// Eyes that compute this feature set, with all stages of the layer on, of frames that have nothing to do with each
+    /// other, of any camera.
     ///
     /// # Errors
     /// See [`PerceptionError`].
-    pub fn new(set: FeatureSet, config: HandConfig) -> Result<Self, PerceptionError> {
-        config.validate()?;
-        Ok(Self {
-            set,
-            layer: LayerConfig::ALL,
-            camera: None,
-            glance: View::new(GLANCE),
-            close: View::new(CLOSE),
-            colours: ColourModel::new(config.minimum_contrast),
-            finder: HandFinder::new(config),
-            canonical: Canonical::default(),
-            hog: hog::descriptor()?,
-            descriptors: Vector::new(),
-        })
+    pub fn new(set: FeatureSet, hand: HandConfig) -> Result<Self, PerceptionError> {
+        Self::build(set, hand, LayerConfig::ALL, None)
     }
 
-    /// Eyes that compute this feature set, of the frames of this camera, with these stages of the layer.
+    /// Eyes that compute this feature set, of the frames of this camera one after another, with these stages of the
+    /// layer.
     ///
     /// # Errors
     /// See [`PerceptionError`].
@@ -264,7 +267,35 @@ impl Perception {
         layer: LayerConfig,
         camera: &CameraModel,
     ) -> Result<Self, PerceptionError> {
-        Ok(Self { layer, camera: Some(camera.clone()), ..Self::new(set, hand)? })
+        Self::build(set, hand, layer, Some(camera))
+    }
+
+    fn build(
+        set: FeatureSet,
+        hand: HandConfig,
+        layer: LayerConfig,
+        camera: Option<&CameraModel>,
+    ) -> Result<Self, PerceptionError> {
+        hand.validate()?;
+        let period = camera.map(|camera| camera.period().as_secs_f32());
+        Ok(Self {
+            set,
+            layer,
+            camera: camera.cloned(),
+            mismatch: None,
+            canvas: Mat::default(),
+            canvas_before: Mat::default(),
+            glance: View::new(Some(GLANCE)),
+            colours: ColourModel::new(hand.minimum_contrast, layer.colour, period),
+            close: View::new((layer.geometry && layer.resolution).then_some(CLOSE)),
+            resolution: Resolution::new(layer.resolution, camera),
+            region: Rect::default(),
+            finder: HandFinder::new(hand),
+            balanced: Mat::default(),
+            canonical: Canonical::default(),
+            hog: hog::descriptor()?,
+            descriptors: Vector::new(),
+        })
     }
 
     /// Which stages of the layer are on.
@@ -288,7 +319,7 @@ impl Perception {
     }
 
     /// Looks at one frame of a scene that is known without anyone in it: `background`, 8-bit BGR of any size, of the
-    /// frame's aspect.
+    /// frame's aspect. What was there before is no hand, whatever its colour.
     ///
     /// # Errors
     /// As [`Self::observe`].
@@ -301,17 +332,41 @@ impl Perception {
         if let Some(background) = background {
             frame::check(background)?;
         }
-        self.glance.look(bgr, Rect::new(0, 0, bgr.cols(), bgr.rows()))?;
+        self.compare_with_camera(bgr.size()?);
+        if self.layer.geometry {
+            return self.see(bgr, background, 1.0);
+        }
+        let (mut canvas, mut before) =
+            (std::mem::take(&mut self.canvas), std::mem::take(&mut self.canvas_before));
+        resize(bgr, &mut canvas, CANVAS, 0.0, 0.0, INTER_AREA)?;
+        if let Some(background) = background {
+            resize(background, &mut before, CANVAS, 0.0, 0.0, INTER_AREA)?;
+        }
+        let seen = self.see(&canvas, background.map(|_| &before), CANVAS.width as f32 / bgr.cols() as f32);
+        self.region = Rect::new(0, 0, bgr.cols(), bgr.rows());
+        (self.canvas, self.canvas_before) = (canvas, before);
+        seen
+    }
+
+    /// `scale`: pixels of this frame per pixel of the camera.
+    fn see(&mut self, bgr: &Mat, before: Option<&Mat>, scale: f32) -> Result<Observation, NoObservation> {
+        let whole = Rect::new(0, 0, bgr.cols(), bgr.rows());
+        self.region = whole;
+        self.glance.look(bgr, before, whole)?;
         self.colours.learn(&self.glance)?;
         self.colours.mark(&mut self.glance)?;
-        let region = self.finder.locate(&self.glance)?;
-        self.close.look(bgr, region)?;
+        let found = self.finder.locate(&self.glance)?;
+        self.region = if self.layer.geometry { found } else { whole };
+        self.close.look(bgr, before, self.region)?;
+        let scale = self.close.scale() * scale;
+        self.resolution.even_out(bgr, &mut self.close, scale)?;
         self.colours.mark(&mut self.close)?;
         let hand = self.finder.find(&self.close)?;
-        self.canonical.crop(&self.close.image, &hand)?;
         let features = match self.set {
             FeatureSet::Shape => features::measure(&hand)?,
             FeatureSet::Hog => {
+                self.colours.balance().apply(&self.close.image, &mut self.balanced)?;
+                self.canonical.crop(&self.balanced, &hand)?;
                 hog::compute(&self.hog, self.canonical.image(), &mut self.descriptors)?;
                 self.descriptors.as_slice().to_vec()
             }
@@ -319,10 +374,50 @@ impl Perception {
         Ok(Observation { features, quality: self.colours.plausibility() * hand.plausibility })
     }
 
+    /// Notes, once, that frames are not of the size that the camera's model has.
+    fn compare_with_camera(&mut self, found: Size) {
+        let Some(camera) = &self.camera else { return };
+        let expected = Size::new(camera.width_px, camera.height_px);
+        if self.mismatch.is_none() && found != expected {
+            let mismatch = CameraMismatch { camera: camera.name.clone(), expected, found };
+            tracing::warn!("{mismatch}");
+            self.mismatch = Some(mismatch);
+        }
+    }
+
+    /// How the camera's frames differ from what its model promises, if the first that did not fit has come.
+    #[must_use]
+    pub fn mismatch(&self) -> Option<&CameraMismatch> {
+        self.mismatch.as_ref()
+    }
+
+    /// What the white balance of the last frame multiplies its blue, green and red channel by.
+    #[must_use]
+    pub fn gains(&self) -> [f32; 3] {
+        self.colours.balance().gains()
+    }
+
+    /// The last frame, or any other, in the white balance of the last one.
+    ///
+    /// # Errors
+    /// When the image is not 8-bit BGR.
+    pub fn balance(&self, bgr: &Mat) -> Result<Mat, opencv::Error> {
+        let mut balanced = Mat::default();
+        self.colours.balance().apply(bgr, &mut balanced)?;
+        Ok(balanced)
+    }
+
     /// The part of the last frame that was looked at closely, in pixels of the frame.
     #[must_use]
     pub fn region(&self) -> Rect {
-        self.close.region
+        self.region
+    }
+
+    /// The pixels of the last frame, at a glance, that had the colour of the hand (255; elsewhere 0). Empty before the
+    /// first.
+    #[must_use]
+    pub fn candidates(&self) -> &Mat {
+        &self.glance.mask
     }
 
     /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a
@@ -333,7 +428,7 @@ impl Perception {
     }
 
     /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the
-    /// first.
+    /// first, and with a feature set that does not need it.
     #[must_use]
     pub fn crop(&self) -> &Mat {
         self.canonical.image()

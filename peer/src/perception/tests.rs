@@ -201,6 +201,93 @@ fn the_crop_shows_the_hand_alone() {
     assert!(inside > 3000, "{inside} pixels");
 }
 
+/// A wall with a poster of the hand's own colour on it, larger than the hand.
+fn wall_with_a_poster(colour: [u8; 3]) -> Mat {
+    let mut wall = plain(640, 480, WALL);
+    let poster = opencv::core::Rect::new(20, 20, 220, 180);
+    opencv::imgproc::rectangle(&mut wall, poster, scalar(colour), FILLED, LINE_8, 0).unwrap();
+    wall
+}
+
+#[test]
+fn what_was_there_before_is_no_hand() {
+    let wall = wall_with_a_poster(SKIN);
+    let mut frame = wall.clone();
+    draw_hand(&mut frame, (430, 290), 50, 4, SKIN);
+    let mut eyes = perception(FeatureSet::Shape);
+    let alone = eyes.observe(&frame).map(|seen| feature(&seen.features, "fingers_at_1.9"));
+    assert!(!matches!(alone, Ok(fingers) if fingers == 4.0), "the poster is the larger blob: {alone:?}");
+    // Dimmer by a third, under another light, and of another size: the same wall.
+    let mut before = Mat::default();
+    resize(&wall, &mut before, Size::new(320, 240), 0.0, 0.0, INTER_AREA).unwrap();
+    let mut cast = Mat::default();
+    opencv::core::multiply(&before, &Scalar::new(0.6, 0.7, 0.8, 0.0), &mut cast, 1.0, -1).unwrap();
+    for before in [before, cast] {
+        let seen = eyes.observe_before(&frame, Some(&before)).unwrap();
+        assert_eq!(feature(&seen.features, "fingers_at_1.9"), 4.0);
+        let empty = eyes.observe_before(&wall, Some(&before));
+        assert!(matches!(empty, Err(NoObservation::NoHand(_))), "{empty:?}");
+    }
+}
+
+#[test]
+fn a_plain_background_known_changes_nothing_and_a_wrong_one_is_not_believed() {
+    let frame = hand(640, 480, 3, SKIN);
+    let reference = shape(&frame);
+    for before in [plain(640, 480, WALL), plain(64, 48, [9, 200, 9]), hand(640, 480, 3, SKIN)] {
+        let seen = perception(FeatureSet::Shape).observe_before(&frame, Some(&before));
+        // A background that shows the very hand leaves nothing to see; any other, the same hand.
+        match seen {
+            Ok(seen) => {
+                assert_eq!(feature(&seen.features, "fingers_at_1.9"), feature(&reference, "fingers_at_1.9"))
+            }
+            Err(error) => assert!(matches!(error, NoObservation::NoHand(_)), "{error}"),
+        }
+    }
+    let seen = perception(FeatureSet::Shape).observe_before(&frame, Some(&plain(640, 480, WALL))).unwrap();
+    for (known, (a, b)) in features().iter().zip(reference.iter().zip(seen.features)) {
+        assert!((a - b).abs() <= 0.05 * a.abs().max(1.0), "{}: {a} and {b}", known.name);
+    }
+}
+
+#[test]
+fn a_hand_before_an_overexposed_wall_is_still_a_hand() {
+    let mut frame = plain(640, 480, [255; 3]);
+    draw_hand(&mut frame, (320, 288), 60, 3, [200, 240, 255]);
+    assert_eq!(feature(&shape(&frame), "fingers_at_1.9"), 3.0);
+}
+
+#[test]
+fn a_camera_that_is_not_as_its_model_says_is_noted_and_seen_all_the_same() {
+    let camera = CameraModel::parrot();
+    let mut eyes =
+        Perception::for_camera(FeatureSet::Shape, HandConfig::default(), LayerConfig::ALL, &camera).unwrap();
+    assert!(eyes.observe(&hand(640, 360, 3, SKIN)).is_ok());
+    assert_eq!(eyes.mismatch(), None);
+    let seen = eyes.observe(&hand(640, 480, 3, SKIN)).unwrap();
+    assert_eq!(feature(&seen.features, "fingers_at_1.9"), 3.0);
+    let mismatch = eyes.mismatch().unwrap().to_string();
+    assert!(mismatch.contains("640×360") && mismatch.contains("640×480"), "{mismatch}");
+}
+
+#[test]
+fn each_stage_off_is_a_pipeline_that_works_where_nothing_needs_it() {
+    let camera = CameraModel::laptop();
+    for layer in [
+        LayerConfig { geometry: false, ..LayerConfig::ALL },
+        LayerConfig { colour: false, ..LayerConfig::ALL },
+        LayerConfig { resolution: false, ..LayerConfig::ALL },
+        LayerConfig { time: false, ..LayerConfig::ALL },
+        LayerConfig::NONE,
+    ] {
+        let mut eyes =
+            Perception::for_camera(FeatureSet::Shape, HandConfig::default(), layer, &camera).unwrap();
+        let seen = eyes.observe(&hand(640, 480, 3, GLOVE)).unwrap();
+        assert_eq!(feature(&seen.features, "fingers_at_1.9"), 3.0, "{layer:?}");
+        assert_eq!(eyes.layer(), layer);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
