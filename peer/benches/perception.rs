@@ -22,10 +22,13 @@ fn main() {
 }
 
 fn frame() -> Mat {
+    scene(Some(4))
+}
+
+fn scene(gesture: Option<u8>) -> Mat {
     let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)
         .expect("the preset is a valid camera");
-    let scene = Scene { gesture: Some(4), seed: 3 };
-    source.next_frame(Duration::ZERO, &scene).expect("a hand of 4 fingers can be drawn").image
+    source.next_frame(Duration::ZERO, &Scene { gesture, seed: 3 }).expect("0 to 5 fingers can be drawn").image
 }
 
 fn observe(bencher: Bencher<'_, '_>, set: FeatureSet) {
@@ -42,6 +45,16 @@ fn observe_shape(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn observe_hog(bencher: Bencher<'_, '_>) {
     observe(bencher, FeatureSet::Hog);
+}
+
+#[divan::bench]
+fn observe_shape_in_a_room_known_empty(bencher: Bencher<'_, '_>) {
+    let (frame, room) = (frame(), scene(None));
+    let mut perception =
+        Perception::new(FeatureSet::Shape, HandConfig::default()).expect("the defaults are valid");
+    bencher.bench_local(|| {
+        perception.observe_before(black_box(&frame), Some(&room)).expect("the frame shows a hand")
+    });
 }
 
 #[divan::bench(args = ["shape", "hog"])]

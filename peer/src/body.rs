@@ -1,6 +1,7 @@
 //! A whole robot: a link to the swarm, and an eye.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::CameraState;
 use gestalt_strategies::Classify;
@@ -40,7 +41,10 @@ impl Body {
     /// See [`BodyError`].
     pub async fn start(config: &Config, model: Option<RobotModel>, boot: u32) -> Result<Self, BodyError> {
         let eye = match &model {
-            Some(model) => Eye::open(&config.camera, model, config.robot.id)?,
+            Some(model) => {
+                let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                Eye::open(&config.camera, model, config.robot.id, clock)?
+            }
             None => None,
         };
         let learning = model.as_ref().and_then(|model| learning(&config.learning, model));
@@ -119,9 +123,9 @@ fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearni
 /// A boot number for a robot that keeps no count of its starts: tenths of a second since 2026, which grows from
 /// start to start as long as the clock does, and lasts for thirteen years.
 #[must_use]
-pub fn boot_number(now: std::time::SystemTime) -> u32 {
+pub fn boot_number(now: SystemTime) -> u32 {
     const YEAR_2026: u64 = 1_767_225_600;
-    let since_1970 = now.duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let since_1970 = now.duration_since(UNIX_EPOCH).unwrap_or_default();
     let tenths = since_1970.as_millis() / 100;
     tenths.saturating_sub(u128::from(YEAR_2026) * 10).try_into().unwrap_or(u32::MAX)
 }

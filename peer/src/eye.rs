@@ -1,7 +1,7 @@
-//! A robot's eye: frames in, observations out, while a round is open.
+//! A robot's eye: frames in, observations out, while a round is open; all the time where motion is watched.
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{CameraState, ClassId, RobotId, RoundId};
 use gestalt_strategies::Classify;
@@ -9,14 +9,19 @@ use opencv::core::Mat;
 use thiserror::Error;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
+use tokio::time::MissedTickBehavior;
 
+use crate::camera_report::{self, CameraReport};
 use crate::config::{CameraSection, SourceSection};
 use crate::human::Human;
 use crate::link::{Event, Robot};
 use crate::model::RobotModel;
 use crate::perception::PerceptionError;
 use crate::sight::{Sight, Taken};
-use crate::source::{Glove, ImageFolder, RenderedSource, Source, SourceError, Video};
+use crate::source::{
+    Device, Frame, Glove, ImageFolder, Opener, Reader, RenderedSource, Scene, ScheduledSource, Source,
+    SourceError, Video,
+};
 use crate::stream::{Inlet, StreamSource};
 
 /// Why an eye cannot open.
@@ -32,10 +37,19 @@ pub enum EyeError {
 
 /// An open eye.
 pub struct Eye {
-    source: Box<dyn Source>,
+    /// `None`: a device that is not there yet.
+    source: Option<Box<dyn Source>>,
+    open: Opener,
+    describe: String,
+    /// Whether it looks also while no round is open.
+    watches: bool,
+    live: bool,
     sight: Sight,
     human: Human,
+    /// Where its frames come in, if they come from another machine.
     inlet: Option<Arc<Inlet>>,
+    /// The zero of its time.
+    zero: Instant,
 }
 
 /// A frame, and what perception made of it.
@@ -65,34 +79,9 @@ pub fn likeliest(probabilities: &[f64]) -> Option<(ClassId, f64)> {
     by_class.max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
-/// Opens the source of frames at this robot that a configuration describes, and says who stands before a rendered one;
-/// `None` for a robot without a camera, or with one that is somewhere else.
-///
-/// # Errors
-/// See [`SourceError`].
-pub fn open_source(
-    camera: &CameraSection,
-    robot: RobotId,
-) -> Result<Option<(Box<dyn Source>, Human)>, SourceError> {
-    let properties = camera.model.properties();
-    let period = properties.period();
-    let mut human = Human::new(0);
-    let source: Box<dyn Source> = match &camera.source {
-        SourceSection::None | SourceSection::Stream(_) => return Ok(None),
-        SourceSection::Rendered(rendered) => {
-            human = Human::new(rendered.seed);
-            // Every robot has a noise of its own, of the same scene.
-            let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
-            Box::new(RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?)
-        }
-        SourceSection::Images(files) => Box::new(ImageFolder::open(&files.path, period, files.repeat)?),
-        SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
-    };
-    Ok(Some((source, human)))
-}
-
 impl Eye {
-    /// Opens the eye a configuration describes; `None` for a robot without one.
+    /// Opens the eye a configuration describes; `None` for a robot without one. A device that is not there is no error: it is
+    /// tried again and again. `clock` is the time since 1970 now, for a human who goes by it.
     ///
     /// # Errors
     /// See [`EyeError`].
@@ -100,20 +89,36 @@ impl Eye {
         camera: &CameraSection,
         model: &RobotModel,
         robot: RobotId,
+        clock: Duration,
     ) -> Result<Option<Self>, EyeError> {
-        let (source, human, inlet): (Box<dyn Source>, _, _) = match &camera.source {
-            SourceSection::Stream(stream) => {
-                let inlet = Inlet::new(stream.robot.unwrap_or(robot));
-                let period = camera.model.properties().period();
-                (Box::new(StreamSource::new(inlet.clone(), period)), Human::new(0), Some(inlet))
+        if matches!(camera.source, SourceSection::None) {
+            return Ok(None);
+        }
+        let inlet = match &camera.source {
+            SourceSection::Stream(stream) => Some(Inlet::new(stream.robot.unwrap_or(robot))),
+            _ => None,
+        };
+        let (section, frames_from) = (camera.clone(), inlet.clone());
+        let zero = Instant::now();
+        let mut open: Opener = Box::new(move || match &frames_from {
+            Some(inlet) => {
+                let period = section.model.properties().period();
+                Ok(Box::new(StreamSource::new(inlet.clone(), period)) as Box<dyn Source>)
             }
-            _ => match open_source(camera, robot)? {
-                Some((source, human)) => (source, human, None),
-                None => return Ok(None),
-            },
+            None => open_source(&section, robot, clock),
+        });
+        let (source, describe, live) = match &camera.source {
+            // A driver may hang: it is opened where it keeps nobody.
+            SourceSection::Device(device) => (None, format!("device {}", device.path.display()), true),
+            _ => {
+                let source = open()?;
+                let (describe, live) = (source.describe(), source.is_live());
+                (Some(source), describe, live)
+            }
         };
         let sight = Sight::new(camera, model.features)?;
-        Ok(Some(Self { source, sight, human, inlet }))
+        let (watches, human) = (camera.motion.enabled, human_before(camera));
+        Ok(Some(Self { source, open, describe, watches, live, sight, human, inlet, zero }))
     }
 
     /// Where its frames come in, if they come from another machine: to be opened at the robot's session.
@@ -125,78 +130,175 @@ impl Eye {
     /// What it looks through, in words.
     #[must_use]
     pub fn describe(&self) -> String {
-        self.source.describe()
-    }
-
-    /// Takes one look. `seen` receives the frame.
-    fn look(
-        &mut self,
-        now: Duration,
-        round: RoundId,
-        seen: &Mutex<Option<Seen>>,
-    ) -> Result<Taken, SourceError> {
-        let frame = self.source.next_frame(now, &self.human.shows(round))?;
-        let taken = self.sight.take(&frame, true);
-        let features = match &taken.observation {
-            Some(Ok(observation)) => Some(observation.features.clone()),
-            _ => None,
-        };
-        *seen.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some(Seen { round, image: frame.image, features });
-        Ok(taken)
+        self.describe.clone()
     }
 }
 
-/// Looks while rounds are open, until the robot is gone. Frames are taken beside the robot's task, so that a slow
-/// camera never delays a vote.
+/// Who stands before the camera of a configuration, if it is a rendered one.
+#[must_use]
+pub fn human_before(camera: &CameraSection) -> Human {
+    match &camera.source {
+        SourceSection::Rendered(rendered) => Human::new(rendered.seed),
+        _ => Human::new(0),
+    }
+}
+
+/// Opens the source of frames on this machine that a configuration describes. `clock` is the time since 1970 now.
+///
+/// # Errors
+/// See [`SourceError`]; [`SourceError::Ended`] for a configuration without one.
+pub fn open_source(
+    camera: &CameraSection,
+    robot: RobotId,
+    clock: Duration,
+) -> Result<Box<dyn Source>, SourceError> {
+    let properties = camera.model.properties();
+    Ok(match &camera.source {
+        SourceSection::None | SourceSection::Stream(_) => return Err(SourceError::Ended("none".to_owned())),
+        SourceSection::Rendered(rendered) => {
+            // Every robot has a noise of its own, of the same scene.
+            let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
+            let source = RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?;
+            match rendered.schedule {
+                Some(schedule) => {
+                    Box::new(ScheduledSource::new(source, Human::new(rendered.seed), schedule, clock))
+                }
+                None => Box::new(source),
+            }
+        }
+        SourceSection::Device(device) => Box::new(Device::open(&device.path, &properties)?),
+        SourceSection::Images(files) => {
+            Box::new(ImageFolder::open(&files.path, properties.period(), files.repeat)?)
+        }
+        SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
+    })
+}
+
+/// Looks until the robot is gone. The camera has a thread of its own and judging is done beside the robot's task, so that
+/// neither delays a vote; a frame that comes while one is judged waits, and is replaced by the next.
 pub(crate) async fn look(
-    mut eye: Eye,
+    eye: Eye,
     robot: Weak<Robot>,
     mut events: Receiver<Event>,
     seen: Arc<Mutex<Option<Seen>>>,
 ) {
-    let Some(started) = robot.upgrade().map(|robot| robot.started()) else { return };
-    let period = eye.source.period();
+    let Eye { source, open, describe, watches, live, mut sight, human, zero, inlet: _inlet } = eye;
+    let reader = match Reader::start(source, open, zero) {
+        Ok(reader) => reader,
+        Err(error) => {
+            if let Some(robot) = robot.upgrade() {
+                robot.report_error(&format!("no thread for the camera: {error}"));
+            }
+            return;
+        }
+    };
+    let mut report = CameraReport::new(live);
+    let mut state = CameraState::None;
     let mut round = None;
-    let mut next = tokio::time::Instant::now();
+    if watches {
+        reader.want(Some(Scene::default()));
+    }
+    if watches || live {
+        report.expect(zero.elapsed());
+    }
+    let mut tick = tokio::time::interval(camera_report::INTERVAL);
+    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         tokio::select! {
             event = events.recv() => match event {
                 Ok(Event::Opened(opened)) => {
                     round = Some(opened);
-                    next = tokio::time::Instant::now();
+                    reader.want(Some(human.shows(opened)));
+                    report.expect(zero.elapsed());
                 }
-                Ok(Event::Closed(closed)) if round == Some(closed) => round = None,
+                Ok(Event::Closed(closed)) if round == Some(closed) => {
+                    round = None;
+                    reader.want(watches.then(Scene::default));
+                    if !(watches || live) {
+                        report.rest();
+                    }
+                }
                 Ok(_) | Err(RecvError::Lagged(_)) => {}
                 Err(RecvError::Closed) => return,
             },
-            () = tokio::time::sleep_until(next), if round.is_some() => {
-                // A camera that fell behind drops frames; it never hurries to make up for them.
-                next = tokio::time::Instant::now().max(next + period);
-                let Some(current) = round else { continue };
-                let (now, shared) = (started.elapsed(), seen.clone());
-                let looked = tokio::task::spawn_blocking(move || {
-                    let glance = eye.look(now, current, &shared);
-                    (eye, glance)
-                });
-                let Ok((returned, glance)) = looked.await else { return };
-                eye = returned;
+            frame = reader.next() => {
                 let Some(robot) = robot.upgrade() else { return };
-                match glance {
-                    Ok(taken) => taken.tell(&robot, started),
+                match frame {
+                    Ok(frame) => {
+                        let worth = report.note_frame(&frame);
+                        if !worth || (round.is_none() && !watches) {
+                            continue;
+                        }
+                        let (current, shared) = (round, seen.clone());
+                        let judged = tokio::task::spawn_blocking(move || {
+                            let taken = judge(&mut sight, frame, current, &shared);
+                            (sight, taken)
+                        });
+                        let Ok((returned, taken)) = judged.await else { return };
+                        sight = returned;
+                        let hand = taken.observation.as_ref().and_then(|seen| seen.as_ref().ok());
+                        let features = hand.map(|observation| observation.features.clone());
+                        report.note_judged(taken.at, zero.elapsed(), features);
+                        taken.tell(&robot, zero);
+                    }
                     Err(error) => {
+                        report.note_error(&error);
                         robot.count("frames_failed");
                         robot.report_error(&error.to_string());
-                        if matches!(error, SourceError::Ended(_)) {
-                            robot.update_camera(|camera| {
-                                camera.state = CameraState::Ended;
-                                camera.trouble = error.to_string();
-                            });
-                            return;
-                        }
                     }
                 }
+                keep_status(&mut report, &mut state, &robot, &sight, &describe, zero);
+            }
+            _ = tick.tick() => {
+                let Some(robot) = robot.upgrade() else { return };
+                keep_status(&mut report, &mut state, &robot, &sight, &describe, zero);
             }
         }
     }
+}
+
+/// Takes one look. `seen` receives the frame of a round.
+fn judge(sight: &mut Sight, frame: Frame, round: Option<RoundId>, seen: &Mutex<Option<Seen>>) -> Taken {
+    let taken = sight.take(&frame, round.is_some());
+    if let (Some(round), Some(observation)) = (round, &taken.observation) {
+        let features = observation.as_ref().ok().map(|observation| observation.features.clone());
+        *seen.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(Seen { round, image: frame.image, features });
+    }
+    taken
+}
+
+/// Writes to the robot's status what there is to say of its camera, when it is time to.
+fn keep_status(
+    report: &mut CameraReport,
+    state: &mut CameraState,
+    robot: &Robot,
+    sight: &Sight,
+    source: &str,
+    zero: Instant,
+) {
+    let now = zero.elapsed();
+    if !report.is_due(now) {
+        return;
+    }
+    let classifier = robot.classifier();
+    let mut camera = report.write(now, source, sight.motion(), classifier.as_deref());
+    if let Some(opinion) = &mut camera.opinion {
+        // The eye was open before the robot started.
+        let before = robot.started().saturating_duration_since(zero).as_millis();
+        opinion.at_ms = opinion.at_ms.saturating_sub(u64::try_from(before).unwrap_or(u64::MAX));
+    }
+    let blind = |state| matches!(state, CameraState::Frozen | CameraState::Failing | CameraState::Ended);
+    if blind(camera.state) != blind(*state) {
+        robot.blind(blind(camera.state));
+    }
+    // What came over a camera is told once, and stays among the errors when it is over.
+    if camera.state != *state {
+        robot.blind(!matches!(camera.state, CameraState::Live | CameraState::Opening));
+    }
+    if camera.state != *state && camera.state == CameraState::Frozen {
+        robot.report_error(&camera.trouble);
+    }
+    *state = camera.state;
+    robot.update_camera(|before| *before = camera);
 }

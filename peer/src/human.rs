@@ -1,10 +1,19 @@
-//! The human before rendered cameras: what they show, round by round.
+//! The human before rendered cameras: what they show, round by round or by the clock.
+
+use std::time::Duration;
 
 use gestalt_protocol::RoundId;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+pub use crate::config::Schedule;
 use crate::source::Scene;
+
+/// How long the hand takes to come into its place, and to leave it.
+const MOVE: Duration = Schedule::MOVE;
+
+/// From how far away the hand comes, in metres: no camera before it sees that far.
+const AWAY_M: f32 = 1.8;
 
 /// A human who shows a gesture of 0 to 5 fingers in every round. All robots that are told the same seed see the
 /// same human, wherever they run: what is shown follows from the seed and the round's counter alone.
@@ -27,6 +36,36 @@ impl Human {
         chance.set_stream(u64::from(round.counter));
         Scene { gesture: Some(chance.random_range(0..=5)), seed: chance.random() }
     }
+
+    /// What they show at that time since 1970, and how far their hand is from its place, in metres. In every period there is
+    /// nobody first; then the hand comes, holds still, and leaves as the period ends.
+    #[must_use]
+    pub fn shows_at(&self, clock: Duration, schedule: &Schedule) -> (Scene, f32) {
+        let (number, into) = schedule.divide(clock);
+        let nobody = schedule.nobody();
+        let Some(seen) = into.checked_sub(nobody) else {
+            return (Scene { gesture: None, seed: 0 }, 0.0);
+        };
+        let part = |passed: Duration| passed.as_secs_f32() / MOVE.as_secs_f32();
+        let away_m = if seen < MOVE {
+            AWAY_M * (1.0 - part(seen))
+        } else {
+            AWAY_M * part(seen.saturating_sub(MOVE + schedule.still))
+        };
+        let mut chance = ChaCha8Rng::seed_from_u64(self.seed);
+        chance.set_stream(number);
+        (Scene { gesture: Some(chance.random_range(0..=5)), seed: chance.random() }, away_m)
+    }
+
+    /// The gesture of the showing to which a robot's round at that time since 1970 belongs: the last one that was in its
+    /// place by then.
+    #[must_use]
+    pub fn last_shown(&self, clock: Duration, schedule: &Schedule) -> Option<u8> {
+        let (_, into) = schedule.divide(clock);
+        let back = if into >= schedule.nobody() { Duration::ZERO } else { into + Duration::from_millis(1) };
+        let at = clock.checked_sub(back)?;
+        self.shows_at(at, schedule).0.gesture
+    }
 }
 
 #[cfg(test)]
@@ -44,6 +83,23 @@ mod tests {
     #[test]
     fn robots_that_disagree_about_the_opener_see_the_same_hand() {
         assert_eq!(Human::new(3).shows(round(7, 1)), Human::new(3).shows(round(7, 2)));
+    }
+
+    #[test]
+    fn by_the_clock_a_hand_comes_holds_still_and_leaves() {
+        let schedule = Schedule { period: Duration::from_secs(6), still: Duration::from_millis(2500) };
+        let human = Human::new(3);
+        let at = |ms: u64| human.shows_at(Duration::from_millis(6_000_000 + ms), &schedule);
+        assert_eq!(at(0), (Scene { gesture: None, seed: 0 }, 0.0));
+        let (scene, far) = at(2600);
+        assert!(scene.gesture.is_some() && far > 1.0);
+        assert_eq!(at(3000), (scene, 0.0));
+        assert_eq!(at(5400), (scene, 0.0));
+        assert!(at(5900).1 > 1.0 && at(5900).0 == scene);
+        assert_eq!(at(6000).0.gesture, None);
+        let last = |ms: u64| human.last_shown(Duration::from_millis(6_000_000 + ms), &schedule);
+        assert_eq!((last(3500), last(6000), last(8000)), (scene.gesture, scene.gesture, scene.gesture));
+        assert_ne!(at(9100).0.seed, scene.seed);
     }
 
     #[test]

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! [`link::Robot`] is a robot without eyes, for a controller with a camera of its own; [`body::Body`] is a robot with one,
-//! from a [`config::Config`]. [`link::Client`] watches a swarm without being part of it. The verbs of the binary
+//! from a [`config::Config`]. Cameras without a computer stream ([`stream::Sender`]) to a fusion centre ([`center::Center`]).
+//! [`link::Client`] watches a swarm without being part of it. The verbs of the binary
 //! `gestalt` are in [`cli`].
 //!
 //! OpenCV sits behind the feature `opencv` (on by default): without it, swarms can be watched, instructed and
@@ -15,6 +16,8 @@
 #[cfg(feature = "opencv")]
 pub mod body;
 pub mod camera_model;
+#[cfg(feature = "opencv")]
+pub mod camera_report;
 #[cfg(feature = "opencv")]
 pub mod center;
 pub mod cli;
@@ -34,6 +37,8 @@ pub mod memory;
 #[cfg(feature = "opencv")]
 pub mod model;
 pub mod model_file;
+#[cfg(feature = "opencv")]
+pub mod motion;
 #[cfg(feature = "opencv")]
 pub mod perception;
 #[cfg(feature = "opencv")]

@@ -14,6 +14,7 @@ use gestalt_peer::source::rendered::{LabelledFrame, TrainingFrames};
 use gestalt_peer::source::{Glove, RenderedSource, Scene, Source};
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classifier, Classify, Sample, TrainOptions, Vocabulary, train};
+use opencv::core::Mat;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -165,8 +166,8 @@ fn ratio(layer: LayerConfig, scenes: u64) -> (f64, usize) {
                 })
                 .collect::<Vec<_>>()
         });
-        for k in 0..6 {
-            match (&views[0][k], &views[1][k]) {
+        for pair in views[0].iter().zip(&views[1]) {
+            match pair {
                 (Some(a), Some(b)) => between_cameras.push(distance(a, b)),
                 _ => missed += 1,
             }
@@ -196,4 +197,38 @@ fn two_cameras_differ_less_than_two_neighbouring_gestures() {
             assert!(ratio <= 0.5, "{ratio}");
         }
     }
+}
+
+/// Scenes seen by both cameras, from many poses: the frame, the same room empty, and what is shown.
+fn scenes_with_their_rooms(count: u64) -> Vec<(CameraModel, Mat, Mat, u8)> {
+    let cameras = [CameraModel::parrot(), CameraModel::footbot()];
+    let take = |seed: u64| {
+        let camera = cameras[(seed % 2) as usize].clone();
+        let (gesture, turn) = ((seed / 2 % 6) as u8, (seed * 37 % 101) as f64 - 50.0);
+        let pose = Pose { bearing_deg: turn, elevation_deg: -10.0, distance_m: 0.9 };
+        let mut source = RenderedSource::new(camera.clone(), pose, GLOVE, 900 + seed).unwrap();
+        let mut frame = |gesture| source.next_frame(Duration::ZERO, &Scene { gesture, seed }).unwrap().image;
+        let (empty, shown) = (frame(None), frame(Some(gesture)));
+        (camera, shown, empty, gesture)
+    };
+    (0..count).map(take).collect()
+}
+
+#[test]
+fn a_room_known_empty_does_no_harm() {
+    let parrot = CameraModel::parrot();
+    let classifier =
+        learn(&samples(&frames(parrot.clone(), 5, LEARNED), LayerConfig::ALL, &parrot), 5).unwrap();
+    let scenes = scenes_with_their_rooms(60 * seeds());
+    let accuracy = |with_room: bool| {
+        let sample = |(camera, frame, room, gesture): &(CameraModel, Mat, Mat, u8)| {
+            let room = with_room.then_some(room);
+            let features = eyes(LayerConfig::ALL, camera).observe_before(frame, room).ok()?.features;
+            Some(Sample { features, class: ClassId(*gesture), group: None })
+        };
+        named(&classifier, &scenes.iter().map(sample).collect::<Vec<_>>())
+    };
+    let (without, with) = (accuracy(false), accuracy(true));
+    eprintln!("{} scenes: {without:.1} % without the empty room, {with:.1} % with it", scenes.len());
+    assert!(with >= without - 1.0, "{without} without, {with} with");
 }

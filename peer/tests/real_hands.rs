@@ -115,6 +115,24 @@ fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
     let accuracy = evaluation.accuracy().unwrap().value * seen / (seen + unseen.without_hand.len() as f64);
     // scikit-learn with 30 shape features, untuned: 0.654.
     assert!(accuracy > 0.654, "{accuracy} of all images");
+
+    // The same frames before the wall known empty.
+    let wall = data("webcam-fingers/background").unwrap();
+    let mut walls: Vec<PathBuf> =
+        std::fs::read_dir(wall).unwrap().map(|entry| entry.unwrap().path()).collect();
+    walls.sort();
+    let wall = walls.iter().find_map(|path| read_image(path).ok()).unwrap();
+    let mut eyes = Perception::new(set, HandConfig::default()).unwrap();
+    let mut evaluation = Evaluation::new(5);
+    let images = Dataset::list_known(&webcam, &vocabulary).unwrap().images;
+    for image in &images {
+        if let Ok(seen) = eyes.observe_before(&read_image(&image.path).unwrap(), Some(&wall)) {
+            evaluation.record(image.class, &trained.classifier.probabilities(&seen.features).unwrap());
+        }
+    }
+    side_by_side::print("webcam, wall known", &evaluation);
+    let known = evaluation.accuracy().unwrap().value * evaluation.count() as f64 / images.len() as f64;
+    assert!(known >= accuracy - 0.01, "{known} of all images with the wall known, {accuracy} without");
 }
 
 /// What a camera may do to a picture.

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
 
@@ -32,19 +32,29 @@ impl Process {
                 command
             }
         };
-        let mut child = command
-            .arg(orders.to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the robot's process starts");
+        Self::run(command.arg(orders.to_string()))
+    }
+
+    /// Runs a program that prints a line of JSON for whatever happens; each gets the time at which it was read, `at_ms`
+    /// since 1970, if it has none.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn run(command: &mut Command) -> Self {
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("the robot's process starts");
         let stdin = child.stdin.take().expect("stdin is piped");
         let stdout = child.stdout.take().expect("stdout is piped");
         let told = Told::default();
         let teller = told.clone();
         std::thread::spawn(move || {
             for line in BufReader::new(stdout).lines().map_while(Result::ok) {
-                let Ok(value) = serde_json::from_str(&line) else { continue };
+                let Ok(mut value) = serde_json::from_str::<Value>(&line) else { continue };
+                if value["at_ms"].is_null() {
+                    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+                    value["at_ms"] = u64::try_from(now.as_millis()).unwrap_or(u64::MAX).into();
+                }
                 teller.0.lock().unwrap_or_else(PoisonError::into_inner).push(value);
                 teller.1.notify_all();
             }

@@ -70,7 +70,7 @@ impl Hands {
 }
 
 /// The configuration of a centre, from a process's orders: `{"id": 9, "swarm": "demo", "link": {…}, "serve": {"fuse":
-/// "central", "workers": 1}}`.
+/// "central", "workers": 1, "max_robots": 8}}`.
 ///
 /// # Panics
 /// When they are no orders.
@@ -90,6 +90,9 @@ pub fn center_config(orders: &Value) -> Config {
             serde_json::from_value(serve["fuse"].clone()).expect("\"fuse\": central or swarm");
     }
     config.center.workers = serve["workers"].as_u64().and_then(|workers| usize::try_from(workers).ok());
+    if let Some(most) = serve["max_robots"].as_u64().and_then(|most| usize::try_from(most).ok()) {
+        config.center.max_robots = most;
+    }
     config.center.gone_after = Duration::from_secs(4);
     config
 }
@@ -109,7 +112,7 @@ pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
         source: SourceSection::Images(FilesSection { path, repeat: true }),
         ..CameraSection::default()
     };
-    let feed = Feed::open(&camera, robot).expect("the pictures are there").expect("a camera");
+    let feed = Feed::open(&camera, robot, Duration::ZERO).expect("the pictures are there").expect("a camera");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name").to_owned();
     (SenderConfig { swarm, link, robot, camera: "parrot".to_owned(), quality: 80 }, feed)
 }

@@ -1,5 +1,6 @@
 //! Whole swarms on real Zenoh, one scenario a file. Run them one after the other: they measure time.
 
+mod cameras;
 mod center;
 mod churn;
 mod clients;
@@ -9,6 +10,8 @@ mod knowledge;
 mod learning;
 mod line;
 mod memory;
+mod mixed;
+mod motion;
 mod ring;
 mod scouting;
 mod stream;

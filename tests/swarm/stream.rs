@@ -23,9 +23,10 @@ fn model(hands: &Hands) -> RobotModel {
     RobotModel::load(&ModelSection::File(hands.model()), |_, _| {}).unwrap().unwrap()
 }
 
-async fn center(swarm: &str, hands: &Hands, workers: usize) -> Center {
+async fn center(swarm: &str, hands: &Hands, max_robots: usize) -> Center {
+    let serve = json!({"workers": 1, "max_robots": max_robots});
     let orders = json!({
-        "id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": {"workers": workers},
+        "id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": serve,
     });
     Center::start(&center_config(&orders), model(hands), boot_number(SystemTime::now())).await.unwrap()
 }
@@ -113,7 +114,7 @@ async fn a_peer_looks_through_a_camera_that_is_elsewhere() {
 async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
     let hands = Hands::new(1);
     let swarm = unique("nonsense");
-    let center = center(&swarm, &hands, 1).await;
+    let center = center(&swarm, &hands, 64).await;
     let mut zenoh = zenoh::Config::default();
     zenoh.insert_json5("mode", "\"client\"").unwrap();
     zenoh.insert_json5("connect/endpoints", &json!(center.robot().locators()).to_string()).unwrap();
@@ -175,6 +176,39 @@ async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
     center.stop().await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn who_is_there_already_and_who_comes_too_many_is_refused_and_counted() {
+    let hands = Hands::new(5);
+    let swarm = unique("crowd");
+    let center = center(&swarm, &hands, 1).await;
+    let on_board = Robot::start(config(9, &swarm, center.robot().locators())).await.unwrap();
+    let alive = |id: u32| center.robot().status().alive.contains(&RobotId(id)).then_some(());
+    wait_for("on-board robot", || alive(9)).await;
+    let stream =
+        |id: u32| tokio::spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));
+    let refused = |cause: &str| {
+        let status = center.robot().status();
+        let count = status.counters.get(&format!("refused_frame_{cause}")).copied().unwrap_or_default();
+        (count > 0 && status.errors.iter().any(|error| error.what.contains("streams, but"))).then_some(())
+    };
+    let twin = stream(9);
+    wait_for("refusal of who runs elsewhere", || refused("elsewhere")).await;
+    assert!(center.served().is_empty());
+    let first = stream(1);
+    wait_for("guest", || alive(1)).await;
+    let second = stream(2);
+    wait_for("refusal of one too many", || refused("too_many")).await;
+    assert_eq!(center.served().len(), 1);
+    // When the first has gone, there is room.
+    first.abort();
+    wait_for("second guest", || alive(2)).await;
+    assert!(alive(1).is_none(), "{:?}", center.robot().status().alive);
+    twin.abort();
+    second.abort();
+    on_board.stop().await;
+    center.stop().await;
+}
+
 /// Memory of this process, in MB.
 fn resident() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -187,7 +221,7 @@ async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
     const PARROTS: u32 = 14;
     let hands = Hands::new(3);
     let swarm = unique("slow");
-    let center = center(&swarm, &hands, 1).await;
+    let center = center(&swarm, &hands, 64).await;
     let mut streaming = tokio::task::JoinSet::new();
     for id in 1..=PARROTS {
         streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));

@@ -207,6 +207,10 @@ mod tests {
         desk
     }
 
+    fn put(desk: &Desk<Blind, u32>, robot: u32, frame: u32) {
+        assert!(matches!(desk.put(RobotId(robot), frame), Put::Waits));
+    }
+
     /// Takes one frame; says whose, and who was granted the next.
     fn take(desk: &Desk<Blind, u32>) -> (u32, u32, Vec<u32>) {
         let granted = RefCell::new(Vec::new());
@@ -218,8 +222,8 @@ mod tests {
     #[test]
     fn the_newest_frame_replaces_the_one_before() {
         let desk = desk(1, 4);
-        desk.put(RobotId(0), 1);
-        desk.put(RobotId(0), 2);
+        put(&desk, 0, 1);
+        put(&desk, 0, 2);
         assert_eq!(take(&desk), (0, 2, vec![0]));
         assert_eq!(desk.count(RobotId(0)), Count { received: 2, overwritten: 1 });
         assert!(matches!(desk.put(RobotId(9), 3), Put::Unknown(3)));
@@ -231,7 +235,7 @@ mod tests {
         let mut order = Vec::new();
         // All have a frame waiting all the time, the last one most of all.
         for frame in 0..6 {
-            (0..3).rev().for_each(|robot| drop(desk.put(RobotId(robot), frame)));
+            (0..3).rev().for_each(|robot| put(&desk, robot, frame));
             order.push(take(&desk).0);
         }
         assert_eq!(order, [0, 1, 2, 0, 1, 2]);
@@ -240,10 +244,10 @@ mod tests {
     #[test]
     fn frames_of_one_robot_are_looked_at_one_by_one() {
         let desk = desk(2, 4);
-        desk.put(RobotId(0), 1);
+        put(&desk, 0, 1);
         let (busy, ..) = desk.next(|_, _| {}).unwrap();
-        desk.put(RobotId(0), 2);
-        desk.put(RobotId(1), 3);
+        put(&desk, 0, 2);
+        put(&desk, 1, 3);
         assert_eq!(take(&desk).0, 1, "0 waits for its own");
         desk.done(busy);
         assert_eq!(take(&desk).0, 0);
@@ -252,12 +256,12 @@ mod tests {
     #[test]
     fn when_frames_wait_cameras_wait_for_their_turn_to_send() {
         let desk = desk(5, 2);
-        (0..5).for_each(|robot| drop(desk.put(RobotId(robot), 1)));
+        (0..5).for_each(|robot| put(&desk, robot, 1));
         assert_eq!(take(&desk), (0, 1, vec![]), "four others wait");
         assert_eq!(take(&desk), (1, 1, vec![]));
         assert_eq!(take(&desk), (2, 1, vec![]));
         assert_eq!(take(&desk), (3, 1, vec![0]), "one waits, one more may");
-        desk.put(RobotId(0), 2);
+        put(&desk, 0, 2);
         assert_eq!(take(&desk), (4, 1, vec![1]));
         assert_eq!(take(&desk), (0, 2, vec![2, 3]));
     }
@@ -265,8 +269,10 @@ mod tests {
     #[test]
     fn nobody_is_kept_waiting_by_cameras_that_stay_silent() {
         let desk = desk(5, 1);
-        (0..5).for_each(|robot| drop(desk.put(RobotId(robot), 1)));
-        (0..5).for_each(|_| drop(take(&desk)));
+        (0..5).for_each(|robot| put(&desk, robot, 1));
+        for _ in 0..5 {
+            take(&desk);
+        }
         let granted = RefCell::new(Vec::new());
         std::thread::scope(|scope| {
             scope.spawn(|| {

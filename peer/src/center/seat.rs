@@ -98,8 +98,10 @@ impl Seat {
             self.note(&mut state, CameraState::Frozen, trouble);
         }
         let size = [state.frame.image.cols(), state.frame.image.rows()];
+        let motion = state.sight.motion();
         let opinion = state.hand.take().and_then(|(features, at)| self.opinion(&features, at));
         self.robot.update_camera(|status| {
+            status.motion = motion;
             status.opinion = opinion.or(status.opinion.take());
             status.fps = fps_served as f32;
             status.delay_ms = delay.0.as_secs_f32() * 1e3;

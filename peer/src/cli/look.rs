@@ -245,7 +245,7 @@ impl View {
     }
 
     /// The features in groups, and what their bars mean.
-    fn features(&self) -> (Vec<(String, Vec<f32>)>, (String, f32)) {
+    fn features(&self) -> (stages::Groups, stages::Scale) {
         let Ok(observation) = &self.seen else { return (Vec::new(), (String::new(), 1.0)) };
         match self.perception.feature_set() {
             FeatureSet::Shape => {

@@ -1,5 +1,7 @@
 //! `gestalt stream`: a camera whose pictures are looked at elsewhere.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
 use serde_json::json;
 
 use super::config_args::ConfigArgs;
@@ -29,7 +31,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (config, link) = args.config.streaming()?;
     let (swarm, robot) = (config.swarm.0.clone(), config.robot.id);
-    let feed = Feed::open(&config.camera, robot)?.ok_or(
+    let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let feed = Feed::open(&config.camera, robot, clock)?.ok_or(
         "there is no camera to stream from: set camera.source to rendered, images, video or a device",
     )?;
     let source = feed.describe();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{ClassId, Decision, FusionRule, Gesture, Instruction, InstructorId, RobotId, RoundId};
 use gestalt_strategies::Proportion;
@@ -15,7 +15,8 @@ use super::show::{self, line};
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::{
-    CameraSection, Config, LearnFrom, LearningSection, ModelSection, RenderedSection, SourceSection,
+    CameraSection, Config, LearnFrom, LearningSection, ModelSection, MotionConfig, RenderedSection, Schedule,
+    SourceSection,
 };
 use crate::experiment::rasterise;
 use crate::eye::likeliest;
@@ -42,7 +43,12 @@ pub struct Args {
     #[arg(long, default_value_t = 12)]
     rounds: u32,
 
-    /// The pause between a decision and the next gesture
+    /// What opens the rounds: an instructor, or motion: the human shows a gesture every six seconds, the robots see it, and
+    /// nobody tells them
+    #[arg(long, value_enum, default_value_t = By::Instructor)]
+    by: By,
+
+    /// The pause between a decision and the next gesture, by an instructor
     #[arg(long, default_value = "1s", value_parser = super::duration)]
     pause: Duration,
 
@@ -87,6 +93,16 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// What opens rounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum By {
+    Instructor,
+    Motion,
+}
+
+/// When the human shows gestures to robots that watch for motion.
+const SCHEDULE: Schedule = Schedule { period: Duration::from_secs(6), still: Duration::from_millis(2500) };
 
 fn rule(text: &str) -> Result<FusionRule, String> {
     serde_json::from_value(json!(text)).map_err(|error| error.to_string())
@@ -205,6 +221,7 @@ fn draw_curve(args: &Args, path: &Path, robots: usize, tally: &Tally) -> Result<
 /// One configuration for each robot: all around one human, listening on a free port of this machine.
 fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
     let cameras = args.robots.cameras();
+    let schedule = (args.by == By::Motion).then_some(SCHEDULE);
     let mut configs = Vec::with_capacity(cameras.len());
     for (id, (camera, pose)) in (1..).zip(cameras.iter().zip(place(cameras.len(), args.seed))) {
         let mut config = Config::default();
@@ -213,7 +230,8 @@ fn plan(args: &Args) -> Result<Vec<Config>, Failure> {
         config.swarm.0.clone_from(&args.swarm);
         config.camera = CameraSection {
             model: camera.clone(),
-            source: SourceSection::Rendered(RenderedSection { pose, seed: args.seed }),
+            source: SourceSection::Rendered(RenderedSection { pose, seed: args.seed, schedule }),
+            motion: MotionConfig { enabled: args.by == By::Motion, ..MotionConfig::default() },
             ..CameraSection::default()
         };
         config.model = ModelSection::Rendered;
@@ -287,10 +305,19 @@ async fn rounds(
     let mut tally = Tally::new(configs.iter().map(|config| config.robot.id));
     let mut most_disputed = 0;
     for _ in 0..args.rounds {
-        tokio::time::sleep(args.pause).await;
-        let announcement = next_decision(client, news).await?;
+        let announcement = match args.by {
+            By::Instructor => {
+                tokio::time::sleep(args.pause).await;
+                next_decision(client, news).await?
+            }
+            By::Motion => next_shown(news).await?,
+        };
         let decision = &announcement.decision;
-        let truth = human.shows(decision.round).gesture.map(ClassId).ok_or("the human showed nothing")?;
+        let shown = match args.by {
+            By::Instructor => human.shows(decision.round).gesture,
+            By::Motion => human.last_shown(opened(decision), &SCHEDULE),
+        };
+        let truth = shown.map(ClassId).ok_or("the human showed nothing")?;
         tally.record(truth, decision);
         // The others hold it a moment after the first; what was not held by then is said to be so.
         tokio::time::sleep(Duration::from_millis(300)).await;
@@ -339,6 +366,25 @@ async fn next_decision(client: &Client, news: &mut News) -> Result<Announcement,
     let before = news.newest();
     let decided = super::open_round(client, news, &instructor, before, PATIENCE).await?;
     decided.ok_or_else(|| format!("no decision within {PATIENCE:?}").into())
+}
+
+/// Waits for the decision of the next round that the robots open by themselves.
+async fn next_shown(news: &mut News) -> Result<Announcement, Failure> {
+    /// Some showings, should none of the robots notice the first.
+    const PATIENCE: Duration = Duration::from_secs(30);
+    let before = news.newest();
+    match tokio::time::timeout(PATIENCE, news.decision_after(before)).await {
+        Ok(decided) => decided.ok_or_else(|| "the session has ended".into()),
+        Err(_) => Err(format!("no robot opened a round within {PATIENCE:?}").into()),
+    }
+}
+
+/// When the round of a decision that was announced just now was opened, since 1970.
+fn opened(decision: &Decision) -> Duration {
+    // Decisions are left a while to meet before one is announced.
+    const SETTLED: Duration = Duration::from_millis(300);
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    now.saturating_sub(SETTLED + Duration::from_millis(decision.certificate.elapsed_ms.into()))
 }
 
 /// Says what the gesture was, and waits until that is learned.

@@ -135,7 +135,7 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
         if let Some(error) = status.errors.last() {
             words.push_str(&format!(", last error: {}", error.what));
         }
-        line(as_json, &serde_json::to_value(&status)?, &words)?;
+        line(as_json, &serde_json::to_value(status)?, &words)?;
     }
     Ok(())
 }

@@ -4,6 +4,8 @@ mod center;
 mod document;
 mod layer;
 mod learning;
+mod motion;
+mod schedule;
 
 use std::path::{Path, PathBuf};
 
@@ -21,6 +23,8 @@ pub use center::{CenterSection, Fuse, StreamingSection};
 pub use document::{Document, Override};
 pub use layer::LayerConfig;
 pub use learning::{LearnFrom, LearningSection};
+pub use motion::{MotionConfig, MotionConfigError};
+pub use schedule::Schedule;
 
 /// A configuration that cannot be used. Each variant names the key and the mend.
 #[derive(Debug, Error)]
@@ -126,6 +130,8 @@ pub struct CameraSection {
     pub layer: LayerConfig,
     /// Where the frames come from.
     pub source: SourceSection,
+    /// How motion before it is watched.
+    pub motion: MotionConfig,
 }
 
 /// A camera by name, or described.
@@ -152,6 +158,8 @@ pub enum SourceSection {
     None,
     /// A drawn, gloved hand.
     Rendered(RenderedSection),
+    /// A camera of this machine.
+    Device(DeviceSection),
     /// The image files of a folder, in the order of their names.
     Images(FilesSection),
     /// A video file.
@@ -177,6 +185,19 @@ pub struct RenderedSection {
     /// What the human shows in each round, and this robot's noise, follow from it. The same at all robots that
     /// look at the same human.
     pub seed: u64,
+    /// When the human shows gestures; none: in every round, from its opening to its end.
+    pub schedule: Option<Schedule>,
+}
+
+/// A camera of this machine, by V4L2.
+///
+/// It is asked for the size and rate of `camera.model`. One that is not there, is unplugged, frozen, or delivers no pictures is
+/// no reason to stop: the robot says so in its status, goes on without it, and tries again every few seconds.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceSection {
+    /// Its file, `/dev/video0`.
+    pub path: PathBuf,
 }
 
 /// Frames from the disk.
@@ -318,6 +339,16 @@ impl Config {
             ));
         }
         self.camera.model.validate("camera.model")?;
+        self.camera
+            .motion
+            .validate()
+            .map_err(|error| ConfigError::value("camera.motion", error.to_string()))?;
+        if let SourceSection::Rendered(RenderedSection { schedule: Some(schedule), .. }) = &self.camera.source
+        {
+            schedule
+                .validate()
+                .map_err(|cause| ConfigError::value("camera.source.rendered.schedule", cause))?;
+        }
         let sees = !matches!(self.camera.source, SourceSection::None);
         if sees && matches!(self.model, ModelSection::None) {
             return Err(ConfigError::value(
@@ -425,8 +456,16 @@ mod tests {
             ("{learning: {samples: {capacity: 0}}}", "learning.samples", "capacity"),
             ("{learning: {samples: {selection: 'best'}}}", "learning.samples.selection", "representativity"),
             ("{learning: {enabled: true}}", "learning.enabled", "rendered"),
+            ("{center: {max_robots: 0}}", "center.max_robots", "1..=256"),
+            ("{center: {workers: 0}}", "center.workers", "one per core"),
+            ("{center: {gone_after: '1s'}}", "center.gone_after", "frozen_after"),
+            ("{center: {fuse: 'mean'}}", "center.fuse", "central"),
+            ("{center: {robots: {'7': {camera: 'kite'}}}}", "center.robots.7.camera", "parrot"),
             ("{links: {max_links: 1}}", "links.max_links", "2..=16"),
             ("{camera: {source: {video: {path: 'x.mp4'}}}}", "model", "classifier"),
+            ("{camera: {motion: {area: 2}}}", "camera.motion", "0.0002"),
+            ("{camera: {motion: {hold: 3}}}", "camera.motion.hold", "duration"),
+            ("{camera: {source: {rendered: {schedule: {period: '2s', still: '2s'}}}}}", "schedule", "4s"),
             ("{zenoh: {transprot: {}}}", "zenoh", "transprot"),
             ("{zenoh: {id: 'a1'}}", "zenoh.id", "leave it out"),
         ] {

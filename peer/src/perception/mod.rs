@@ -66,8 +66,8 @@ impl FeatureSet {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Shape => "shape-1",
-            Self::Hog => "hog-1",
+            Self::Shape => "shape-2",
+            Self::Hog => "hog-2",
         }
     }
 
@@ -160,6 +160,9 @@ pub enum PerceptionError {
     /// No area is both large and small enough for a hand.
     #[error("minimum_area must be smaller than maximum_area")]
     Areas,
+    /// The motion detector beside it cannot be.
+    #[error(transparent)]
+    Motion(#[from] crate::motion::MotionError),
     /// OpenCV failed.
     #[error("OpenCV: {0}")]
     OpenCv(#[from] opencv::Error),

@@ -7,6 +7,12 @@ use opencv::prelude::*;
 use super::PictureError;
 use super::canvas::{AGREES, BACKGROUND, CARD, DIFFERS, MUTED, TEXT, TRACK, colour, fill, fit, write};
 
+/// Groups of features: each a name and its values.
+pub type Groups = Vec<(String, Vec<f32>)>;
+
+/// What bars show, and the value of a bar of full height.
+pub type Scale = (String, f32);
+
 /// What perception made of one frame.
 #[derive(Debug)]
 pub struct Stages<'a> {
@@ -25,10 +31,10 @@ pub struct Stages<'a> {
     pub mask: &'a Mat,
     /// Whether there is a hand, or else why not.
     pub hand: Result<String, String>,
-    /// The features by groups, each a name and its values. Empty without a hand.
-    pub features: Vec<(String, Vec<f32>)>,
-    /// What the bars of the features show, and the value of a bar of full height; negative values hang.
-    pub scale: (String, f32),
+    /// The features. Empty without a hand.
+    pub features: Groups,
+    /// What the bars of the features show; negative values hang.
+    pub scale: Scale,
     /// The label and probability (`0.0..=1.0`) of each gesture, or why there is none.
     pub opinion: Result<Vec<(String, f64)>, String>,
 }

@@ -1,8 +1,10 @@
-//! Where frames come from: drawn, read from a folder, or played from a video.
+//! Where frames come from: a camera, drawn, read from a folder, or played from a video.
 
+mod device;
 mod emulated_view;
 mod folder;
 mod image_file;
+mod reader;
 pub mod rendered;
 mod sensor;
 mod video;
@@ -18,12 +20,14 @@ use thiserror::Error;
 use crate::camera_model::CameraModelError;
 use crate::pose::PoseError;
 
+pub use device::Device;
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
 pub use image_file::{
     MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, encode_jpeg, read_image, read_jpeg,
 };
-pub use rendered::{Glove, RenderedSource};
+pub use reader::{Opener, Reader};
+pub use rendered::{Glove, RenderedSource, ScheduledSource};
 pub use sensor::Sensor;
 pub use video::Video;
 
@@ -52,6 +56,12 @@ pub trait Source: Send {
 
     /// The time between two frames.
     fn period(&self) -> Duration;
+
+    /// Whether it runs by itself, as a camera does: its next frame comes when it comes, and one that is not read in time is
+    /// lost. Others are read when it is time for their next frame.
+    fn is_live(&self) -> bool {
+        false
+    }
 
     /// The next frame, taken at `now`. Only the rendered source looks at the scene.
     ///
@@ -92,6 +102,12 @@ pub enum SourceError {
     /// Not a video that FFmpeg can decode, or one without a single whole frame.
     #[error("{} is no video that FFmpeg can decode: give an mp4, mkv or avi file", .0.display())]
     NotAVideo(PathBuf),
+    /// Not a camera that V4L2 can open, or one that is in use.
+    #[error("{} is no camera that V4L2 can open: check with v4l2-ctl --list-devices that it is one and that no other program uses it", .0.display())]
+    NotADevice(PathBuf),
+    /// A camera that is there and gives no frame.
+    #[error("{} delivers no frame: check its cable; it is opened again", .0.display())]
+    NoFrame(PathBuf),
     /// More pixels or bytes than a frame may have.
     #[error("{} is too large ({size}): the limit is {limit}; scale it down", path.display())]
     TooLarge {

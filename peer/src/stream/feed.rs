@@ -7,7 +7,7 @@ use gestalt_protocol::{MAX_FRAME, RobotId, RoundId};
 use opencv::core::Mat;
 
 use crate::config::{CameraSection, SourceSection};
-use crate::eye::open_source;
+use crate::eye::{human_before, open_source};
 use crate::human::Human;
 use crate::source::{ImageFolder, Scene, Source, SourceError, read_image, read_jpeg};
 
@@ -30,15 +30,23 @@ pub enum Content {
 
 impl Feed {
     /// Opens the camera a configuration describes; `None` for a robot without one, or whose pictures come from elsewhere.
+    /// `clock` is the time since 1970 now, for a human who goes by it.
     ///
     /// # Errors
     /// See [`SourceError`].
-    pub fn open(camera: &CameraSection, robot: RobotId) -> Result<Option<Self>, SourceError> {
+    pub fn open(
+        camera: &CameraSection,
+        robot: RobotId,
+        clock: Duration,
+    ) -> Result<Option<Self>, SourceError> {
         if let SourceSection::Images(files) = &camera.source {
             let period = camera.model.properties().period();
             return Ok(Some(Self::Files(ImageFolder::open(&files.path, period, files.repeat)?)));
         }
-        Ok(open_source(camera, robot)?.map(|(source, human)| Self::Camera(source, human)))
+        if matches!(camera.source, SourceSection::None | SourceSection::Stream(_)) {
+            return Ok(None);
+        }
+        Ok(Some(Self::Camera(open_source(camera, robot, clock)?, human_before(camera))))
     }
 
     /// What it is, in words.

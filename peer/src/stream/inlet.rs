@@ -1,6 +1,5 @@
 //! The frames of one robot, received at a peer: its camera is somewhere else.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -23,20 +22,13 @@ pub struct Inlet {
     newest: Mutex<Option<FrameArrival>>,
     arrived: Condvar,
     gate: OnceLock<FrameGate>,
-    overwritten: AtomicU64,
 }
 
 impl Inlet {
     /// For the frames of that robot.
     #[must_use]
     pub fn new(robot: RobotId) -> Arc<Self> {
-        Arc::new(Self {
-            robot,
-            newest: Mutex::new(None),
-            arrived: Condvar::new(),
-            gate: OnceLock::new(),
-            overwritten: AtomicU64::new(0),
-        })
+        Arc::new(Self { robot, newest: Mutex::new(None), arrived: Condvar::new(), gate: OnceLock::new() })
     }
 
     /// Opens it at that robot's session.
@@ -57,10 +49,7 @@ impl Inlet {
     }
 
     fn put(&self, frame: FrameArrival) {
-        let before = self.newest.lock().unwrap_or_else(PoisonError::into_inner).replace(frame);
-        if before.is_some() {
-            self.overwritten.fetch_add(1, Ordering::Relaxed);
-        }
+        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(frame);
         self.arrived.notify_one();
     }
 

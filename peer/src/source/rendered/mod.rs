@@ -8,6 +8,7 @@ mod backdrop;
 mod hand;
 mod pinhole;
 mod raster;
+mod scheduled;
 mod training;
 
 use std::time::Duration;
@@ -19,9 +20,10 @@ use rand_chacha::ChaCha8Rng;
 
 pub use hand::Glove;
 pub(super) use pinhole::Pinhole;
+pub use scheduled::ScheduledSource;
 pub use training::{LabelledFrame, TrainingFrames};
 
-use hand::Hand;
+use hand::{Capsule, Hand};
 use raster::{Light, Rasterizer};
 
 use super::{Frame, Scene, Sensor, Source, SourceError};
@@ -40,6 +42,8 @@ pub struct RenderedSource {
     rasterizer: Rasterizer,
     stage: Option<Stage>,
     frame: u64,
+    /// How far the human is from their place.
+    away: Vector3<f32>,
 }
 
 /// What stays the same while a scene lasts.
@@ -73,6 +77,7 @@ impl RenderedSource {
             rasterizer: Rasterizer::default(),
             stage: None,
             frame: 0,
+            away: Vector3::zeros(),
         })
     }
 
@@ -93,6 +98,24 @@ impl RenderedSource {
         Ok(())
     }
 
+    /// Moves the human, who comes in from one side and below, to that distance from their place.
+    pub fn move_hand(&mut self, away_m: f32) {
+        let away = Vector3::new(0.6, -0.8, 0.0) * away_m;
+        if away != self.away {
+            self.away = away;
+            self.stage = None;
+        }
+    }
+
+    /// Where the human's parts are.
+    fn moved(&self, mut parts: Vec<Capsule>) -> Vec<Capsule> {
+        for part in &mut parts {
+            part.from += self.away;
+            part.to += self.away;
+        }
+        parts
+    }
+
     fn stage(&mut self, scene: &Scene) -> Result<Stage, SourceError> {
         if let Some(count @ 6..) = scene.gesture {
             return Err(SourceError::Gesture(count));
@@ -107,7 +130,8 @@ impl RenderedSource {
         let mut backdrop = self.room.clone();
         if let Some(hand) = &hand {
             let pinhole = Pinhole::new(&self.pose, &self.camera, aim, roll);
-            self.rasterizer.draw(&mut backdrop, &hand.body(), &pinhole, &light)?;
+            let body = self.moved(hand.body());
+            self.rasterizer.draw(&mut backdrop, &body, &pinhole, &light)?;
         }
         Ok(Stage { scene: *scene, hand, backdrop, light, aim, roll })
     }
@@ -136,7 +160,8 @@ impl Source for RenderedSource {
             let shake = 0.004 * self.pose.distance_m as f32;
             let aim = stage.aim + Vector3::from_fn(|_, _| rng.random_range(-shake..shake));
             let pinhole = Pinhole::new(&self.pose, &self.camera, aim, stage.roll);
-            self.rasterizer.draw(&mut picture, &hand.capsules(seconds), &pinhole, &stage.light)?;
+            let parts = self.moved(hand.capsules(seconds));
+            self.rasterizer.draw(&mut picture, &parts, &pinhole, &stage.light)?;
         }
         self.stage = Some(stage);
         Ok(Frame { image: self.sensor.expose(&picture, rng)?, at: now })

@@ -1,0 +1,96 @@
+//! A frame, reduced to what motion is looked for in.
+
+use std::time::Duration;
+
+use opencv::core::{self, Mat, Point, Size};
+use opencv::imgproc;
+use opencv::prelude::*;
+
+use super::MotionError;
+
+/// Views are the largest images of their frame's aspect ratio within this.
+const LIMIT: Size = Size { width: 160, height: 120 };
+
+/// The smallest frame that can be watched.
+const SMALLEST: i32 = 16;
+
+/// A small, smooth picture of a frame.
+#[derive(Clone, Default)]
+pub(super) struct View {
+    pub at: Duration,
+    pub picture: Mat,
+    /// The least and the greatest value around each pixel, up to `reach` pixels away: what it may become when things tremble
+    /// by as much. Found when they are asked for.
+    pub least: Mat,
+    pub greatest: Mat,
+    reach: Option<i32>,
+    halved: [Mat; 2],
+    reduced: Mat,
+}
+
+impl View {
+    /// The view of a frame, in the buffers of a view that is no longer needed.
+    pub fn of(bgr: &Mat, at: Duration, buffers: Self) -> Result<Self, MotionError> {
+        let (width, height) = (bgr.cols(), bgr.rows());
+        if width.min(height) < SMALLEST || bgr.typ() != core::CV_8UC3 {
+            return Err(MotionError::Frame { width, height, channels: bgr.channels() });
+        }
+        let mut view = Self { at, reach: None, ..buffers };
+        view.reduce(bgr)?;
+        // Averages out codec noise and what noise the reduction has left.
+        let anchor = Point::new(-1, -1);
+        let border = core::BORDER_REPLICATE;
+        imgproc::blur(&view.reduced, &mut view.picture, Size::new(3, 3), anchor, border)?;
+        Ok(view)
+    }
+
+    /// Whether two views can be compared.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.picture.size().ok() == other.picture.size().ok()
+    }
+
+    /// Allows for things that tremble by that many pixels.
+    pub fn allow(&mut self, reach: i32) -> opencv::Result<()> {
+        if self.reach == Some(reach) {
+            return Ok(());
+        }
+        let side = 2 * reach + 1;
+        let square = imgproc::get_structuring_element_def(imgproc::MORPH_RECT, Size::new(side, side))?;
+        let (anchor, border) = (Point::new(-1, -1), core::BORDER_REPLICATE);
+        let value = imgproc::morphology_default_border_value()?;
+        imgproc::erode(&self.picture, &mut self.least, &square, anchor, 1, border, value)?;
+        imgproc::dilate(&self.picture, &mut self.greatest, &square, anchor, 1, border, value)?;
+        self.reach = Some(reach);
+        Ok(())
+    }
+
+    /// Its picture has changed.
+    pub fn renew(&mut self, at: Duration) {
+        self.at = at;
+        self.reach = None;
+    }
+
+    /// Reduces by area, so that no pixel of the frame is lost; by halves first, which is several times as fast.
+    fn reduce(&mut self, bgr: &Mat) -> opencv::Result<()> {
+        let fit = |frame: Size| {
+            let scale = (f64::from(LIMIT.width) / f64::from(frame.width))
+                .min(f64::from(LIMIT.height) / f64::from(frame.height))
+                .min(1.0);
+            let side = |length: i32| ((f64::from(length) * scale).round() as i32).max(1);
+            Size::new(side(frame.width), side(frame.height))
+        };
+        let target = fit(bgr.size()?);
+        let [even, odd] = &mut self.halved;
+        let mut source: &Mat = bgr;
+        for buffer in [even, odd] {
+            let size = source.size()?;
+            let half = Size::new(size.width / 2, size.height / 2);
+            if half.width < target.width || half.height < target.height {
+                break;
+            }
+            imgproc::resize(source, buffer, half, 0.0, 0.0, imgproc::INTER_AREA)?;
+            source = buffer;
+        }
+        imgproc::resize(source, &mut self.reduced, target, 0.0, 0.0, imgproc::INTER_AREA)
+    }
+}
