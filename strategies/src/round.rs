@@ -191,7 +191,8 @@ impl Round {
         }
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
         // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
-        let heard_all = now >= patience || alive.iter().all(|robot| self.ballot.has_spoken(*robot));
+        let mut robots = alive.iter().chain([&me]);
+        let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
         if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
             return;
         }

@@ -32,9 +32,11 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
+/// A mind whose camera shows nothing, so that it waits for no frame of its own; it takes those it is given all the same.
 fn mind_with(me: u32, config: MindConfig) -> Mind {
     let mut mind = Mind::new(RobotId(me), 1, config).unwrap();
     mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(vocabulary()))));
+    mind.handle(ms(0), Input::Blind(true));
     mind
 }
 
@@ -290,6 +292,7 @@ fn a_vote_of_another_vocabulary_or_length_or_with_impossible_values_is_refused_a
 #[test]
 fn a_new_vocabulary_makes_the_robot_look_afresh() {
     let mut mind = mind(7);
+    mind.handle(ms(0), Input::Blind(false));
     mind.handle(ms(0), Input::Open);
     mind.handle(ms(100), saw([0.6, 0.2, 0.2]));
     let other = Vocabulary::new(["left", "right", "up"]).unwrap();
@@ -731,7 +734,6 @@ fn a_round_ends_early_when_the_hand_has_left() {
 #[test]
 fn nobody_waits_for_a_robot_that_says_it_is_blind() {
     let mut blinded = mind(2);
-    blinded.handle(ms(0), Input::Blind(true));
     let said = blinded.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
     let [theirs] = broadcast(&said)[..] else { panic!("{said:?}") };
     let mut other = mind(7);
@@ -743,4 +745,15 @@ fn nobody_waits_for_a_robot_that_says_it_is_blind() {
     let mut out = blinded.handle(ms(20), Input::Blind(false));
     out.extend(blinded.handle(ms(400), saw([0.2, 0.7, 0.1])));
     assert!(broadcast(&out).iter().any(|vote| vote.vocabulary == vocabulary().id()), "{out:?}");
+}
+
+#[test]
+fn a_robot_that_may_still_see_waits_for_itself_as_the_others_do_for_it() {
+    let mut slow = mind(7);
+    slow.handle(ms(0), Input::Blind(false));
+    slow.handle(ms(0), Input::Alive(robots([1])));
+    slow.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
+    slow.handle(ms(300), Input::Tick);
+    assert_eq!(slow.held(), None, "its own frame is due");
+    assert_eq!(holds(&slow.handle(ms(450), saw([0.9, 0.05, 0.05]))), [Some(0)]);
 }
