@@ -48,17 +48,19 @@ fn main() {
 
     let mut most = Bound::default();
     most.measure(&pictures, threads);
-    let (mut served, mut too_many) = (0, (most.looking / FPS).ceil() as u32 + 1);
-    while too_many - served > 1 {
-        let n = if served == 0 { (too_many * 3 / 4).max(1) } else { served.midpoint(too_many) };
+    // Up in steps of a quarter, then the middle of what is known to go and what is not.
+    let (mut served, mut too_many) = (0, None);
+    let mut n = ((most.looking / FPS * 0.6) as u32).max(1);
+    while too_many.is_none_or(|too_many| too_many - served > 1) {
         let seen = runtime.block_on(run(n, &model, folder.path(), MEASURED));
         let good = seen.part() >= 0.95 && seen.p99 < Duration::from_millis(100);
         println!("{n} Parrots: {seen}{}", if good { "" } else { " — too many" });
         if good {
-            served = n
+            served = n;
         } else {
-            too_many = n
+            too_many = Some(n);
         }
+        n = too_many.map_or(n + n.div_ceil(4), |too_many| served.midpoint(too_many));
         most.measure(&pictures, threads);
     }
     let frames = f64::from(served) * FPS;

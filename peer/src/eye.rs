@@ -293,9 +293,6 @@ fn keep_status(
         robot.blind(blind(camera.state));
     }
     // What came over a camera is told once, and stays among the errors when it is over.
-    if camera.state != *state {
-        robot.blind(!matches!(camera.state, CameraState::Live | CameraState::Opening));
-    }
     if camera.state != *state && camera.state == CameraState::Frozen {
         robot.report_error(&camera.trouble);
     }

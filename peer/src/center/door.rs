@@ -118,6 +118,8 @@ impl Door {
             camera.source = "stream".to_owned();
             camera.state = CameraState::Opening;
         });
+        // Nobody reads them, so none need be kept.
+        drop(robot.events());
         // Until a picture of it was seen.
         robot.blind(true);
         robot.learned(self.model.classifier.clone(), &self.model.name);

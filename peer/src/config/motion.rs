@@ -56,8 +56,8 @@ pub struct MotionConfig {
     /// camera of 2 frames per second. Default 500 ms, range 100 ms to 5 s.
     #[serde(with = "humantime_serde")]
     pub hold: Duration,
-    /// The share of the picture that must change for a movement to begin; it lasts while half of that changes. A hand 1.6 m
-    /// before a Foot-bot covers 0.01. Default 0.001, range 0.0002 to 0.2.
+    /// The share of the picture that must change for a movement to begin; it lasts while half of that changes. Between frames
+    /// more than 250 ms apart it is three times as much. A hand 1.6 m before a Foot-bot covers 0.01. Default 0.001, range 0.0002 to 0.2.
     pub area: f64,
     /// The share of the picture that must differ from the empty scene for somebody to be there. Default 0.002, range
     /// 0.0002 to 0.5.

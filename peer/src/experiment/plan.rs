@@ -269,6 +269,9 @@ mod tests {
         let mut found = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
+            if path.is_dir() {
+                continue;
+            }
             let text = std::fs::read_to_string(&path).unwrap();
             assert!(Experiment::is_one(&text), "{}", path.display());
             let experiment = Experiment::parse(&text, &path).unwrap();

@@ -42,6 +42,9 @@ const FINE: i32 = 1;
 /// Between frames that lie further apart than this, somebody who holds still sways as much as they ever do.
 const SWAY: Duration = Duration::from_millis(250);
 
+/// How much more of the picture must change between such frames.
+const SLOW: f64 = 3.0;
+
 /// Why a frame could not be watched, or a detector not be made.
 #[derive(Debug, Error)]
 pub enum MotionError {
@@ -119,9 +122,12 @@ impl MotionDetector {
         };
         let moving = self.state == MotionState::Moving;
         // A movement goes on with less than it takes to begin one. Between the frames of a slow camera, though, somebody
-        // who holds still sways as far as they ever do.
-        let fine = moving && at.saturating_sub(reference.at) <= SWAY;
-        let (reach, area) = if fine { (FINE, self.config.area / 2.0) } else { (COARSE, self.config.area) };
+        // who holds still sways as far as they ever do, and a hand that moves leaves its place altogether.
+        let (reach, area) = match (at.saturating_sub(reference.at) > SWAY, moving) {
+            (true, _) => (COARSE, SLOW * self.config.area),
+            (false, false) => (COARSE, self.config.area),
+            (false, true) => (FINE, self.config.area / 2.0),
+        };
         reference.allow(reach)?;
         let active = self.difference.share(&view, reference, self.config.noise)? > area;
         let reference = reference.at;

@@ -26,6 +26,8 @@ const SPREAD: f32 = 4.0;
 const GRAVITY: f32 = 0.8;
 /// More of the frame's edge than this is no hand's.
 const LARGEST_EDGE: f32 = 0.4;
+/// Less of the frame than this is a speck at a glance, whatever its pixels.
+const SMALLEST_SHARE: f32 = 0.0006;
 /// Room around the hand in the close view, as a share of its longer side, on each side.
 const ROOM: f32 = 0.12;
 
@@ -103,7 +105,8 @@ impl HandFinder {
         let blob = self.blobs.largest(&glance.mask, 0)?.ok_or(NoHand::TooSmall { share: 0.0 })?;
         let share = blob.area as f32 / size.area() as f32;
         let edge = edge_share(blob.contour.as_slice(), size);
-        if share < self.config.minimum_area {
+        let pixels = share * glance.frame.area() as f32;
+        if pixels < self.config.minimum_pixels || share < SMALLEST_SHARE {
             return Err(NoHand::TooSmall { share }.into());
         }
         if share > self.config.maximum_area {
@@ -113,7 +116,7 @@ impl HandFinder {
             return Err(NoHand::AlongTheEdge { share: edge }.into());
         }
         // Full marks for a hand four times as large as the smallest, and for half of the edge that is allowed.
-        let large_enough = (share / (4.0 * self.config.minimum_area)).min(1.0);
+        let large_enough = (pixels / (4.0 * self.config.minimum_pixels)).min(1.0);
         let inside = (2.0 - 2.0 * edge / LARGEST_EDGE).min(1.0);
         self.plausibility = large_enough * inside;
 

@@ -7,22 +7,4 @@
 //! | resolution (`resolution`) | blur and noise of the close view are brought to one measure | the hand is measured at the camera's own pixels |
 //! | time | evidence counts by the seconds between frames | every frame counts alike; perception only carries this |
 
-use opencv::core::Size;
-use thiserror::Error;
-
 pub use crate::config::LayerConfig;
-
-/// A camera whose frames are not those that its model promises. Perception adapts to what comes.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error(
-    "camera '{camera}' should give {}×{} pixels and gives {}×{}: adapted; correct camera.model or the camera's format",
-    expected.width, expected.height, found.width, found.height
-)]
-pub struct CameraMismatch {
-    /// The camera's name.
-    pub camera: String,
-    /// The size that its model has.
-    pub expected: Size,
-    /// The size of its frames.
-    pub found: Size,
-}

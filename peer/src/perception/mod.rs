@@ -5,9 +5,9 @@
 //! any size     160×120                                   192×192                            └─► crop ─► HOG
 //! ```
 //!
-//! The same hand gives nearly the same features whatever the camera: views of a fixed size make resolutions and
-//! distances comparable, colours are judged relative to the background of the same frame, and every feature is
-//! a ratio, an angle or a count.
+//! The same hand gives nearly the same features whatever the camera, by the stages of the `layer`: views of a fixed size
+//! make resolutions and distances comparable, colours are judged relative to the background, blur and noise are brought
+//! to one measure, and every feature is a ratio, an angle or a count.
 
 mod background;
 mod blob;
@@ -38,7 +38,7 @@ use colour::ColourModel;
 pub use features::{FEATURES, Feature, GROUPS, features};
 use frame::View;
 use hand::HandFinder;
-pub use layer::{CameraMismatch, LayerConfig};
+pub use layer::LayerConfig;
 use resolution::Resolution;
 
 /// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
@@ -106,8 +106,9 @@ pub struct HandConfig {
     /// How much the hand's colour must differ from the background's, in nats of log chromaticity; `0.01..=2.0`.
     /// An empty wall has 0.04, skin before a grey wall 0.3 to 0.7, a coloured glove 1 and more.
     pub minimum_contrast: f32,
-    /// The smallest share of the frame that a hand covers, `0.0005..=0.5`: below it, a finger is a pixel wide.
-    pub minimum_area: f32,
+    /// The fewest pixels of the camera that a hand covers, `20..=100000`: below it, a finger is two pixels wide. In pixels, not
+    /// as a share of the frame: how wide a camera sees says nothing of how well it sees a hand.
+    pub minimum_pixels: f32,
     /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to
     /// judge by.
     pub maximum_area: f32,
@@ -115,7 +116,7 @@ pub struct HandConfig {
 
 impl Default for HandConfig {
     fn default() -> Self {
-        Self { minimum_contrast: 0.12, minimum_area: 0.0015, maximum_area: 0.7 }
+        Self { minimum_contrast: 0.12, minimum_pixels: 160.0, maximum_area: 0.7 }
     }
 }
 
@@ -127,16 +128,13 @@ impl HandConfig {
     pub fn validate(&self) -> Result<(), PerceptionError> {
         let fields = [
             ("minimum_contrast", self.minimum_contrast, 0.01, 2.0),
-            ("minimum_area", self.minimum_area, 0.0005, 0.5),
+            ("minimum_pixels", self.minimum_pixels, 20.0, 100_000.0),
             ("maximum_area", self.maximum_area, 0.1, 1.0),
         ];
         for (field, value, low, high) in fields {
             if !(low..=high).contains(&value) {
                 return Err(PerceptionError::Range { field, value, low, high });
             }
-        }
-        if self.minimum_area >= self.maximum_area {
-            return Err(PerceptionError::Areas);
         }
         Ok(())
     }
@@ -157,9 +155,6 @@ pub enum PerceptionError {
         /// The largest value allowed.
         high: f32,
     },
-    /// No area is both large and small enough for a hand.
-    #[error("minimum_area must be smaller than maximum_area")]
-    Areas,
     /// The motion detector beside it cannot be.
     #[error(transparent)]
     Motion(#[from] crate::motion::MotionError),
@@ -209,7 +204,7 @@ pub enum NoHand {
         /// The contrast found, nats.
         contrast: f32,
     },
-    /// The largest blob is smaller than [`HandConfig::minimum_area`].
+    /// The largest blob is smaller than [`HandConfig::minimum_pixels`], or next to nothing of the frame.
     #[error("the largest hand-coloured blob covers {share:.4} of the frame: too small")]
     TooSmall {
         /// Its share of the frame, `0.0..=1.0`.
@@ -233,8 +228,6 @@ pub enum NoHand {
 pub struct Perception {
     set: FeatureSet,
     layer: LayerConfig,
-    camera: Option<CameraModel>,
-    mismatch: Option<CameraMismatch>,
     canvas: Mat,
     canvas_before: Mat,
     glance: View,
@@ -284,8 +277,6 @@ impl Perception {
         Ok(Self {
             set,
             layer,
-            camera: camera.cloned(),
-            mismatch: None,
             canvas: Mat::default(),
             canvas_before: Mat::default(),
             glance: View::new(Some(GLANCE)),
@@ -335,7 +326,6 @@ impl Perception {
         if let Some(background) = background {
             frame::check(background)?;
         }
-        self.compare_with_camera(bgr.size()?);
         if self.layer.geometry {
             return self.see(bgr, background, 1.0);
         }
@@ -375,23 +365,6 @@ impl Perception {
             }
         };
         Ok(Observation { features, quality: self.colours.plausibility() * hand.plausibility })
-    }
-
-    /// Notes, once, that frames are not of the size that the camera's model has.
-    fn compare_with_camera(&mut self, found: Size) {
-        let Some(camera) = &self.camera else { return };
-        let expected = Size::new(camera.width_px, camera.height_px);
-        if self.mismatch.is_none() && found != expected {
-            let mismatch = CameraMismatch { camera: camera.name.clone(), expected, found };
-            tracing::warn!("{mismatch}");
-            self.mismatch = Some(mismatch);
-        }
-    }
-
-    /// How the camera's frames differ from what its model promises, if the first that did not fit has come.
-    #[must_use]
-    pub fn mismatch(&self) -> Option<&CameraMismatch> {
-        self.mismatch.as_ref()
     }
 
     /// What the white balance of the last frame multiplies its blue, green and red channel by.
