@@ -8,6 +8,7 @@ mod motion;
 mod schedule;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use gestalt_protocol::{Keys, RobotId};
 use gestalt_strategies::MindConfig;
@@ -132,6 +133,10 @@ pub struct CameraSection {
     pub source: SourceSection,
     /// How motion before it is watched.
     pub motion: MotionConfig,
+    /// τ of this camera: how long until its view may have changed enough to count as another look. `None`: as long as
+    /// `rounds.decorrelation` says for the swarm.
+    #[serde(with = "humantime_serde")]
+    pub decorrelation: Option<Duration>,
 }
 
 /// A camera by name, or described.
@@ -295,6 +300,7 @@ impl Config {
     #[must_use]
     pub fn mind(&self) -> MindConfig {
         let mut mind = self.rounds.clone();
+        mind.decorrelation = self.camera.decorrelation.unwrap_or(mind.decorrelation);
         self.camera.layer.weigh(&mut mind);
         mind
     }
@@ -339,6 +345,9 @@ impl Config {
             ));
         }
         self.camera.model.validate("camera.model")?;
+        self.mind()
+            .validate()
+            .map_err(|error| ConfigError::value("camera.decorrelation", error.to_string()))?;
         self.camera
             .motion
             .validate()
@@ -449,6 +458,7 @@ mod tests {
             ("{rouns: {}}", "rouns", "rounds"),
             ("{rounds: {alpha: 0.7}}", "rounds", "below 0.5"),
             ("{rounds: {deadline: 5}}", "rounds.deadline", "duration"),
+            ("{camera: {decorrelation: '0s'}}", "camera.decorrelation", "above 0"),
             ("{rounds: {deadline: '5 parsecs'}}", "rounds.deadline", "unit"),
             ("{rounds: {rule: 'vote'}}", "rounds.rule", "log_pool"),
             ("{swarm: 'a/b'}", "swarm", "A-Z"),
@@ -472,6 +482,14 @@ mod tests {
             let error = config(text).unwrap_err().to_string();
             assert!(error.contains(key) && error.contains(mend), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn a_camera_may_have_a_decorrelation_time_of_its_own() {
+        let of = |text: &str| config(text).unwrap().mind().decorrelation;
+        assert_eq!(of("{rounds: {decorrelation: '700ms'}}"), Duration::from_millis(700));
+        let own = "{rounds: {decorrelation: '700ms'}, camera: {decorrelation: '2s'}}";
+        assert_eq!(of(own), Duration::from_secs(2));
     }
 
     #[test]
