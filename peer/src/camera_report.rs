@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use gestalt_protocol::{Camera, CameraState, Motion, Opinion};
+use gestalt_protocol::{Camera, CameraState, Motion};
 use gestalt_strategies::Classify;
 use opencv::core::Mat;
 use opencv::prelude::*;
 
+use crate::eye::opinion;
 use crate::source::{Frame, SourceError};
 
 /// The status is written this often at most.
@@ -164,16 +165,8 @@ impl CameraReport {
     ) -> Camera {
         self.written = Some(now);
         let (state, trouble) = self.state(now);
-        let opinion = classifier.zip(self.hand.as_ref()).and_then(|(classifier, (features, at))| {
-            let probabilities = classifier.probabilities(features).ok()?;
-            let best =
-                (0..probabilities.len()).max_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]))?;
-            Some(Opinion {
-                gesture: classifier.vocabulary().labels().get(best)?.clone(),
-                probability: probabilities[best] as f32,
-                at_ms: u64::try_from(at.as_millis()).unwrap_or(u64::MAX),
-            })
-        });
+        let seen = classifier.zip(self.hand.as_ref());
+        let opinion = seen.and_then(|(classifier, (features, at))| opinion(classifier, features, *at));
         Camera {
             source: source.to_owned(),
             state,

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, ClassId, RobotId, RoundId};
+use gestalt_protocol::{CameraState, ClassId, Opinion, RobotId, RoundId};
 use gestalt_strategies::Classify;
 use opencv::core::Mat;
 use thiserror::Error;
@@ -132,6 +132,14 @@ impl Eye {
     pub fn describe(&self) -> String {
         self.describe.clone()
     }
+}
+
+/// What a classifier takes a hand for that was seen at that time of its robot; `None` when it cannot judge it.
+pub(crate) fn opinion(classifier: &dyn Classify, features: &[f32], at: Duration) -> Option<Opinion> {
+    let (class, probability) = likeliest(&classifier.probabilities(features).ok()?)?;
+    let gesture = classifier.vocabulary().label(class)?.to_owned();
+    let at_ms = u64::try_from(at.as_millis()).unwrap_or(u64::MAX);
+    Some(Opinion { gesture, probability: probability as f32, at_ms })
 }
 
 /// Who stands before the camera of a configuration, if it is a rendered one.

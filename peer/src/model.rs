@@ -101,8 +101,6 @@ pub fn train_on_rendered(mut progress: impl FnMut(usize, usize)) -> Result<Class
     const SEED: u64 = 2026;
     let features = FeatureSet::Shape;
     let mut perception = Perception::new(features, HandConfig::default())?;
-    let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])
-        .expect("six different labels of one letter are a vocabulary");
     let mut samples = Vec::with_capacity(RENDERED_FRAMES);
     // The robots of a swarm stand within ±80°; frames without a hand to be found teach nothing.
     for frame in TrainingFrames::new(Vec::new(), Glove::default(), 80.0, SEED).take(RENDERED_FRAMES) {
@@ -116,14 +114,19 @@ pub fn train_on_rendered(mut progress: impl FnMut(usize, usize)) -> Result<Class
         }
         progress(samples.len(), RENDERED_FRAMES);
     }
+    Ok(learn_fingers(features, &samples, SEED)?)
+}
+
+/// Learns the gestures `0` to `5` from drawn hands, with the one choice of parameters that serves them.
+pub(crate) fn learn_fingers(
+    features: FeatureSet,
+    samples: &[Sample],
+    seed: u64,
+) -> Result<Classifier, TrainError> {
+    let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])
+        .expect("six different labels of one letter are a vocabulary");
     let options = TrainOptions { costs: vec![8.0], gammas: vec![1.0], ..TrainOptions::default() };
-    let trained = train(
-        features.name(),
-        &vocabulary,
-        &samples,
-        &options,
-        &mut ChaCha8Rng::seed_from_u64(SEED),
-        |_: Progress| {},
-    )?;
-    Ok(trained.classifier)
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    train(features.name(), &vocabulary, samples, &options, rng, |_: Progress| {})
+        .map(|trained| trained.classifier)
 }

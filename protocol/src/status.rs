@@ -37,6 +37,28 @@ pub struct Status {
     pub errors: Vec<Reported>,
 }
 
+impl Status {
+    /// Of a robot that has just started: no camera, no classifier, nobody known.
+    #[must_use]
+    pub fn new(robot: RobotId, name: String, boot: u32) -> Self {
+        Self {
+            robot,
+            name,
+            boot,
+            camera: Camera { source: "none".to_owned(), ..Camera::default() },
+            model: "none".to_owned(),
+            vocabulary: Vec::new(),
+            neighbours: Vec::new(),
+            alive: Vec::new(),
+            round: None,
+            open: false,
+            learning: None,
+            counters: BTreeMap::new(),
+            errors: Vec::new(),
+        }
+    }
+}
+
 /// What a robot sees with, and how that goes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Camera {

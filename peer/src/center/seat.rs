@@ -3,13 +3,13 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, Opinion, RoundId, Status};
+use gestalt_protocol::{CameraState, RoundId, Status};
 use opencv::core::Mat;
 use opencv::prelude::*;
 
 use super::desk::{Count, Look};
 use super::tally::{Lately, Tally};
-use crate::eye::likeliest;
+use crate::eye::opinion;
 use crate::link::{FrameArrival, Robot};
 use crate::sight::Sight;
 use crate::source::{Frame, decode};
@@ -99,7 +99,8 @@ impl Seat {
         }
         let size = [state.frame.image.cols(), state.frame.image.rows()];
         let motion = state.sight.motion();
-        let opinion = state.hand.take().and_then(|(features, at)| self.opinion(&features, at));
+        let seen = state.hand.take().zip(self.robot.classifier());
+        let opinion = seen.and_then(|((features, at), classifier)| opinion(&*classifier, &features, at));
         self.robot.update_camera(|status| {
             status.motion = motion;
             status.opinion = opinion.or(status.opinion.take());
@@ -119,15 +120,6 @@ impl Seat {
             self.robot.set(name, value);
         }
         silent
-    }
-
-    /// What the robot takes a hand for.
-    fn opinion(&self, features: &[f32], at: Duration) -> Option<Opinion> {
-        let classifier = self.robot.classifier()?;
-        let (class, probability) = likeliest(&classifier.probabilities(features).ok()?)?;
-        let gesture = classifier.vocabulary().label(class)?.to_owned();
-        let at_ms = u64::try_from(at.as_millis()).unwrap_or(u64::MAX);
-        Some(Opinion { gesture, probability: probability as f32, at_ms })
     }
 
     /// The robot's account of itself.

@@ -65,21 +65,7 @@ mod tests {
     use super::*;
 
     fn status(robot: u32, name: &str, camera: Camera) -> Status {
-        Status {
-            robot: RobotId(robot),
-            name: name.to_owned(),
-            boot: 1,
-            camera,
-            model: "none".to_owned(),
-            vocabulary: Vec::new(),
-            neighbours: Vec::new(),
-            alive: Vec::new(),
-            round: None,
-            open: false,
-            learning: None,
-            counters: std::collections::BTreeMap::new(),
-            errors: Vec::new(),
-        }
+        Status { camera, ..Status::new(RobotId(robot), name.to_owned(), 1) }
     }
 
     #[test]

@@ -137,26 +137,12 @@ impl Refusal {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Camera, RobotId};
+    use gestalt_protocol::RobotId;
 
     use super::*;
 
     fn account() -> Account {
-        let status = Status {
-            robot: RobotId(1),
-            name: "one".to_owned(),
-            boot: 1,
-            camera: Camera::default(),
-            model: "none".to_owned(),
-            vocabulary: Vec::new(),
-            neighbours: Vec::new(),
-            alive: Vec::new(),
-            round: None,
-            open: false,
-            learning: None,
-            counters: BTreeMap::new(),
-            errors: Vec::new(),
-        };
+        let status = Status::new(RobotId(1), "one".to_owned(), 1);
         Account::new(status, Instant::now())
     }
 

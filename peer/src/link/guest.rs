@@ -1,9 +1,9 @@
 //! A robot without a mind of its own: it sees and votes through another robot's session, and that one decides.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use gestalt_protocol::{Camera, RobotId, Status};
+use gestalt_protocol::{RobotId, Status};
 use gestalt_strategies::{Classify, Input, Voter};
 use tokio::sync::{Notify, broadcast, mpsc};
 
@@ -92,21 +92,7 @@ impl Robot {
         let departure = Departure { guest: id, guests: self.guests.clone(), host: self.commands.downgrade() };
         let voter = Voter::new(id, boot, self.rounds.clone())?;
         let vocabulary = self.account.lock().vocabulary.clone();
-        let status = Status {
-            robot: id,
-            name,
-            boot,
-            camera: Camera { source: "none".to_owned(), ..Camera::default() },
-            model: "none".to_owned(),
-            vocabulary,
-            neighbours: vec![host],
-            alive: Vec::new(),
-            round: None,
-            open: false,
-            learning: None,
-            counters: BTreeMap::new(),
-            errors: Vec::new(),
-        };
+        let status = Status { vocabulary, neighbours: vec![host], ..Status::new(id, name, boot) };
         let account = Arc::new(Account::new(status, self.started));
         let lost_links = self.lost_links.clone();
         let presence = Presence::declare(&self.session, &self.keys, id, account.clone(), lost_links)

@@ -1,6 +1,6 @@
 //! A robot of a swarm, as the program around it holds it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -116,19 +116,9 @@ impl Robot {
         let zenoh = link.to_zenoh(id, &swarm, nonce)?;
         let started = Instant::now();
         let status = Status {
-            robot: id,
-            name,
-            boot,
-            camera: Camera { source: "none".to_owned(), ..Camera::default() },
-            model: "none".to_owned(),
             vocabulary: vocabulary.as_ref().map(|v| v.labels().to_vec()).unwrap_or_default(),
-            neighbours: Vec::new(),
             alive: vec![id],
-            round: None,
-            open: false,
-            learning: None,
-            counters: BTreeMap::new(),
-            errors: Vec::new(),
+            ..Status::new(id, name, boot)
         };
         let account = Arc::new(Account::new(status, started));
         let inbox =

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{Classifier, Progress, Sample, TrainOptions, Vocabulary, train};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use gestalt_strategies::{Classifier, Sample};
 
 use super::plan::{Recognition, SwarmPlan, camera};
 use crate::camera_model::CameraModel;
 use crate::experiment::ExperimentError;
+use crate::model::learn_fingers;
 use crate::perception::{FeatureSet, HandConfig, LayerConfig, Perception};
 use crate::source::rendered::TrainingFrames;
 
@@ -68,8 +67,6 @@ fn train_one(
     mut progress: impl FnMut(usize),
 ) -> Result<Classifier, ExperimentError> {
     let models: Vec<CameraModel> = cameras.iter().map(|name| camera(name)).collect::<Result<_, _>>()?;
-    let vocabulary = Vocabulary::new((0..GESTURES).map(|fingers| fingers.to_string()))
-        .expect("six different digits are a vocabulary");
     let mut samples = Vec::with_capacity(plan.training_frames);
     let mut eyes: Vec<(String, Perception)> = Vec::new();
     for (n, frame) in
@@ -88,9 +85,6 @@ fn train_one(
         }
         progress(n + 1);
     }
-    let options = TrainOptions { costs: vec![8.0], gammas: vec![1.0], ..TrainOptions::default() };
-    let rng = &mut ChaCha8Rng::seed_from_u64(SEED);
-    let trained = train(FEATURES.name(), &vocabulary, &samples, &options, rng, |_: Progress| {})
-        .map_err(|error| ExperimentError::Setting(format!("training: {error}")))?;
-    Ok(trained.classifier)
+    learn_fingers(FEATURES, &samples, SEED)
+        .map_err(|error| ExperimentError::Setting(format!("training: {error}")))
 }
