@@ -7,7 +7,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
+use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
 use gestalt_protocol::{ClassId, RobotId};
 use gestalt_strategies::{Classify, ClassifyError, MindConfig, Observation, Vocabulary};
 use tokio::time::timeout;

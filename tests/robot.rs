@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_peer::body::boot_number;
+use gestalt_link::boot_number;
+use gestalt_link::{Client, Event, LinkConfig, Robot, RobotConfig};
 use gestalt_peer::center::Center;
 use gestalt_peer::config::ModelSection;
-use gestalt_peer::link::{Client, Event, LinkConfig, Robot, RobotConfig};
-use gestalt_peer::model::RobotModel;
 use gestalt_peer::stream::{Sender, StreamEvent};
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId, RoundId};
 use gestalt_strategies::MindConfig;
@@ -127,7 +126,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
 async fn serve(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let config = center_config(orders);
     let model = ModelSection::File(orders["serve"]["model"].as_str().expect("\"model\": a file").into());
-    let model = RobotModel::load(&model, |_, _| {}).expect("a model").expect("a model");
+    let model = gestalt_peer::model::load(&model, |_, _| {}).expect("a model").expect("a model");
     let boot = boot_number(SystemTime::now());
     let center = Center::start(&config, model, boot).await.expect("the centre starts");
     let id = config.robot.id.0;

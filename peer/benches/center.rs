@@ -5,6 +5,7 @@
 //! centre has workers decode and look in a loop, without Zenoh, and beside that, with plain OpenCV calls in the place of
 //! Gestalt's perception. A round is open all the time, so that every frame is judged and every robot votes.
 
+#[path = "../vision/benches/bare/mod.rs"]
 mod bare;
 
 use std::path::Path;
@@ -12,20 +13,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use bare::Bare;
-use gestalt_peer::body::boot_number;
-use gestalt_peer::camera_model::CameraModel;
+use gestalt_link::boot_number;
+use gestalt_link::{Client, LinkConfig};
 use gestalt_peer::center::Center;
-use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, ModelSection, SourceSection};
-use gestalt_peer::link::{Client, LinkConfig};
-use gestalt_peer::model::RobotModel;
-use gestalt_peer::perception::FeatureSet;
-use gestalt_peer::pose::Pose;
-use gestalt_peer::sight::Sight;
-use gestalt_peer::source::{
-    Frame, Glove, MAX_MEGAPIXELS, RenderedSource, Scene, Source, decode, encode_jpeg,
-};
+use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, SourceSection};
 use gestalt_peer::stream::{Feed, Sender, SenderConfig};
 use gestalt_protocol::{RobotId, Status};
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::config::{LayerConfig, MotionConfig};
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::perception::FeatureSet;
+use gestalt_vision::pose::Pose;
+use gestalt_vision::sight::{Sight, SightConfig};
+use gestalt_vision::source::{
+    Frame, Glove, MAX_MEGAPIXELS, RenderedSource, Scene, Source, decode, encode_jpeg,
+};
 use opencv::core::Mat;
 
 const FPS: f64 = 30.0;
@@ -43,7 +45,7 @@ fn main() {
     let folder = tempfile::tempdir().expect("a folder for the pictures");
     let pictures = pictures(folder.path());
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let model = RobotModel::load(&ModelSection::Rendered, |_, _| {}).expect("a model").expect("a model");
+    let model = RobotModel::rendered(|_, _| {}).expect("a model");
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().expect("a runtime");
 
     let mut most = Bound::default();
@@ -103,9 +105,13 @@ struct Bound {
 
 impl Bound {
     fn measure(&mut self, pictures: &[Vec<u8>], threads: usize) {
-        let parrot = CameraSection { model: CameraChoice::Parrot, ..CameraSection::default() };
+        let parrot = SightConfig {
+            camera: CameraModel::parrot(),
+            layer: LayerConfig::ALL,
+            motion: MotionConfig::default(),
+        };
         let looking = timed(threads, || {
-            let mut sight = Sight::new(&parrot, FeatureSet::Shape).expect("the defaults are valid");
+            let mut sight = Sight::new(parrot.clone(), FeatureSet::Shape).expect("the defaults are valid");
             let mut frame = Frame { image: Mat::default(), at: Duration::ZERO };
             let mut pictures = pictures.iter().cycle();
             move || {

@@ -10,8 +10,8 @@ use tokio::task::JoinHandle;
 
 use crate::config::{Config, LearnFrom, LearningSection};
 use crate::eye::{Eye, EyeError, Seen, look};
-use crate::link::{LinkError, Robot, RobotConfig, RobotLearning, fresh_nonce};
-use crate::model::RobotModel;
+use gestalt_link::{LinkError, Robot, RobotConfig, RobotLearning, fresh_nonce};
+use gestalt_vision::model::RobotModel;
 
 /// Why a robot cannot start.
 #[derive(Debug, Error)]
@@ -118,14 +118,4 @@ fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearni
         memory: section.memory.clone(),
         seed: section.seed,
     })
-}
-
-/// A boot number for a robot that keeps no count of its starts: tenths of a second since 2026, which grows from
-/// start to start as long as the clock does, and lasts for thirteen years.
-#[must_use]
-pub fn boot_number(now: SystemTime) -> u32 {
-    const YEAR_2026: u64 = 1_767_225_600;
-    let since_1970 = now.duration_since(UNIX_EPOCH).unwrap_or_default();
-    let tenths = since_1970.as_millis() / 100;
-    tenths.saturating_sub(u128::from(YEAR_2026) * 10).try_into().unwrap_or(u32::MAX)
 }

@@ -8,8 +8,8 @@ use gestalt_strategies::Classify;
 use opencv::core::Mat;
 use opencv::prelude::*;
 
-use crate::eye::opinion;
-use crate::source::{Frame, SourceError};
+use crate::opinion::opinion;
+use gestalt_vision::source::{Frame, SourceError};
 
 /// The status is written this often at most.
 pub const INTERVAL: Duration = Duration::from_millis(250);

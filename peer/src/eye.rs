@@ -3,8 +3,13 @@
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, ClassId, Opinion, RobotId, RoundId};
+use gestalt_link::{Event, Robot};
+use gestalt_protocol::{CameraState, RobotId, RoundId};
 use gestalt_strategies::Classify;
+use gestalt_vision::human::Human;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::sight::{Sight, SightError, Taken};
+use gestalt_vision::source::{Frame, Opener, Reader, Scene, Source, SourceError};
 use opencv::core::Mat;
 use thiserror::Error;
 use tokio::sync::broadcast::Receiver;
@@ -12,17 +17,10 @@ use tokio::sync::broadcast::error::RecvError;
 use tokio::time::MissedTickBehavior;
 
 use crate::camera_report::{self, CameraReport};
+use crate::camera_source::{human_before, open_source};
 use crate::config::{CameraSection, SourceSection};
-use crate::human::Human;
-use crate::link::{Event, Robot};
-use crate::model::RobotModel;
-use crate::perception::PerceptionError;
-use crate::sight::{Sight, Taken};
-use crate::source::{
-    Device, Frame, Glove, ImageFolder, Opener, Reader, RenderedSource, Scene, ScheduledSource, Source,
-    SourceError, Video,
-};
 use crate::stream::{Inlet, StreamSource};
+use crate::telling::tell;
 
 /// Why an eye cannot open.
 #[derive(Debug, Error)]
@@ -30,9 +28,9 @@ pub enum EyeError {
     /// Its source of frames.
     #[error("camera: {0}")]
     Source(#[from] SourceError),
-    /// Its perception.
+    /// What it sees with.
     #[error(transparent)]
-    Perception(#[from] PerceptionError),
+    Sight(#[from] SightError),
 }
 
 /// An open eye.
@@ -72,13 +70,6 @@ impl Seen {
     }
 }
 
-/// The likeliest class and its probability; `None` of no classes.
-#[must_use]
-pub fn likeliest(probabilities: &[f64]) -> Option<(ClassId, f64)> {
-    let by_class = (0..).map(ClassId).zip(probabilities.iter().copied());
-    by_class.max_by(|(_, a), (_, b)| a.total_cmp(b))
-}
-
 impl Eye {
     /// Opens the eye a configuration describes; `None` for a robot without one. A device that is not there is no error: it is
     /// tried again and again. `clock` is the time since 1970 now, for a human who goes by it.
@@ -116,7 +107,7 @@ impl Eye {
                 (Some(source), describe, live)
             }
         };
-        let sight = Sight::new(camera, model.features)?;
+        let sight = Sight::new(camera.sight(), model.features)?;
         let (watches, human) = (camera.motion.enabled, human_before(camera));
         Ok(Some(Self { source, open, describe, watches, live, sight, human, inlet, zero }))
     }
@@ -132,54 +123,6 @@ impl Eye {
     pub fn describe(&self) -> String {
         self.describe.clone()
     }
-}
-
-/// What a classifier takes a hand for that was seen at that time of its robot; `None` when it cannot judge it.
-pub(crate) fn opinion(classifier: &dyn Classify, features: &[f32], at: Duration) -> Option<Opinion> {
-    let (class, probability) = likeliest(&classifier.probabilities(features).ok()?)?;
-    let gesture = classifier.vocabulary().label(class)?.to_owned();
-    let at_ms = u64::try_from(at.as_millis()).unwrap_or(u64::MAX);
-    Some(Opinion { gesture, probability: probability as f32, at_ms })
-}
-
-/// Who stands before the camera of a configuration, if it is a rendered one.
-#[must_use]
-pub fn human_before(camera: &CameraSection) -> Human {
-    match &camera.source {
-        SourceSection::Rendered(rendered) => Human::new(rendered.seed),
-        _ => Human::new(0),
-    }
-}
-
-/// Opens the source of frames on this machine that a configuration describes. `clock` is the time since 1970 now.
-///
-/// # Errors
-/// See [`SourceError`]; [`SourceError::Ended`] for a configuration without one.
-pub fn open_source(
-    camera: &CameraSection,
-    robot: RobotId,
-    clock: Duration,
-) -> Result<Box<dyn Source>, SourceError> {
-    let properties = camera.model.properties();
-    Ok(match &camera.source {
-        SourceSection::None | SourceSection::Stream(_) => return Err(SourceError::Ended("none".to_owned())),
-        SourceSection::Rendered(rendered) => {
-            // Every robot has a noise of its own, of the same scene.
-            let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
-            let source = RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?;
-            match rendered.schedule {
-                Some(schedule) => {
-                    Box::new(ScheduledSource::new(source, Human::new(rendered.seed), schedule, clock))
-                }
-                None => Box::new(source),
-            }
-        }
-        SourceSection::Device(device) => Box::new(Device::open(&device.path, &properties)?),
-        SourceSection::Images(files) => {
-            Box::new(ImageFolder::open(&files.path, properties.period(), files.repeat)?)
-        }
-        SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
-    })
 }
 
 /// Looks until the robot is gone. The camera has a thread of its own and judging is done beside the robot's task, so that
@@ -247,7 +190,7 @@ pub(crate) async fn look(
                         let hand = taken.observation.as_ref().and_then(|seen| seen.as_ref().ok());
                         let features = hand.map(|observation| observation.features.clone());
                         report.note_judged(taken.at, zero.elapsed(), features);
-                        taken.tell(&robot, zero);
+                        tell(taken, &robot, zero);
                     }
                     Err(error) => {
                         report.note_error(&error);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_peer::link::RobotLearning;
+use gestalt_link::RobotLearning;
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
     Classify, Components, FeatureSpace, LearningConfig, MindConfig, Observation, ScalingMethod,

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
-use gestalt_peer::link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
+use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
 use gestalt_protocol::{ClassId, Decision, RobotId};
 use gestalt_strategies::{Classify, MindConfig, Observation};
 use rand_chacha::ChaCha8Rng;

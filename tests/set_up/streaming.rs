@@ -4,15 +4,15 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use gestalt_peer::camera_model::CameraModel;
-use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, ModelSection, SourceSection};
-use gestalt_peer::link::LinkConfig;
-use gestalt_peer::model::RobotModel;
+use gestalt_link::LinkConfig;
+use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, SourceSection};
 use gestalt_peer::picture::write_png;
-use gestalt_peer::pose::Pose;
-use gestalt_peer::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
 use gestalt_peer::stream::{Feed, SenderConfig};
 use gestalt_protocol::RobotId;
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::pose::Pose;
+use gestalt_vision::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
 use serde_json::{Value, json};
 
 /// A folder of pictures of one gesture, and a file with the classifier that tells it.
@@ -30,7 +30,7 @@ impl Hands {
         let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
         // The same for all scenarios of this process.
         static MODEL: OnceLock<RobotModel> = OnceLock::new();
-        let train = || RobotModel::load(&ModelSection::Rendered, |_, _| {}).ok().flatten();
+        let train = || RobotModel::rendered(|_, _| {}).ok();
         let model = MODEL.get_or_init(|| train().expect("it can be trained"));
         model.write(&hands.model()).expect("the model is written");
         std::fs::create_dir(hands.images()).expect("a folder for the pictures");

@@ -4,18 +4,18 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use gestalt_link::Event;
 use gestalt_peer::body::Body;
 use gestalt_peer::config::{
     CameraChoice, CameraSection, Config, DeviceSection, FilesSection, ModelSection, MotionConfig,
     RenderedSection, SourceSection,
 };
-use gestalt_peer::link::Event;
 use gestalt_peer::picture::write_png;
-use gestalt_peer::pose::Pose;
-use gestalt_peer::source::{Glove, RenderedSource, Scene, Source};
 use gestalt_peer::swarm::Members;
 use gestalt_protocol::{Camera, CameraState, Decision, RobotId};
 use gestalt_tests::unique;
+use gestalt_vision::pose::Pose;
+use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
 use serde_json::json;
 
 use super::motion::model;

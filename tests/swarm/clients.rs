@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use gestalt_peer::link::{Client, Decisions, Event, LinkConfig};
+use gestalt_link::{Client, Decisions, Event, LinkConfig};
 use gestalt_protocol::{ClassId, Instruction};
 use gestalt_strategies::MindConfig;
 use gestalt_tests::{Process, config, start, unique};

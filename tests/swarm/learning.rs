@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 
-use gestalt_peer::link::{Client, LinkConfig, RobotConfig};
+use gestalt_link::{Client, LinkConfig, RobotConfig};
 use gestalt_protocol::{
     ClassId, Envelope, FeatureSpaceId, Gesture, Instruction, InstructorId, Keys, Message, Outcome, RobotId,
     RoundId, SampleId, Samples, SharedSample, Stamp, Status, Topic, Vector,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use gestalt_peer::link::{Client, LinkConfig};
+use gestalt_link::{Client, LinkConfig};
 use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId};
 use gestalt_tests::{Process, unique};
 use rand_chacha::ChaCha8Rng;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_peer::human::{Human, Schedule};
 use gestalt_tests::{Process, unique};
+use gestalt_vision::human::{Human, Schedule};
 use serde_json::{Value, json};
 
 use crate::motion::model;

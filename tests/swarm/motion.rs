@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use gestalt_link::Event;
 use gestalt_peer::config::{
     CameraChoice, CameraSection, Config, ModelSection, MotionConfig, RenderedSection, Schedule, SourceSection,
 };
-use gestalt_peer::human::Human;
-use gestalt_peer::link::Event;
-use gestalt_peer::model::RobotModel;
-use gestalt_peer::pose::Pose;
 use gestalt_peer::swarm::Members;
 use gestalt_protocol::{CameraState, ClassId, RobotId, Status};
 use gestalt_tests::unique;
+use gestalt_vision::human::Human;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::pose::Pose;
 use serde_json::json;
 
 const SCHEDULE: Schedule = Schedule { period: Duration::from_secs(6), still: Duration::from_millis(2500) };
@@ -22,7 +22,7 @@ const SEED: u64 = 5;
 /// A model of drawn hands, learned once for all scenarios.
 pub fn model() -> RobotModel {
     static MODEL: OnceLock<RobotModel> = OnceLock::new();
-    let learn = || RobotModel::load(&ModelSection::Rendered, |_, _| ()).unwrap().unwrap();
+    let learn = || RobotModel::rendered(|_, _| ()).unwrap();
     MODEL.get_or_init(learn).clone()
 }
 

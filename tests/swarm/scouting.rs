@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use gestalt_peer::link::{LinkConfig, RobotConfig, Scouting};
+use gestalt_link::{LinkConfig, RobotConfig, Scouting};
 use gestalt_protocol::ClassId;
 use gestalt_strategies::MindConfig;
 use gestalt_tests::{Watched, config, start, unique};

@@ -5,22 +5,23 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use gestalt_peer::body::{Body, boot_number};
+use gestalt_link::boot_number;
+use gestalt_link::{Event, Robot};
+use gestalt_peer::body::Body;
 use gestalt_peer::center::Center;
-use gestalt_peer::config::{ModelSection, SourceSection, StreamSection};
-use gestalt_peer::link::{Event, Robot};
-use gestalt_peer::model::RobotModel;
+use gestalt_peer::config::{SourceSection, StreamSection};
 use gestalt_peer::stream::{Sender, StreamEvent};
 use gestalt_protocol::{
     CameraState, ClassId, FrameHeader, FrameTaken, ImageEncoding, Keys, RobotId, Status, Topic,
 };
 use gestalt_tests::{Hands, center_config, config, sender_config, unique};
+use gestalt_vision::model::RobotModel;
 use serde_json::json;
 
 const PATIENCE: Duration = Duration::from_secs(15);
 
 fn model(hands: &Hands) -> RobotModel {
-    RobotModel::load(&ModelSection::File(hands.model()), |_, _| {}).unwrap().unwrap()
+    RobotModel::read(&hands.model()).unwrap()
 }
 
 async fn center(swarm: &str, hands: &Hands, max_robots: usize) -> Center {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_peer::link::{LinkConfig, LinkError, Robot, RobotConfig};
+use gestalt_link::{LinkConfig, LinkError, Robot, RobotConfig};
 use gestalt_protocol::{ClassId, Keys, RobotId, Topic};
 use gestalt_strategies::MindConfig;
 use gestalt_tests::{config, start, unique};

@@ -5,7 +5,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use gestalt_protocol::{FrameTaken, RobotId, RoundId};
 
-use crate::link::FrameArrival;
+use gestalt_link::FrameArrival;
 
 /// A frame that can be acknowledged.
 pub(super) trait Acknowledge {

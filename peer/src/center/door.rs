@@ -12,12 +12,12 @@ use tokio::time::MissedTickBehavior;
 use super::Frames;
 use super::desk::Put;
 use super::seat::Seat;
-use crate::body::boot_number;
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
-use crate::link::{FrameArrival, GuestConfig, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
-use crate::model::RobotModel;
-use crate::perception::PerceptionError;
-use crate::sight::Sight;
+use gestalt_link::boot_number;
+use gestalt_link::{FrameArrival, GuestConfig, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
+use gestalt_vision::model::RobotModel;
+
+use gestalt_vision::sight::{Sight, SightError};
 
 /// Where the centre listens for the robots in its own process.
 pub(super) const LOOPBACK: &str = "tcp/127.0.0.1:0";
@@ -43,7 +43,7 @@ enum Refusal {
     #[error("robot {0}: {1}")]
     Link(RobotId, LinkError),
     #[error("robot {0}: {1}")]
-    Perception(RobotId, PerceptionError),
+    Perception(RobotId, SightError),
 }
 
 impl Refusal {
@@ -111,8 +111,8 @@ impl Door {
         let model = about.camera.or(stated).unwrap_or_else(|| self.config.camera.model.clone());
         let name = about.name.unwrap_or_else(|| format!("{}-{id}", model.properties().name));
         let camera = CameraSection { model, ..self.config.camera.clone() };
-        let sight =
-            Sight::new(&camera, self.model.features).map_err(|cause| Refusal::Perception(id, cause))?;
+        let sight = Sight::new(camera.sight(), self.model.features)
+            .map_err(|cause| Refusal::Perception(id, cause))?;
         let robot = self.start(id, name).await.map_err(|cause| Refusal::Link(id, cause))?;
         robot.update_camera(|camera| {
             camera.source = "stream".to_owned();

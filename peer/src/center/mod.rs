@@ -26,10 +26,10 @@ use thiserror::Error;
 use tokio::sync::mpsc;
 
 use crate::config::{Config, Fuse};
-use crate::link::{FrameGate, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
-use crate::model::RobotModel;
 use desk::{Desk, Put};
 use door::Door;
+use gestalt_link::{FrameGate, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
+use gestalt_vision::model::RobotModel;
 use seat::Seat;
 
 /// How many frames of robots not served yet wait at the door.
@@ -55,7 +55,7 @@ pub enum CenterError {
     Learning,
 }
 
-type Frames = Desk<Seat, crate::link::FrameArrival>;
+type Frames = Desk<Seat, gestalt_link::FrameArrival>;
 
 /// A running centre.
 pub struct Center {

@@ -9,11 +9,12 @@ use opencv::prelude::*;
 
 use super::desk::{Count, Look};
 use super::tally::{Lately, Tally};
-use crate::eye::opinion;
-use crate::link::{FrameArrival, Robot};
-use crate::sight::Sight;
-use crate::source::{Frame, decode};
+use crate::opinion::opinion;
 use crate::stream::MAX_MEGAPIXELS;
+use crate::telling::tell;
+use gestalt_link::{FrameArrival, Robot};
+use gestalt_vision::sight::Sight;
+use gestalt_vision::source::{Frame, decode};
 
 /// A robot that is served.
 pub(super) struct Seat {
@@ -67,7 +68,7 @@ impl Seat {
         if let Some(Ok(observation)) = &taken.observation {
             state.hand = Some((observation.features.clone(), taken.at));
         }
-        taken.tell(&self.robot, zero);
+        tell(taken, &self.robot, zero);
         state.judged += u64::from(judge);
         state.tally.served(age + arrival.at.elapsed());
         self.note(state, CameraState::Live, "");

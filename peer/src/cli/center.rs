@@ -10,10 +10,9 @@ use super::peer::report;
 use super::progress::bar;
 use super::show::line;
 use super::{Failure, interrupted};
-use crate::body::boot_number;
 use crate::center::Center;
 use crate::config::Fuse;
-use crate::model::RobotModel;
+use gestalt_link::boot_number;
 
 /// Runs a fusion centre until Ctrl-C: it serves every robot that streams to it.
 #[derive(Debug, clap::Args)]
@@ -42,7 +41,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut config = args.config.load()?;
     config.center.fuse = args.fuse.unwrap_or(config.center.fuse);
     let training = bar("learning", 0);
-    let model = RobotModel::load(&config.model, |done, total| {
+    let model = crate::model::load(&config.model, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::config::{Config, ConfigError, Document, ModelSection, Override};
-use crate::link::LinkConfig;
+use gestalt_link::LinkConfig;
 
 /// Which configuration, and what to change in it.
 #[derive(Clone, Debug, Default, clap::Args)]

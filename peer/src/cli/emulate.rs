@@ -9,11 +9,11 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::{Failure, progress};
-use crate::emulation::{self, Scenario, ScenarioError, Table, Trace};
+use gestalt_lab::emulation::{self, Scenario, ScenarioError, Table, Trace};
 #[cfg(feature = "opencv")]
-use crate::experiment::recognition::{self, Recognition};
+use gestalt_lab::experiment::recognition::{self, Recognition};
 #[cfg(feature = "opencv")]
-use crate::experiment::{self, Experiment, Materials, Progress};
+use gestalt_lab::experiment::{self, Experiment, Materials, Progress};
 
 /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares; or an
 /// experiment: how well swarms learn, over settings and seeds, with tables and plots.

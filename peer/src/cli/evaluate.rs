@@ -8,10 +8,10 @@ use serde_json::json;
 
 use super::train::measure;
 use super::{Failure, report, say};
-use crate::confusion;
-use crate::dataset::{Dataset, LabelledImage};
-use crate::model_file::{Model, Origin};
-use crate::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_draw::confusion;
+use gestalt_vision::dataset::{Dataset, LabelledImage};
+use gestalt_vision::model_file::{Model, Origin};
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 
 /// Measures a model on a folder of photographs. Images and people that it was trained on are left out.
 #[derive(Debug, clap::Args)]
@@ -39,7 +39,7 @@ pub struct Args {
 /// When the model or the dataset cannot be used, or nothing unseen is left to measure on.
 pub fn run(args: Args) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
-        confusion::check_name(path)?;
+        gestalt_draw::check(path)?;
     }
     let model = Model::read(&args.model)?;
     let vocabulary = model.classifier.vocabulary();

@@ -13,14 +13,16 @@ use serde_json::json;
 use super::Failure;
 use super::progress::bar;
 use super::show::line;
-use crate::camera_model::CameraModel;
 use crate::config::{CameraSection, Config, ModelSection, SourceSection};
-use crate::eye::likeliest;
-use crate::model::RobotModel;
-use crate::perception::{FeatureSet, GROUPS, HandConfig, NoObservation, Perception};
+use crate::opinion::likeliest;
 use crate::picture::{stages, writable, write_png};
-use crate::pose::Pose;
-use crate::source::{Glove, ImageFolder, RenderedSource, Scene, Source, SourceError, Video, read_image};
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::perception::{FeatureSet, GROUPS, HandConfig, NoObservation, Perception};
+use gestalt_vision::pose::Pose;
+use gestalt_vision::source::{
+    Glove, ImageFolder, RenderedSource, Scene, Source, SourceError, Video, read_image,
+};
 
 /// Shows what perception makes of one frame: raw, white-balanced, mask, hand, features, opinion
 #[derive(Debug, clap::Args)]
@@ -161,7 +163,7 @@ fn model(args: &Args, section: Option<&ModelSection>) -> Result<RobotModel, Fail
         _ => ModelSection::Rendered,
     };
     let training = bar("learning", 0);
-    let model = RobotModel::load(&section, |done, total| {
+    let model = crate::model::load(&section, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?;

@@ -34,7 +34,7 @@ use clap::{Parser, Subcommand};
 use gestalt_protocol::{Instruction, InstructorId};
 use tracing_subscriber::EnvFilter;
 
-use crate::link::{Announcement, Client, News};
+use gestalt_link::{Announcement, Client, News};
 
 /// A swarm of robots that reads hand gestures together.
 #[derive(Debug, Parser)]

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::Failure;
 use super::config_args::ConfigArgs;
 use super::show::{self, line};
-use crate::link::Client;
+use gestalt_link::Client;
 
 /// Opens a round as an instructor, and prints the swarm's decision.
 #[derive(Debug, clap::Args)]

@@ -9,9 +9,9 @@ use super::config_args::ConfigArgs;
 use super::progress::bar;
 use super::show::{self, line};
 use super::{Failure, interrupted};
-use crate::body::{Body, boot_number};
-use crate::link::Event;
-use crate::model::RobotModel;
+use crate::body::Body;
+use gestalt_link::Event;
+use gestalt_link::boot_number;
 
 /// Runs one robot until Ctrl-C.
 #[derive(Debug, clap::Args)]
@@ -35,7 +35,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let config = args.config.load()?;
     let training = bar("learning", 0);
-    let model = RobotModel::load(&config.model, |done, total| {
+    let model = crate::model::load(&config.model, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?;

@@ -4,8 +4,8 @@ use gestalt_protocol::ClassId;
 use gestalt_strategies::{Evaluation, Proportion, Vocabulary};
 use serde_json::json;
 
-use crate::confusion;
-use crate::survey::{Rejected, Survey};
+use gestalt_draw::confusion;
+use gestalt_vision::survey::{Rejected, Survey};
 
 /// The accuracy over all images that can be read: one whose hand is not found is not judged right.
 pub fn of_all(evaluation: &Evaluation, survey: &Survey) -> Option<Proportion> {

@@ -18,15 +18,14 @@ use crate::config::{
     CameraSection, Config, LearnFrom, LearningSection, ModelSection, MotionConfig, RenderedSection, Schedule,
     SourceSection,
 };
-use crate::experiment::rasterise;
-use crate::eye::likeliest;
-use crate::human::Human;
-use crate::link::{Announcement, Client, LinkConfig, News};
-use crate::model::RobotModel;
+use crate::opinion::likeliest;
 use crate::picture::{self, Panel};
-use crate::pose::place;
 use crate::swarm::{Members, Roster, Score, Tally, curve};
-use crate::topology::Topology;
+use gestalt_lab::topology::Topology;
+use gestalt_link::{Announcement, Client, LinkConfig, News};
+use gestalt_vision::human::Human;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::pose::place;
 
 /// Runs a swarm of robots with rendered cameras around one human, as real Zenoh peers.
 #[derive(Debug, clap::Args)]
@@ -122,11 +121,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         picture::writable(picture)?;
     }
     if let Some(curve) = &args.curve {
-        chart_writable(curve)?;
+        gestalt_draw::check(curve)?;
     }
     let section = args.model.clone().map_or(ModelSection::Rendered, ModelSection::File);
     let training = bar("learning", 0);
-    let model = RobotModel::load(&section, |done, total| {
+    let model = crate::model::load(&section, |done, total| {
         training.set_length(total as u64);
         training.set_position(done as u64);
     })?
@@ -179,31 +178,13 @@ async fn show_gestures(args: &Args, model: &RobotModel) -> Result<(), Failure> {
     say_score(args, &configs, &tally.score())
 }
 
-/// Whether a chart can be written there, found out before the work is done.
-fn chart_writable(path: &Path) -> Result<(), Failure> {
-    match path.extension().and_then(|extension| extension.to_str()) {
-        Some("png") => Ok(picture::writable(path)?),
-        Some("svg") => match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            Some(folder) if !folder.is_dir() => {
-                Err(format!("--curve: no folder {}", folder.display()).into())
-            }
-            _ => Ok(()),
-        },
-        _ => Err(format!("--curve {}: end its name in .svg or .png", path.display()).into()),
-    }
-}
-
 fn draw_curve(args: &Args, path: &Path, robots: usize, tally: &Tally) -> Result<(), Failure> {
     let from = match args.learn {
         Some(LearnFrom::Model) => "from a model",
         _ => "from nothing",
     };
     let svg = curve::svg(tally, &format!("{robots} robots learn {from}"))?;
-    if path.extension().is_some_and(|extension| extension == "png") {
-        picture::write_png(path, &rasterise(&svg)?)?;
-    } else {
-        std::fs::write(path, svg).map_err(|error| format!("{}: {error}", path.display()))?;
-    }
+    gestalt_draw::write(&svg, path)?;
     let (single, swarm) = curve::latest(tally);
     line(
         args.json,

@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use super::config_args::ConfigArgs;
 use super::show::{self, line};
 use super::{Failure, interrupted};
-use crate::link::{Client, News};
+use gestalt_link::{Client, News};
 
 /// Teaches a swarm what its last gesture was.
 ///

@@ -13,10 +13,10 @@ use rand_chacha::rand_core::SeedableRng;
 use serde_json::json;
 
 use super::{Failure, progress, report, say};
-use crate::dataset::{Dataset, LabelledImage};
-use crate::model_file::{Model, Origin};
-use crate::perception::{FeatureSet, HandConfig, Perception};
-use crate::survey::Survey;
+use gestalt_vision::dataset::{Dataset, LabelledImage};
+use gestalt_vision::model_file::{Model, Origin};
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::survey::Survey;
 
 /// Trains a classifier on a folder of photographs: one folder per gesture, the images in it. File names `sNNN_…` tell
 /// who shows the gesture; then cross-validation and --test-share keep people apart.

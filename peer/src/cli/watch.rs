@@ -10,7 +10,7 @@ use super::config_args::ConfigArgs;
 use super::robots::table;
 use super::show::{self, line};
 use super::{Failure, interrupted};
-use crate::link::{Client, Heard, News};
+use gestalt_link::{Client, Heard, News};
 
 /// Attaches to a swarm and prints its decisions, and robots as they come and go, until Ctrl-C.
 #[derive(Debug, clap::Args)]

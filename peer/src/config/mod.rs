@@ -2,10 +2,7 @@
 
 mod center;
 mod document;
-mod layer;
 mod learning;
-mod motion;
-mod schedule;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -16,16 +13,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use thiserror::Error;
 
-use crate::camera_model::CameraModel;
-use crate::link::{LinkConfig, LinkError, Scouting};
-use crate::pose::Pose;
+use gestalt_link::{LinkConfig, LinkError, Scouting};
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::pose::Pose;
 
 pub use center::{CenterSection, Fuse, StreamingSection};
 pub use document::{Document, Override};
-pub use layer::LayerConfig;
+pub use gestalt_vision::config::{LayerConfig, MotionConfig, MotionConfigError, Schedule};
 pub use learning::{LearnFrom, LearningSection};
-pub use motion::{MotionConfig, MotionConfigError};
-pub use schedule::Schedule;
 
 /// A configuration that cannot be used. Each variant names the key and the mend.
 #[derive(Debug, Error)]
@@ -369,6 +364,15 @@ impl Config {
             LinkError::Config { key, cause } => ConfigError::Value { key, cause },
             other => ConfigError::value("zenoh", other.to_string()),
         })
+    }
+}
+
+impl CameraSection {
+    /// What its frames are seen with.
+    #[cfg(feature = "opencv")]
+    pub(crate) fn sight(&self) -> gestalt_vision::sight::SightConfig {
+        let camera = self.model.properties();
+        gestalt_vision::sight::SightConfig { camera, layer: self.layer, motion: self.motion.clone() }
     }
 }
 

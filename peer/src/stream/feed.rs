@@ -6,10 +6,10 @@ use std::time::Duration;
 use gestalt_protocol::{MAX_FRAME, RobotId, RoundId};
 use opencv::core::Mat;
 
+use crate::camera_source::{human_before, open_source};
 use crate::config::{CameraSection, SourceSection};
-use crate::eye::{human_before, open_source};
-use crate::human::Human;
-use crate::source::{ImageFolder, Scene, Source, SourceError, read_image, read_jpeg};
+use gestalt_vision::human::Human;
+use gestalt_vision::source::{ImageFolder, Scene, Source, SourceError, read_image, read_jpeg};
 
 /// A camera whose pictures are sent, not looked at.
 pub enum Feed {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use gestalt_protocol::{FrameHeader, FrameTaken, RobotId};
 use opencv::core::Mat;
 
-use crate::link::{FrameArrival, FrameGate, LinkError, Robot};
-use crate::source::{Frame, PictureError, Scene, Source, SourceError, decode};
+use gestalt_link::{FrameArrival, FrameGate, LinkError, Robot};
+use gestalt_vision::source::{Frame, PictureError, Scene, Source, SourceError, decode};
 
 /// The largest streamed picture that is decoded, in millions of pixels: 3840×2160.
 pub const MAX_MEGAPIXELS: f64 = 8.3;

@@ -8,7 +8,7 @@ use gestalt_protocol::RoundId;
 use tokio::sync::Notify;
 
 use super::feed::{Content, Feed};
-use crate::source::SourceError;
+use gestalt_vision::source::SourceError;
 
 /// The newest picture of a running camera; it stops when this is dropped.
 #[derive(Debug, Default)]

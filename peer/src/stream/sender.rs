@@ -11,8 +11,8 @@ use tokio::time::MissedTickBehavior;
 use super::credit::Credit;
 use super::feed::{Content, Feed};
 use super::lens::{Lens, Shot};
-use crate::link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
-use crate::source::{SourceError, encode_jpeg};
+use gestalt_link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
+use gestalt_vision::source::{SourceError, encode_jpeg};
 
 /// How many acknowledgements wait to be read: one is expected, more are somebody's nonsense.
 const MAX_WAITING: usize = 16;

@@ -11,9 +11,10 @@ use thiserror::Error;
 use tokio::io::{AsyncBufReadExt, BufReader, Lines};
 use tokio::process::{Child, ChildStdout, Command};
 
-use crate::body::{Body, BodyError, boot_number};
+use crate::body::{Body, BodyError};
 use crate::config::Config;
-use crate::model::RobotModel;
+use gestalt_link::boot_number;
+use gestalt_vision::model::RobotModel;
 
 /// How long a process may take until it listens.
 const START: Duration = Duration::from_secs(30);

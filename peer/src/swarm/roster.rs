@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::camera_model::CameraModel;
 use crate::config::CameraChoice;
+use gestalt_vision::camera_model::CameraModel;
 
 /// The most robots one machine is asked to run.
 const MAX_MEMBERS: usize = 1000;

@@ -1,0 +1,106 @@
+//! SVG as PNG.
+
+use std::sync::Arc;
+
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::fontdb::Database;
+use resvg::usvg::{FontResolver, Options, Tree};
+
+use crate::DrawError;
+
+/// DejaVu Sans: Latin, Greek, Cyrillic, Armenian, Georgian, Hebrew, Arabic, Lao and the mathematical signs.
+const FONT: &[u8] = include_bytes!("../fonts/DejaVuSans.ttf");
+const FAMILY: &str = "DejaVu Sans";
+
+/// No picture is wider or higher, in pixels.
+const MAX_SIDE: u32 = 16_384;
+
+/// Renders an SVG drawing at its own size, on the background it brings, as the bytes of a PNG file.
+///
+/// Text is set in the embedded font, whatever family it asks for; a sign that it lacks, in the first of the system's
+/// fonts that has it.
+///
+/// # Errors
+/// [`DrawError::Svg`] for text that is no SVG, or larger than 16,384 pixels.
+pub fn png(svg: &str) -> Result<Vec<u8>, DrawError> {
+    let mut fonts = Database::new();
+    fonts.load_font_data(FONT.to_vec());
+    fonts.set_sans_serif_family(FAMILY);
+    fonts.set_serif_family(FAMILY);
+    fonts.set_monospace_family(FAMILY);
+    let among_known = FontResolver::default_fallback_selector();
+    let options = Options {
+        fontdb: Arc::new(fonts),
+        font_family: FAMILY.to_owned(),
+        font_resolver: FontResolver {
+            // The system's fonts are many files, seldom needed.
+            select_fallback: Box::new(move |sign, tried, fonts| {
+                if fonts.len() == 1 {
+                    Arc::make_mut(fonts).load_system_fonts();
+                }
+                among_known(sign, tried, fonts)
+            }),
+            ..FontResolver::default()
+        },
+        ..Options::default()
+    };
+    let tree = Tree::from_str(svg, &options).map_err(|error| DrawError::Svg(error.to_string()))?;
+    let size = tree.size().to_int_size();
+    if size.width().max(size.height()) > MAX_SIDE {
+        let (width, height) = (size.width(), size.height());
+        return Err(DrawError::Svg(format!("{width}×{height} pixels are more than {MAX_SIDE} a side")));
+    }
+    let mut pixels = Pixmap::new(size.width(), size.height())
+        .ok_or_else(|| DrawError::Svg("a drawing without a size".to_owned()))?;
+    resvg::render(&tree, Transform::default(), &mut pixels.as_mut());
+    pixels.encode_png().map_err(|error| DrawError::Svg(error.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pixels(svg: &str) -> Pixmap {
+        Pixmap::decode_png(&png(svg).unwrap()).unwrap()
+    }
+
+    fn with_text(text: &str) -> Pixmap {
+        pixels(&format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='60' height='30'><rect width='60' height='30' fill='white'/>\
+             <text x='10' y='20' font-family='sans-serif' font-size='16'>{text}</text></svg>"
+        ))
+    }
+
+    fn ink(picture: &Pixmap) -> u32 {
+        picture.pixels().iter().map(|pixel| u32::from(255 - pixel.green())).sum()
+    }
+
+    #[test]
+    fn letters_of_many_scripts_are_drawn_and_differ() {
+        let pictures = ["3", "±", "ж", "λ", "א", "ب", "é"].map(with_text);
+        for (i, picture) in pictures.iter().enumerate() {
+            assert!(ink(picture) > 500, "sign {i} leaves no ink");
+            assert!(
+                pictures[..i].iter().all(|other| other.data() != picture.data()),
+                "sign {i} looks like another"
+            );
+        }
+        assert_eq!(ink(&with_text("")), 0);
+    }
+
+    #[test]
+    fn an_embedded_picture_keeps_its_colours() {
+        let red = pixels(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='4' height='4'><rect width='4' height='4' fill='#f00'/></svg>",
+        );
+        let first = red.pixels()[0];
+        assert_eq!((first.red(), first.green(), first.blue(), first.alpha()), (255, 0, 0, 255));
+    }
+
+    #[test]
+    fn what_is_no_drawing_is_refused_with_its_cause() {
+        for svg in ["", "<svg", "no", "<svg xmlns='http://www.w3.org/2000/svg' width='1e9' height='1'/>"] {
+            assert!(matches!(png(svg), Err(DrawError::Svg(cause)) if !cause.is_empty()), "{svg}");
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! What robots see: each of many hands from each of many places, looked at once and used by all runs.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{Observation, Vocabulary};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::ExperimentError;
+use super::plan::{Experiment, Hands};
+use super::setting::Drift;
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::dataset::Dataset;
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::pose::Pose;
+use gestalt_vision::source::{EmulatedView, RenderedSource, Scene, Source, read_image};
+
+/// The features robots learn from.
+pub const FEATURES: FeatureSet = FeatureSet::Shape;
+
+/// How often each person shows a gesture where the people themselves change half-way, and how many do before and
+/// after.
+const TAKES: u64 = 12;
+const PEOPLE_OF_A_DRIFT: u64 = 3;
+
+/// An instant at which a hand shows a gesture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Moment {
+    /// The gesture.
+    pub class: ClassId,
+    /// Who shows it, as far as that is known.
+    pub person: Option<u32>,
+    /// Whether it is of after the drift.
+    pub after: bool,
+}
+
+/// Moments, seen from all places.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pool {
+    /// Gestures by their labels.
+    pub gestures: Vec<String>,
+    /// How many places there are.
+    pub places: usize,
+    /// The moments.
+    pub moments: Vec<Moment>,
+    /// Features and quality, place by place of each moment; `None` where no hand was found.
+    views: Views,
+}
+
+/// Features and quality of each view with a hand.
+type Views = Vec<Option<(Vec<f32>, f32)>>;
+
+/// A moment and how to make it visible.
+#[derive(Clone, Debug, Serialize)]
+struct Take {
+    moment: Moment,
+    dim: bool,
+    shown: Shown,
+}
+
+#[derive(Clone, Debug, Serialize)]
+enum Shown {
+    Rendered { fingers: u8, seed: u64, take: u64 },
+    Picture(PathBuf, u64),
+}
+
+impl Pool {
+    /// Looks at rendered hands, or at the pictures of a dataset, from all places, on all cores; or reads what an earlier
+    /// call kept in `folder`. `step(done, total)` is called now and then.
+    ///
+    /// # Errors
+    /// A dataset that cannot be read, or fewer gestures in it than two.
+    pub fn look(
+        experiment: &Experiment,
+        dataset: Option<&Path>,
+        folder: &Path,
+        step: impl Fn(usize, usize) + Sync,
+    ) -> Result<Self, ExperimentError> {
+        let drift = experiment.drift();
+        let hands = if dataset.is_some() { &experiment.photographs } else { &experiment.hands };
+        let (gestures, takes) = match dataset {
+            None => rendered(hands, drift),
+            Some(folder) => pictured(hands, drift, folder)?,
+        };
+        let made_of = serde_json::to_string(&(FEATURES.name(), hands, drift, &gestures, &takes))
+            .expect("names and numbers can be written as JSON");
+        let made_of = crc32fast::hash(made_of.as_bytes());
+        let kept = folder.join(format!("observations-{made_of:08x}.bin"));
+        if let Some(pool) = Self::read(&kept) {
+            return Ok(pool);
+        }
+        let views = look_at(&takes, hands, step)?;
+        let moments = takes.iter().map(|take| take.moment).collect();
+        let pool = Self { gestures, places: hands.places, moments, views };
+        pool.write(&kept).map_err(|source| ExperimentError::Write { path: kept, source })?;
+        Ok(pool)
+    }
+
+    /// What was kept, if it is whole.
+    fn read(path: &Path) -> Option<Self> {
+        let bytes = std::fs::read(path).ok()?;
+        let (sum, bytes) = bytes.split_first_chunk::<4>()?;
+        (crc32fast::hash(bytes) == u32::from_le_bytes(*sum)).then(|| postcard::from_bytes(bytes).ok())?
+    }
+
+    fn write(&self, path: &Path) -> std::io::Result<()> {
+        let bytes = postcard::to_stdvec(self).map_err(std::io::Error::other)?;
+        let sum = crc32fast::hash(&bytes).to_le_bytes();
+        std::fs::write(path, [&sum[..], &bytes].concat())
+    }
+
+    /// The gestures.
+    ///
+    /// # Errors
+    /// Labels that make no vocabulary.
+    pub fn vocabulary(&self) -> Result<Vocabulary, ExperimentError> {
+        Vocabulary::new(self.gestures.iter().cloned())
+            .map_err(|error| ExperimentError::Setting(error.to_string()))
+    }
+
+    /// What is seen of a moment from a place.
+    #[must_use]
+    pub fn view(&self, moment: usize, place: usize) -> Option<Observation> {
+        let (features, quality) = self.features(moment, place)?;
+        Some(Observation { features: features.to_vec(), quality })
+    }
+
+    /// The same by reference: features and quality.
+    #[must_use]
+    pub fn features(&self, moment: usize, place: usize) -> Option<(&[f32], f32)> {
+        let (features, quality) = self.views.get(moment * self.places + place)?.as_ref()?;
+        Some((features, *quality))
+    }
+
+    /// In how many of the views a hand was found, `0.0..=1.0`.
+    #[must_use]
+    pub fn found(&self) -> f64 {
+        self.views.iter().flatten().count() as f64 / self.views.len().max(1) as f64
+    }
+}
+
+fn rendered(hands: &Hands, drift: Drift) -> (Vec<String>, Vec<Take>) {
+    let people = hands.people as u64;
+    let (people, takes, shift) = match drift {
+        Drift::None => (vec![(false, 0..people)], 1, 0),
+        Drift::Light => (vec![(false, 0..people), (true, 0..people)], 1, 0),
+        Drift::Person => {
+            let n = PEOPLE_OF_A_DRIFT;
+            (vec![(false, 0..n), (true, n..2 * n)], TAKES, 1000)
+        }
+    };
+    let mut all = Vec::new();
+    for (after, people) in people {
+        for (person, take) in people.flat_map(|person| (0..takes).map(move |take| (person, take))) {
+            for fingers in 0..6 {
+                let moment = Moment { class: ClassId(fingers), person: Some(person as u32), after };
+                let dim = after && drift == Drift::Light;
+                all.push(Take {
+                    moment,
+                    dim,
+                    shown: Shown::Rendered { fingers, seed: shift + person, take },
+                });
+            }
+        }
+    }
+    ((0..6).map(|n: u8| n.to_string()).collect(), all)
+}
+
+fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, Vec<Take>), ExperimentError> {
+    let fingers: Vec<String> = (0..6).map(|n: u8| n.to_string()).collect();
+    // Counts of fingers where there are any, as of the rendered hands; else whatever there is.
+    let counts: Vec<String> = fingers.into_iter().filter(|label| folder.join(label).is_dir()).collect();
+    let dataset = Dataset::list(folder, (counts.len() > 1).then_some(&counts[..]))?;
+    let people: BTreeSet<u32> = dataset.people();
+    let middle = people.iter().nth(people.len() / 2).copied();
+    let mut takes = Vec::new();
+    for class in 0..dataset.vocabulary.classes() {
+        let images: Vec<_> = dataset.images.iter().filter(|image| image.class.index() == class).collect();
+        // Spread over the list, so that all people are among them.
+        let used = images.len().min(hands.pictures);
+        for image in (0..used).map(|n| images[n * images.len() / used]) {
+            let person = image.person;
+            let fingerprint = image
+                .fingerprint()
+                .map_err(|source| ExperimentError::Read { path: image.path.clone(), source })?;
+            let later = person.zip(middle).is_some_and(|(person, middle)| person >= middle);
+            let shown = Shown::Picture(image.path.clone(), fingerprint);
+            let mut take = |after| {
+                let moment = Moment { class: image.class, person, after };
+                takes.push(Take { moment, dim: after && drift == Drift::Light, shown: shown.clone() });
+            };
+            match drift {
+                Drift::None => take(false),
+                Drift::Light => [false, true].into_iter().for_each(take),
+                Drift::Person => take(later),
+            }
+        }
+    }
+    if drift == Drift::Person && people.len() < 2 {
+        return Err(ExperimentError::Setting(
+            "the file names of this dataset tell of no people that could change (sNNN_…): take another"
+                .to_owned(),
+        ));
+    }
+    Ok((dataset.vocabulary.labels().to_vec(), takes))
+}
+
+/// Looks at each moment from each place.
+fn look_at(
+    takes: &[Take],
+    hands: &Hands,
+    step: impl Fn(usize, usize) + Sync,
+) -> Result<Views, ExperimentError> {
+    let cameras = cameras(hands)?;
+    let seen = Mutex::new(vec![Vec::new(); takes.len()]);
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let work = || -> Result<(), ExperimentError> {
+        let mut perception = Perception::new(FEATURES, HandConfig::default())?;
+        loop {
+            let n = next.fetch_add(1, Ordering::Relaxed);
+            let Some(take) = takes.get(n) else { return Ok(()) };
+            let views = look_from_all(n, take, &cameras, hands, &mut perception)?;
+            seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[n] = views;
+            step(done.fetch_add(1, Ordering::Relaxed) + 1, takes.len());
+        }
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..super::runner::workers()).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().expect("looking does not panic"))
+    })?;
+    let seen = seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    Ok(seen.into_iter().flatten().collect())
+}
+
+/// The camera at each place, before and after the drift of light.
+fn cameras(hands: &Hands) -> Result<Vec<(Pose, [CameraModel; 2])>, ExperimentError> {
+    let model = CameraModel::named(&hands.camera).ok_or_else(|| {
+        ExperimentError::Setting("the camera is none of footbot, parrot and laptop".to_owned())
+    })?;
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let places = hands.placement.place(hands.places, 1);
+    Ok(places
+        .into_iter()
+        .map(|pose| {
+            let bright = model.specimen(&mut rng);
+            let [blue, green, red] = bright.cast_bgr;
+            let dim = CameraModel {
+                gain: (bright.gain * 0.7).max(0.1),
+                noise_sigma: bright.noise_sigma + 3.0,
+                cast_bgr: [blue * 0.85, green, red * 1.12],
+                ..bright.clone()
+            };
+            (pose, [bright, dim])
+        })
+        .collect())
+}
+
+fn look_from_all(
+    n: usize,
+    take: &Take,
+    cameras: &[(Pose, [CameraModel; 2])],
+    hands: &Hands,
+    perception: &mut Perception,
+) -> Result<Views, ExperimentError> {
+    let picture = match &take.shown {
+        Shown::Picture(path, _) => Some(read_image(path)?),
+        Shown::Rendered { .. } => None,
+    };
+    let mut views = Vec::with_capacity(cameras.len());
+    for (place, (pose, by_light)) in cameras.iter().enumerate() {
+        let camera = by_light[usize::from(take.dim)].clone();
+        let seed = (n as u64) << 16 | place as u64;
+        let frame = match (&take.shown, &picture) {
+            (Shown::Picture(..), Some(picture)) => {
+                EmulatedView::new(camera, *pose, hands.picture_height_m, seed)?.view(picture)?
+            }
+            (Shown::Rendered { fingers, seed: person, take }, _) => {
+                // Aim and tilt differ from take to take.
+                let mut source = RenderedSource::new(camera, *pose, hands.glove, seed ^ take << 48)?;
+                let scene = Scene { gesture: Some(*fingers), seed: *person };
+                source.next_frame(Duration::ZERO, &scene)?.image
+            }
+            (Shown::Picture(..), None) => continue,
+        };
+        views.push(perception.observe(&frame).ok().map(|seen| (seen.features, seen.quality)));
+    }
+    Ok(views)
+}

@@ -1,0 +1,132 @@
+//! One seed: every swarm is shown the same gestures.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{Classifier, Classify, Observation};
+
+use super::plan::{Kind, Recognition, SwarmPlan};
+use super::takes::{Take, Takes};
+use super::training::{Classifiers, GESTURES};
+use crate::emulation::{self, Group, LinkModel, Observer, Order, Scenario, Trace};
+use crate::experiment::ExperimentError;
+use crate::topology::Topology;
+use gestalt_vision::perception::LayerConfig;
+
+/// What a swarm made of the gestures of a seed; shares are of the gestures shown, `0.0..=1.0`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// It decided for the gesture shown.
+    pub right: f64,
+    /// It decided for another.
+    pub wrong: f64,
+    /// Single frames with a hand in which the robot that saw it found the gesture shown likeliest, of such frames.
+    pub frames_right: f64,
+    /// Seconds from the showing until the first robot held a class, over the decided ones.
+    pub decided_s: f64,
+}
+
+/// Shows all swarms of a plan the gestures of a seed; outcomes in the order of the plan.
+pub fn run(
+    plan: &Recognition,
+    classifiers: &Classifiers,
+    seed: u64,
+) -> Result<Vec<Outcome>, ExperimentError> {
+    let seen = Rc::new(RefCell::new(Takes::new(plan.clone(), seed)));
+    plan.swarms.iter().map(|swarm| show(plan, swarm, classifiers.of(swarm), &seen, seed)).collect()
+}
+
+fn show(
+    plan: &Recognition,
+    swarm: &SwarmPlan,
+    classifier: &Arc<Classifier>,
+    seen: &Rc<RefCell<Takes>>,
+    seed: u64,
+) -> Result<Outcome, ExperimentError> {
+    let scenario = Scenario {
+        robots: vec![Group { name: "robot".to_owned(), count: swarm.size(), view: None }],
+        topology: Topology::Ring,
+        link: LinkModel::default(),
+        classes: GESTURES,
+        rounds: plan.showings,
+        order: Order::InTurn,
+        interval: plan.shown_for + Duration::from_secs(3),
+        mind: plan.mind(swarm)?,
+        learning: None,
+        faults: Vec::new(),
+        churn: None,
+        compare: Vec::new(),
+        seeds: 1,
+    };
+    let failure = Rc::new(RefCell::new(None));
+    let mut observers: Vec<Box<dyn Observer>> = Vec::new();
+    for kind in &swarm.robots {
+        for robot in 0..kind.count {
+            observers.push(Box::new(Eyes {
+                seen: seen.clone(),
+                failure: failure.clone(),
+                classifier: classifier.clone(),
+                kind: kind.clone(),
+                layer: swarm.layer,
+                period: kind.model()?.period().as_secs_f64(),
+                robot,
+                showing: 0,
+                take: Take::default(),
+                next: 0,
+            }));
+        }
+    }
+    let (report, _) = emulation::run_with(&scenario, seed, observers, Trace::none())?;
+    if let Some(failure) = failure.take() {
+        return Err(failure);
+    }
+    Ok(Outcome {
+        right: report.right.share,
+        wrong: report.wrong.share,
+        frames_right: report.frames_right.share,
+        decided_s: report.decided_ms.mean / 1000.0,
+    })
+}
+
+/// A robot's eyes: they see what was taken for its kind and number.
+struct Eyes {
+    seen: Rc<RefCell<Takes>>,
+    failure: Rc<RefCell<Option<ExperimentError>>>,
+    classifier: Arc<Classifier>,
+    kind: Kind,
+    layer: LayerConfig,
+    period: f64,
+    robot: usize,
+    showing: u32,
+    take: Take,
+    next: usize,
+}
+
+impl Observer for Eyes {
+    fn classifier(&self) -> Option<Arc<dyn Classify>> {
+        Some(self.classifier.clone())
+    }
+
+    fn period(&self) -> f64 {
+        self.period
+    }
+
+    fn show(&mut self, shown: ClassId, _: &mut dyn rand::Rng) {
+        self.showing += 1;
+        self.next = 0;
+        let take = self.seen.borrow_mut().of(&self.kind, self.layer, self.robot, (self.showing, shown));
+        self.take = take.unwrap_or_else(|error| {
+            self.failure.borrow_mut().get_or_insert(error);
+            Take::default()
+        });
+    }
+
+    fn frame(&mut self, _: &mut dyn rand::Rng) -> Option<Observation> {
+        let frame = self.take.get(self.next).cloned().flatten();
+        self.next += 1;
+        frame
+    }
+}

@@ -1,0 +1,139 @@
+//! The feature spaces and classifiers that runs start from, made once and shared by all.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{
+    Classifier, Components, FeatureSpace, Learner, LearnerOptions, Sample, ScalingMethod, Vocabulary,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::ExperimentError;
+use super::pool::FEATURES;
+use super::setting::{Method, Setting, Start};
+use crate::emulation::School;
+use gestalt_vision::dataset::Dataset;
+use gestalt_vision::perception::{HandConfig, Perception};
+use gestalt_vision::source::Glove;
+use gestalt_vision::source::rendered::TrainingFrames;
+use gestalt_vision::survey::Survey;
+
+/// Rendered people who show each gesture once to fit a feature space on, and up to which bearing they are seen.
+const PEOPLE: usize = 40;
+const BEARING_DEG: f64 = 75.0;
+
+/// Of these, who teach the model that robots may start from; and up to which bearing: cameras that nobody thought of
+/// when it was trained are what robots learn on the spot for.
+const MODEL_PEOPLE: usize = 8;
+const MODEL_BEARING_DEG: f64 = 10.0;
+
+/// Labelled hands, other than those that robots see.
+#[derive(Debug)]
+pub struct Schools {
+    vocabulary: Vocabulary,
+    nothing: Vec<Sample>,
+    model: Vec<Sample>,
+    made: BTreeMap<String, Arc<School>>,
+}
+
+impl Schools {
+    /// Looks at rendered hands and, for the model that robots may start from, at the pictures of `dataset` if there is
+    /// one.
+    ///
+    /// # Errors
+    /// A dataset that cannot be read, or has not all gestures of the vocabulary.
+    pub fn new(vocabulary: Vocabulary, dataset: Option<&Path>) -> Result<Self, ExperimentError> {
+        let mut perception = Perception::new(FEATURES, HandConfig::default())?;
+        let nothing = rendered(&vocabulary, PEOPLE, BEARING_DEG, &mut perception)?;
+        let model = match dataset {
+            None => rendered(&vocabulary, MODEL_PEOPLE, MODEL_BEARING_DEG, &mut perception)?,
+            Some(folder) => {
+                let dataset = Dataset::list(folder, Some(vocabulary.labels()))?;
+                Survey::of(&dataset.images, &mut perception, || ()).samples()
+            }
+        };
+        Ok(Self { vocabulary, nothing, model, made: BTreeMap::new() })
+    }
+
+    /// The school of a setting.
+    ///
+    /// # Errors
+    /// Hands that nothing can be learned from.
+    pub fn of(&mut self, setting: &Setting) -> Result<Arc<School>, ExperimentError> {
+        let options = &setting.learning.learner;
+        let key = format!("{:?} {:?} {} {options:?}", setting.start, setting.reduction, setting.components);
+        if let Some(school) = self.made.get(&key) {
+            return Ok(school.clone());
+        }
+        let samples = match setting.start {
+            Start::Nothing => &self.nothing,
+            Start::Model => &self.model,
+        };
+        let space = Arc::new(space(samples, setting.reduction, setting.components));
+        let start = match setting.start {
+            Start::Nothing => None,
+            Start::Model => Some(self.train(&space, options)?),
+        };
+        let school = Arc::new(School::new(space, self.vocabulary.clone(), start, options.clone())?);
+        self.made.insert(key, school.clone());
+        Ok(school)
+    }
+
+    fn train(
+        &self,
+        space: &Arc<FeatureSpace>,
+        options: &LearnerOptions,
+    ) -> Result<Arc<Classifier>, ExperimentError> {
+        let mut learner = Learner::new(space.clone(), self.vocabulary.clone(), options.clone())?;
+        for (key, sample) in (0..).zip(&self.model) {
+            if let Ok(coordinates) = space.project(&sample.features) {
+                learner.insert(key, sample.class, &coordinates)?;
+            }
+        }
+        Ok(learner.learn()?)
+    }
+}
+
+fn space(samples: &[Sample], method: Method, components: usize) -> FeatureSpace {
+    let scaling = ScalingMethod::PerComponent;
+    match method.ranking() {
+        None => {
+            let rows = samples.iter().map(|sample| sample.features.as_slice());
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            FeatureSpace::fit(FEATURES.name(), rows, scaling, Components::Count(components), &mut rng)
+        }
+        Some(ranking) => {
+            let samples: Vec<(&[f32], ClassId)> =
+                samples.iter().map(|sample| (sample.features.as_slice(), sample.class)).collect();
+            FeatureSpace::fit_ranked(FEATURES.name(), &samples, scaling, ranking, components)
+        }
+    }
+}
+
+/// Rendered hands of the gestures that the vocabulary has.
+fn rendered(
+    vocabulary: &Vocabulary,
+    people: usize,
+    bearing_deg: f64,
+    perception: &mut Perception,
+) -> Result<Vec<Sample>, ExperimentError> {
+    let frames = TrainingFrames::new(Vec::new(), Glove::Cyan, bearing_deg, 0x7eac4);
+    let mut samples = Vec::new();
+    for frame in frames.take(6 * people) {
+        let frame = frame?;
+        let class = vocabulary.class(&frame.class.to_string());
+        if let (Ok(seen), Some(class)) = (perception.observe(&frame.image), class) {
+            samples.push(Sample { features: seen.features, class, group: Some(frame.group) });
+        }
+    }
+    if samples.len() < 2 {
+        return Err(ExperimentError::Setting(
+            "no gesture of the dataset is a count of fingers that can be rendered: give --start-dataset"
+                .to_owned(),
+        ));
+    }
+    Ok(samples)
+}

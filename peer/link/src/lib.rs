@@ -1,0 +1,45 @@
+//! How a robot of a Gestalt swarm talks and remembers: what a controller embeds.
+//!
+//! [`Robot`] hosts a [`Mind`](gestalt_strategies::Mind) on Zenoh: it feeds the mind what other robots and instructors say and
+//! what the controller's own eyes see, and carries out what the mind wants done. [`Client`] watches a swarm without being part
+//! of it. A robot that learns keeps its memory in a file. This crate knows neither cameras nor command lines.
+//!
+//! ```text
+//! controller ─ observations ─► Robot ─► Mind ─► votes, samples, decisions ─► Zenoh ─► other robots, clients
+//!            ◄─ events ───────       ◄──────── votes, samples, decisions, words of instructors ◄──
+//! ```
+
+mod account;
+mod announcement;
+mod apprentice;
+mod boot;
+mod census;
+mod client;
+mod config;
+mod error;
+mod frames;
+mod guest;
+mod host;
+mod identity;
+mod inbox;
+mod keeper;
+mod memory;
+mod news;
+mod presence;
+mod robot;
+mod session;
+mod topology;
+mod trainer;
+mod worker;
+
+pub use announcement::Announcement;
+pub use apprentice::RobotLearning;
+pub use boot::boot_number;
+pub use client::{Client, Decisions};
+pub use config::{LinkConfig, Scouting};
+pub use error::LinkError;
+pub use frames::{FrameArrival, FrameGate, FrameSender};
+pub use guest::GuestConfig;
+pub use identity::fresh_nonce;
+pub use news::{Heard, News};
+pub use robot::{Event, Robot, RobotConfig};

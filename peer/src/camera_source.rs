@@ -1,0 +1,51 @@
+//! The camera that a configuration describes, opened; and who stands in front of it, if it is a rendered one.
+
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+use gestalt_vision::human::Human;
+use gestalt_vision::source::{
+    Device, Glove, ImageFolder, RenderedSource, ScheduledSource, Source, SourceError, Video,
+};
+
+use crate::config::{CameraSection, SourceSection};
+
+/// Who stands before the camera of a configuration, if it is a rendered one.
+#[must_use]
+pub fn human_before(camera: &CameraSection) -> Human {
+    match &camera.source {
+        SourceSection::Rendered(rendered) => Human::new(rendered.seed),
+        _ => Human::new(0),
+    }
+}
+
+/// Opens the source of frames on this machine that a configuration describes. `clock` is the time since 1970 now.
+///
+/// # Errors
+/// See [`SourceError`]; [`SourceError::Ended`] for a configuration without one.
+pub fn open_source(
+    camera: &CameraSection,
+    robot: RobotId,
+    clock: Duration,
+) -> Result<Box<dyn Source>, SourceError> {
+    let properties = camera.model.properties();
+    Ok(match &camera.source {
+        SourceSection::None | SourceSection::Stream(_) => return Err(SourceError::Ended("none".to_owned())),
+        SourceSection::Rendered(rendered) => {
+            // Every robot has a noise of its own, of the same scene.
+            let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
+            let source = RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?;
+            match rendered.schedule {
+                Some(schedule) => {
+                    Box::new(ScheduledSource::new(source, Human::new(rendered.seed), schedule, clock))
+                }
+                None => Box::new(source),
+            }
+        }
+        SourceSection::Device(device) => Box::new(Device::open(&device.path, &properties)?),
+        SourceSection::Images(files) => {
+            Box::new(ImageFolder::open(&files.path, properties.period(), files.repeat)?)
+        }
+        SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
+    })
+}

@@ -1,0 +1,412 @@
+//! How a robot sees: from a camera frame to the feature vector of the hand in it.
+//!
+//! ```text
+//! BGR frame ─► glance ─► colour and place of the hand ─► close view ─► palm, wrist ─► hand ─┬─► 110 shape features
+//! any size     160×120                                   192×192                            └─► crop ─► HOG
+//! ```
+//!
+//! The same hand gives nearly the same features whatever the camera, by the stages of the `layer`: views of a fixed size
+//! make resolutions and distances comparable, colours are judged relative to the background, blur and noise are brought
+//! to one measure, and every feature is a ratio, an angle or a count.
+
+mod background;
+mod blob;
+mod canonical;
+mod colour;
+mod features;
+mod frame;
+mod hand;
+mod hog;
+mod layer;
+mod resolution;
+mod ring;
+mod white_balance;
+
+use std::str::FromStr;
+
+use gestalt_strategies::Observation;
+use opencv::core::{Mat, MatTraitConst, Rect, Size, Vector};
+use opencv::imgproc::{INTER_AREA, resize};
+use opencv::objdetect::HOGDescriptor;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::camera_model::CameraModel;
+
+use canonical::Canonical;
+use colour::ColourModel;
+pub use features::{FEATURES, Feature, GROUPS, features};
+use frame::View;
+use hand::HandFinder;
+pub use layer::LayerConfig;
+use resolution::Resolution;
+
+/// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
+const GLANCE: Size = Size { width: 160, height: 120 };
+/// The size that every frame is squeezed to with the stage of geometry off.
+const CANVAS: Size = Size { width: 320, height: 240 };
+/// The size of the close view of the hand: enough for the shape of its fingers.
+const CLOSE: Size = Size { width: 192, height: 192 };
+
+/// Which feature vector perception computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FeatureSet {
+    /// The 110 hand-crafted features of [`features()`].
+    Shape,
+    /// The histogram of oriented gradients of the canonical crop, 1,764 values.
+    Hog,
+}
+
+impl FeatureSet {
+    /// Both sets.
+    pub const ALL: [Self; 2] = [Self::Shape, Self::Hog];
+
+    /// Names the set and its version: vectors of sets with different names never mix.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shape => "shape-2",
+            Self::Hog => "hog-2",
+        }
+    }
+
+    /// How many values a feature vector of this set has.
+    #[must_use]
+    pub fn length(self) -> usize {
+        match self {
+            Self::Shape => FEATURES,
+            Self::Hog => hog::LENGTH,
+        }
+    }
+}
+
+/// A text that names no feature set.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("'{0}' is no feature set: say 'shape' or 'hog'")]
+pub struct FeatureSetError(String);
+
+impl FromStr for FeatureSet {
+    type Err = FeatureSetError;
+
+    /// Reads `shape` or `hog`, or the full name with its version as [`FeatureSet::name`] gives it.
+    fn from_str(text: &str) -> Result<Self, FeatureSetError> {
+        let bare = |set: Self| set.name().split('-').next().unwrap_or_default();
+        Self::ALL
+            .into_iter()
+            .find(|&set| text == set.name() || text == bare(set))
+            .ok_or_else(|| FeatureSetError(text.to_owned()))
+    }
+}
+
+/// What counts as a hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HandConfig {
+    /// How much the hand's colour must differ from the background's, in nats of log chromaticity; `0.01..=2.0`.
+    /// An empty wall has 0.04, skin before a grey wall 0.3 to 0.7, a coloured glove 1 and more.
+    pub minimum_contrast: f32,
+    /// The fewest pixels of the camera that a hand covers, `20..=100000`: below it, a finger is two pixels wide. In pixels, not
+    /// as a share of the frame: how wide a camera sees says nothing of how well it sees a hand.
+    pub minimum_pixels: f32,
+    /// The largest share of the frame that a hand covers, `0.1..=1.0`: above it, there is no background to
+    /// judge by.
+    pub maximum_area: f32,
+}
+
+impl Default for HandConfig {
+    fn default() -> Self {
+        Self { minimum_contrast: 0.12, minimum_pixels: 160.0, maximum_area: 0.7 }
+    }
+}
+
+impl HandConfig {
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// [`PerceptionError::Range`] for the first field outside its range.
+    pub fn validate(&self) -> Result<(), PerceptionError> {
+        let fields = [
+            ("minimum_contrast", self.minimum_contrast, 0.01, 2.0),
+            ("minimum_pixels", self.minimum_pixels, 20.0, 100_000.0),
+            ("maximum_area", self.maximum_area, 0.1, 1.0),
+        ];
+        for (field, value, low, high) in fields {
+            if !(low..=high).contains(&value) {
+                return Err(PerceptionError::Range { field, value, low, high });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why perception cannot start.
+#[derive(Debug, Error)]
+pub enum PerceptionError {
+    /// A field of [`HandConfig`] is outside its range.
+    #[error("{field} is {value}: set it within {low}..={high}")]
+    Range {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f32,
+        /// The smallest value allowed.
+        low: f32,
+        /// The largest value allowed.
+        high: f32,
+    },
+    /// OpenCV failed.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// Why a frame gave no observation. It never becomes a vote; perception is ready for the next frame.
+#[derive(Debug, Error)]
+pub enum NoObservation {
+    /// The frame has no pixels.
+    #[error("the frame is empty: the source delivered no image")]
+    EmptyFrame,
+    /// The frame is not 8-bit BGR.
+    #[error(
+        "the frame has {channels} channels of OpenCV depth {depth}, not 3 of depth 0: convert it to 8-bit BGR"
+    )]
+    Format {
+        /// Its channels.
+        channels: i32,
+        /// Its depth, as OpenCV numbers them (0 is 8-bit unsigned).
+        depth: i32,
+    },
+    /// The frame is so long and narrow that nothing is left of its shorter side on the canvas.
+    #[error("a frame of {width}×{height} pixels is too narrow to show a hand")]
+    TooNarrow {
+        /// Columns.
+        width: i32,
+        /// Rows.
+        height: i32,
+    },
+    /// The frame shows no hand.
+    #[error("no hand: {0}")]
+    NoHand(#[from] NoHand),
+    /// OpenCV failed.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// Why a frame shows no hand.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum NoHand {
+    /// Nothing differs from the background in colour, or what does is not of one colour.
+    #[error("nothing stands out from the background (colour contrast {contrast:.2})")]
+    NothingStandsOut {
+        /// The contrast found, nats.
+        contrast: f32,
+    },
+    /// The largest blob is smaller than [`HandConfig::minimum_pixels`], or next to nothing of the frame.
+    #[error("the largest hand-coloured blob covers {share:.4} of the frame: too small")]
+    TooSmall {
+        /// Its share of the frame, `0.0..=1.0`.
+        share: f32,
+    },
+    /// The largest blob is larger than [`HandConfig::maximum_area`].
+    #[error("the largest hand-coloured blob covers {share:.2} of the frame: too large to be one hand")]
+    TooLarge {
+        /// Its share of the frame, `0.0..=1.0`.
+        share: f32,
+    },
+    /// The blob runs along most of the frame's edge: a hand comes in from one side.
+    #[error("the largest hand-coloured blob covers {share:.2} of the frame's edge: a background, not a hand")]
+    AlongTheEdge {
+        /// The covered share of the frame's edge, `0.0..=1.0`.
+        share: f32,
+    },
+}
+
+/// Sees hands. Owns every buffer it needs, so that a frame allocates next to nothing.
+pub struct Perception {
+    set: FeatureSet,
+    layer: LayerConfig,
+    canvas: Mat,
+    canvas_before: Mat,
+    glance: View,
+    colours: ColourModel,
+    close: View,
+    resolution: Resolution,
+    region: Rect,
+    finder: HandFinder,
+    balanced: Mat,
+    canonical: Canonical,
+    hog: HOGDescriptor,
+    descriptors: Vector<f32>,
+}
+
+impl Perception {
+    /// Eyes that compute this feature set, with all stages of the layer on, of frames that have nothing to do with each
+    /// other, of any camera.
+    ///
+    /// # Errors
+    /// See [`PerceptionError`].
+    pub fn new(set: FeatureSet, hand: HandConfig) -> Result<Self, PerceptionError> {
+        Self::build(set, hand, LayerConfig::ALL, None)
+    }
+
+    /// Eyes that compute this feature set, of the frames of this camera one after another, with these stages of the
+    /// layer.
+    ///
+    /// # Errors
+    /// See [`PerceptionError`].
+    pub fn for_camera(
+        set: FeatureSet,
+        hand: HandConfig,
+        layer: LayerConfig,
+        camera: &CameraModel,
+    ) -> Result<Self, PerceptionError> {
+        Self::build(set, hand, layer, Some(camera))
+    }
+
+    fn build(
+        set: FeatureSet,
+        hand: HandConfig,
+        layer: LayerConfig,
+        camera: Option<&CameraModel>,
+    ) -> Result<Self, PerceptionError> {
+        hand.validate()?;
+        let period = camera.map(|camera| camera.period().as_secs_f32());
+        Ok(Self {
+            set,
+            layer,
+            canvas: Mat::default(),
+            canvas_before: Mat::default(),
+            glance: View::new(Some(GLANCE)),
+            colours: ColourModel::new(hand.minimum_contrast, layer.colour, period),
+            close: View::new((layer.geometry && layer.resolution).then_some(CLOSE)),
+            resolution: Resolution::new(layer.resolution, camera),
+            region: Rect::default(),
+            finder: HandFinder::new(hand),
+            balanced: Mat::default(),
+            canonical: Canonical::default(),
+            hog: hog::descriptor()?,
+            descriptors: Vector::new(),
+        })
+    }
+
+    /// Which stages of the layer are on.
+    #[must_use]
+    pub fn layer(&self) -> LayerConfig {
+        self.layer
+    }
+
+    /// Which feature set this computes.
+    #[must_use]
+    pub fn feature_set(&self) -> FeatureSet {
+        self.set
+    }
+
+    /// Looks at one frame: 8-bit BGR of any size.
+    ///
+    /// # Errors
+    /// See [`NoObservation`]; a frame without a hand is [`NoObservation::NoHand`].
+    pub fn observe(&mut self, bgr: &Mat) -> Result<Observation, NoObservation> {
+        self.observe_before(bgr, None)
+    }
+
+    /// Looks at one frame of a scene that is known without anyone in it: `background`, 8-bit BGR of any size, of the
+    /// frame's aspect. What was there before is no hand, whatever its colour.
+    ///
+    /// # Errors
+    /// As [`Self::observe`].
+    pub fn observe_before(
+        &mut self,
+        bgr: &Mat,
+        background: Option<&Mat>,
+    ) -> Result<Observation, NoObservation> {
+        frame::check(bgr)?;
+        if let Some(background) = background {
+            frame::check(background)?;
+        }
+        if self.layer.geometry {
+            return self.see(bgr, background, 1.0);
+        }
+        let (mut canvas, mut before) =
+            (std::mem::take(&mut self.canvas), std::mem::take(&mut self.canvas_before));
+        resize(bgr, &mut canvas, CANVAS, 0.0, 0.0, INTER_AREA)?;
+        if let Some(background) = background {
+            resize(background, &mut before, CANVAS, 0.0, 0.0, INTER_AREA)?;
+        }
+        let seen = self.see(&canvas, background.map(|_| &before), CANVAS.width as f32 / bgr.cols() as f32);
+        self.region = Rect::new(0, 0, bgr.cols(), bgr.rows());
+        (self.canvas, self.canvas_before) = (canvas, before);
+        seen
+    }
+
+    /// `scale`: pixels of this frame per pixel of the camera.
+    fn see(&mut self, bgr: &Mat, before: Option<&Mat>, scale: f32) -> Result<Observation, NoObservation> {
+        let whole = Rect::new(0, 0, bgr.cols(), bgr.rows());
+        self.region = whole;
+        self.glance.look(bgr, before, whole)?;
+        self.colours.learn(&self.glance)?;
+        self.colours.mark(&mut self.glance)?;
+        let found = self.finder.locate(&self.glance)?;
+        self.region = if self.layer.geometry { found } else { whole };
+        self.close.look(bgr, before, self.region)?;
+        let scale = self.close.scale() * scale;
+        self.resolution.even_out(bgr, &mut self.close, scale)?;
+        self.colours.mark(&mut self.close)?;
+        let hand = self.finder.find(&self.close)?;
+        let features = match self.set {
+            FeatureSet::Shape => features::measure(&hand)?,
+            FeatureSet::Hog => {
+                self.colours.balance().apply(&self.close.image, &mut self.balanced)?;
+                self.canonical.crop(&self.balanced, &hand)?;
+                hog::compute(&self.hog, self.canonical.image(), &mut self.descriptors)?;
+                self.descriptors.as_slice().to_vec()
+            }
+        };
+        Ok(Observation { features, quality: self.colours.plausibility() * hand.plausibility })
+    }
+
+    /// What the white balance of the last frame multiplies its blue, green and red channel by.
+    #[must_use]
+    pub fn gains(&self) -> [f32; 3] {
+        self.colours.balance().gains()
+    }
+
+    /// The last frame, or any other, in the white balance of the last one.
+    ///
+    /// # Errors
+    /// When the image is not 8-bit BGR.
+    pub fn balance(&self, bgr: &Mat) -> Result<Mat, opencv::Error> {
+        let mut balanced = Mat::default();
+        self.colours.balance().apply(bgr, &mut balanced)?;
+        Ok(balanced)
+    }
+
+    /// The part of the last frame that was looked at closely, in pixels of the frame.
+    #[must_use]
+    pub fn region(&self) -> Rect {
+        self.region
+    }
+
+    /// The pixels of the last frame, at a glance, that had the colour of the hand (255; elsewhere 0). Empty before the
+    /// first.
+    #[must_use]
+    pub fn candidates(&self) -> &Mat {
+        &self.glance.mask
+    }
+
+    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a
+    /// margin of one pixel. Empty before the first hand.
+    #[must_use]
+    pub fn mask(&self) -> &Mat {
+        self.finder.mask()
+    }
+
+    /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the
+    /// first, and with a feature set that does not need it.
+    #[must_use]
+    pub fn crop(&self) -> &Mat {
+        self.canonical.image()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,119 @@
+//! One robot's sight: what is remembered from frame to frame of one camera, and what each frame says.
+//!
+//! The same wherever it runs: on board, beside the robot's own link, or in a fusion centre, for a robot that only streams.
+
+mod mismatch;
+
+use std::time::Duration;
+
+use gestalt_protocol::{Motion, MotionState};
+use gestalt_strategies::Observation;
+use thiserror::Error;
+
+use crate::camera_model::CameraModel;
+use crate::config::{LayerConfig, MotionConfig};
+use crate::motion::{Change, MotionDetector, MotionError};
+use crate::perception::{FeatureSet, HandConfig, NoObservation, Perception, PerceptionError};
+use crate::source::Frame;
+use mismatch::Mismatch;
+
+/// What a robot sees with, and what is done to its frames.
+#[derive(Clone, Debug)]
+pub struct SightConfig {
+    /// What the camera does to a picture, and how often it takes one.
+    pub camera: CameraModel,
+    /// Which stages make its frames like those of other cameras.
+    pub layer: LayerConfig,
+    /// How motion in front of it is watched.
+    pub motion: MotionConfig,
+}
+
+/// A camera that nobody can see with.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SightError {
+    /// No perception for this camera and these features.
+    #[error(transparent)]
+    Perception(#[from] PerceptionError),
+    /// No motion detector.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+}
+
+/// The sight of one camera.
+pub struct Sight {
+    layer: LayerConfig,
+    features: FeatureSet,
+    perception: Perception,
+    /// `None` when motion is not watched.
+    detector: Option<MotionDetector>,
+    mismatch: Mismatch,
+}
+
+/// What one frame said.
+#[derive(Debug)]
+pub struct Taken {
+    /// When the frame was taken, in the time of [`Frame::at`].
+    pub at: Duration,
+    /// What has begun or ended with this frame.
+    pub change: Option<Change>,
+    /// What hand it showed, when it was to be judged and nothing moved: a moving hand is no evidence.
+    pub observation: Option<Result<Observation, NoObservation>>,
+    /// What is wrong with the camera or its frames, and the mend; the same thing is said once.
+    pub trouble: Option<String>,
+}
+
+impl Sight {
+    /// The sight of that camera, for a classifier of that feature set.
+    ///
+    /// # Errors
+    /// See [`SightError`].
+    pub fn new(config: SightConfig, features: FeatureSet) -> Result<Self, SightError> {
+        let SightConfig { camera, layer, motion } = config;
+        Ok(Self {
+            perception: Perception::for_camera(features, HandConfig::default(), layer, &camera)?,
+            detector: motion.enabled.then(|| MotionDetector::new(motion)).transpose()?,
+            mismatch: Mismatch::new(camera),
+            layer,
+            features,
+        })
+    }
+
+    /// Takes in the next frame; `judge`: also says what hand it shows. Frames between which no round is open are taken
+    /// in as well, for they show what moves.
+    pub fn take(&mut self, frame: &Frame, judge: bool) -> Taken {
+        let mut trouble = self.adapt_to(frame);
+        let change = self.detector.as_mut().map(|detector| detector.watch(&frame.image, frame.at));
+        let change = change.unwrap_or(Ok(None)).unwrap_or_else(|error: MotionError| {
+            trouble = Some(error.to_string());
+            None
+        });
+        let moving = self.detector.as_ref().is_some_and(|d| d.state() == MotionState::Moving);
+        let observation = (judge && !moving).then(|| {
+            let background = self.detector.as_ref().and_then(MotionDetector::background);
+            self.perception.observe_before(&frame.image, background)
+        });
+        Taken { at: frame.at, change, observation, trouble }
+    }
+
+    /// What moves, for the status; `None` when motion is not watched.
+    #[must_use]
+    pub fn motion(&self) -> Option<Motion> {
+        let detector = self.detector.as_ref()?;
+        let delay = detector.delay().unwrap_or_default();
+        Some(Motion { state: detector.state(), delay_ms: delay.as_secs_f32() * 1000.0 })
+    }
+
+    /// Reads frames as what they are when they are not what the configuration says. Says so, once.
+    fn adapt_to(&mut self, frame: &Frame) -> Option<String> {
+        let said = self.mismatch.notice(frame)?;
+        let model = self.mismatch.model();
+        match Perception::for_camera(self.features, HandConfig::default(), self.layer, model) {
+            Ok(perception) => {
+                self.perception = perception;
+                Some(said)
+            }
+            Err(error) => Some(format!("{said}; it cannot be read so: {error}")),
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Where frames come from: a camera, drawn, read from a folder, or played from a video.
+
+mod device;
+mod emulated_view;
+mod folder;
+mod image_file;
+mod reader;
+pub mod rendered;
+mod sensor;
+mod video;
+
+use std::io;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+use opencv::core::Mat;
+use thiserror::Error;
+
+use crate::camera_model::CameraModelError;
+use crate::pose::PoseError;
+
+pub use device::Device;
+pub use emulated_view::EmulatedView;
+pub use folder::ImageFolder;
+pub use image_file::{
+    MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, encode_jpeg, read_image, read_jpeg, through_jpeg,
+};
+pub use reader::{Opener, Reader};
+pub use rendered::{Glove, RenderedSource, ScheduledSource};
+pub use sensor::Sensor;
+pub use video::Video;
+
+/// One picture of a camera.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The picture: blue, green, red, 8 bits each.
+    pub image: Mat,
+    /// When it was taken, since the host's start.
+    pub at: Duration,
+}
+
+/// What the human shows at the moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Scene {
+    /// How many fingers are raised, 0 to 5; `None`: no hand is in view.
+    pub gesture: Option<u8>,
+    /// Varies the person from round to round: hand, glove, light and background.
+    pub seed: u64,
+}
+
+/// A stream of frames.
+pub trait Source: Send {
+    /// What it is, in words: `rendered`, `video hand.mp4`, `images DIR`.
+    fn describe(&self) -> String;
+
+    /// The time between two frames.
+    fn period(&self) -> Duration;
+
+    /// Whether it runs by itself, as a camera does: its next frame comes when it comes, and one that is not read in time is
+    /// lost. Others are read when it is time for their next frame.
+    fn is_live(&self) -> bool {
+        false
+    }
+
+    /// The next frame, taken at `now`. Only the rendered source looks at the scene.
+    ///
+    /// # Errors
+    /// See [`SourceError`]. After an error about one image, the next call goes on with the next image.
+    fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<Frame, SourceError>;
+}
+
+/// Why there is no frame.
+#[derive(Debug, Error)]
+pub enum SourceError {
+    /// The last frame was given; the source does not start again.
+    #[error("{0} has ended: set it to loop to start again")]
+    Ended(String),
+    /// The file or folder is not there.
+    #[error("{} does not exist: check the path", .0.display())]
+    Missing(PathBuf),
+    /// The file or folder may not be read.
+    #[error("no permission to read {}: grant it with chmod or choose another file", .0.display())]
+    Permission(PathBuf),
+    /// The operating system cannot read it.
+    #[error("cannot read {}: {cause}", path.display())]
+    Unreadable {
+        /// Which file or folder.
+        path: PathBuf,
+        /// What the operating system says.
+        cause: io::Error,
+    },
+    /// Zero bytes.
+    #[error("{} is empty (0 bytes): record or copy it again", .0.display())]
+    Empty(PathBuf),
+    /// The end of the image is missing. (A decoder would fill the rest with grey and say nothing.)
+    #[error("{} is cut short: its end is missing; copy it again", .0.display())]
+    Truncated(PathBuf),
+    /// Not a JPEG or PNG image, or a damaged one.
+    #[error("{} is no image that can be decoded: give a JPEG or PNG file", .0.display())]
+    NotAnImage(PathBuf),
+    /// Not a video that FFmpeg can decode, or one without a single whole frame.
+    #[error("{} is no video that FFmpeg can decode: give an mp4, mkv or avi file", .0.display())]
+    NotAVideo(PathBuf),
+    /// Not a camera that V4L2 can open, or one that is in use.
+    #[error("{} is no camera that V4L2 can open: check with v4l2-ctl --list-devices that it is one and that no other program uses it", .0.display())]
+    NotADevice(PathBuf),
+    /// A camera that is there and gives no frame.
+    #[error("{} delivers no frame: check its cable; it is opened again", .0.display())]
+    NoFrame(PathBuf),
+    /// More pixels or bytes than a frame may have.
+    #[error("{} is too large ({size}): the limit is {limit}; scale it down", path.display())]
+    TooLarge {
+        /// Which file.
+        path: PathBuf,
+        /// How large it is.
+        size: String,
+        /// How large it may be.
+        limit: String,
+    },
+    /// A stream that has run dry.
+    #[error("no frames of robot {0} arrive: start `gestalt stream` on it, and check its way here")]
+    NoFrames(RobotId),
+    /// A frame of a stream that is no picture.
+    #[error("robot {robot} streams {cause}")]
+    Garbled {
+        /// Whose stream.
+        robot: RobotId,
+        /// What it is.
+        cause: PictureError,
+    },
+    /// A folder with nothing to show.
+    #[error("the folder {} holds no images (*.jpg, *.jpeg, *.png)", .0.display())]
+    NoImages(PathBuf),
+    /// More fingers than a hand has.
+    #[error("a hand cannot raise {0} fingers: 0 to 5")]
+    Gesture(u8),
+    /// A camera that cannot be.
+    #[error(transparent)]
+    Camera(#[from] CameraModelError),
+    /// A place where no camera can be.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// OpenCV failed where it should not.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+impl SourceError {
+    /// The error of the operating system, told apart by its mend.
+    pub(crate) fn io(path: impl Into<PathBuf>, cause: io::Error) -> Self {
+        let path = path.into();
+        match cause.kind() {
+            io::ErrorKind::NotFound => Self::Missing(path),
+            io::ErrorKind::PermissionDenied => Self::Permission(path),
+            _ => Self::Unreadable { path, cause },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_of_the_system_names_the_path_and_the_mend() {
+        let message = |kind: io::ErrorKind| SourceError::io("/robot/video.mp4", kind.into()).to_string();
+        assert_eq!(
+            message(io::ErrorKind::PermissionDenied),
+            "no permission to read /robot/video.mp4: grant it with chmod or choose another file"
+        );
+        assert_eq!(message(io::ErrorKind::NotFound), "/robot/video.mp4 does not exist: check the path");
+        assert!(message(io::ErrorKind::Other).contains("/robot/video.mp4"));
+    }
+}
