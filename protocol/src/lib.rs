@@ -13,6 +13,7 @@
 mod bounded;
 mod decision;
 mod envelope;
+mod fnv;
 mod frame;
 mod id;
 mod instruction;
@@ -26,6 +27,7 @@ pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
 pub use envelope::{
     DecodeError, Envelope, MAX_ALLOCATION, MAX_JSON, MAX_MESSAGE, PROTOCOL_VERSION, decode_json,
 };
+pub use fnv::Fnv1a;
 pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
 pub use id::{
     ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,

@@ -7,7 +7,7 @@ mod plain;
 
 use divan::{Bencher, black_box};
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
-use gestalt_strategies::training_set::{Part, Samples};
+use gestalt_strategies::sample::{Part, Samples};
 use gestalt_strategies::{
     Classify, ClassifyError, Forgetting, ForgettingRule, Selection, SelectionRule, TrainingSet, Vocabulary,
 };

@@ -3,9 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
-
-use crate::fnv::Fnv1a;
+use gestalt_protocol::{ClassId, Fnv1a, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
 
 /// The most instructors of one round.
 const MAX_INSTRUCTORS: usize = 16;

@@ -1,59 +1,48 @@
-//! How a robot of a Gestalt swarm decides and learns.
+//! The mind of a robot of a Gestalt swarm: it decides with the others and learns from what it is told.
 //!
-//! Pure: no clock, no entropy, no socket, no file, no camera. Time and random generators are arguments, so the
-//! same inputs give the same outputs on every machine, byte for byte. The entry type is [`Mind`]: a state machine
-//! with one verb, `handle(now, input) -> outputs`, which a host (real Zenoh or an emulated network, both in
-//! `gestalt-peer`) feeds and obeys.
+//! Pure: no clock, no entropy, no socket, no file, no camera. Time and random generators are arguments, so on one machine
+//! the same inputs give the same outputs, byte for byte. The entry type is [`Mind`]: a state machine with one verb,
+//! `handle(now, input) -> outputs`, which a host (real Zenoh or an emulated network) feeds and obeys.
 //!
 //! ```text
-//! Observation ─► Classifier ─► opinion ─► Round (evidence) ─► my Vote ─► Ballot ─► fusion ─► Decision
-//!                                                      votes of others ──┘                     │
-//!                                                      decisions of others ─── the greatest wins ┘
+//! Observation ─► Rounds (gestalt-rounds): votes, ballot, fusion, agreement ─► Decision
+//!      │            ▲ votes and decisions of others
+//!      │            └─ Classifier (gestalt-svm) ◄─ Train
+//!      └─► Learning: looks ─ labelled by instructors ─► TrainingSet ─ selection ─► samples for others
+//!                                                            └─ forgetting ─► what is not worth its place
 //! ```
+//!
+//! Who wants decisions and no learning takes `gestalt-rounds` alone; who wants classifiers, `gestalt-svm`. What a host
+//! needs of both is re-exported here.
 
-mod agreement;
-pub mod ballot;
-mod classifier;
-mod classify;
-mod coding;
-mod evaluation;
-mod evidence;
-mod feature_space;
-mod fnv;
 pub mod forgetting;
-pub mod fusion;
-mod learner;
+mod geometry;
+mod learning;
 mod lessons;
 pub mod mind;
-mod observation;
-mod reduction;
-mod round;
-mod scaling;
+pub mod sample;
 pub mod selection;
-mod training;
-pub mod training_set;
-mod vocabulary;
-mod voter;
+mod training_set;
+mod vector_codec;
 
-pub use ballot::Ballot;
-pub use classifier::{Classifier, MAX_MODEL, ModelError};
-pub use classify::{Classify, ClassifyError};
-pub use coding::{Precision, VectorError, decode_vector};
-pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
-pub use evidence::{Evidence, Look};
-pub use feature_space::FeatureSpace;
 pub use forgetting::{Forgetting, ForgettingRule};
-pub use learner::{LearnError, Learner, LearnerOptions};
-pub use lessons::{Candidates, Heard, LessonBook, Verdict};
-pub use mind::{
-    Change, Input, Instructed, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory,
-    MemoryError, Mind, MindConfig, MindConfigError, Output, Refusal, Refusals, TrainingChange,
+pub use gestalt_rounds::{
+    Ballot, Classify, ClassifyError, Evidence, Look, Observation, Refusal, Refusals, Vocabulary,
+    VocabularyError, Voter, fusion,
 };
-pub use observation::Observation;
-pub use reduction::{Components, Pca, Ranking, Reduction};
-pub use scaling::{Scaling, ScalingMethod};
+pub use gestalt_svm::{
+    CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LearnError, Learner, LearnerOptions,
+    MAX_MODEL, ModelError, Pca, Proportion, Ranking, Reduction, Sample, Scaling, ScalingMethod,
+};
+#[cfg(feature = "offline")]
+pub use gestalt_svm::{Folding, MIN_SAMPLES, Progress, TrainError, TrainOptions, Trained, train};
+pub use learning::{
+    Change, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory, MemoryError,
+    TrainingChange,
+};
+pub use lessons::{Candidates, Heard, LessonBook, Verdict};
+pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
+pub use sample::{HeldSample, Part, Samples, Seen, SeenError};
 pub use selection::{Selection, SelectionRule};
-pub use training::{Folding, MIN_SAMPLES, Progress, Sample, TrainError, TrainOptions, Trained, train};
-pub use training_set::{HeldSample, Part, Receipt, RestoreError, Seen, SeenError, SetChange, TrainingSet};
-pub use vocabulary::{Vocabulary, VocabularyError};
-pub use voter::Voter;
+pub use training_set::{Receipt, RestoreError, SetChange, TrainingSet};
+pub use vector_codec::{Precision, VectorError, decode_vector};

@@ -5,7 +5,7 @@ mod operations;
 use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{ClassId, RobotId, SampleId};
-use gestalt_strategies::training_set::Samples;
+use gestalt_strategies::sample::Samples;
 use gestalt_strategies::{
     Classify, Forgetting, ForgettingRule, HeldSample, Part, Receipt, RestoreError, Seen, SeenError,
     Selection, SelectionRule, SetChange, TrainingSet,
@@ -259,7 +259,7 @@ fn strangers_cannot_keep_a_robot_from_sharing() {
     let mut rng = generator(1);
     let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
     let mut refused = 0;
-    for author in 1..=gestalt_strategies::training_set::MAX_AUTHORS as u32 {
+    for author in 1..=gestalt_strategies::sample::MAX_AUTHORS as u32 {
         let receipt = robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng);
         refused += u32::from(matches!(receipt, Receipt::Refused(SeenError::TooManyAuthors(_))));
     }

@@ -5,7 +5,7 @@
 
 #![cfg(feature = "opencv")]
 
-#[path = "../../../strategies/tests/side_by_side/mod.rs"]
+#[path = "../../../strategies/svm/tests/side_by_side/mod.rs"]
 mod side_by_side;
 
 use std::path::{Path, PathBuf};

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use gestalt_protocol::ClassId;
 use rand::{Rng, RngExt};
 
-use super::Forgetting;
-use crate::training_set::{HeldSample, Samples, draw};
+use super::contract::Forgetting;
+use crate::sample::{HeldSample, Samples, draw};
 
 /// Class-balancing reservoir sampling (Chrysakis & Moens, "Online continual learning from imbalanced data", ICML
 /// 2020). A class that is or once was the largest of a full set is *full*. The newest sample, of class c,

@@ -2,8 +2,8 @@
 
 use rand::Rng;
 
-use super::Forgetting;
-use crate::training_set::Samples;
+use super::contract::Forgetting;
+use crate::sample::Samples;
 
 /// The oldest sample of the whole set goes, whatever its class.
 ///

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
-use super::Forgetting;
-use crate::training_set::{Cluster, HeldSample, Samples, Sum, narrow};
+use super::contract::Forgetting;
+use crate::geometry::{Cluster, Sum, narrow};
+use crate::sample::{HeldSample, Samples};
 
 /// Of the class K with the most samples (ties at random)
 /// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that ever came, S the sum of the m held.

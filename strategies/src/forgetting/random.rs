@@ -2,8 +2,8 @@
 
 use rand::Rng;
 
-use super::Forgetting;
-use crate::training_set::{Samples, draw};
+use super::contract::Forgetting;
+use crate::sample::{Samples, draw};
 
 /// Of the class with the most samples (ties at random) any one goes.
 ///

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
-use super::Forgetting;
-use crate::training_set::{HeldSample, Neighbours, Samples, draw};
+use super::contract::Forgetting;
+use crate::geometry::Neighbours;
+use crate::sample::{HeldSample, Samples, draw};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg min over x of min over x' ≠ x in K of ‖x − x'‖. The two of the closest pair tie: one of them goes at random.

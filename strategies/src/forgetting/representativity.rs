@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
-use super::Forgetting;
-use crate::training_set::{Cluster, HeldSample, Samples};
+use super::contract::Forgetting;
+use crate::geometry::Cluster;
+use crate::sample::{HeldSample, Samples};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg max over x of ‖x − f_K‖, f_K the centroid of all samples of K. Ties go to the oldest.

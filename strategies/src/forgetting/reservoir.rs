@@ -3,8 +3,8 @@
 use rand::Rng;
 use rand::RngExt;
 
-use super::Forgetting;
-use crate::training_set::Samples;
+use super::contract::Forgetting;
+use crate::sample::Samples;
 
 /// The newest sample, the i-th that ever came, stays with probability T / i in place of any of the T others; else it
 /// goes itself. Each sample of the stream is then held with the same probability, whatever its class.

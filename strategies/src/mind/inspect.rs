@@ -1,52 +1,55 @@
 //! What a host may want to know of a mind, and to show.
 
-use gestalt_protocol::{Decision, Digest, RobotId, RoundId, Stamp};
+use std::collections::BTreeSet;
 
-use super::learning::Learning;
-use super::{Mind, MindConfig, Refusals};
-use crate::{Ballot, TrainingSet, Vocabulary};
+use gestalt_protocol::{Decision, Digest, RobotId, RoundId, Stamp};
+use gestalt_rounds::{Ballot, Refusals, RoundsConfig, Vocabulary};
+
+use super::machine::Mind;
+use crate::learning::Learning;
+use crate::training_set::TrainingSet;
 
 impl Mind {
     /// Whose mind it is.
     #[must_use]
     pub fn me(&self) -> RobotId {
-        self.me
+        self.rounds.me()
     }
 
     /// Its parameters.
     #[must_use]
-    pub fn config(&self) -> &MindConfig {
-        &self.config
+    pub fn config(&self) -> &RoundsConfig {
+        self.rounds.config()
     }
 
     /// The newest round known.
     #[must_use]
     pub fn round(&self) -> Option<RoundId> {
-        self.round.as_ref().map(|round| round.id)
+        self.rounds.round()
     }
 
     /// Whether this robot takes part in that round by looking and voting.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.round.as_ref().is_some_and(|round| round.open)
+        self.rounds.is_open()
     }
 
     /// The decision held for that round.
     #[must_use]
     pub fn held(&self) -> Option<&Decision> {
-        self.round.as_ref()?.agreement.held()
+        self.rounds.held()
     }
 
     /// The votes known in that round.
     #[must_use]
     pub fn ballot(&self) -> Option<&Ballot> {
-        self.round.as_ref().map(|round| &round.ballot)
+        self.rounds.ballot()
     }
 
     /// The vocabulary of its classifier.
     #[must_use]
     pub fn vocabulary(&self) -> Option<&Vocabulary> {
-        self.classifier.as_ref().map(|classifier| classifier.vocabulary())
+        self.rounds.classifier().map(|classifier| classifier.vocabulary())
     }
 
     /// What it has learned from; `None` for one that does not learn.
@@ -71,13 +74,19 @@ impl Mind {
     /// What it refused so far, by cause.
     #[must_use]
     pub fn refusals(&self) -> &Refusals {
-        &self.refusals
+        self.rounds.refusals()
     }
 
     /// The stamp on the latest message that another robot said under this robot's id: give one of the two
     /// another id.
     #[must_use]
     pub fn duplicate(&self) -> Option<Stamp> {
-        self.duplicate
+        self.rounds.duplicate()
+    }
+
+    /// The robots this one is directly linked to.
+    #[must_use]
+    pub fn neighbours(&self) -> &BTreeSet<RobotId> {
+        self.rounds.neighbours()
     }
 }

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, Gesture, Instruction, InstructorId, Lesson, Outcome, RobotId, Word};
+use gestalt_rounds::Input as AboutRounds;
 
-use super::{Mind, Output};
-use crate::{Heard, Verdict};
-
-/// The most answers that wait.
-const MAX_WAITING: usize = 64;
+use super::answers::Waiting;
+use super::input::Instructed;
+use super::machine::Mind;
+use super::output::Output;
+use crate::learning::Learning;
+use crate::lessons::{Heard, Verdict};
 
 /// How much longer a robot waits that saw nothing of the round: another may have.
 const SAW_NOTHING: Duration = Duration::from_millis(500);
@@ -16,34 +18,12 @@ const SAW_NOTHING: Duration = Duration::from_millis(500);
 /// How much longer one waits that has nothing but "no" to say.
 const KNOWS_NOTHING: Duration = Duration::from_secs(1);
 
-/// A human's word, as it reached the swarm.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Instructed {
-    /// Who said it.
-    pub by: InstructorId,
-    /// When, in the swarm's own time: the same at every robot.
-    pub at: u64,
-    /// What was said.
-    pub instruction: Instruction,
-}
-
-/// An answer that waits for its turn, and until what it says is remembered.
-#[derive(Clone, Debug)]
-pub(super) struct Waiting {
-    pub due: Duration,
-    revision: u64,
-    by: InstructorId,
-    answer: Answer,
-}
-
 impl Mind {
-    pub(super) fn on_instructed(&mut self, instructed: Instructed, out: &mut Vec<Output>) {
-        if instructed.instruction == Instruction::Open {
-            return self.on_open(out);
-        }
+    pub(super) fn on_instructed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
         let outcome = self.learn_from(&instructed);
         self.share();
-        self.prepare_answer(instructed, outcome);
+        self.prepare_answer(now, instructed, outcome);
+        AboutRounds::Tick
     }
 
     fn learn_from(&mut self, instructed: &Instructed) -> Outcome {
@@ -83,10 +63,9 @@ impl Mind {
         }
     }
 
-    fn prepare_answer(&mut self, instructed: Instructed, outcome: Outcome) {
+    fn prepare_answer(&mut self, now: Duration, instructed: Instructed, outcome: Outcome) {
         let Instructed { by, at, instruction } = instructed;
-        let known = self.answers.iter().any(|w| w.by == by && w.answer.at == at);
-        if known || self.answered.contains(&(by.clone(), at)) || self.answers.len() >= MAX_WAITING {
+        if self.answers.needs_none(&by, at) {
             return;
         }
         let wait = match outcome {
@@ -105,44 +84,36 @@ impl Mind {
             samples = u32::try_from(learning.held_of(round)).unwrap_or(u32::MAX);
             revision = learning.pending_revision();
         }
-        let answer = Answer { robot: self.me, at, to: instruction, outcome, class, samples };
-        let due = self.now + wait + self.config.takeover.saturating_mul(self.turns);
-        self.answers.push(Waiting { due, revision, by, answer });
+        let answer = Answer { robot: self.me(), at, to: instruction, outcome, class, samples };
+        let due = now + wait + self.rounds.turn();
+        self.answers.wait(Waiting { due, revision, by, answer });
     }
 
     /// Another robot has answered that word.
-    pub(super) fn on_answered(&mut self, by: &InstructorId, at: u64, robot: RobotId) {
-        if robot != self.me {
-            self.answers.retain(|waiting| waiting.by != *by || waiting.answer.at != at);
-            self.note_answered(by.clone(), at);
+    pub(super) fn on_answered(&mut self, by: InstructorId, at: u64, robot: RobotId) -> AboutRounds {
+        if robot != self.me() {
+            self.answers.note_answered(by, at);
         }
-    }
-
-    /// An answer may come before the word it answers.
-    fn note_answered(&mut self, by: InstructorId, at: u64) {
-        self.answered.push_back((by, at));
-        if self.answered.len() > MAX_WAITING {
-            self.answered.pop_front();
-        }
+        AboutRounds::Tick
     }
 
     /// When the next answer is to be given, if what it says is remembered by then.
     pub(super) fn answer_due(&self) -> Option<Duration> {
-        self.answers.iter().filter(|waiting| self.may_say(waiting)).map(|waiting| waiting.due).min()
-    }
-
-    fn may_say(&self, waiting: &Waiting) -> bool {
-        self.learning.as_ref().is_none_or(|learning| learning.is_remembered(waiting.revision))
+        self.answers.due(|revision| is_remembered(self.learning.as_ref(), revision))
     }
 
     pub(super) fn answer_when_due(&mut self, out: &mut Vec<Output>) {
-        let ready = |mind: &Self| {
-            mind.answers.iter().position(|waiting| mind.now >= waiting.due && mind.may_say(waiting))
-        };
-        while let Some(position) = ready(self) {
-            let Waiting { by, answer, .. } = self.answers.remove(position);
-            self.note_answered(by.clone(), answer.at);
+        let (now, learning) = (self.rounds.now(), self.learning.as_ref());
+        while let Some((by, answer)) =
+            self.answers.take_due(now, |revision| is_remembered(learning, revision))
+        {
             out.push(Output::Answer(by, answer));
         }
     }
+}
+
+/// Whether what a robot knows as of that revision would survive a kill; there is nothing to survive for one that learns
+/// nothing.
+fn is_remembered(learning: Option<&Learning>, revision: u64) -> bool {
+    learning.is_none_or(|learning| learning.is_remembered(revision))
 }

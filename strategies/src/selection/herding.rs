@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::ClassId;
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{Cluster, HeldSample, Part, Samples, Sum, narrow};
+use super::contract::Selection;
+use crate::geometry::{Cluster, Sum, narrow};
+use crate::sample::{HeldSample, Part, Samples};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖μ − (S + x) / (k + 1)‖: μ the mean of the own samples of K (personal and

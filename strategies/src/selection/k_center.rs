@@ -1,10 +1,11 @@
 //! What covers all that was seen with the fewest samples.
 
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{HeldSample, Neighbours, Part, Samples, Sum, narrow};
+use super::contract::Selection;
+use crate::geometry::{Neighbours, Sum, narrow};
+use crate::sample::{HeldSample, Part, Samples};
 
 /// arg max over all personal x of min over all shared and external x' of ‖x − x'‖, whatever their classes: the point
 /// that the centres so far cover worst becomes the next. With no common knowledge at all the one nearest to the

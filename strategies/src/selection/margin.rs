@@ -1,10 +1,10 @@
 //! What the classifier is least sure of.
 
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{Part, Samples, draw};
+use super::contract::Selection;
+use crate::sample::{Part, Samples, draw};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of p₁(x) − p₂(x), the probabilities of the classifier's first and second choice. Ties

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::ClassId;
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{HeldSample, Neighbours, Part, Samples, Sum, narrow};
+use super::contract::Selection;
+use crate::geometry::{Neighbours, Sum, narrow};
+use crate::sample::{HeldSample, Part, Samples};
 
 /// A class K at random among those with personal samples, then
 /// arg max over x personal in K of min over x' in K, shared or external, of ‖x − x'‖: the farthest from its nearest

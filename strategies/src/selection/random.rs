@@ -1,10 +1,10 @@
 //! Any sample is as good as another.
 
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{Part, Samples, draw};
+use super::contract::Selection;
+use crate::sample::{Part, Samples, draw};
 
 /// A class K at random among those with personal samples, then one of its personal samples at random.
 ///

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::ClassId;
+use gestalt_rounds::Classify;
 use rand::Rng;
 
-use super::Selection;
-use crate::Classify;
-use crate::training_set::{Cluster, HeldSample, Part, Samples};
+use super::contract::Selection;
+use crate::geometry::Cluster;
+use crate::sample::{HeldSample, Part, Samples};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖x − f_K‖, f_K the centroid of the personal samples of K. Ties go to the oldest.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::training_set::{HeldSample, Part, Samples};
+use gestalt_strategies::sample::{HeldSample, Part, Samples};
 use gestalt_strategies::{Classify, Forgetting, ForgettingRule, Selection, SelectionRule};
 use rand::{Rng, RngExt};
 

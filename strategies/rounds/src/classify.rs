@@ -1,0 +1,54 @@
+//! The contract between a robot and its classifier.
+
+use std::fmt::Debug;
+
+use thiserror::Error;
+
+use crate::vocabulary::Vocabulary;
+
+/// A feature vector that a classifier cannot judge. The classifier is unchanged.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ClassifyError {
+    /// It has another number of components than the classifier was trained on.
+    #[error(
+        "feature vector of {found} components, the classifier takes {expected}: train and look with the same feature set"
+    )]
+    Length {
+        /// Components of the vector.
+        found: usize,
+        /// Components the classifier takes.
+        expected: usize,
+    },
+    /// A component is NaN or infinite.
+    #[error("component {0} of the feature vector is not finite")]
+    NotFinite(usize),
+}
+
+/// Tells gestures apart: from a raw feature vector to a probability for each class.
+///
+/// A trait, so that a researcher's own classifier can sit in a robot; `Classifier` is ours.
+pub trait Classify: Debug + Send + Sync {
+    /// The gestures it can tell.
+    fn vocabulary(&self) -> &Vocabulary;
+
+    /// The probability of each class given the features: one value per class of the vocabulary, each in
+    /// `0.0..=1.0`, summing to 1.
+    ///
+    /// # Errors
+    /// See [`ClassifyError`].
+    fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError>;
+
+    /// The same of a vector already reduced: coordinates in the feature space it judges in.
+    /// `None` for a classifier without such a space, and for coordinates of another length or that are not finite.
+    fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
+        let _ = coordinates;
+        None
+    }
+
+    /// Where a feature vector lies among all views, in units such that errors about two views correlate by exp(−d²) at a
+    /// distance of d: near ones repeat each other. `None` for a classifier that cannot say, whose every look is new.
+    fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
+        let _ = features;
+        None
+    }
+}

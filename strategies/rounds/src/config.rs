@@ -1,0 +1,183 @@
+//! The parameters of a robot's rounds.
+
+use std::time::Duration;
+
+use gestalt_protocol::{FusionRule, MAX_ROBOTS};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Parameters no robot can work with; each names the field and the mend.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum RoundsConfigError {
+    /// α outside its range.
+    #[error("alpha is {0}: choose it above 0 and below 0.5, for example 0.05")]
+    Alpha(f64),
+    /// A quorum that is always or never met.
+    #[error("quorum is {0}: choose from 1 to {MAX_ROBOTS} robots")]
+    Quorum(u32),
+    /// A bound on the evidence that bounds nothing or leaves none.
+    #[error("clip is {0}: choose it above 0 and at most 1000 nats, for example 6")]
+    Clip(f64),
+    /// A period of no length.
+    #[error("{0} is zero: choose a duration above 0, for example 500ms")]
+    Zero(&'static str),
+    /// A duration so long that adding it up could overflow.
+    #[error("{0} is longer than a day: choose a shorter duration")]
+    TooLong(&'static str),
+    /// Two durations in the wrong order.
+    #[error("{longer} is shorter than {shorter}: make {longer} at least as long")]
+    Order {
+        /// The field that must not be the longer one.
+        shorter: &'static str,
+        /// The field that must not be the shorter one.
+        longer: &'static str,
+    },
+}
+
+/// How a robot takes part in rounds. All robots of a swarm should share these. In a configuration file durations are
+/// written as `"500ms"`, and what is left out is the default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RoundsConfig {
+    /// How votes are fused.
+    pub rule: FusionRule,
+    /// α: decide once the fused probability of the top class reaches 1 − α. Range `0.0 < α < 0.5`.
+    pub alpha: f64,
+    /// q: how many robots must have contributed evidence. At least 1.
+    pub quorum: u32,
+    /// f: how many lying robots a decision must withstand. The margin top − second must exceed what f robots can
+    /// add to it (2·f·c for the log pools), and a decision heard is believed once f + 1 robots hold its class.
+    pub liars: u32,
+    /// c: the bound on a robot's log-evidence for or against any class, in nats.
+    pub clip: f64,
+    /// τ: how long until a view may have changed enough to count as another look; frames closer in time are one.
+    #[serde(with = "humantime_serde")]
+    pub decorrelation: Duration,
+    /// Whether a look counts for less, the more it resembles an earlier one of the round.
+    pub discount_repeats: bool,
+    /// How long a round waits for live robots that have not seen anything yet, before it decides without them. A robot
+    /// that never sees makes every round last this long.
+    #[serde(with = "humantime_serde")]
+    pub patience: Duration,
+    /// When a round ends undecided, from its opening.
+    #[serde(with = "humantime_serde")]
+    pub deadline: Duration,
+    /// After hearing of a round, requests to open another have no effect for this long: a copy of the request
+    /// for this one may still be on its way.
+    #[serde(with = "humantime_serde")]
+    pub refractory: Duration,
+    /// The least time between two votes of one robot.
+    #[serde(with = "humantime_serde")]
+    pub vote_interval: Duration,
+    /// A vote is said again after this long, while the round is open.
+    #[serde(with = "humantime_serde")]
+    pub vote_repeat: Duration,
+    /// How long the spokesrobot lets decisions meet before it announces the greatest.
+    #[serde(with = "humantime_serde")]
+    pub settle: Duration,
+    /// How much longer each next robot waits for the announcement before it makes it itself.
+    #[serde(with = "humantime_serde")]
+    pub takeover: Duration,
+    /// The period of repair between neighbours while a round is open or the neighbourhood has just changed.
+    #[serde(with = "humantime_serde")]
+    pub repair_busy: Duration,
+    /// The same when nothing happens.
+    #[serde(with = "humantime_serde")]
+    pub repair_idle: Duration,
+}
+
+impl Default for RoundsConfig {
+    fn default() -> Self {
+        Self {
+            rule: FusionRule::LogPool,
+            alpha: 0.05,
+            quorum: 1,
+            liars: 0,
+            clip: 6.0,
+            decorrelation: Duration::from_millis(500),
+            discount_repeats: true,
+            patience: Duration::from_millis(1000),
+            deadline: Duration::from_secs(5),
+            refractory: Duration::from_millis(500),
+            vote_interval: Duration::from_millis(250),
+            vote_repeat: Duration::from_secs(1),
+            settle: Duration::from_millis(200),
+            takeover: Duration::from_millis(400),
+            repair_busy: Duration::from_millis(500),
+            repair_idle: Duration::from_secs(4),
+        }
+    }
+}
+
+impl RoundsConfig {
+    /// Whether a robot can work with these parameters.
+    ///
+    /// # Errors
+    /// The first [`RoundsConfigError`] found.
+    pub fn validate(&self) -> Result<(), RoundsConfigError> {
+        if !(self.alpha > 0.0 && self.alpha < 0.5) {
+            return Err(RoundsConfigError::Alpha(self.alpha));
+        }
+        if !(1..=MAX_ROBOTS).contains(&(self.quorum as usize)) {
+            return Err(RoundsConfigError::Quorum(self.quorum));
+        }
+        if !(self.clip > 0.0 && self.clip <= 1000.0) {
+            return Err(RoundsConfigError::Clip(self.clip));
+        }
+        let above_zero = [
+            ("decorrelation", self.decorrelation),
+            ("deadline", self.deadline),
+            ("vote_interval", self.vote_interval),
+            ("vote_repeat", self.vote_repeat),
+            ("takeover", self.takeover),
+            ("repair_busy", self.repair_busy),
+            ("repair_idle", self.repair_idle),
+        ];
+        if let Some((field, _)) = above_zero.iter().find(|(_, duration)| duration.is_zero()) {
+            return Err(RoundsConfigError::Zero(field));
+        }
+        let any = [("patience", self.patience), ("refractory", self.refractory), ("settle", self.settle)];
+        let day = Duration::from_secs(24 * 60 * 60);
+        if let Some((field, _)) = above_zero.iter().chain(&any).find(|(_, duration)| *duration > day) {
+            return Err(RoundsConfigError::TooLong(field));
+        }
+        let ordered = [
+            ("patience", self.patience, "deadline", self.deadline),
+            ("vote_interval", self.vote_interval, "vote_repeat", self.vote_repeat),
+            ("repair_busy", self.repair_busy, "repair_idle", self.repair_idle),
+        ];
+        match ordered.iter().find(|(_, less, _, more)| less > more) {
+            Some(&(shorter, _, longer, _)) => Err(RoundsConfigError::Order { shorter, longer }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_valid() {
+        assert_eq!(RoundsConfig::default().validate(), Ok(()));
+    }
+
+    #[test]
+    fn what_no_robot_can_work_with_is_named() {
+        let default = RoundsConfig::default;
+        let ms = Duration::from_millis;
+        for (config, field) in [
+            (RoundsConfig { alpha: 0.5, ..default() }, "alpha"),
+            (RoundsConfig { alpha: f64::NAN, ..default() }, "alpha"),
+            (RoundsConfig { quorum: 0, ..default() }, "quorum"),
+            (RoundsConfig { clip: f64::INFINITY, ..default() }, "clip"),
+            (RoundsConfig { repair_busy: ms(0), ..default() }, "repair_busy"),
+            (RoundsConfig { settle: Duration::MAX, ..default() }, "settle"),
+            (RoundsConfig { patience: ms(6000), ..default() }, "patience"),
+            (RoundsConfig { vote_repeat: ms(100), ..default() }, "vote_repeat"),
+        ] {
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! How a swarm of robots decides, together, what it was shown.
+//!
+//! Pure: no clock, no entropy, no socket, no file, no camera, and no learning: whoever wants a swarm's decisions embeds
+//! this crate alone. Time is an argument. The entry type is [`Rounds`]: a state machine with one verb,
+//! `handle(now, input) -> outputs`, which a host feeds and obeys.
+//!
+//! ```text
+//! Observation ─► Classify ─► Evidence ─► my Vote ─► Ballot ─► fusion ─► Decision ─► Agreement ─► Hold, Announce
+//!                                votes of others ──┘   decisions of others ──┘ the greatest wins
+//! ```
+//!
+//! Who also wants to learn takes `gestalt-strategies`, whose mind [follows](Follow) these rounds.
+
+mod agreement;
+mod ballot;
+mod classify;
+mod config;
+mod evidence;
+pub mod fusion;
+mod machine;
+mod observation;
+mod refusal;
+mod round;
+mod vocabulary;
+mod voter;
+
+pub use ballot::{Ballot, Cast, Scale};
+pub use classify::{Classify, ClassifyError};
+pub use config::{RoundsConfig, RoundsConfigError};
+pub use evidence::{Evidence, Look};
+pub use machine::{Follow, Input, Output, Rounds};
+pub use observation::Observation;
+pub use refusal::{Refusal, Refusals};
+pub use vocabulary::{Vocabulary, VocabularyError};
+pub use voter::Voter;

@@ -1,0 +1,131 @@
+//! The course of a round: when it opens, how long a robot looks, when it closes.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::RoundId;
+
+use super::follow::Follow;
+use super::output::Output;
+use super::rounds::{Effects, Rounds};
+use crate::classify::Classify;
+use crate::observation::Observation;
+use crate::refusal::Refusal;
+use crate::round::Round;
+
+impl Rounds {
+    pub(super) fn on_open(&mut self, effects: &mut Effects<'_>) {
+        if self.is_open() || self.now < self.refractory_until() {
+            return;
+        }
+        match self.highest.map_or(Some(1), |highest| highest.checked_add(1)) {
+            Some(counter) => self.join(RoundId { counter, opener: self.me }, effects),
+            None => self.refusals.add(Refusal::CountersUsedUp),
+        }
+    }
+
+    /// Until when a request to open a round may be a copy of the one for the newest round.
+    fn refractory_until(&self) -> Duration {
+        self.round.as_ref().map_or(Duration::ZERO, |round| round.since + self.config.refractory)
+    }
+
+    /// When a round is to be opened for the gesture shown; never for one that has had its round, and not before the
+    /// round of an earlier gesture is over.
+    pub(super) fn showing(&self) -> Option<Duration> {
+        let began = self.shown?;
+        let round = self.round.as_ref();
+        let waits = round.is_none_or(|round| !round.open && round.since < began);
+        waits.then(|| self.refractory_until())
+    }
+
+    pub(super) fn on_left(&mut self) {
+        self.shown = None;
+        if let Some(round) = self.round.as_mut().filter(|round| round.open) {
+            round.end_early(self.now, &self.config);
+        }
+    }
+
+    pub(super) fn on_blind(&mut self, blind: bool) {
+        if self.blind != blind
+            && let Some(round) = &mut self.round
+        {
+            round.outdate();
+        }
+        self.blind = blind;
+    }
+
+    pub(super) fn on_observed(&mut self, observation: &Observation, learns: bool) {
+        let Some(round) = self.round.as_mut().filter(|round| round.open) else { return };
+        let Some(classifier) = &self.classifier else {
+            // Who learns has none until it was taught.
+            if !learns {
+                self.refusals.add(Refusal::NoClassifier);
+            }
+            return;
+        };
+        if !round.observe(self.now, observation, &**classifier, &self.config) {
+            self.refusals.add(Refusal::Unclassified);
+        }
+    }
+
+    pub(super) fn on_learned(&mut self, classifier: Arc<dyn Classify>) {
+        let before = self.classifier.as_ref().map(|old| old.vocabulary().id());
+        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary().id())) {
+            round.look_afresh();
+        }
+        self.classifier = Some(classifier);
+    }
+
+    /// When the open round closes: what is decided is left a while to meet what others decided.
+    pub(super) fn closing(&self) -> Option<Duration> {
+        let round = self.round.as_ref().filter(|round| round.open)?;
+        Some(round.agreement.held_since()? + self.config.settle)
+    }
+
+    pub(super) fn close(&mut self, effects: &mut Effects<'_>) {
+        if let Some(round) = self.round.as_mut().filter(|round| round.open) {
+            round.open = false;
+        }
+        if self.looking_until(effects.follower).is_none() {
+            self.stop_looking(effects);
+        }
+    }
+
+    /// Until when this robot looks at a round that is over: it saw something, and is to learn from more of it.
+    pub(super) fn looking_until(&self, follower: &dyn Follow) -> Option<Duration> {
+        let round = self.round.as_ref().filter(|round| !round.open)?;
+        if self.looking.is_none() || follower.knowledge().is_none() {
+            return None;
+        }
+        let (_, deadline) = round.patience_and_deadline(&self.config);
+        let more = self.now < deadline && follower.wants_more(round.id);
+        Some(if more { deadline } else { self.now })
+    }
+
+    pub(super) fn stop_looking(&mut self, effects: &mut Effects<'_>) {
+        if self.looking.take().is_some()
+            && let Some(round) = &self.round
+        {
+            // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
+            effects.out.push(Output::Closed(round.id));
+        }
+    }
+
+    /// Takes part in a round from now on; an older one that is still open is over.
+    pub(super) fn join(&mut self, id: RoundId, effects: &mut Effects<'_>) {
+        self.enter(id, true, effects);
+        effects.out.push(Output::Opened(id));
+        self.partners.hurry(self.now, self.config.repair_busy);
+        self.speak(effects);
+    }
+
+    /// Makes this the newest round known, with or without taking part in it.
+    pub(super) fn enter(&mut self, id: RoundId, open: bool, effects: &mut Effects<'_>) {
+        self.close(effects);
+        self.stop_looking(effects);
+        self.highest = self.highest.max(Some(id.counter));
+        self.round = Some(Round::new(id, self.now, open));
+        self.looking = open.then_some(id);
+        effects.follower.entered(id);
+    }
+}

@@ -1,0 +1,33 @@
+//! What goes along with the rounds of a robot without deciding any of them: its learning.
+
+use gestalt_protocol::{ClassId, Digest, RoundId};
+
+/// Follows the rounds that a robot lives through: is told of them, and asked for the little they need to know of it.
+///
+/// `()` follows nothing: a robot that decides and does not learn. Calls come in the order in which things happen, within
+/// [`Rounds::handle_with`](crate::Rounds::handle_with).
+pub trait Follow {
+    /// This robot knows of a round, or of another name for one: robots that open at once merge their rounds.
+    fn entered(&mut self, round: RoundId) {
+        let _ = round;
+    }
+
+    /// This robot holds a decision for that round; `None` is "no decision". A later one replaces it.
+    fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
+        let _ = (round, class);
+    }
+
+    /// Whether it wants to see more of a round that is decided. The robot then goes on looking until the round's deadline
+    /// at the latest.
+    fn wants_more(&self, round: RoundId) -> bool {
+        let _ = round;
+        false
+    }
+
+    /// All it knows, in two numbers, which neighbours are told with what is known of the round. `None`: it does not learn.
+    fn knowledge(&self) -> Option<Digest> {
+        None
+    }
+}
+
+impl Follow for () {}

@@ -1,0 +1,132 @@
+//! What a robot makes of what the others say: of their votes, their decisions, and the rounds that these are about.
+
+use std::cmp::Ordering;
+
+use gestalt_protocol::{Decision, Envelope, Message, RobotId, RoundId, Stamp, Vote};
+
+use super::rounds::{Effects, Rounds};
+use crate::ballot::{Cast, Scale};
+use crate::refusal::Refusal;
+
+/// A round this many counters ahead of the newest known is refused: nobody shows a million gestures unnoticed.
+const MAX_LEAP: u32 = 1_000_000;
+
+impl Rounds {
+    pub(super) fn on_received(&mut self, envelope: Envelope, effects: &mut Effects<'_>) {
+        let Envelope { author, stamp, message } = envelope;
+        if author == self.me {
+            // The own words may come back; words never said are another's.
+            if stamp.boot != self.stamp.boot || stamp > self.stamp {
+                self.meet_duplicate(stamp);
+            }
+            return;
+        }
+        match message {
+            Message::Vote(vote) => {
+                self.hear_vote(author, stamp, vote, effects);
+            }
+            Message::Have(have) => self.on_have(author, &have, effects),
+            Message::Give(give) => self.on_give(author, give, effects),
+            // Whoever follows the rounds to learn from them takes these in.
+            Message::Samples(_) | Message::Know(_) | Message::Lessons(_) => {}
+        }
+    }
+
+    pub(super) fn on_heard(&mut self, robot: RobotId, decision: Decision, effects: &mut Effects<'_>) {
+        if robot != self.me {
+            self.hear_decision(Some(robot), decision, effects);
+        }
+    }
+
+    pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
+        let (counter, class) = (decision.round.counter, decision.class);
+        self.hear_decision(None, decision, effects);
+        if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == counter) {
+            round.agreement.note_announced(self.now, class);
+        }
+    }
+
+    /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Equal counters
+    /// merge here, on the smaller opener.
+    pub(super) fn place(&mut self, id: RoundId, effects: &mut Effects<'_>) -> Option<Ordering> {
+        if self.highest.is_some_and(|highest| id.counter > highest.saturating_add(MAX_LEAP)) {
+            self.refusals.add(Refusal::FarAhead);
+            return None;
+        }
+        self.highest = self.highest.max(Some(id.counter));
+        let Some(round) = &mut self.round else { return Some(Ordering::Greater) };
+        let order = id.counter.cmp(&round.id.counter);
+        if order.is_eq() {
+            round.id.opener = round.id.opener.min(id.opener);
+            effects.follower.entered(id);
+        }
+        Some(order)
+    }
+
+    /// Counts a robot's vote, by whichever way it came. Says whether it was news.
+    pub(super) fn hear_vote(
+        &mut self,
+        robot: RobotId,
+        stamp: Stamp,
+        vote: Vote,
+        effects: &mut Effects<'_>,
+    ) -> bool {
+        if robot == self.me {
+            // From an earlier life it is merely old.
+            if stamp > self.stamp {
+                self.meet_duplicate(stamp);
+            }
+            return false;
+        }
+        if vote.check().is_err() {
+            self.refusals.add(Refusal::Impossible);
+            return false;
+        }
+        let scale = Scale { vocabulary: vote.vocabulary, classes: vote.evidence.len() };
+        if !vote.evidence.is_empty() && self.own_scale().is_some_and(|own| own != scale) {
+            self.refusals.add(Refusal::Vocabulary);
+            return false;
+        }
+        match self.place(vote.round, effects) {
+            None | Some(Ordering::Less) => return false,
+            Some(Ordering::Greater) => self.join(vote.round, effects),
+            Some(Ordering::Equal) => {}
+        }
+        let Some(round) = self.round.as_mut() else { return false };
+        match round.ballot.cast(robot, stamp, vote) {
+            Cast::Counted => true,
+            Cast::Known => false,
+            Cast::Full => {
+                self.refusals.add(Refusal::BallotFull);
+                false
+            }
+        }
+    }
+
+    /// Takes in a decision, by whichever way it came. Says whether it was news.
+    pub(super) fn hear_decision(
+        &mut self,
+        holder: Option<RobotId>,
+        decision: Decision,
+        effects: &mut Effects<'_>,
+    ) -> bool {
+        if decision.check().is_err() {
+            self.refusals.add(Refusal::Impossible);
+            return false;
+        }
+        match self.place(decision.round, effects) {
+            None | Some(Ordering::Less) => return false,
+            // What is decided elsewhere needs no looking; unless it cannot be believed on one robot's word.
+            Some(Ordering::Greater) if self.config.liars == 0 => self.enter(decision.round, false, effects),
+            Some(Ordering::Greater) => self.join(decision.round, effects),
+            Some(Ordering::Equal) => {}
+        }
+        let Some(round) = self.round.as_mut() else { return false };
+        round.agreement.hear(holder, decision, self.config.liars)
+    }
+
+    fn meet_duplicate(&mut self, stamp: Stamp) {
+        self.refusals.add(Refusal::DuplicateId);
+        self.duplicate = Some(stamp);
+    }
+}

@@ -1,0 +1,26 @@
+//! The state machine that lives through rounds: what the world tells it goes in, what it wants done comes out.
+//!
+//! ```text
+//! Input ─► Rounds: course (open, look, close) ─► Output
+//!                  voting (speak, decide, announce)
+//!                  hearing (votes and decisions of others)
+//!                  repair (what a neighbour lacks)
+//! ```
+
+mod course;
+mod follow;
+mod hearing;
+mod input;
+mod inspect;
+mod output;
+mod partners;
+mod repair;
+mod rounds;
+#[cfg(test)]
+mod tests;
+mod voting;
+
+pub use follow::Follow;
+pub use input::Input;
+pub use output::Output;
+pub use rounds::Rounds;

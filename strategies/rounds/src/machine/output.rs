@@ -1,0 +1,20 @@
+//! What the machine wants done.
+
+use gestalt_protocol::{Decision, Envelope, RobotId, RoundId};
+
+/// What [`Rounds`](crate::Rounds) wants done. The host carries out all of them, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Output {
+    /// Say this to all robots (a vote on `robot/<me>/vote`): the fast way.
+    Broadcast(Envelope),
+    /// Say this to one neighbour (`robot/<id>/repair`): the sure way.
+    Tell(RobotId, Envelope),
+    /// This robot now holds that decision: publish it (`robot/<me>/decision`).
+    Hold(Decision),
+    /// As the spokesrobot: announce the swarm's decision (`decision`).
+    Announce(Decision),
+    /// This robot takes part in that round from now on: look.
+    Opened(RoundId),
+    /// That round is over for this robot: no further looking.
+    Closed(RoundId),
+}

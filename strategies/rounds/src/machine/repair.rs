@@ -1,0 +1,148 @@
+//! The sure way: neighbours tell each other what they have and give each other what they lack, hop by hop, so
+//! that nothing depends on how the fast way routes.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+
+use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
+
+use super::output::Output;
+use super::rounds::{Effects, Rounds};
+
+/// The most votes in one [`Give`], so that it fits in a message whatever the vocabulary; the next one brings more.
+const MAX_GIVEN: usize = 1024;
+
+impl Rounds {
+    /// Greets new neighbours with what this robot has.
+    pub(super) fn on_neighbours(&mut self, mut robots: BTreeSet<RobotId>, effects: &mut Effects<'_>) {
+        robots.remove(&self.me);
+        if robots == *self.neighbours() {
+            return;
+        }
+        let new = self.partners.change(robots);
+        self.hurry_repair();
+        for robot in new {
+            self.tell_have(robot, false, effects);
+        }
+    }
+
+    /// Compares what this robot has with one neighbour, when it is time to.
+    pub(super) fn repair_when_due(&mut self, effects: &mut Effects<'_>) {
+        let periods = (self.config.repair_busy, self.config.repair_idle);
+        if !self.partners.is_due(self.now, self.is_open(), periods) {
+            return;
+        }
+        if let Some(robot) = self.partners.turn(&self.alive) {
+            self.tell_have(robot, false, effects);
+        }
+    }
+
+    /// Hears what a neighbour has: gives what it lacks, and asks for what this robot lacks itself.
+    pub(super) fn on_have(&mut self, from: RobotId, have: &Have, effects: &mut Effects<'_>) {
+        let order = match have.round {
+            None => Ordering::Less,
+            Some(id) => match self.place(id, effects) {
+                None => return,
+                // A round still undecided there is one to take part in.
+                Some(Ordering::Greater) if have.decision.is_none() => {
+                    self.join(id, effects);
+                    Ordering::Equal
+                }
+                Some(order) => order,
+            },
+        };
+        if let Some(give) = self.lacking_there(order, have) {
+            self.tell(from, Message::Give(give), effects);
+        }
+        if !have.answer && self.lacking_here(order, have) {
+            self.tell_have(from, true, effects);
+        }
+    }
+
+    /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
+    pub(super) fn on_give(&mut self, from: RobotId, give: Give, effects: &mut Effects<'_>) {
+        let counter = self.round().map(|id| id.counter);
+        let mut news = Give { decision: None, votes: Vec::new() };
+        if let Some(decision) = give.decision {
+            let id = decision.round;
+            if self.hear_decision(Some(from), decision.clone(), effects) {
+                if !self.is_open() && counter.is_none_or(|counter| id.counter > counter) {
+                    self.note_missed_announcement();
+                }
+                news.decision = Some(decision);
+            }
+        }
+        for held in give.votes {
+            if self.hear_vote(held.robot, held.stamp, held.vote.clone(), effects) {
+                news.votes.push(held);
+            }
+        }
+        if news.decision.is_none() && news.votes.is_empty() {
+            return;
+        }
+        let others: Vec<RobotId> = self.neighbours().iter().copied().filter(|r| *r != from).collect();
+        for robot in others {
+            self.tell(robot, Message::Give(news.clone()), effects);
+        }
+    }
+
+    /// A round learnt of only after it was decided is not this robot's to announce: those who took part did.
+    fn note_missed_announcement(&mut self) {
+        if let Some(round) = &mut self.round
+            && let Some(class) = round.agreement.best_class()
+        {
+            round.agreement.note_announced(self.now, class);
+        }
+    }
+
+    /// What the neighbour lacks; its newest round stands to this robot's as `order` says.
+    fn lacking_there(&self, order: Ordering, have: &Have) -> Option<Give> {
+        let round = self.round.as_ref().filter(|_| order.is_le())?;
+        let (rank, known) = match order {
+            Ordering::Equal => (have.decision, have.votes.iter().copied().collect()),
+            _ => (None, BTreeMap::<RobotId, Stamp>::new()),
+        };
+        let decision = round.agreement.held().filter(|held| Some(held.rank()) > rank).cloned();
+        // Who gets a decision needs no votes; unless it must not believe one robot's word.
+        let votes = if rank.is_none() && (decision.is_none() || self.config.liars > 0) {
+            round.ballot.lacking(&known).take(MAX_GIVEN).collect()
+        } else {
+            Vec::new()
+        };
+        (decision.is_some() || !votes.is_empty()).then_some(Give { decision, votes })
+    }
+
+    /// Whether the neighbour has something that this robot lacks.
+    fn lacking_here(&self, order: Ordering, have: &Have) -> bool {
+        let Some(round) = self.round.as_ref().filter(|_| order.is_eq()) else { return order.is_gt() };
+        let rank = round.agreement.rank();
+        let newer = |(robot, stamp): &(RobotId, Stamp)| {
+            *robot != self.me && round.ballot.stamp(*robot).is_none_or(|mine| mine < *stamp)
+        };
+        have.decision > rank || (rank.is_none() && have.votes.iter().any(newer))
+    }
+
+    fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
+        let have = Have {
+            round: self.round(),
+            decision: self.round.as_ref().and_then(|round| round.agreement.rank()),
+            votes: match &self.round {
+                Some(round) if round.open => round.ballot.stamps().collect(),
+                _ => Vec::new(),
+            },
+            knowledge: effects.follower.knowledge(),
+            answer,
+        };
+        self.tell(robot, Message::Have(have), effects);
+    }
+
+    /// Turns to one neighbour after the other at the busy pace for a while: there is news for them.
+    pub fn hurry_repair(&mut self) {
+        self.partners.stay_busy(self.now, self.config.repair_busy);
+    }
+
+    fn tell(&mut self, robot: RobotId, message: Message, effects: &mut Effects<'_>) {
+        let envelope = self.stamped(message);
+        effects.out.push(Output::Tell(robot, envelope));
+    }
+}

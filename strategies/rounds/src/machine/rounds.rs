@@ -1,0 +1,230 @@
+//! The machine itself: what it holds, and the one verb that moves it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Stamp};
+
+use super::follow::Follow;
+use super::input::Input;
+use super::output::Output;
+use super::partners::Partners;
+use crate::classify::Classify;
+use crate::config::{RoundsConfig, RoundsConfigError};
+use crate::refusal::Refusals;
+use crate::round::Round;
+
+/// The rounds of one robot: what the world tells it goes in, what it wants done comes out.
+///
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
+/// inputs at the same times give the same outputs.
+///
+/// Two robots that decide together, each with a classifier of its own, and a network of five lines:
+///
+/// ```
+/// use std::sync::Arc;
+/// use std::time::Duration;
+///
+/// use gestalt_protocol::{ClassId, RobotId};
+/// use gestalt_rounds::{Classify, ClassifyError, Input, Observation, Output, Rounds, RoundsConfig, Vocabulary};
+///
+/// /// Takes the features for the probabilities.
+/// #[derive(Debug)]
+/// struct Verbatim(Vocabulary);
+///
+/// impl Classify for Verbatim {
+///     fn vocabulary(&self) -> &Vocabulary {
+///         &self.0
+///     }
+///
+///     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+///         Ok(features.iter().map(|p| f64::from(*p)).collect())
+///     }
+/// }
+///
+/// let now = Duration::ZERO;
+/// let robots = [RobotId(0), RobotId(1)];
+/// let mut swarm: Vec<Rounds> = Vec::new();
+/// for robot in robots {
+///     let mut rounds = Rounds::new(robot, 1, RoundsConfig::default())?;
+///     let vocabulary = Vocabulary::new(["left", "right"])?;
+///     rounds.handle(now, Input::Learned(Arc::new(Verbatim(vocabulary))));
+///     rounds.handle(now, Input::Alive(robots.into()));
+///     swarm.push(rounds);
+/// }
+///
+/// // Neither is sure enough alone; together they are.
+/// let saw = |p: f32| Input::Observed(Observation { features: vec![1.0 - p, p], quality: 1.0 });
+/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.85)), (1, saw(0.9))];
+/// let mut decided = Vec::new();
+/// for ms in 1..1000 {
+///     let now = Duration::from_millis(ms);
+///     inbox.extend([(0, Input::Tick), (1, Input::Tick)]);
+///     for (robot, input) in std::mem::take(&mut inbox) {
+///         for output in swarm[robot].handle(now, input) {
+///             match output {
+///                 Output::Broadcast(vote) => inbox.push((1 - robot, Input::Received(vote))),
+///                 Output::Hold(decision) => inbox.push((1 - robot, Input::Heard(robots[robot], decision))),
+///                 Output::Announce(decision) => {
+///                     decided.push(decision.clone());
+///                     inbox.push((1 - robot, Input::Announced(decision)));
+///                 }
+///                 _ => {}
+///             }
+///         }
+///     }
+/// }
+/// assert_eq!(decided.len(), 1, "one robot speaks for all");
+/// assert_eq!(decided[0].class, Some(ClassId(1)));
+/// assert_eq!(decided[0].certificate.votes.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Rounds {
+    pub(super) me: RobotId,
+    pub(super) config: RoundsConfig,
+    pub(super) classifier: Option<Arc<dyn Classify>>,
+    /// The stamp of the last message said.
+    pub(super) stamp: Stamp,
+    pub(super) now: Duration,
+    /// The newest round known.
+    pub(super) round: Option<Round>,
+    /// The highest counter heard of, also of a round about which nothing else is known yet.
+    pub(super) highest: Option<u32>,
+    /// The other robots alive, guests among them.
+    pub(super) alive: BTreeSet<RobotId>,
+    /// How many of them have a smaller id: whoever speaks for the swarm waits this many turns.
+    pub(super) turns: u32,
+    pub(super) guests: BTreeSet<RobotId>,
+    pub(super) partners: Partners,
+    pub(super) refusals: Refusals,
+    pub(super) duplicate: Option<Stamp>,
+    /// The round for which this robot still looks, though it may be decided: its learning wants more of it.
+    pub(super) looking: Option<RoundId>,
+    /// Since when the hand had moved that now holds still and has had no round yet.
+    pub(super) shown: Option<Duration>,
+    pub(super) blind: bool,
+}
+
+/// What comes of one input: for the host, and for whoever follows the rounds.
+pub(super) struct Effects<'a> {
+    pub follower: &'a mut dyn Follow,
+    pub out: Vec<Output>,
+}
+
+impl Rounds {
+    /// The rounds of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
+    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
+    /// but gives no evidence.
+    ///
+    /// # Errors
+    /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
+    pub fn new(me: RobotId, boot: u32, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
+        config.validate()?;
+        Ok(Self {
+            me,
+            classifier: None,
+            stamp: Stamp { boot, sequence: 0 },
+            now: Duration::ZERO,
+            round: None,
+            highest: None,
+            alive: BTreeSet::new(),
+            turns: 0,
+            guests: BTreeSet::new(),
+            partners: Partners::new(config.repair_idle),
+            config,
+            refusals: Refusals::default(),
+            duplicate: None,
+            looking: None,
+            shown: None,
+            blind: false,
+        })
+    }
+
+    /// Takes in one input at the time `now` and says what is to be done.
+    pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        self.handle_with(now, input, &mut ())
+    }
+
+    /// The same for a robot whose learning follows the rounds: the same one at every call.
+    pub fn handle_with(&mut self, now: Duration, input: Input, follower: &mut dyn Follow) -> Vec<Output> {
+        self.now = now.max(self.now);
+        let mut effects = Effects { follower, out: Vec::new() };
+        match input {
+            Input::Tick => {}
+            Input::Open => self.on_open(&mut effects),
+            Input::Shown(began) => self.shown = Some(began.min(self.now)),
+            Input::Left => self.on_left(),
+            Input::Blind(blind) => self.on_blind(blind),
+            Input::Observed(observation) => {
+                self.on_observed(&observation, effects.follower.knowledge().is_some());
+            }
+            Input::Received(envelope) => self.on_received(envelope, &mut effects),
+            Input::Heard(robot, decision) => self.on_heard(robot, decision, &mut effects),
+            Input::Announced(decision) => self.on_announced(decision, &mut effects),
+            Input::Alive(robots) => self.on_alive(robots),
+            Input::Guests(robots) => self.on_guests(robots),
+            Input::Neighbours(robots) => self.on_neighbours(robots, &mut effects),
+            Input::Learned(classifier) => self.on_learned(classifier),
+        }
+        self.advance(&mut effects);
+        effects.out
+    }
+
+    /// When the machine wants its next [`Input::Tick`], if nothing else comes before.
+    #[must_use]
+    pub fn next_wake(&self) -> Option<Duration> {
+        self.next_wake_with(&())
+    }
+
+    /// The same for a robot whose learning follows the rounds.
+    #[must_use]
+    pub fn next_wake_with(&self, follower: &dyn Follow) -> Option<Duration> {
+        let round = self.round.as_ref();
+        let (patience, deadline) = round
+            .filter(|round| round.open && round.agreement.held().is_none())
+            .map(|round| round.patience_and_deadline(&self.config))
+            .unzip();
+        [
+            round.and_then(|round| round.vote_due(&self.config)),
+            patience.filter(|patience| *patience > self.now),
+            deadline,
+            self.closing(),
+            self.announcement(),
+            self.looking_until(follower),
+            self.showing(),
+            self.partners.due(&self.alive),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
+    }
+
+    /// Does whatever is due.
+    fn advance(&mut self, effects: &mut Effects<'_>) {
+        self.speak(effects);
+        self.decide(effects);
+        if self.closing().is_some_and(|due| self.now >= due) {
+            self.close(effects);
+        }
+        if self.showing().is_some_and(|due| self.now >= due) {
+            self.on_open(effects);
+            self.shown = None;
+        }
+        if self.announcement().is_some_and(|due| self.now >= due) {
+            self.announce(effects);
+        }
+        if self.looking_until(effects.follower).is_some_and(|until| self.now >= until) {
+            self.stop_looking(effects);
+        }
+        self.repair_when_due(effects);
+    }
+
+    /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence.
+    #[must_use]
+    pub fn stamped(&mut self, message: Message) -> Envelope {
+        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+        Envelope { author: self.me, stamp: self.stamp, message }
+    }
+}

@@ -1,0 +1,164 @@
+//! One sentence of the design each.
+
+mod agreeing;
+mod deciding;
+mod opening;
+mod order;
+mod repair;
+mod showing;
+mod voting;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{
+    ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Have, HeldVote, Message, RobotId, RoundId,
+    Stamp, VocabularyId, Vote,
+};
+
+use super::{Input, Output, Rounds};
+use crate::classify::{Classify, ClassifyError};
+use crate::config::RoundsConfig;
+use crate::observation::Observation;
+use crate::refusal::{Refusal, Refusals};
+use crate::vocabulary::Vocabulary;
+
+/// Takes its features for the probabilities.
+#[derive(Debug)]
+struct Verbatim(Vocabulary);
+
+impl Classify for Verbatim {
+    fn vocabulary(&self) -> &Vocabulary {
+        &self.0
+    }
+
+    fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+        match features.iter().position(|f| !f.is_finite()) {
+            Some(component) => Err(ClassifyError::NotFinite(component)),
+            None => Ok(features.iter().map(|f| f64::from(*f)).collect()),
+        }
+    }
+}
+
+fn vocabulary() -> Vocabulary {
+    Vocabulary::new(["one", "two", "three"]).unwrap()
+}
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// A mind whose camera shows nothing, so that it waits for no frame of its own; it takes those it is given all the same.
+fn mind_with(me: u32, config: RoundsConfig) -> Rounds {
+    let mut mind = Rounds::new(RobotId(me), 1, config).unwrap();
+    mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(vocabulary()))));
+    mind.handle(ms(0), Input::Blind(true));
+    mind
+}
+
+fn mind(me: u32) -> Rounds {
+    mind_with(me, RoundsConfig::default())
+}
+
+fn blind(me: u32) -> Rounds {
+    Rounds::new(RobotId(me), 1, RoundsConfig::default()).unwrap()
+}
+
+fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
+    ids.into_iter().map(RobotId).collect()
+}
+
+fn round(counter: u32, opener: u32) -> RoundId {
+    RoundId { counter, opener: RobotId(opener) }
+}
+
+fn saw(probabilities: [f32; 3]) -> Input {
+    Input::Observed(Observation { features: probabilities.to_vec(), quality: 1.0 })
+}
+
+/// The evidence of a robot that is sure of a class, and of one that leans to it.
+const SURE: f32 = 4.0;
+const LEANING: f32 = 1.0;
+
+fn vote(counter: u32, class: usize, strength: f32) -> Vote {
+    let mut evidence = vec![-strength / 2.0; 3];
+    evidence[class] = strength;
+    Vote { round: round(counter, 1), vocabulary: vocabulary().id(), evidence, looks: 1.0 }
+}
+
+fn null(counter: u32) -> Vote {
+    Vote { evidence: Vec::new(), looks: 0.0, ..vote(counter, 0, 0.0) }
+}
+
+fn says(author: u32, sequence: u32, message: Message) -> Input {
+    Input::Received(Envelope { author: RobotId(author), stamp: Stamp { boot: 1, sequence }, message })
+}
+
+fn votes(author: u32, sequence: u32, vote: Vote) -> Input {
+    says(author, sequence, Message::Vote(vote))
+}
+
+fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decision {
+    let counted = |robot| CountedVote {
+        robot: RobotId(robot),
+        stamp: Stamp { boot: 1, sequence: 1 },
+        class: ClassId(0),
+        weight: 1.0,
+    };
+    Decision {
+        round: round(counter, 1),
+        class: class.map(ClassId),
+        confidence: 0.97,
+        author: RobotId(author),
+        certificate: gestalt_protocol::Certificate {
+            vocabulary: vocabulary().id(),
+            rule: FusionRule::LogPool,
+            probabilities: vec![0.97, 0.02, 0.01],
+            votes: (0..robots).map(counted).collect(),
+            elapsed_ms: 10,
+        },
+    }
+}
+
+fn broadcast(out: &[Output]) -> Vec<&Vote> {
+    out.iter()
+        .filter_map(|output| match output {
+            Output::Broadcast(Envelope { message: Message::Vote(vote), .. }) => Some(vote),
+            _ => None,
+        })
+        .collect()
+}
+
+fn holds(out: &[Output]) -> Vec<Option<u8>> {
+    out.iter()
+        .filter_map(|output| match output {
+            Output::Hold(decision) => Some(decision.class.map(|class| class.0)),
+            _ => None,
+        })
+        .collect()
+}
+
+fn announces(out: &[Output]) -> usize {
+    out.iter().filter(|output| matches!(output, Output::Announce(_))).count()
+}
+
+fn told(out: &[Output]) -> Vec<(u32, &Message)> {
+    out.iter()
+        .filter_map(|output| match output {
+            Output::Tell(robot, envelope) => Some((robot.0, &envelope.message)),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Ticks whenever the mind wants to, until `end`; collects what it wants done.
+fn live(mind: &mut Rounds, end: Duration) -> Vec<(Duration, Output)> {
+    let mut all = Vec::new();
+    for _ in 0..10_000 {
+        let Some(wake) = mind.next_wake().filter(|wake| *wake <= end) else { return all };
+        assert!(wake > mind.now || all.is_empty(), "a mind that wants to wake in the past spins its host");
+        all.extend(mind.handle(wake, Input::Tick).into_iter().map(|output| (wake, output)));
+    }
+    panic!("the mind never comes to rest");
+}

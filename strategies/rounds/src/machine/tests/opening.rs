@@ -1,0 +1,88 @@
+//! When rounds open, merge and are refused.
+
+use super::*;
+
+#[test]
+fn opening_says_a_null_vote_to_all_at_once() {
+    let mut mind = mind(7);
+    let out = mind.handle(ms(10), Input::Open);
+    assert_eq!(out[0], Output::Opened(round(1, 7)));
+    let said = broadcast(&out);
+    assert_eq!((said.len(), said[0].round, said[0].evidence.len()), (1, round(1, 7), 0));
+    assert!(mind.is_open());
+}
+
+#[test]
+fn a_request_to_open_has_no_effect_while_a_round_is_open_or_has_just_begun() {
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
+    mind.handle(ms(0), Input::Open);
+    assert!(mind.handle(ms(5), Input::Open).is_empty());
+    mind.handle(ms(10), Input::Heard(RobotId(1), decision(1, Some(0), 2, 1)));
+    assert!(!mind.is_open(), "decided and closed");
+    mind.handle(ms(499), Input::Open);
+    assert_eq!(mind.round(), Some(round(1, 7).min(round(1, 1))));
+    mind.handle(ms(500), Input::Open);
+    assert_eq!(mind.round(), Some(round(2, 7)));
+}
+
+#[test]
+fn hearing_a_vote_of_a_newer_round_joins_it_and_ends_the_older() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    let out = mind.handle(ms(100), votes(3, 1, vote(5, 0, LEANING)));
+    assert_eq!(out[..2], [Output::Closed(round(1, 7)), Output::Opened(round(5, 1))]);
+    assert_eq!(broadcast(&out)[0].round.counter, 5, "all hear that this robot takes part");
+    mind.handle(ms(200), votes(3, 2, vote(4, 0, LEANING)));
+    assert_eq!(mind.round(), Some(round(5, 1)), "an older round changes nothing");
+}
+
+#[test]
+fn equal_counters_merge_on_the_smaller_opener_and_keep_what_was_seen() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(300), saw([0.5, 0.3, 0.2]));
+    let out = mind.handle(ms(310), votes(1, 1, vote(1, 1, LEANING)));
+    assert_eq!(mind.round(), Some(round(1, 1)));
+    assert!(!out.contains(&Output::Closed(round(1, 7))));
+    assert_eq!(mind.ballot().unwrap().contributors(mind.own_scale().unwrap()), 2);
+    mind.handle(ms(320), votes(2, 1, Vote { round: round(1, 9), ..vote(1, 1, LEANING) }));
+    assert_eq!(mind.round(), Some(round(1, 1)), "a greater opener changes nothing");
+}
+
+#[test]
+fn a_counter_a_million_ahead_is_refused_but_a_newborn_mind_believes_any() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), votes(3, 1, null(4_000_000)));
+    assert_eq!(mind.round().unwrap().counter, 4_000_000);
+    mind.handle(ms(1), votes(3, 2, null(5_000_001)));
+    assert_eq!(mind.refusals().count(Refusal::FarAhead), 1);
+    mind.handle(ms(2), votes(3, 3, null(5_000_000)));
+    assert_eq!(mind.round().unwrap().counter, 5_000_000);
+}
+
+#[test]
+fn when_the_counters_are_used_up_no_round_opens_and_it_is_counted() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Heard(RobotId(1), decision(u32::MAX, Some(0), 2, 1)));
+    mind.handle(ms(900), Input::Open);
+    assert_eq!(mind.refusals().count(Refusal::CountersUsedUp), 1);
+}
+
+#[test]
+fn a_round_decided_elsewhere_is_adopted_without_opening() {
+    let mut mind = mind(7);
+    let out = mind.handle(ms(0), Input::Heard(RobotId(3), decision(9, Some(2), 4, 1)));
+    assert_eq!(out, [Output::Hold(decision(9, Some(2), 4, 1))]);
+    assert!(!mind.is_open());
+    let have = Have {
+        round: Some(round(12, 1)),
+        decision: Some(decision(12, Some(1), 2, 1).rank()),
+        votes: vec![],
+        knowledge: None,
+        answer: false,
+    };
+    let out = mind.handle(ms(1), says(3, 1, Message::Have(have)));
+    assert!(matches!(told(&out)[..], [(3, Message::Have(Have { answer: true, .. }))]), "it asks for it");
+    mind.handle(ms(2000), Input::Open);
+    assert_eq!(mind.round().unwrap().counter, 13, "the counter heard of is taken");
+}

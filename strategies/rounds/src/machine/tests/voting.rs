@@ -1,0 +1,85 @@
+//! What a robot says, and whose votes it counts.
+
+use super::*;
+
+#[test]
+fn votes_are_said_on_change_at_a_bounded_rate_and_repeated_while_open() {
+    let mut mind = mind_with(7, RoundsConfig { alpha: 1e-9, ..RoundsConfig::default() });
+    mind.handle(ms(0), Input::Open);
+    let mut said = Vec::new();
+    for t in (20..2000).step_by(20) {
+        let out = mind.handle(ms(t), saw([0.4, 0.3, 0.3]));
+        said.extend(broadcast(&out).iter().map(|vote| (t, vote.looks)));
+    }
+    assert_eq!(said.len(), 7, "one each 250 ms: {said:?}");
+    assert!(said.is_sorted_by(|a, b| a.1 <= b.1) && said[0].1 < said[6].1, "the whole sum so far");
+    let later: Vec<_> =
+        live(&mut mind, ms(4500)).into_iter().filter(|(_, o)| matches!(o, Output::Broadcast(_))).collect();
+    assert_eq!(later.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [ms(2070), ms(3070), ms(4070)]);
+    assert_eq!(later[1].1, later[2].1, "a repeated vote is the same message");
+}
+
+#[test]
+fn frames_outside_a_round_count_for_nothing() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), saw([0.9, 0.05, 0.05]));
+    mind.handle(ms(10), Input::Open);
+    mind.handle(ms(300), Input::Tick);
+    assert_eq!(mind.held(), None);
+    assert_eq!(mind.refusals(), &Refusals::default());
+}
+
+#[test]
+fn a_frame_that_cannot_be_judged_is_counted_and_never_becomes_a_vote() {
+    let mut seeing = mind(7);
+    seeing.handle(ms(0), Input::Open);
+    seeing.handle(ms(300), saw([f32::NAN, 0.0, 1.0]));
+    seeing.handle(ms(600), saw([7.0, 0.0, 0.0]));
+    let out = seeing.handle(ms(1000), Input::Tick);
+    assert!(broadcast(&out)[0].evidence.is_empty());
+    assert_eq!(seeing.refusals().count(Refusal::Unclassified), 2);
+    let mut blind = blind(8);
+    blind.handle(ms(0), Input::Open);
+    blind.handle(ms(300), saw([0.9, 0.05, 0.05]));
+    assert_eq!(blind.refusals().count(Refusal::NoClassifier), 1);
+}
+
+#[test]
+fn a_vote_of_another_vocabulary_or_length_or_with_impossible_values_is_refused_and_counted() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), votes(1, 1, Vote { vocabulary: VocabularyId(1), ..vote(1, 0, SURE) }));
+    mind.handle(ms(1), votes(2, 1, Vote { evidence: vec![1.0, -1.0], ..vote(1, 0, SURE) }));
+    assert_eq!(mind.refusals().count(Refusal::Vocabulary), 2);
+    mind.handle(ms(2), votes(3, 1, Vote { evidence: vec![f32::NAN, 0.0, 0.0], ..vote(1, 0, SURE) }));
+    assert_eq!(mind.refusals().count(Refusal::Impossible), 1);
+    assert_eq!(mind.round(), None, "nothing of it is kept");
+}
+
+#[test]
+fn a_new_vocabulary_makes_the_robot_look_afresh() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Blind(false));
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(100), saw([0.6, 0.2, 0.2]));
+    let other = Vocabulary::new(["left", "right", "up"]).unwrap();
+    mind.handle(ms(200), Input::Learned(Arc::new(Verbatim(other.clone()))));
+    let out = mind.handle(ms(300), Input::Tick);
+    assert_eq!((broadcast(&out)[0].looks, broadcast(&out)[0].vocabulary), (0.0, other.id()));
+}
+
+#[test]
+fn a_second_robot_with_my_id_is_counted_and_reported_but_my_echo_is_not() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(1), says(7, 1, Message::Vote(null(1))));
+    assert_eq!(mind.duplicate(), None, "the own null vote came back");
+    mind.handle(ms(2), says(7, 40, Message::Vote(vote(1, 1, SURE))));
+    assert_eq!(mind.refusals().count(Refusal::DuplicateId), 1);
+    let held = HeldVote { robot: RobotId(7), stamp: Stamp { boot: 2, sequence: 1 }, vote: vote(1, 1, SURE) };
+    mind.handle(ms(3), says(3, 1, Message::Give(Give { decision: None, votes: vec![held.clone()] })));
+    assert_eq!(mind.duplicate(), Some(held.stamp));
+    let earlier = HeldVote { stamp: Stamp { boot: 0, sequence: 9 }, ..held };
+    mind.handle(ms(4), says(3, 2, Message::Give(Give { decision: None, votes: vec![earlier] })));
+    assert_eq!(mind.refusals().count(Refusal::DuplicateId), 2, "a vote of an earlier life is merely old");
+    assert_eq!(mind.held(), None, "none of it counts as this robot's evidence");
+}

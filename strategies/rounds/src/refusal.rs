@@ -1,0 +1,88 @@
+//! What a robot refused, counted by cause: of votes, decisions and rounds, and of what it is to learn from.
+
+/// Why something was refused. The robot is unchanged by what it refuses, but for the count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// A message with this robot's own id that this robot never sent: two robots share the id.
+    DuplicateId,
+    /// A round so far ahead of all rounds known that its counter is taken for a mistake or a lie.
+    FarAhead,
+    /// A vote over another vocabulary, or with another number of classes, than this robot's classifier has.
+    Vocabulary,
+    /// A vote or decision with a value that no robot may say.
+    Impossible,
+    /// A vote of one robot more than a ballot can hold.
+    BallotFull,
+    /// A frame seen while there is no classifier to judge it.
+    NoClassifier,
+    /// A frame that the classifier could not judge, or judged with something that is no distribution.
+    Unclassified,
+    /// A sample of another feature space than this robot learns in.
+    OtherSpace,
+    /// A sample whose vector has another length, or a component that is not finite.
+    BadVector,
+    /// A sample of a class that the vocabulary does not have.
+    UnknownClass,
+    /// A sample with an author or number beyond the bounds of what one robot remembers.
+    SampleNumber,
+    /// A round could not be opened: the counters are used up.
+    CountersUsedUp,
+}
+
+impl Refusal {
+    /// All causes.
+    pub const ALL: [Self; 12] = [
+        Self::DuplicateId,
+        Self::FarAhead,
+        Self::Vocabulary,
+        Self::Impossible,
+        Self::BallotFull,
+        Self::NoClassifier,
+        Self::Unclassified,
+        Self::OtherSpace,
+        Self::BadVector,
+        Self::UnknownClass,
+        Self::SampleNumber,
+        Self::CountersUsedUp,
+    ];
+
+    /// The cause in words, as the status names its counter.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DuplicateId => "refused_duplicate_id",
+            Self::FarAhead => "refused_round_far_ahead",
+            Self::Vocabulary => "refused_other_vocabulary",
+            Self::Impossible => "refused_impossible_value",
+            Self::BallotFull => "refused_ballot_full",
+            Self::NoClassifier => "refused_no_classifier",
+            Self::Unclassified => "refused_unclassified_frame",
+            Self::OtherSpace => "refused_sample_of_other_space",
+            Self::BadVector => "refused_sample_with_bad_vector",
+            Self::UnknownClass => "refused_sample_of_unknown_class",
+            Self::SampleNumber => "refused_sample_number",
+            Self::CountersUsedUp => "refused_counters_used_up",
+        }
+    }
+}
+
+/// How often each [`Refusal`] happened.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Refusals([u64; Refusal::ALL.len()]);
+
+impl Refusals {
+    /// How often this one happened.
+    #[must_use]
+    pub fn count(&self, refusal: Refusal) -> u64 {
+        self.0[refusal as usize]
+    }
+
+    /// Every cause with its count, in a fixed order.
+    pub fn iter(&self) -> impl Iterator<Item = (Refusal, u64)> + '_ {
+        Refusal::ALL.into_iter().map(|refusal| (refusal, self.count(refusal)))
+    }
+
+    pub(crate) fn add(&mut self, refusal: Refusal) {
+        self.0[refusal as usize] += 1;
+    }
+}

@@ -1,0 +1,231 @@
+//! One showing of a gesture, as one robot lives through it.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use gestalt_protocol::{
+    Certificate, Decision, Envelope, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+};
+
+use crate::agreement::Agreement;
+use crate::ballot::{Ballot, Scale};
+use crate::classify::Classify;
+use crate::config::RoundsConfig;
+use crate::evidence::{Evidence, Look};
+use crate::observation::Observation;
+
+/// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
+#[derive(Clone, Debug)]
+pub(crate) struct Round {
+    pub id: RoundId,
+    /// When this robot first heard of it.
+    pub since: Duration,
+    /// Whether this robot still takes part by looking and voting.
+    pub open: bool,
+    pub ballot: Ballot,
+    pub agreement: Agreement,
+    evidence: Option<Evidence>,
+    said: Option<Said>,
+    /// When it ends undecided, if before its deadline.
+    ends: Option<Duration>,
+}
+
+/// This robot's vote as it was last said.
+#[derive(Clone, Debug)]
+struct Said {
+    at: Duration,
+    envelope: Envelope,
+    /// Whether there is newer evidence.
+    outdated: bool,
+}
+
+impl Round {
+    pub fn new(id: RoundId, since: Duration, open: bool) -> Self {
+        Self {
+            id,
+            since,
+            open,
+            ballot: Ballot::default(),
+            agreement: Agreement::default(),
+            evidence: None,
+            said: None,
+            ends: None,
+        }
+    }
+
+    /// Judges a frame and counts it; `false` when the classifier could not judge it, or gave no distribution.
+    pub fn observe(
+        &mut self,
+        now: Duration,
+        observation: &Observation,
+        classifier: &dyn Classify,
+        config: &RoundsConfig,
+    ) -> bool {
+        let classes = classifier.vocabulary().classes();
+        match classifier.probabilities(&observation.features) {
+            Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
+                let quality = f64::from(observation.quality.clamp(0.0, 1.0));
+                let view = if config.discount_repeats {
+                    classifier.view(&observation.features).unwrap_or_default()
+                } else {
+                    Vec::new()
+                };
+                self.look(Look { at: now, probabilities: &p, quality, view: &view }, config);
+                true
+            }
+            Ok(_) | Err(_) => false,
+        }
+    }
+
+    /// Counts a frame.
+    fn look(&mut self, look: Look<'_>, config: &RoundsConfig) {
+        let classes = look.probabilities.len();
+        let evidence = self.evidence.get_or_insert_with(|| Evidence::new(classes));
+        if evidence.classes() != classes {
+            *evidence = Evidence::new(classes);
+        }
+        if evidence.add(look, config.decorrelation)
+            && let Some(said) = &mut self.said
+        {
+            said.outdated = true;
+        }
+    }
+
+    /// This robot's vote has to be said anew, though it saw nothing new.
+    pub fn outdate(&mut self) {
+        if let Some(said) = &mut self.said {
+            said.outdated = true;
+        }
+    }
+
+    /// Forgets what was seen so far: it was judged by another vocabulary.
+    pub fn look_afresh(&mut self) {
+        self.evidence = None;
+    }
+
+    /// Whether this robot has seen anything.
+    fn has_evidence(&self) -> bool {
+        self.evidence.is_some()
+    }
+
+    /// This robot's evidence as a vote.
+    fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
+        let (evidence, looks) = match &self.evidence {
+            Some(evidence) => (evidence.clipped(clip), evidence.looks() as f32),
+            None => (Vec::new(), 0.0),
+        };
+        Vote { round: self.id, vocabulary, evidence, looks }
+    }
+
+    /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next. `stamp` is that of
+    /// the last message said; `vocabulary` is the classifier's; `blind`: who has seen nothing says that it cannot.
+    pub fn speak(
+        &mut self,
+        now: Duration,
+        me: RobotId,
+        stamp: &mut Stamp,
+        vocabulary: Option<VocabularyId>,
+        blind: bool,
+        config: &RoundsConfig,
+    ) -> Option<Envelope> {
+        if self.vote_due(config).is_none_or(|due| now < due) {
+            return None;
+        }
+        if let Some(repeated) = self.repeat(now) {
+            return Some(repeated);
+        }
+        let vocabulary = vocabulary.filter(|_| !blind || self.has_evidence());
+        let vote = self.vote(vocabulary.unwrap_or(VocabularyId::NONE), config.clip);
+        stamp.sequence = stamp.sequence.saturating_add(1);
+        self.ballot.cast(me, *stamp, vote.clone());
+        let envelope = Envelope { author: me, stamp: *stamp, message: Message::Vote(vote) };
+        self.said = Some(Said { at: now, envelope: envelope.clone(), outdated: false });
+        Some(envelope)
+    }
+
+    /// When this robot's vote is to be said (again).
+    pub fn vote_due(&self, config: &RoundsConfig) -> Option<Duration> {
+        match &self.said {
+            _ if !self.open => None,
+            None => Some(self.since),
+            Some(said) if said.outdated => Some(said.at + config.vote_interval),
+            Some(said) => Some(said.at + config.vote_repeat),
+        }
+    }
+
+    /// What to say again: the vote said last, when nothing was seen since.
+    fn repeat(&mut self, now: Duration) -> Option<Envelope> {
+        let said = self.said.as_mut().filter(|said| !said.outdated)?;
+        said.at = now;
+        Some(said.envelope.clone())
+    }
+
+    /// When this robot stops waiting for live robots that have not seen anything, and when it gives up.
+    pub fn patience_and_deadline(&self, config: &RoundsConfig) -> (Duration, Duration) {
+        let deadline = self.since + config.deadline;
+        (self.since + config.patience, self.ends.map_or(deadline, |ends| ends.min(deadline)))
+    }
+
+    /// Nothing more can be seen of the gesture: what is still to be heard of it is on its way.
+    pub fn end_early(&mut self, now: Duration, config: &RoundsConfig) {
+        self.ends.get_or_insert(now + config.patience);
+    }
+
+    /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline.
+    pub fn conclude(
+        &mut self,
+        now: Duration,
+        me: RobotId,
+        alive: &BTreeSet<RobotId>,
+        scale: Option<Scale>,
+        config: &RoundsConfig,
+    ) {
+        // One of its own per round: what is concluded is held at once.
+        if !self.open || self.agreement.held().is_some() {
+            return;
+        }
+        let (patience, deadline) = self.patience_and_deadline(config);
+        let late = now >= deadline;
+        // Asked at every input: with a thousand robots, counting their votes each time would be most of the work.
+        if now < patience && self.ballot.len() < alive.len() {
+            return;
+        }
+        let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
+        // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
+        let mut robots = alive.iter().chain([&me]);
+        let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
+        if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
+            return;
+        }
+        let fusion = scale.and_then(|scale| self.ballot.fuse(config.rule, config.clip, scale));
+        let class = fusion
+            .as_ref()
+            .filter(|fusion| {
+                contributors >= config.quorum as usize
+                    && fusion.probabilities[fusion.top.index()] >= 1.0 - config.alpha
+                    && fusion.margin > f64::from(config.liars)
+            })
+            .map(|fusion| fusion.top);
+        if class.is_none() && !late {
+            return;
+        }
+        let (probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
+            let confidence = fusion.probabilities[fusion.top.index()];
+            (fusion.probabilities, confidence)
+        });
+        let votes = scale.map_or(Vec::new(), |s| self.ballot.counted(config.rule, config.clip, s));
+        self.agreement.believe(Decision {
+            round: self.id,
+            class,
+            confidence,
+            author: me,
+            certificate: Certificate {
+                vocabulary: scale.map_or(VocabularyId::NONE, |scale| scale.vocabulary),
+                rule: config.rule,
+                probabilities,
+                votes,
+                elapsed_ms: u32::try_from(now.saturating_sub(self.since).as_millis()).unwrap_or(u32::MAX),
+            },
+        });
+    }
+}

@@ -1,0 +1,153 @@
+//! Who is whose nearest neighbour, kept up to date.
+
+use std::ops::ControlFlow;
+
+use super::points::Points;
+
+/// For each *seeker* the nearest of the *neighbours*, itself excepted.
+///
+/// A seeker or neighbour that comes costs one pass over the other side. A neighbour that goes leaves those it was
+/// nearest to with a lower bound of their distance, which is looked into when it matters: on average over the
+/// neighbours that is one pass as well, since each seeker has one nearest of them.
+///
+/// Ask for the [`farthest`](Self::farthest) or for the [`closest`](Self::closest), not for both: the first does not
+/// look which of equally near neighbours has the smallest key.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Neighbours {
+    seekers: Points,
+    /// By place of the seeker.
+    nearest: Vec<Nearest>,
+    neighbours: Points,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Nearest {
+    /// Squared; infinite when there is no neighbour.
+    distance: f32,
+    /// `None`: there is none, or the one there was has gone and `distance` is a lower bound.
+    key: Option<u64>,
+    stale: bool,
+}
+
+/// A seeker and its nearest neighbour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Pair {
+    pub(crate) seeker: u64,
+    pub(crate) neighbour: Option<u64>,
+}
+
+impl Neighbours {
+    /// Takes a seeker in.
+    pub(crate) fn add_seeker(&mut self, key: u64, vector: &[f32]) {
+        self.seekers.push(key, vector);
+        let nearest = self.nearest_to(key, vector, |_| false);
+        self.nearest.push(nearest);
+    }
+
+    /// Takes a seeker out.
+    pub(crate) fn remove_seeker(&mut self, key: u64) {
+        if let Some(place) = self.seekers.place(key) {
+            self.seekers.swap_remove(place);
+            self.nearest.swap_remove(place);
+        }
+    }
+
+    /// Takes a neighbour in.
+    pub(crate) fn add_neighbour(&mut self, key: u64, vector: &[f32]) {
+        self.neighbours.push(key, vector);
+        let seekers = self.seekers.keys();
+        self.seekers.measure(vector, |place, distance| {
+            let nearest = &mut self.nearest[place];
+            // At the lower bound of a stale entry another one with a smaller key may lie.
+            let closer = distance < nearest.distance
+                || !nearest.stale
+                    && distance == nearest.distance
+                    && nearest.key.is_none_or(|held| key < held);
+            if closer && seekers[place] != key {
+                *nearest = Nearest { distance, key: Some(key), stale: false };
+            }
+        });
+    }
+
+    /// Takes a neighbour out.
+    pub(crate) fn remove_neighbour(&mut self, key: u64) {
+        if let Some(place) = self.neighbours.place(key) {
+            self.neighbours.swap_remove(place);
+            for nearest in self.nearest.iter_mut().filter(|nearest| nearest.key == Some(key)) {
+                (nearest.key, nearest.stale) = (None, true);
+            }
+        }
+    }
+
+    /// The seekers.
+    pub(crate) fn seekers(&self) -> &Points {
+        &self.seekers
+    }
+
+    /// Whether there is a neighbour at all.
+    pub(crate) fn has_neighbours(&self) -> bool {
+        !self.neighbours.keys().is_empty()
+    }
+
+    /// The seeker whose nearest neighbour is farthest; of equals the smaller key.
+    pub(crate) fn farthest(&mut self) -> Option<Pair> {
+        for place in 0..self.nearest.len() {
+            // Only the distance matters, and there is none below the lower bound: where many are equally near, as
+            // copies of one sample are, the search ends at the first of them.
+            self.refresh(place, |distance, bound| distance <= bound);
+        }
+        let place = self.first_by(|a, b| a > b)?;
+        Some(self.pair(place))
+    }
+
+    /// The seeker whose nearest neighbour is closest, and that neighbour; of equals the smaller keys.
+    pub(crate) fn closest(&mut self) -> Option<Pair> {
+        loop {
+            // Only a lower bound that nothing undercuts has to be looked into.
+            let place = self.first_by(|a, b| a < b)?;
+            if !self.refresh(place, |_, _| false) {
+                return Some(self.pair(place));
+            }
+        }
+    }
+
+    /// The place of the seeker whose distance goes before all others, ties to the smaller key.
+    fn first_by(&self, before: impl Fn(f32, f32) -> bool) -> Option<usize> {
+        let keys = self.seekers.keys();
+        (0..keys.len()).reduce(|best, place| {
+            let (a, b) = (self.nearest[place].distance, self.nearest[best].distance);
+            if before(a, b) || !before(b, a) && keys[place] < keys[best] { place } else { best }
+        })
+    }
+
+    fn pair(&self, place: usize) -> Pair {
+        Pair { seeker: self.seekers.keys()[place], neighbour: self.nearest[place].key }
+    }
+
+    /// Looks for the nearest neighbour again if it has gone, until one is near `enough` for the lower bound of the
+    /// distance; says whether it had gone.
+    fn refresh(&mut self, place: usize, enough: impl Fn(f32, f32) -> bool) -> bool {
+        let Nearest { distance: bound, stale, .. } = self.nearest[place];
+        if stale {
+            let (key, point) = (self.seekers.keys()[place], self.seekers.point(place));
+            self.nearest[place] = self.nearest_to(key, &point, |distance| enough(distance, bound));
+        }
+        stale
+    }
+
+    fn nearest_to(&self, seeker: u64, vector: &[f32], enough: impl Fn(f32) -> bool) -> Nearest {
+        let keys = self.neighbours.keys();
+        let mut nearest = Nearest { distance: f32::INFINITY, key: None, stale: false };
+        self.neighbours.measure_until(vector, |place, distance| {
+            let key = keys[place];
+            let closer = distance < nearest.distance
+                || distance == nearest.distance && nearest.key.is_none_or(|held| key < held);
+            if !closer || key == seeker {
+                return ControlFlow::Continue(());
+            }
+            nearest = Nearest { distance, key: Some(key), stale: false };
+            if enough(distance) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        nearest
+    }
+}

@@ -1,0 +1,88 @@
+//! Samples of which it is not known what they show: kept, not trained on, until an instructor says more or the
+//! classifier is sure.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use gestalt_protocol::{ClassId, RoundId, SampleId};
+
+use crate::sample::Part;
+
+/// A sample whose class is open.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Aside {
+    /// The part of the training set it came from, or would go to.
+    pub part: Part,
+    /// Its id, once shared, and the class it was shared under.
+    pub shared: Option<(SampleId, ClassId)>,
+    pub round: RoundId,
+    pub vector: Arc<[f32]>,
+    /// The class the robot trains on it as meanwhile, because it is sure itself. Never shared.
+    pub guess: Option<ClassId>,
+}
+
+/// The keys of such samples in training begin here, far beyond those of the training set.
+const FIRST_KEY: u64 = 1 << 63;
+
+/// The key that a sample of that number has in training.
+pub(crate) fn training_key(number: u64) -> u64 {
+    FIRST_KEY | number
+}
+
+/// The samples kept aside, oldest first, never more than so many.
+#[derive(Clone, Debug)]
+pub(super) struct Shelf {
+    samples: BTreeMap<u64, Aside>,
+    next: u64,
+    capacity: usize,
+}
+
+impl Shelf {
+    pub fn new(samples: Vec<(u64, Aside)>, next: u64, capacity: usize) -> Self {
+        let samples: BTreeMap<_, _> = samples.into_iter().collect();
+        let next = samples.keys().next_back().map_or(next, |last| next.max(last + 1));
+        Self { samples, next, capacity }
+    }
+
+    /// Puts one aside; those whose place was taken, which may be itself, come back.
+    pub fn put(&mut self, aside: Aside) -> (u64, Vec<(u64, Aside)>) {
+        let number = self.next;
+        self.next += 1;
+        self.samples.insert(number, aside);
+        let mut gone = Vec::new();
+        while self.samples.len() > self.capacity {
+            gone.extend(self.samples.pop_first());
+        }
+        (number, gone)
+    }
+
+    /// Takes out those for which `pick` says so, oldest first.
+    pub fn take(&mut self, pick: impl Fn(&Aside) -> bool) -> Vec<(u64, Aside)> {
+        let (taken, left) = std::mem::take(&mut self.samples).into_iter().partition(|(_, aside)| pick(aside));
+        self.samples = left;
+        BTreeMap::into_iter(taken).collect()
+    }
+
+    pub fn get(&self, number: u64) -> Option<&Aside> {
+        self.samples.get(&number)
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (u64, &Aside)> {
+        self.samples.iter().map(|(number, aside)| (*number, aside))
+    }
+
+    /// Notes what the robot takes one for.
+    pub fn guess(&mut self, number: u64, class: Option<ClassId>) {
+        if let Some(aside) = self.samples.get_mut(&number) {
+            aside.guess = class;
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    pub fn next(&self) -> u64 {
+        self.next
+    }
+}

@@ -1,0 +1,166 @@
+//! The parameters of a robot's learning.
+
+use std::time::Duration;
+
+use gestalt_svm::LearnerOptions;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::forgetting::ForgettingRule;
+use crate::selection::SelectionRule;
+use crate::vector_codec::Precision;
+
+/// Parameters no robot can learn with; each names the field and the mend.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum LearningConfigError {
+    /// A number of samples out of range.
+    #[error("{field} is {value}: choose from {least} to {most}")]
+    Range {
+        /// The field.
+        field: &'static str,
+        /// What it is.
+        value: usize,
+        /// The least it may be.
+        least: usize,
+        /// The most it may be.
+        most: usize,
+    },
+    /// A part that is none.
+    #[error("{field} is {value}: choose it from {least} to 1")]
+    Part {
+        /// The field.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// The least it may be.
+        least: f64,
+    },
+    /// Fewer bytes than one sample takes.
+    #[error(
+        "share_bytes is {0}: one sample takes up to 128 bytes and more; choose at least 128, or leave it out"
+    )]
+    Bytes(u32),
+    /// An unlikely time between looks.
+    #[error("spacing is longer than a minute: choose a shorter duration, for example 400ms")]
+    Spacing,
+}
+
+/// How a robot learns: what it keeps, what it shares, what it forgets. In a configuration file what is left out is the
+/// default.
+///
+/// | name | default | meaning | range |
+/// |---|---|---|---|
+/// | `capacity` | 1000 | T: the most samples held | 2–100,000 |
+/// | `keep` | 3 | M: observations of a round that become samples | 1–64 |
+/// | `spacing` | 400ms | least time between two of them | ≤ 1 min |
+/// | `share_samples` | none | n: the most samples shared per round | ≥ 0 |
+/// | `share_fraction` | 1.0 | B: the most samples shared, as a part of those newly acquired | 0–1 |
+/// | `share_bytes` | 512 | the most bytes of samples per round, with their envelope | ≥ 128 |
+/// | `precision` | i8 | how shared vectors travel | |
+/// | `selection` | k_center | which samples are shared | |
+/// | `forgetting` | redundancy | which samples go when there are more than T | |
+/// | `sure` | 0.95 | probability from which a sample of several possible gestures is labelled by the robot itself | 0.5–1 |
+/// | `aside` | 256 | the most samples kept aside until it is known what they show | 0–100,000 |
+/// | `learner` | | how the support vector machines are trained | |
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LearningConfig {
+    /// T: the most samples held, personal, shared and external together.
+    pub capacity: usize,
+    /// M: how many observations of a round become samples.
+    pub keep: usize,
+    /// The least time between two of them: frames that follow each other show the same.
+    #[serde(with = "humantime_serde")]
+    pub spacing: Duration,
+    /// n: the most samples shared per round.
+    pub share_samples: Option<u32>,
+    /// B: the most samples shared, as a part of those newly acquired. What a round leaves of it counts for the next.
+    pub share_fraction: f64,
+    /// The most bytes of samples per round, with their envelope.
+    pub share_bytes: Option<u32>,
+    /// How shared vectors travel.
+    pub precision: Precision,
+    /// Which samples are shared.
+    pub selection: SelectionRule,
+    /// Which samples go when there are more than T.
+    pub forgetting: ForgettingRule,
+    /// From which probability on a sample of which several gestures are possible is labelled by the robot itself.
+    pub sure: f64,
+    /// The most samples kept aside until it is known what they show.
+    pub aside: usize,
+    /// How the support vector machines are trained.
+    pub learner: LearnerOptions,
+}
+
+impl Default for LearningConfig {
+    fn default() -> Self {
+        Self {
+            capacity: 1000,
+            keep: 3,
+            spacing: Duration::from_millis(400),
+            share_samples: None,
+            share_fraction: 1.0,
+            share_bytes: Some(512),
+            precision: Precision::default(),
+            selection: SelectionRule::default(),
+            forgetting: ForgettingRule::default(),
+            sure: 0.95,
+            aside: 256,
+            learner: LearnerOptions::default(),
+        }
+    }
+}
+
+impl LearningConfig {
+    /// Whether a robot can learn with these parameters.
+    ///
+    /// # Errors
+    /// The first [`LearningConfigError`] found.
+    pub fn validate(&self) -> Result<(), LearningConfigError> {
+        for (field, value, least, most) in [
+            ("capacity", self.capacity, 2, 100_000),
+            ("keep", self.keep, 1, 64),
+            ("aside", self.aside, 0, 100_000),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(LearningConfigError::Range { field, value, least, most });
+            }
+        }
+        for (field, value, least) in [("share_fraction", self.share_fraction, 0.0), ("sure", self.sure, 0.5)]
+        {
+            if !(least..=1.0).contains(&value) {
+                return Err(LearningConfigError::Part { field, value, least });
+            }
+        }
+        if let Some(bytes) = self.share_bytes.filter(|bytes| *bytes < 128) {
+            return Err(LearningConfigError::Bytes(bytes));
+        }
+        if self.spacing > Duration::from_secs(60) {
+            return Err(LearningConfigError::Spacing);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_nobody_can_learn_with_is_named() {
+        assert_eq!(LearningConfig::default().validate(), Ok(()));
+        let default = LearningConfig::default;
+        for (config, field) in [
+            (LearningConfig { capacity: 1, ..default() }, "capacity"),
+            (LearningConfig { keep: 0, ..default() }, "keep"),
+            (LearningConfig { share_fraction: 1.1, ..default() }, "share_fraction"),
+            (LearningConfig { share_fraction: f64::NAN, ..default() }, "share_fraction"),
+            (LearningConfig { share_bytes: Some(10), ..default() }, "share_bytes"),
+            (LearningConfig { sure: 0.2, ..default() }, "sure"),
+            (LearningConfig { spacing: Duration::MAX, ..default() }, "spacing"),
+        ] {
+            let error = config.validate().unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What becomes of samples by what instructors say of their round: into the training set, out of it, aside.
+
+use gestalt_protocol::{ClassId, RoundId};
+use gestalt_rounds::Classify;
+
+use super::aside::{self, Aside};
+use super::changes::TrainingChange;
+use super::memory::Item;
+use super::state::Learning;
+use crate::lessons::{Candidates, Verdict};
+use crate::sample::{HeldSample, Part};
+use crate::training_set::SetChange;
+
+impl Learning {
+    /// Does to all samples of a round what instructors said of it: nothing but that decides, so that robots that heard
+    /// it in another order come to the same.
+    pub(super) fn apply_to_round(&mut self, round: RoundId) {
+        match self.verdict(round) {
+            Verdict::Class(class) => {
+                let changes = self.set.relabel(round, class);
+                self.absorb(changes);
+                for (number, aside) in self.aside.take(|aside| aside.round == round) {
+                    self.note_not_aside(number, &aside);
+                    self.take_back(aside, class);
+                }
+                for vector in self.lives.take_unlabelled(round) {
+                    self.keep(round, class, vector);
+                }
+            }
+            verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
+                for change in self.set.retract(round) {
+                    if let SetChange::Removed(sample) = &change {
+                        let HeldSample { part, id, class, round, vector, .. } = sample.clone();
+                        let shared = id.map(|id| (id, class));
+                        self.put_aside(Aside { part, shared, round, vector, guess: None });
+                    }
+                    self.absorb(vec![change]);
+                }
+                let possible =
+                    |class| matches!(verdict, Verdict::Among(candidates) if candidates.contains(class));
+                let of_round = self.aside.iter().filter(|(_, aside)| aside.round == round);
+                let refuted = of_round.filter(|(_, aside)| aside.guess.is_some_and(|guess| !possible(guess)));
+                let refuted: Vec<u64> = refuted.map(|(number, _)| number).collect();
+                refuted.into_iter().for_each(|number| self.guess(number, None));
+                if verdict != Verdict::Retracted {
+                    for vector in self.lives.take_unlabelled(round) {
+                        let (part, vector) = (Part::Personal, vector.into());
+                        self.put_aside(Aside { part, shared: None, round, vector, guess: None });
+                    }
+                }
+            }
+            Verdict::Unsaid => {}
+        }
+    }
+
+    /// A new sample of this robot's own.
+    fn keep(&mut self, round: RoundId, class: ClassId, vector: Vec<f32>) {
+        self.credit += self.config.share_fraction;
+        let changes = self.set.keep(class, round, vector, &mut *self.rng);
+        self.absorb(changes);
+    }
+
+    fn take_back(&mut self, aside: Aside, class: ClassId) {
+        let Aside { shared, round, vector, .. } = aside;
+        match shared {
+            None => self.keep(round, class, vector.to_vec()),
+            Some((id, _)) => {
+                let changes = self.set.take_back(id, class, round, vector, &mut *self.rng);
+                self.absorb(changes);
+            }
+        }
+    }
+
+    fn put_aside(&mut self, aside: Aside) {
+        let (number, gone) = self.aside.put(aside);
+        self.dirty.extend([Item::Counters, Item::Aside(number)]);
+        for (number, aside) in gone {
+            self.note_not_aside(number, &aside);
+        }
+    }
+
+    /// Notes that a sample is aside no longer.
+    fn note_not_aside(&mut self, number: u64, aside: &Aside) {
+        self.dirty.insert(Item::Aside(number));
+        if aside.guess.is_some() {
+            self.training.push(TrainingChange::Remove(aside::training_key(number)));
+        }
+    }
+
+    /// Trains, or trains no longer, on a sample aside as what the robot itself takes it for.
+    fn guess(&mut self, number: u64, class: Option<ClassId>) {
+        self.aside.guess(number, class);
+        self.dirty.insert(Item::Aside(number));
+        let key = aside::training_key(number);
+        self.training.push(match (class, self.aside.get(number)) {
+            (Some(class), Some(aside)) => TrainingChange::Insert { key, class, vector: aside.vector.clone() },
+            _ => TrainingChange::Remove(key),
+        });
+    }
+
+    /// Trains on own samples of which several gestures are possible and the classifier is sure of one.
+    pub fn settle_aside(&mut self, classifier: &dyn Classify) {
+        let classes = self.vocabulary.classes();
+        let sure = |aside: &Aside| {
+            let Verdict::Among(candidates) = self.lessons.verdict(aside.round, classes) else { return None };
+            let p = classifier.probabilities_in_space(&aside.vector)?;
+            likeliest(&p, candidates).filter(|(_, p)| *p >= self.config.sure).map(|(class, _)| class)
+        };
+        // Guesses at what others share would differ from robot to robot.
+        let open = self.aside.iter().filter(|(_, aside)| aside.shared.is_none() && aside.guess.is_none());
+        let guesses: Vec<(u64, ClassId)> =
+            open.filter_map(|(number, aside)| Some((number, sure(aside)?))).collect();
+        guesses.into_iter().for_each(|(number, class)| self.guess(number, Some(class)));
+    }
+}
+
+/// The likeliest of the candidates, and its probability among them.
+fn likeliest(p: &[f64], candidates: Candidates) -> Option<(ClassId, f64)> {
+    let possible = (0..).map(ClassId).zip(p.iter().copied()).filter(|(class, _)| candidates.contains(*class));
+    let sum: f64 = possible.clone().map(|(_, p)| p).sum();
+    let (class, p) = possible.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (sum > 0.0).then(|| (class, p / sum))
+}

@@ -1,0 +1,296 @@
+//! What a robot must not forget over a restart, as records that any key-value store can keep.
+
+use std::sync::Arc;
+
+use gestalt_protocol::{
+    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, VocabularyId, Word,
+};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use thiserror::Error;
+
+use super::aside::Aside;
+use crate::sample::{HeldSample, Part, Seen};
+
+/// One change of a robot's memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// Which record.
+    pub key: Vec<u8>,
+    /// What it now holds; `None` when it is gone.
+    pub value: Option<Vec<u8>>,
+}
+
+/// Records that are no memory of this robot.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum MemoryError {
+    /// Written by another version of the program.
+    #[error(
+        "the memory has layout {0}, this program reads layout {LAYOUT}: move the file away, or run the release that wrote it"
+    )]
+    Layout(u8),
+    /// Of another robot.
+    #[error("the memory is robot {found}'s, this is robot {expected}: give each robot a file of its own")]
+    Robot {
+        /// Whose it is.
+        found: RobotId,
+        /// Who reads it.
+        expected: RobotId,
+    },
+    /// Of another feature space.
+    #[error(
+        "the memory is of feature space {found}, the model is of {expected}: start with the model it was made with, or move the file away"
+    )]
+    Space {
+        /// The memory's.
+        found: FeatureSpaceId,
+        /// The model's.
+        expected: FeatureSpaceId,
+    },
+    /// Of another vocabulary.
+    #[error(
+        "the memory is of another list of gestures than the model: start with the model it was made with, or move the file away"
+    )]
+    Vocabulary,
+    /// A record that says nothing, or contradicts another.
+    #[error("the memory is damaged: {0}; move the file away")]
+    Damaged(&'static str),
+}
+
+/// The layout of the records; another layout gets another number.
+const LAYOUT: u8 = 1;
+
+/// Whose memory it is, and of what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Owner {
+    layout: u8,
+    robot: RobotId,
+    space: FeatureSpaceId,
+    vocabulary: VocabularyId,
+}
+
+impl Owner {
+    pub fn new(robot: RobotId, space: FeatureSpaceId, vocabulary: VocabularyId) -> Self {
+        Self { layout: LAYOUT, robot, space, vocabulary }
+    }
+}
+
+/// Numbers that must never be used twice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Counters {
+    pub next_key: u64,
+    pub next_number: u32,
+    pub next_aside: u64,
+}
+
+/// Which record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Item {
+    Owner,
+    Counters,
+    Sample(u64),
+    Seen(RobotId),
+    Lessons(RoundId),
+    Aside(u64),
+}
+
+#[derive(Serialize, Deserialize)]
+struct StoredSample {
+    part: u8,
+    id: Option<SampleId>,
+    class: ClassId,
+    round: RoundId,
+    vector: Vec<f32>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StoredAside {
+    part: u8,
+    shared: Option<(SampleId, ClassId)>,
+    round: RoundId,
+    vector: Vec<f32>,
+    guess: Option<ClassId>,
+}
+
+impl Item {
+    /// The record's key: a byte for the kind, then its number in big-endian order.
+    pub fn key(self) -> Vec<u8> {
+        match self {
+            Self::Owner => vec![0],
+            Self::Counters => vec![1],
+            Self::Sample(key) => [&[2][..], &key.to_be_bytes()].concat(),
+            Self::Seen(author) => [&[3][..], &author.0.to_be_bytes()].concat(),
+            Self::Lessons(round) => {
+                [&[4][..], &round.counter.to_be_bytes(), &round.opener.0.to_be_bytes()].concat()
+            }
+            Self::Aside(number) => [&[5][..], &number.to_be_bytes()].concat(),
+        }
+    }
+
+    fn read(key: &[u8]) -> Option<Self> {
+        let (kind, number) = key.split_first()?;
+        let word = |bytes: &[u8]| Some(u32::from_be_bytes(bytes.try_into().ok()?));
+        let long = |bytes: &[u8]| Some(u64::from_be_bytes(bytes.try_into().ok()?));
+        match kind {
+            0 if number.is_empty() => Some(Self::Owner),
+            1 if number.is_empty() => Some(Self::Counters),
+            2 => long(number).map(Self::Sample),
+            3 => word(number).map(|author| Self::Seen(RobotId(author))),
+            4 => {
+                let (counter, opener) = number.split_at_checked(4)?;
+                Some(Self::Lessons(RoundId { counter: word(counter)?, opener: RobotId(word(opener)?) }))
+            }
+            5 => long(number).map(Self::Aside),
+            _ => None,
+        }
+    }
+}
+
+pub(super) fn encode<T: Serialize>(value: &T) -> Vec<u8> {
+    postcard::to_stdvec(value).expect("memory is the only thing that writing to a vector can lack")
+}
+
+pub(super) fn encode_sample(sample: &HeldSample) -> Vec<u8> {
+    let HeldSample { part, id, class, round, vector, .. } = sample;
+    encode(&StoredSample {
+        part: part_number(*part),
+        id: *id,
+        class: *class,
+        round: *round,
+        vector: vector.to_vec(),
+    })
+}
+
+pub(super) fn encode_aside(aside: &Aside) -> Vec<u8> {
+    let Aside { part, shared, round, vector, guess } = aside;
+    encode(&StoredAside {
+        part: part_number(*part),
+        shared: *shared,
+        round: *round,
+        vector: vector.to_vec(),
+        guess: *guess,
+    })
+}
+
+pub(super) fn encode_lessons(lessons: impl Iterator<Item = Lesson>) -> Vec<u8> {
+    let words: Vec<(InstructorId, u64, Word)> =
+        lessons.map(|lesson| (lesson.instructor, lesson.at, lesson.word)).collect();
+    encode(&words)
+}
+
+fn part_number(part: Part) -> u8 {
+    match part {
+        Part::Personal => 0,
+        Part::Shared => 1,
+        Part::External => 2,
+    }
+}
+
+fn part_of(number: u8) -> Option<Part> {
+    [Part::Personal, Part::Shared, Part::External].get(usize::from(number)).copied()
+}
+
+/// A robot's memory as it was read back, not yet compared with the robot.
+#[derive(Clone, Debug, Default)]
+pub struct Memory {
+    owner: Option<Owner>,
+    pub(super) counters: Counters,
+    pub(crate) samples: Vec<HeldSample>,
+    pub(crate) seen: Seen,
+    pub(super) lessons: Vec<Lesson>,
+    pub(super) aside: Vec<(u64, Aside)>,
+}
+
+impl Memory {
+    /// Reads the records that the changes, one after the other, have left; an empty memory of none.
+    ///
+    /// # Errors
+    /// [`MemoryError::Layout`] and [`MemoryError::Damaged`].
+    pub fn read<'a>(records: impl IntoIterator<Item = (&'a [u8], &'a [u8])>) -> Result<Self, MemoryError> {
+        let mut memory = Self::default();
+        let mut seen: Vec<(RobotId, Vec<(u32, u32)>)> = Vec::new();
+        for (key, value) in records {
+            match Item::read(key).ok_or(MemoryError::Damaged("an unknown record"))? {
+                Item::Owner => {
+                    let layout = value.first().copied().ok_or(MemoryError::Damaged("an empty head"))?;
+                    if layout != LAYOUT {
+                        return Err(MemoryError::Layout(layout));
+                    }
+                    memory.owner = Some(decode(value)?);
+                }
+                Item::Counters => memory.counters = decode(value)?,
+                Item::Sample(key) => {
+                    let StoredSample { part, id, class, round, vector } = decode(value)?;
+                    let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
+                    let vector = Arc::from(finite(vector)?);
+                    memory.samples.push(HeldSample { key, part, id, class, round, vector });
+                }
+                Item::Seen(author) => seen.push((author, decode(value)?)),
+                Item::Lessons(round) => {
+                    let words: Vec<(InstructorId, u64, Word)> = decode(value)?;
+                    memory.lessons.extend(words.into_iter().map(|(instructor, at, word)| Lesson {
+                        round,
+                        instructor,
+                        at,
+                        word,
+                    }));
+                }
+                Item::Aside(number) => {
+                    let StoredAside { part, shared, round, vector, guess } = decode(value)?;
+                    let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
+                    memory.aside.push((
+                        number,
+                        Aside { part, shared, round, vector: Arc::from(finite(vector)?), guess },
+                    ));
+                }
+            }
+        }
+        memory.seen =
+            Seen::from_intervals(seen).map_err(|_| MemoryError::Damaged("impossible sample numbers"))?;
+        Ok(memory)
+    }
+
+    /// Whether nothing was ever written to it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.owner.is_none()
+    }
+
+    pub(super) fn check(&self, owner: Owner, components: usize, classes: usize) -> Result<(), MemoryError> {
+        let Some(found) = self.owner else {
+            let empty = self.samples.is_empty() && self.lessons.is_empty();
+            return if empty { Ok(()) } else { Err(MemoryError::Damaged("records without a head")) };
+        };
+        if found.robot != owner.robot {
+            return Err(MemoryError::Robot { found: found.robot, expected: owner.robot });
+        }
+        if found.space != owner.space {
+            return Err(MemoryError::Space { found: found.space, expected: owner.space });
+        }
+        if found.vocabulary != owner.vocabulary {
+            return Err(MemoryError::Vocabulary);
+        }
+        let vectors = self.samples.iter().map(|sample| &sample.vector);
+        let mut vectors = vectors.chain(self.aside.iter().map(|(_, aside)| &aside.vector));
+        if !vectors.all(|vector| vector.len() == components) {
+            return Err(MemoryError::Damaged("a vector of another length"));
+        }
+        let labels = self.samples.iter().map(|sample| sample.class);
+        let mut labels = labels.chain(self.aside.iter().filter_map(|(_, aside)| aside.guess));
+        if !labels.all(|class| class.index() < classes) {
+            return Err(MemoryError::Damaged("a sample of an unknown class"));
+        }
+        Ok(())
+    }
+}
+
+fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, MemoryError> {
+    postcard::from_bytes(bytes).map_err(|_| MemoryError::Damaged("a record that cannot be read"))
+}
+
+fn finite(vector: Vec<f32>) -> Result<Vec<f32>, MemoryError> {
+    if vector.iter().all(|x| x.is_finite()) {
+        Ok(vector)
+    } else {
+        Err(MemoryError::Damaged("a vector that is not finite"))
+    }
+}

@@ -1,0 +1,47 @@
+//! What a robot needs to learn, and why it may not be able to.
+
+use std::fmt;
+use std::sync::Arc;
+
+use gestalt_rounds::Vocabulary;
+use gestalt_svm::FeatureSpace;
+use thiserror::Error;
+
+use super::config::{LearningConfig, LearningConfigError};
+use super::memory::{Memory, MemoryError};
+use crate::training_set::RestoreError;
+
+/// What a robot needs to learn.
+pub struct LearningSetup {
+    /// Its parameters.
+    pub config: LearningConfig,
+    /// The space its samples lie in; all robots of a swarm need the same.
+    pub space: Arc<FeatureSpace>,
+    /// The gestures there are to be learned.
+    pub vocabulary: Vocabulary,
+    /// Where chance comes from.
+    pub rng: Box<dyn rand::Rng + Send>,
+    /// What the robot remembers from before; `None` for a robot whose host keeps nothing: such a one is never owed an
+    /// [`Input::Remembered`](crate::Input::Remembered).
+    pub memory: Option<Memory>,
+}
+
+impl fmt::Debug for LearningSetup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LearningSetup").field("config", &self.config).finish_non_exhaustive()
+    }
+}
+
+/// Why a robot cannot learn.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum LearningError {
+    /// Its parameters.
+    #[error(transparent)]
+    Config(#[from] LearningConfigError),
+    /// What it remembers is not its own.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+    /// What it remembers contradicts itself.
+    #[error("the memory is damaged: {0}; move the file away")]
+    Restore(#[from] RestoreError),
+}

@@ -1,0 +1,331 @@
+//! What a robot makes of what it saw and was told: samples, labelled, kept, shared and forgotten.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{
+    ClassId, Digest, FeatureSpaceId, Fnv1a, Learning as Status, Lesson, RobotId, RoundId, SampleId,
+    SharedSample,
+};
+use gestalt_rounds::{Follow, Vocabulary};
+use gestalt_svm::FeatureSpace;
+
+use super::aside::{self, Shelf};
+use super::changes::{TrainingChange, inserted};
+use super::config::LearningConfig;
+use super::lived::Lives;
+use super::memory::{self, Change, Counters, Item, Memory, Owner};
+use super::setup::{LearningError, LearningSetup};
+use crate::lessons::{Heard, LessonBook, Verdict};
+use crate::sample::Part;
+use crate::training_set::{Receipt, SetChange, TrainingSet};
+use crate::vector_codec::{VectorError, decode_vector};
+
+/// Why a received sample was not taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Declined {
+    Vector(VectorError),
+    Class,
+    Number,
+}
+
+/// What has come of samples and lessons so far.
+pub(crate) struct Learning {
+    pub(super) config: LearningConfig,
+    pub(super) me: RobotId,
+    pub(super) space: Arc<FeatureSpace>,
+    pub(super) space_id: FeatureSpaceId,
+    pub(super) vocabulary: Vocabulary,
+    pub(super) rng: Box<dyn rand::Rng + Send>,
+    pub(super) set: TrainingSet,
+    pub(super) lessons: LessonBook,
+    pub(super) lives: Lives,
+    pub(super) aside: Shelf,
+    /// Samples that may still be shared, by the bounds of the rounds so far.
+    pub(super) credit: f64,
+    /// Whether the numbers of this robot's samples are sure not to have been used before.
+    pub(super) numbered: bool,
+    /// What is to be trained and remembered, and was not yet said.
+    pub(super) training: Vec<TrainingChange>,
+    pub(super) dirty: BTreeSet<Item>,
+    pub(super) durable: bool,
+    pub(super) revision: u64,
+    pub(super) remembered: u64,
+    /// Shared samples that wait until that revision is remembered.
+    pub(super) unsent: VecDeque<(u64, Vec<SampleId>)>,
+}
+
+impl fmt::Debug for Learning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Learning")
+            .field("set", &self.set)
+            .field("lessons", &self.lessons)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Learning {
+    pub fn new(me: RobotId, setup: LearningSetup) -> Result<Self, LearningError> {
+        let LearningSetup { config, space, vocabulary, rng, memory } = setup;
+        config.validate()?;
+        let durable = memory.is_some();
+        let memory = memory.unwrap_or_default();
+        let space_id = space.id();
+        let owner = Owner::new(me, space_id, vocabulary.id());
+        memory.check(owner, space.components(), vocabulary.classes())?;
+        let mut set =
+            TrainingSet::new(me, config.capacity, config.selection.build(), config.forgetting.build());
+        let fresh = memory.is_empty();
+        let Memory { counters, samples, seen, lessons: heard, aside, .. } = memory;
+        if !fresh {
+            set.restore(samples, seen, counters.next_key, counters.next_number)?;
+        }
+        let mut lessons = LessonBook::default();
+        heard.iter().for_each(|lesson| {
+            lessons.hear(lesson);
+        });
+        let guesses = aside.iter().filter_map(|(number, aside)| {
+            let key = aside::training_key(*number);
+            Some(TrainingChange::Insert { key, class: aside.guess?, vector: aside.vector.clone() })
+        });
+        let training = set.iter().map(inserted).chain(guesses).collect();
+        let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
+        Ok(Self {
+            aside: Shelf::new(aside, counters.next_aside, config.aside),
+            config,
+            me,
+            space,
+            space_id,
+            vocabulary,
+            rng,
+            set,
+            lessons,
+            lives: Lives::default(),
+            credit: 0.0,
+            numbered: durable,
+            training,
+            dirty,
+            durable,
+            revision: 0,
+            remembered: 0,
+            unsent: VecDeque::new(),
+        })
+    }
+
+    /// Notes a look at the gesture of a round; says whether it was kept.
+    pub fn look(&mut self, now: Duration, round: RoundId, features: &[f32]) -> bool {
+        let Ok(vector) = self.space.project(features) else { return false };
+        self.lives.look(now, round, vector, self.config.keep, self.config.spacing) && {
+            self.apply_to_round(round);
+            true
+        }
+    }
+
+    /// What was decided in a round that this robot remembers.
+    pub fn decision(&self, round: RoundId) -> Option<ClassId> {
+        self.lives.decision(round)
+    }
+
+    /// Whether this robot knows anything of a round.
+    pub fn knows(&self, round: RoundId) -> bool {
+        self.lives.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
+    }
+
+    /// How many samples of that round are held.
+    pub fn held_of(&self, round: RoundId) -> usize {
+        self.set.iter().filter(|sample| sample.round == round).count()
+    }
+
+    pub fn vocabulary(&self) -> &Vocabulary {
+        &self.vocabulary
+    }
+
+    pub fn lessons(&self) -> &LessonBook {
+        &self.lessons
+    }
+
+    pub fn set(&self) -> &TrainingSet {
+        &self.set
+    }
+
+    pub fn verdict(&self, round: RoundId) -> Verdict {
+        self.lessons.verdict(round, self.vocabulary.classes())
+    }
+
+    /// Takes in what an instructor said, and does to all samples of that round what follows.
+    pub fn hear(&mut self, lesson: &Lesson) -> Heard {
+        let oldest = self.lessons.oldest();
+        let heard = self.lessons.hear(lesson);
+        if heard == Heard::New {
+            self.dirty.insert(Item::Lessons(lesson.round));
+            let forgotten = oldest.filter(|round| !self.lessons.contains(*round));
+            self.dirty.extend(forgotten.map(Item::Lessons));
+            self.apply_to_round(lesson.round);
+        }
+        heard
+    }
+
+    /// Takes in a sample that another robot shared. Says whether it was news.
+    pub fn receive(&mut self, space: FeatureSpaceId, sample: &SharedSample) -> Result<bool, Declined> {
+        if space != self.space_id {
+            return Err(Declined::Vector(VectorError::Space { found: space, expected: self.space_id }));
+        }
+        if sample.class.index() >= self.vocabulary.classes() {
+            return Err(Declined::Class);
+        }
+        let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
+        let SharedSample { id, round, .. } = *sample;
+        let verdict = self.verdict(round);
+        let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
+        match self.set.receive(id, class, round, vector, &mut *self.rng) {
+            Receipt::New(changes) => {
+                self.dirty.insert(Item::Seen(id.author));
+                self.absorb(changes);
+                // A class is what it was taken under; anything else concerns all samples of the round.
+                if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
+                    self.apply_to_round(round);
+                }
+                Ok(true)
+            }
+            Receipt::Known => Ok(false),
+            Receipt::Refused(_) => Err(Declined::Number),
+        }
+    }
+
+    /// Notes what changed in the training set, for training and memory.
+    pub(super) fn absorb(&mut self, changes: Vec<SetChange>) {
+        for change in changes {
+            self.dirty.insert(Item::Counters);
+            match change {
+                SetChange::Added(key) => {
+                    self.dirty.insert(Item::Sample(key));
+                    self.training.extend(self.set.get(key).map(inserted));
+                }
+                SetChange::Removed(sample) => {
+                    self.dirty.insert(Item::Sample(sample.key));
+                    self.training.push(TrainingChange::Remove(sample.key));
+                }
+                SetChange::Relabelled(key) => {
+                    self.dirty.insert(Item::Sample(key));
+                    self.training.extend(
+                        self.set.get(key).map(|sample| TrainingChange::Relabel { key, class: sample.class }),
+                    );
+                }
+                SetChange::Shared(key, _) => {
+                    self.dirty.extend([Item::Sample(key), Item::Seen(self.me)]);
+                    self.training.extend(self.set.get(key).map(inserted));
+                }
+            }
+        }
+    }
+
+    /// This robot's numbers are sure not to be used by samples it does not remember: it has heard from others.
+    pub fn note_heard_from_others(&mut self) {
+        self.numbered = true;
+    }
+
+    /// What is to be trained, since the last time.
+    pub fn take_training(&mut self) -> Vec<TrainingChange> {
+        std::mem::take(&mut self.training)
+    }
+
+    /// What is to be remembered, since the last time, as which revision. A robot without a memory on disk remembers
+    /// at once what little it can.
+    pub fn take_changes(&mut self) -> Option<(u64, Vec<Change>)> {
+        if !self.durable {
+            self.dirty.clear();
+            self.revision += 1;
+            self.remembered = self.revision;
+            return None;
+        }
+        if self.dirty.is_empty() {
+            return None;
+        }
+        self.revision += 1;
+        let dirty = std::mem::take(&mut self.dirty);
+        let changes = dirty.into_iter().map(|item| Change { key: item.key(), value: self.record(item) });
+        Some((self.revision, changes.collect()))
+    }
+
+    fn record(&self, item: Item) -> Option<Vec<u8>> {
+        match item {
+            Item::Owner => Some(memory::encode(&Owner::new(self.me, self.space_id, self.vocabulary.id()))),
+            Item::Counters => Some(memory::encode(&Counters {
+                next_key: self.set.next_key(),
+                next_number: self.set.next_number(),
+                next_aside: self.aside.next(),
+            })),
+            Item::Sample(key) => self.set.get(key).map(memory::encode_sample),
+            Item::Seen(author) => Some(memory::encode(&self.set.seen().intervals(author).to_vec())),
+            Item::Lessons(round) => {
+                let mut lessons = self.lessons.of(round).peekable();
+                lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
+            }
+            Item::Aside(number) => self.aside.get(number).map(memory::encode_aside),
+        }
+    }
+
+    /// What was to be remembered up to that revision is safe.
+    pub fn note_remembered(&mut self, revision: u64) {
+        self.remembered = self.remembered.max(revision);
+    }
+
+    /// The revision that what is known now will be remembered with, and whether it is.
+    pub fn pending_revision(&self) -> u64 {
+        if self.dirty.is_empty() { self.revision } else { self.revision + 1 }
+    }
+
+    pub fn is_remembered(&self, revision: u64) -> bool {
+        self.remembered >= revision
+    }
+
+    pub fn digest(&self) -> Digest {
+        Digest { samples: self.set.seen().digest(), lessons: self.lessons.digest() }
+    }
+
+    /// Where it stands, for the status. What the host knows of memory and training is left to it.
+    pub fn status(&self) -> Status {
+        let classes = (0..self.vocabulary.classes()).map(|class| ClassId(class as u8));
+        let counts = |part: Part| classes.clone().map(|class| self.set.count(part, class)).collect();
+        let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
+        let mut fnv = Fnv1a::default();
+        for (id, class) in common.collect::<BTreeMap<_, _>>() {
+            let number = id.author.0.to_le_bytes().into_iter().chain(id.number.to_le_bytes());
+            fnv.add(number.chain([class.0]));
+        }
+        Status {
+            space: self.space_id.to_string(),
+            capacity: self.config.capacity,
+            personal: counts(Part::Personal),
+            shared: counts(Part::Shared),
+            external: counts(Part::External),
+            aside: self.aside.len(),
+            common: format!("{:016x}", fnv.hash()),
+            lessons: self.lessons.len(),
+            memory: String::new(),
+            trainings: 0,
+        }
+    }
+}
+
+impl Follow for Learning {
+    fn entered(&mut self, round: RoundId) {
+        if self.lives.enter(round) {
+            self.apply_to_round(round);
+        }
+    }
+
+    fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
+        self.lives.decided(round, class);
+    }
+
+    fn wants_more(&self, round: RoundId) -> bool {
+        (1..self.config.keep).contains(&self.lives.looks(round))
+    }
+
+    fn knowledge(&self) -> Option<Digest> {
+        Some(self.digest())
+    }
+}

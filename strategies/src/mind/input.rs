@@ -1,0 +1,92 @@
+//! What the world tells the mind.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{Decision, Envelope, Instruction, InstructorId, RobotId};
+use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
+
+/// What the world tells the mind.
+#[derive(Clone, Debug)]
+pub enum Input {
+    /// Time has passed; the host owes one at [`Mind::next_wake`](crate::Mind::next_wake), more do no harm.
+    Tick,
+    /// The robot's host says, by a schedule or for other reasons of its own: a gesture is being shown.
+    Open,
+    /// The robot's own motion detector says: a hand moved from that time on, and now holds still. Opens a round, unless
+    /// the newest one was opened after the hand had begun to move: that one is about this gesture.
+    Shown(Duration),
+    /// The robot's own motion detector says: the hand that held still is moving again, or gone. What was shown can be seen
+    /// no more, so this robot's round ends early.
+    Left,
+    /// Whether the robot's camera shows anything at all. One that is blind takes part, and says that it need not be waited
+    /// for. Until told otherwise, a robot sees.
+    Blind(bool),
+    /// A human says something.
+    Instructed(Instructed),
+    /// That robot has answered what that instructor said at that time.
+    Answered(InstructorId, u64, RobotId),
+    /// A frame showed a hand.
+    Observed(Observation),
+    /// A robot's message arrived, by whichever way.
+    Received(Envelope),
+    /// That robot says it holds this decision (`robot/<id>/decision`).
+    Heard(RobotId, Decision),
+    /// This decision was announced for the swarm (`decision`).
+    Announced(Decision),
+    /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
+    Alive(BTreeSet<RobotId>),
+    /// The robots that see and vote through this robot's host, and leave deciding and announcing to this mind.
+    Guests(BTreeSet<RobotId>),
+    /// The robots this one is directly linked to now.
+    Neighbours(BTreeSet<RobotId>),
+    /// A new classifier takes the place of the old one.
+    Learned(Arc<dyn Classify>),
+    /// All that was to be remembered up to this revision is safe.
+    Remembered(u64),
+}
+
+/// A human's word, as it reached the swarm.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Instructed {
+    /// Who said it.
+    pub by: InstructorId,
+    /// When, in the swarm's own time: the same at every robot.
+    pub at: u64,
+    /// What was said.
+    pub instruction: Instruction,
+}
+
+/// What an input is about.
+pub(super) enum Concern {
+    Rounds(AboutRounds),
+    Word(Instructed),
+    Answered(InstructorId, u64, RobotId),
+    Remembered(u64),
+}
+
+impl Input {
+    pub(super) fn concern(self) -> Concern {
+        Concern::Rounds(match self {
+            Self::Instructed(Instructed { instruction: Instruction::Open, .. }) | Self::Open => {
+                AboutRounds::Open
+            }
+            Self::Instructed(word) => return Concern::Word(word),
+            Self::Answered(by, at, robot) => return Concern::Answered(by, at, robot),
+            Self::Remembered(revision) => return Concern::Remembered(revision),
+            Self::Tick => AboutRounds::Tick,
+            Self::Shown(began) => AboutRounds::Shown(began),
+            Self::Left => AboutRounds::Left,
+            Self::Blind(blind) => AboutRounds::Blind(blind),
+            Self::Observed(observation) => AboutRounds::Observed(observation),
+            Self::Received(envelope) => AboutRounds::Received(envelope),
+            Self::Heard(robot, decision) => AboutRounds::Heard(robot, decision),
+            Self::Announced(decision) => AboutRounds::Announced(decision),
+            Self::Alive(robots) => AboutRounds::Alive(robots),
+            Self::Guests(robots) => AboutRounds::Guests(robots),
+            Self::Neighbours(robots) => AboutRounds::Neighbours(robots),
+            Self::Learned(classifier) => AboutRounds::Learned(classifier),
+        })
+    }
+}

@@ -1,0 +1,179 @@
+//! The mind itself: the rounds, and the learning that follows them.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{Envelope, Message, RobotId};
+use gestalt_rounds::{Classify, Follow, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
+
+use super::answers::Answers;
+use super::input::{Concern, Input};
+use super::output::Output;
+use crate::learning::{Learning, LearningError, LearningSetup};
+
+/// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
+///
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
+/// inputs at the same times give the same outputs.
+///
+/// A robot alone, whose classifier takes the features for the probabilities:
+///
+/// ```
+/// use std::sync::Arc;
+/// use std::time::Duration;
+///
+/// use gestalt_protocol::{ClassId, RobotId};
+/// use gestalt_strategies::{Classify, ClassifyError, Input, Mind, MindConfig, Observation, Output, Vocabulary};
+///
+/// #[derive(Debug)]
+/// struct Verbatim(Vocabulary);
+///
+/// impl Classify for Verbatim {
+///     fn vocabulary(&self) -> &Vocabulary {
+///         &self.0
+///     }
+///
+///     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+///         Ok(features.iter().map(|p| f64::from(*p)).collect())
+///     }
+/// }
+///
+/// let mut mind = Mind::new(RobotId(7), 1, MindConfig::default())?;
+/// let ms = Duration::from_millis;
+/// mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(Vocabulary::new(["left", "right"])?))));
+/// mind.handle(ms(0), Input::Open);
+/// mind.handle(ms(40), Input::Observed(Observation { features: vec![0.02, 0.98], quality: 1.0 }));
+/// // Its vote is said, and with it all that is to be waited for.
+/// let due = mind.next_wake().expect("a vote is to be said");
+/// let outputs = mind.handle(due, Input::Tick);
+/// assert!(outputs.iter().any(|output| matches!(output, Output::Broadcast(_))));
+/// assert_eq!(mind.held().expect("it is sure").class, Some(ClassId(1)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Mind {
+    pub(super) rounds: Rounds,
+    pub(super) learning: Option<Learning>,
+    pub(super) answers: Answers,
+}
+
+impl Mind {
+    /// The mind of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
+    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
+    /// but gives no evidence.
+    ///
+    /// # Errors
+    /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
+    pub fn new(me: RobotId, boot: u32, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
+        Ok(Self { rounds: Rounds::new(me, boot, config)?, learning: None, answers: Answers::default() })
+    }
+
+    /// The same mind, set up to learn: it keeps what it sees, labels it by what instructors say, shares and forgets.
+    ///
+    /// # Errors
+    /// See [`LearningError`].
+    pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
+        self.learning = Some(Learning::new(self.me(), setup)?);
+        Ok(self)
+    }
+
+    /// Takes in one input at the time `now` and says what is to be done.
+    pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        let now = now.max(self.rounds.now());
+        let mut out = Vec::new();
+        let about_rounds = match input.concern() {
+            Concern::Rounds(input) => self.learn_along(now, input, &mut out),
+            Concern::Word(word) => self.on_instructed(now, word),
+            Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
+            Concern::Remembered(revision) => self.on_remembered(revision),
+        };
+        let done = match &mut self.learning {
+            Some(learning) => self.rounds.handle_with(now, about_rounds, learning),
+            None => self.rounds.handle(now, about_rounds),
+        };
+        out.extend(done.into_iter().map(Output::from));
+        self.carry_on_learning(&mut out);
+        self.answer_when_due(&mut out);
+        out
+    }
+
+    /// When the mind wants its next [`Input::Tick`], if nothing else comes before.
+    #[must_use]
+    pub fn next_wake(&self) -> Option<Duration> {
+        let follower: &dyn Follow = match &self.learning {
+            Some(learning) => learning,
+            None => &(),
+        };
+        [self.rounds.next_wake_with(follower), self.answer_due()].into_iter().flatten().min()
+    }
+
+    /// Learns from what concerns the rounds, before they take it in.
+    fn learn_along(&mut self, now: Duration, input: AboutRounds, out: &mut Vec<Output>) -> AboutRounds {
+        match &input {
+            AboutRounds::Observed(observation) => {
+                if let (Some(learning), Some(round)) = (&mut self.learning, self.rounds.looking()) {
+                    learning.look(now, round, &observation.features);
+                }
+            }
+            AboutRounds::Learned(classifier) => self.on_learned(classifier),
+            AboutRounds::Received(envelope) if envelope.author != self.me() => {
+                self.on_received(envelope, out);
+            }
+            _ => {}
+        }
+        input
+    }
+
+    fn on_received(&mut self, envelope: &Envelope, out: &mut Vec<Output>) {
+        let author = envelope.author;
+        match &envelope.message {
+            Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
+            Message::Samples(samples) => self.on_samples(author, samples),
+            Message::Know(know) => self.on_know(author, know, out),
+            Message::Lessons(lessons) => self.on_lessons(&lessons.lessons),
+            Message::Vote(_) | Message::Have(_) | Message::Give(_) => {}
+        }
+    }
+
+    fn on_learned(&mut self, classifier: &Arc<dyn Classify>) {
+        if let Some(learning) = &mut self.learning {
+            learning.settle_aside(&**classifier);
+        }
+    }
+
+    fn on_remembered(&mut self, revision: u64) -> AboutRounds {
+        if let Some(learning) = &mut self.learning {
+            learning.note_remembered(revision);
+        }
+        AboutRounds::Tick
+    }
+
+    /// Chooses samples to share, as far as the bounds allow.
+    pub(super) fn share(&mut self) {
+        if let Some(learning) = &mut self.learning {
+            let classifier = self.rounds.classifier().map(|classifier| &**classifier);
+            learning.share(classifier, self.rounds.alive().is_empty());
+        }
+    }
+
+    /// Says what is to be trained and remembered, and shares what is remembered as shared.
+    fn carry_on_learning(&mut self, out: &mut Vec<Output>) {
+        let Some(learning) = &mut self.learning else { return };
+        let changes = learning.take_training();
+        if !changes.is_empty() {
+            out.push(Output::Train(changes));
+        }
+        if let Some((revision, changes)) = learning.take_changes() {
+            out.push(Output::Remember { revision, changes });
+        }
+        while let Some(samples) = learning.take_unsent() {
+            if !samples.samples.is_empty() {
+                out.push(Output::Broadcast(self.rounds.stamped(Message::Samples(samples))));
+            }
+        }
+    }
+
+    pub(super) fn tell(&mut self, robot: RobotId, message: Message, out: &mut Vec<Output>) {
+        out.push(Output::Tell(robot, self.rounds.stamped(message)));
+    }
+}

@@ -1,0 +1,124 @@
+//! The sure way for samples and lessons: neighbours compare digests of all they know, and give each other what one of
+//! them lacks.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{
+    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, Message, RobotId, RoundId, Samples,
+};
+use gestalt_rounds::Refusal;
+
+use super::machine::Mind;
+use super::output::Output;
+use crate::learning::Declined;
+use crate::lessons::Heard;
+use crate::sample::{MAX_GAPS, Seen};
+use crate::vector_codec::VectorError;
+
+/// About how many bytes of samples one message takes, so that a vote never waits long behind it.
+const CHUNK: usize = 16 * 1024;
+
+/// The most messages given at once; the next comparison brings more.
+const MAX_CHUNKS: usize = 32;
+
+/// The most lessons in one message.
+const MAX_TOLD: usize = 256;
+
+// What is kept of an author can be told.
+const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
+
+impl Mind {
+    /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length.
+    pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
+        let (Some(theirs), Some(learning)) = (theirs, &mut self.learning) else { return };
+        if theirs == learning.digest() {
+            learning.note_heard_from_others();
+        } else {
+            self.tell_know(from, theirs, false, out);
+        }
+    }
+
+    fn tell_know(&mut self, to: RobotId, theirs: Digest, answer: bool, out: &mut Vec<Output>) {
+        let Some(learning) = &self.learning else { return };
+        let mine = learning.digest();
+        let seen = learning.set().seen();
+        let samples = if mine.samples == theirs.samples {
+            Vec::new()
+        } else {
+            let known = |author| Known { author, numbers: seen.intervals(author).to_vec() };
+            seen.authors().map(known).collect()
+        };
+        let lessons =
+            if mine.lessons == theirs.lessons { Vec::new() } else { learning.lessons().rounds().collect() };
+        self.tell(to, Message::Know(Know { samples, lessons, digest: mine, answer }), out);
+    }
+
+    /// A neighbour says what it knows: gives what it lacks, and asks for what this robot lacks.
+    pub(super) fn on_know(&mut self, from: RobotId, know: &Know, out: &mut Vec<Output>) {
+        let Some(learning) = &self.learning else { return };
+        let mine = learning.digest();
+        let mut lacking_here = false;
+        let mut given = Vec::new();
+        if mine.samples != know.digest.samples {
+            let theirs = know.samples.iter().map(|known| (known.author, known.numbers.clone()));
+            let Ok(theirs) = Seen::from_intervals(theirs) else {
+                return self.rounds.note_refusal(Refusal::SampleNumber);
+            };
+            lacking_here |= learning.set().seen().lacks(&theirs);
+            let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
+            given.extend(lacking.take(MAX_CHUNKS).map(Message::Samples));
+        }
+        if mine.lessons != know.digest.lessons {
+            let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
+            let book = learning.lessons();
+            lacking_here |= theirs.iter().any(|(round, digest)| book.digest_of(*round) != *digest);
+            let lacking = book.rounds().filter(|(round, digest)| theirs.get(round) != Some(digest));
+            let lessons: Vec<Lesson> = lacking.flat_map(|(round, _)| book.of(round)).take(MAX_TOLD).collect();
+            if !lessons.is_empty() {
+                given.push(Message::Lessons(Lessons { lessons }));
+            }
+        }
+        for message in given {
+            self.tell(from, message, out);
+        }
+        if lacking_here && !know.answer {
+            self.tell_know(from, know.digest, true, out);
+        } else if let Some(learning) = &mut self.learning {
+            learning.note_heard_from_others();
+        }
+    }
+
+    /// Takes in samples, from their author or from a neighbour that had them.
+    pub(super) fn on_samples(&mut self, from: RobotId, samples: &Samples) {
+        let Some(learning) = &mut self.learning else { return };
+        let mut repaired = false;
+        for sample in &samples.samples {
+            match learning.receive(samples.space, sample) {
+                Ok(new) => repaired |= new && sample.id.author != from,
+                Err(declined) => self.rounds.note_refusal(match declined {
+                    Declined::Vector(VectorError::Space { .. }) => Refusal::OtherSpace,
+                    Declined::Vector(_) => Refusal::BadVector,
+                    Declined::Class => Refusal::UnknownClass,
+                    Declined::Number => Refusal::SampleNumber,
+                }),
+            }
+        }
+        if repaired {
+            // The other neighbours may lack it too.
+            self.rounds.hurry_repair();
+        }
+    }
+
+    /// Takes in what instructors said and this robot had not heard.
+    pub(super) fn on_lessons(&mut self, lessons: &[Lesson]) {
+        let Some(learning) = &mut self.learning else { return };
+        let mut news = false;
+        for lesson in lessons {
+            news |= learning.hear(lesson) == Heard::New;
+        }
+        if news {
+            self.rounds.hurry_repair();
+            self.share();
+        }
+    }
+}

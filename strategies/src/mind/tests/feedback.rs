@@ -1,0 +1,120 @@
+//! What instructors say, and what comes of it.
+
+use super::*;
+
+#[test]
+fn a_correction_reaches_all_also_who_was_away() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 6);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    // The third hears nothing of the correction.
+    let at = swarm.now.as_millis() as u64;
+    for i in 0..2 {
+        let instruction = Instruction::Was { round, class: Gesture::Label("4".to_owned()) };
+        swarm.input(i, Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction }));
+    }
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    for mind in &swarm.minds {
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(4)), 9);
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(1)), 0);
+    }
+    swarm.check();
+}
+
+#[test]
+fn what_is_taken_back_is_forgotten_and_what_is_said_then_counts() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 7);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    let at = swarm.say("ada", Instruction::Retract { round });
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    for i in 0..3 {
+        assert_eq!(swarm.sizes(i), [0, 0, 0]);
+    }
+    swarm.check();
+    swarm.restart(2);
+    swarm.was(round, 5);
+    for i in 0..3 {
+        assert_eq!(swarm.sizes(i), [0, 3, 6], "robot {} has them back, once", i + 1);
+        assert_eq!(swarm.minds[i].training_set().unwrap().class_count(ClassId(5)), 9);
+    }
+    assert_eq!(swarm.said.len(), 9, "nothing is shared again");
+    swarm.check();
+}
+
+#[test]
+fn right_and_wrong_are_about_the_decision() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 8);
+    let round = swarm.show(3);
+    let at = swarm.say("ada", Instruction::Right { round });
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    assert_eq!(swarm.minds[1].training_set().unwrap().class_count(ClassId(3)), 4);
+    let round = swarm.show(2);
+    let at = swarm.say("ada", Instruction::Wrong { round });
+    assert_eq!(swarm.outcome(at), Outcome::NothingSeen, "nothing of it can be trained on yet");
+    assert_eq!(swarm.minds[0].training_set().unwrap().class_count(ClassId(2)), 0);
+    assert_eq!(swarm.minds[0].learned().unwrap().aside, 2);
+    swarm.restart(0);
+    assert_eq!(swarm.minds[0].learned().unwrap().aside, 2);
+    let guessed =
+        |swarm: &Swarm| swarm.trained[0].range(training_key(0)..).map(|(_, c)| *c).collect::<Vec<_>>();
+    assert_eq!(guessed(&swarm), [ClassId(4); 2], "without 2, the classifier is sure of 4");
+    assert_eq!(swarm.said.len(), 4, "a guess is shared with nobody");
+    swarm.was(round, 5);
+    assert_eq!(guessed(&swarm), [], "what is said counts more");
+    assert_eq!(swarm.minds[0].training_set().unwrap().class_count(ClassId(5)), 4);
+    swarm.check();
+}
+
+#[test]
+fn every_word_is_answered_once() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 9);
+    let round = swarm.show(1);
+    let unknown = RoundId { counter: 77, opener: RobotId(1) };
+    let was = |round, class: &str| Instruction::Was { round, class: Gesture::Label(class.to_owned()) };
+    for (instruction, outcome) in [
+        (was(round, "1"), Outcome::Learned),
+        (was(round, "1"), Outcome::Known),
+        (was(round, "seven"), Outcome::UnknownGesture),
+        (was(unknown, "1"), Outcome::UnknownRound),
+        (Instruction::Right { round: unknown }, Outcome::UnknownRound),
+    ] {
+        let at = swarm.say("ada", instruction.clone());
+        assert_eq!(swarm.outcome(at), outcome, "{instruction:?}");
+    }
+    let at = swarm.say("bob", was(round, "1"));
+    assert_eq!(swarm.outcome(at), Outcome::Learned, "another instructor's word is a new one");
+}
+
+#[test]
+fn who_does_not_learn_says_so() {
+    let mut mind = Mind::new(RobotId(1), 1, RoundsConfig::default()).unwrap();
+    let instruction = Instruction::Right { round: RoundId { counter: 1, opener: RobotId(1) } };
+    mind.handle(
+        Duration::ZERO,
+        Input::Instructed(Instructed { by: "ada".parse().unwrap(), at: 1, instruction }),
+    );
+    let out = mind.handle(Duration::from_secs(2), Input::Tick);
+    let answered = |output: &Output| matches!(output, Output::Answer(_, answer) if answer.outcome == Outcome::NotLearning);
+    assert!(out.iter().any(answered));
+}
+
+#[test]
+fn a_lesson_counts_for_samples_that_come_after_it() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 13);
+    let round = swarm.show(1);
+    let lesson = Lesson { round, instructor: "ada".parse().unwrap(), at: 9, word: Word::Was(ClassId(3)) };
+    swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
+    let sample = SharedSample {
+        id: SampleId { author: RobotId(9), number: 1 },
+        class: ClassId(1),
+        round,
+        vector: Vector::F32(vec![0.5; 4]),
+    };
+    let message = Message::Samples(Samples { space: space().id(), samples: vec![sample] });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    let set = swarm.minds[0].training_set().unwrap();
+    assert_eq!((set.class_count(ClassId(3)), set.class_count(ClassId(1))), (3, 0));
+}

@@ -1,0 +1,7 @@
+//! A sample, the samples held, and those ever seen: what rules, training set and learning speak of.
+
+mod samples;
+mod seen;
+
+pub use samples::{HeldSample, Part, Samples, draw};
+pub use seen::{FAR_AHEAD, MAX_AUTHORS, MAX_GAPS, Seen, SeenError};

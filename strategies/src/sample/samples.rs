@@ -1,0 +1,200 @@
+//! The samples a robot holds, found by key, by identifier, by class and by part.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use gestalt_protocol::{ClassId, RoundId, SampleId};
+use rand::{Rng, RngExt};
+
+/// The part of a training set that a sample is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// Own, not shared yet.
+    Personal,
+    /// Own, broadcast.
+    Shared,
+    /// Received from its author or from whoever held it.
+    External,
+}
+
+impl Part {
+    /// All parts.
+    pub const ALL: [Self; 3] = [Self::Personal, Self::Shared, Self::External];
+}
+
+/// A sample as held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldSample {
+    /// Local arrival number: from 1, grows, is never used twice, also across restarts.
+    pub key: u64,
+    /// Where it is.
+    pub part: Part,
+    /// Its name in the swarm; `None` while it is personal.
+    pub id: Option<SampleId>,
+    /// The gesture shown.
+    pub class: ClassId,
+    /// The round it was seen in.
+    pub round: RoundId,
+    /// Coordinates in the robot's feature space.
+    pub vector: Arc<[f32]>,
+}
+
+/// The samples held, as selection and forgetting rules see them. Every list is in the order of the keys, so what a
+/// rule picks depends on what is held and not on how it came to be.
+#[derive(Debug, Default)]
+pub struct Samples {
+    held: BTreeMap<u64, HeldSample>,
+    ids: BTreeMap<SampleId, u64>,
+    classes: BTreeMap<ClassId, ClassKeys>,
+    arrivals: u64,
+}
+
+/// The keys of one class, ascending: in all and by part.
+#[derive(Debug, Default)]
+struct ClassKeys {
+    all: Vec<u64>,
+    parts: [Vec<u64>; 3],
+}
+
+impl Samples {
+    /// The sample with that key.
+    #[must_use]
+    pub fn get(&self, key: u64) -> Option<&HeldSample> {
+        self.held.get(&key)
+    }
+
+    /// The sample with that name.
+    #[must_use]
+    pub fn find(&self, id: SampleId) -> Option<&HeldSample> {
+        self.ids.get(&id).and_then(|key| self.get(*key))
+    }
+
+    /// All samples, by key.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &HeldSample> {
+        self.held.values()
+    }
+
+    /// Shared and external samples, by key: what the swarm knows together.
+    pub fn common(&self) -> impl Iterator<Item = &HeldSample> {
+        self.iter().filter(|sample| sample.part != Part::Personal)
+    }
+
+    /// How many samples are held.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.held.len()
+    }
+
+    /// Whether no sample is held.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.held.is_empty()
+    }
+
+    /// How many samples ever came in, held or not.
+    #[must_use]
+    pub fn arrivals(&self) -> u64 {
+        self.arrivals
+    }
+
+    /// How many samples of a class are in a part.
+    #[must_use]
+    pub fn count(&self, part: Part, class: ClassId) -> usize {
+        self.part_keys(part, class).len()
+    }
+
+    /// How many samples are in a part.
+    #[must_use]
+    pub fn total(&self, part: Part) -> usize {
+        self.classes.values().map(|keys| keys.parts[part as usize].len()).sum()
+    }
+
+    /// How many samples of a class are held.
+    #[must_use]
+    pub fn class_count(&self, class: ClassId) -> usize {
+        self.class_keys(class).len()
+    }
+
+    /// The classes of which a sample is held, ascending.
+    pub fn classes(&self) -> impl Iterator<Item = ClassId> + '_ {
+        self.classes.keys().copied()
+    }
+
+    /// The keys of a class, ascending.
+    #[must_use]
+    pub fn class_keys(&self, class: ClassId) -> &[u64] {
+        self.classes.get(&class).map_or(&[], |keys| &keys.all)
+    }
+
+    /// The keys of a class in a part, ascending.
+    #[must_use]
+    pub fn part_keys(&self, part: Part, class: ClassId) -> &[u64] {
+        self.classes.get(&class).map_or(&[], |keys| &keys.parts[part as usize])
+    }
+
+    /// The samples with these keys, in their order; a key that is not held is passed over.
+    pub fn with_keys<'a>(
+        &'a self,
+        keys: &'a [u64],
+    ) -> impl DoubleEndedIterator<Item = &'a HeldSample> + Clone {
+        keys.iter().filter_map(|key| self.get(*key))
+    }
+
+    /// A class at random among those with personal samples: where selection begins.
+    pub fn draw_personal_class(&self, rng: &mut dyn Rng) -> Option<ClassId> {
+        let candidates: Vec<ClassId> =
+            self.classes().filter(|class| self.count(Part::Personal, *class) > 0).collect();
+        draw(&candidates, rng)
+    }
+
+    /// The class with the most samples, ties at random: where forgetting begins.
+    pub fn draw_largest_class(&self, rng: &mut dyn Rng) -> Option<ClassId> {
+        let most = self.classes.values().map(|keys| keys.all.len()).max()?;
+        let candidates: Vec<ClassId> =
+            self.classes().filter(|class| self.class_count(*class) == most).collect();
+        draw(&candidates, rng)
+    }
+
+    /// Takes a sample in under a key that is not held.
+    pub(crate) fn insert(&mut self, sample: HeldSample) {
+        self.arrivals = self.arrivals.max(sample.key);
+        if let Some(id) = sample.id {
+            self.ids.insert(id, sample.key);
+        }
+        let keys = self.classes.entry(sample.class).or_default();
+        for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
+            list.insert(list.partition_point(|key| *key < sample.key), sample.key);
+        }
+        self.held.insert(sample.key, sample);
+    }
+
+    /// Takes a sample out.
+    pub(crate) fn remove(&mut self, key: u64) -> Option<HeldSample> {
+        let sample = self.held.remove(&key)?;
+        if let Some(id) = sample.id {
+            self.ids.remove(&id);
+        }
+        if let Some(keys) = self.classes.get_mut(&sample.class) {
+            for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
+                if let Ok(place) = list.binary_search(&key) {
+                    list.remove(place);
+                }
+            }
+            if keys.all.is_empty() {
+                self.classes.remove(&sample.class);
+            }
+        }
+        Some(sample)
+    }
+
+    /// Makes up for the samples that came and went before a restart.
+    pub(crate) fn set_arrivals(&mut self, arrivals: u64) {
+        self.arrivals = arrivals;
+    }
+}
+
+/// One of the items at random, each as likely as the others.
+pub fn draw<T: Copy>(items: &[T], rng: &mut dyn Rng) -> Option<T> {
+    // As u64, so that machines of all word sizes draw the same.
+    if items.is_empty() { None } else { Some(items[rng.random_range(0..items.len() as u64) as usize]) }
+}

@@ -1,0 +1,381 @@
+//! The samples a robot learns from: personal, shared, external, and never more than it can train on.
+//!
+//! ```text
+//!            keep              share                       receive
+//! own sample ────► personal ─────────► shared        ─────────────► external
+//!                     └──────────────────┴───── forget when full ─────┘
+//! ```
+
+use std::ops::Deref;
+use std::sync::Arc;
+
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+use gestalt_rounds::Classify;
+use rand::Rng;
+use thiserror::Error;
+
+use crate::forgetting::Forgetting;
+use crate::sample::{HeldSample, MAX_AUTHORS, Part, Samples, Seen, SeenError};
+use crate::selection::Selection;
+
+/// No key read from a store is greater.
+const LAST_KEY: u64 = u64::MAX / 2;
+
+/// What an operation changed, in order: the caller stores, trains and broadcasts from it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SetChange {
+    /// The sample with this key came in. It may be among those removed later in the same list.
+    Added(u64),
+    /// This sample went.
+    Removed(HeldSample),
+    /// The sample with this key has another class.
+    Relabelled(u64),
+    /// The sample with this key went from personal to shared under this name; its vector is now what travels.
+    Shared(u64, SampleId),
+}
+
+/// What became of a received sample.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Receipt {
+    /// It was taken in.
+    New(Vec<SetChange>),
+    /// It was seen before, whether it is still held or not: nothing changed.
+    Known,
+    /// Its name cannot be remembered within the bounds: nothing changed.
+    Refused(SeenError),
+}
+
+/// A stored set that contradicts itself. The training set is unchanged.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum RestoreError {
+    /// Two samples have one key.
+    #[error("two stored samples have the key {0}")]
+    Key(u64),
+    /// A key that is yet to be given out.
+    #[error("stored sample {key} is newer than the next key, {next}")]
+    KeyAhead {
+        /// The sample's key.
+        key: u64,
+        /// The next key.
+        next: u64,
+    },
+    /// A next key that no robot lives long enough to reach: with it, keys could run out.
+    #[error("the stored next key, {0}, is out of range")]
+    NextKey(u64),
+    /// Two samples have one name.
+    #[error("two stored samples have the name {0}")]
+    Name(SampleId),
+    /// A sample in a part that its name does not fit: a personal one has none, a shared one has this robot's, an
+    /// external one another's.
+    #[error("stored sample {0} is in a part that its name does not fit: was it stored by another robot?")]
+    Part(u64),
+    /// A sample with a name that was not seen.
+    #[error("stored sample {0} is not among those seen")]
+    Unseen(SampleId),
+    /// A number of this robot's that was seen, but is yet to be given out.
+    #[error("sample {0} of this robot was shared, but the next number would be no greater")]
+    NumberAhead(SampleId),
+}
+
+/// The bounded set of samples of one robot.
+///
+/// A sample is in one [`Part`] at a time. It is shared at most once, under a number that counts up without gaps, and
+/// taken in at most once under one name, also after it was forgotten. After [`keep`](Self::keep) and
+/// [`receive`](Self::receive) at most `capacity` samples are held: the [`Forgetting`] rule says which one goes.
+///
+/// Vectors are coordinates in one feature space: the caller has checked their length and that they are finite.
+/// Everything that can be asked is asked through [`Samples`], which the set dereferences to.
+#[derive(Debug)]
+pub struct TrainingSet {
+    me: RobotId,
+    capacity: usize,
+    selection: Box<dyn Selection>,
+    forgetting: Box<dyn Forgetting>,
+    samples: Samples,
+    seen: Seen,
+    next_key: u64,
+    next_number: u32,
+}
+
+impl Deref for TrainingSet {
+    type Target = Samples;
+
+    fn deref(&self) -> &Samples {
+        &self.samples
+    }
+}
+
+impl TrainingSet {
+    /// An empty set of at most `capacity` samples; 0 is taken as 1.
+    #[must_use]
+    pub fn new(
+        me: RobotId,
+        capacity: usize,
+        selection: Box<dyn Selection>,
+        forgetting: Box<dyn Forgetting>,
+    ) -> Self {
+        Self {
+            me,
+            capacity: capacity.max(1),
+            selection,
+            forgetting,
+            samples: Samples::default(),
+            seen: Seen::default(),
+            next_key: 1,
+            next_number: 1,
+        }
+    }
+
+    /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
+    /// was seen, the next key and the next share number. If more samples were stored than the capacity,
+    /// [`trim`](Self::trim) brings them down.
+    ///
+    /// # Errors
+    /// See [`RestoreError`].
+    ///
+    /// # Panics
+    /// If the set is not empty.
+    pub fn restore(
+        &mut self,
+        samples: Vec<HeldSample>,
+        seen: Seen,
+        next_key: u64,
+        next_number: u32,
+    ) -> Result<(), RestoreError> {
+        assert!(self.samples.is_empty(), "a stored set is taken up before anything is added");
+        if next_key > LAST_KEY {
+            return Err(RestoreError::NextKey(next_key));
+        }
+        if let Some(&(_, last)) = seen.intervals(self.me).last()
+            && last >= next_number
+        {
+            return Err(RestoreError::NumberAhead(SampleId { author: self.me, number: last }));
+        }
+        let mut restored = Samples::default();
+        for sample in samples {
+            let key = sample.key;
+            if key >= next_key {
+                return Err(RestoreError::KeyAhead { key, next: next_key });
+            }
+            if restored.get(key).is_some() {
+                return Err(RestoreError::Key(key));
+            }
+            let fits = match (sample.part, sample.id) {
+                (Part::Personal, id) => id.is_none(),
+                (part, id) => id.is_some_and(|id| part == self.part_of(id)),
+            };
+            if !fits {
+                return Err(RestoreError::Part(key));
+            }
+            if let Some(id) = sample.id {
+                if restored.find(id).is_some() {
+                    return Err(RestoreError::Name(id));
+                }
+                if !seen.contains(id) {
+                    return Err(RestoreError::Unseen(id));
+                }
+            }
+            restored.insert(sample);
+        }
+        restored.set_arrivals(next_key.saturating_sub(1));
+        for sample in restored.iter() {
+            self.selection.inserted(sample);
+            self.forgetting.inserted(sample);
+        }
+        self.samples = restored;
+        self.seen = seen;
+        self.next_key = next_key.max(1);
+        self.next_number = next_number.max(1);
+        Ok(())
+    }
+
+    /// Takes an own sample in; it becomes personal. Then forgets while there are more than the capacity.
+    pub fn keep(
+        &mut self,
+        class: ClassId,
+        round: RoundId,
+        vector: Vec<f32>,
+        rng: &mut dyn Rng,
+    ) -> Vec<SetChange> {
+        self.add(Part::Personal, None, class, round, vector.into(), rng)
+    }
+
+    /// Selects up to `n` personal samples, one after the other: each choice sees the effect of the one before. Each
+    /// gets the next number of this robot and becomes shared.
+    ///
+    /// `as_sent` is what the vector becomes on its way (rounded to what travels): the author holds what the others
+    /// get. `classifier` is for rules that ask how sure it is.
+    pub fn share(
+        &mut self,
+        n: usize,
+        classifier: Option<&dyn Classify>,
+        as_sent: &dyn Fn(&[f32]) -> Vec<f32>,
+        rng: &mut dyn Rng,
+    ) -> Vec<SetChange> {
+        let mut changes = Vec::new();
+        while changes.len() < n {
+            let Some(key) = self.selection.select(&self.samples, classifier, rng) else { break };
+            let Some(sample) = self.samples.get(key).filter(|sample| sample.part == Part::Personal) else {
+                break;
+            };
+            let id = SampleId { author: self.me, number: self.next_number };
+            let Some(following) = self.next_number.checked_add(1) else { break };
+            if self.seen.insert(id) != Ok(true) {
+                break;
+            }
+            self.next_number = following;
+            let vector = Arc::from(as_sent(&sample.vector));
+            self.replace(HeldSample { part: Part::Shared, id: Some(id), vector, ..sample.clone() });
+            changes.push(SetChange::Shared(key, id));
+        }
+        changes
+    }
+
+    /// Takes a shared sample in, unless it was seen before. Then forgets while there are more than the capacity.
+    ///
+    /// Another's sample becomes external. A robot that lost its memory gets its own samples back this way: they
+    /// become shared, and its next number lies beyond them.
+    pub fn receive(
+        &mut self,
+        id: SampleId,
+        class: ClassId,
+        round: RoundId,
+        vector: Vec<f32>,
+        rng: &mut dyn Rng,
+    ) -> Receipt {
+        // A place is kept for this robot, or the names of strangers could keep it from sharing.
+        let stranger = id.author != self.me && self.seen.intervals(id.author).is_empty();
+        if stranger
+            && self.seen.intervals(self.me).is_empty()
+            && self.seen.authors().count() >= MAX_AUTHORS - 1
+        {
+            return Receipt::Refused(SeenError::TooManyAuthors(id));
+        }
+        match self.seen.insert(id) {
+            Err(error) => return Receipt::Refused(error),
+            Ok(false) => return Receipt::Known,
+            Ok(true) => {}
+        }
+        if id.author == self.me {
+            self.next_number = self.next_number.max(id.number.saturating_add(1));
+        }
+        Receipt::New(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng))
+    }
+
+    /// Takes a shared sample in again that was [retracted](Self::retract), under the class it turned out to have. One
+    /// that is held, or was never seen, is left as it is.
+    pub fn take_back(
+        &mut self,
+        id: SampleId,
+        class: ClassId,
+        round: RoundId,
+        vector: Arc<[f32]>,
+        rng: &mut dyn Rng,
+    ) -> Vec<SetChange> {
+        if self.find(id).is_some() || !self.seen.contains(id) {
+            return Vec::new();
+        }
+        self.add(self.part_of(id), Some(id), class, round, vector, rng)
+    }
+
+    /// Gives all samples of a round another class, whatever part they are in.
+    pub fn relabel(&mut self, round: RoundId, class: ClassId) -> Vec<SetChange> {
+        let wrong = self.of_round(round).filter(|sample| sample.class != class);
+        let relabelled: Vec<_> = wrong.map(|sample| HeldSample { class, ..sample.clone() }).collect();
+        relabelled
+            .into_iter()
+            .map(|sample| {
+                let key = sample.key;
+                self.replace(sample);
+                SetChange::Relabelled(key)
+            })
+            .collect()
+    }
+
+    /// Removes all samples of a round. They stay seen: they are not taken in again.
+    pub fn retract(&mut self, round: RoundId) -> Vec<SetChange> {
+        let keys: Vec<u64> = self.of_round(round).map(|sample| sample.key).collect();
+        keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed).collect()
+    }
+
+    /// Forgets while there are more samples than the capacity: only after a set was taken up that was stored under a
+    /// greater one.
+    ///
+    /// The bound stands whatever the rule says: if it names no sample that is held, the oldest goes.
+    pub fn trim(&mut self, rng: &mut dyn Rng) -> Vec<SetChange> {
+        let mut changes = Vec::new();
+        while self.samples.len() > self.capacity {
+            let oldest = self.samples.iter().next().map(|sample| sample.key);
+            let named = self.forgetting.victim(&self.samples, rng).filter(|key| self.get(*key).is_some());
+            let Some(victim) = named.or(oldest).and_then(|key| self.remove(key)) else { break };
+            changes.push(SetChange::Removed(victim));
+        }
+        changes
+    }
+
+    /// The most samples that are held.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Which shared samples this robot ever had, its own included.
+    #[must_use]
+    pub fn seen(&self) -> &Seen {
+        &self.seen
+    }
+
+    /// The key of the next sample that comes in.
+    #[must_use]
+    pub fn next_key(&self) -> u64 {
+        self.next_key
+    }
+
+    /// The number of the next sample that this robot shares.
+    #[must_use]
+    pub fn next_number(&self) -> u32 {
+        self.next_number
+    }
+
+    fn of_round(&self, round: RoundId) -> impl Iterator<Item = &HeldSample> {
+        self.samples.iter().filter(move |sample| sample.round == round)
+    }
+
+    fn part_of(&self, id: SampleId) -> Part {
+        if id.author == self.me { Part::Shared } else { Part::External }
+    }
+
+    fn add(
+        &mut self,
+        part: Part,
+        id: Option<SampleId>,
+        class: ClassId,
+        round: RoundId,
+        vector: Arc<[f32]>,
+        rng: &mut dyn Rng,
+    ) -> Vec<SetChange> {
+        let key = self.next_key;
+        self.next_key += 1;
+        let sample = HeldSample { key, part, id, class, round, vector };
+        self.selection.inserted(&sample);
+        self.forgetting.inserted(&sample);
+        self.samples.insert(sample);
+        let mut changes = vec![SetChange::Added(key)];
+        changes.append(&mut self.trim(rng));
+        changes
+    }
+
+    fn replace(&mut self, after: HeldSample) {
+        let Some(before) = self.samples.remove(after.key) else { return };
+        self.selection.replaced(&before, &after);
+        self.forgetting.replaced(&before, &after);
+        self.samples.insert(after);
+    }
+
+    fn remove(&mut self, key: u64) -> Option<HeldSample> {
+        let sample = self.samples.remove(key)?;
+        self.selection.removed(&sample);
+        self.forgetting.removed(&sample);
+        Some(sample)
+    }
+}

@@ -1,0 +1,172 @@
+//! The samples of a learner by class, and the kernel between every two of them.
+
+use std::collections::BTreeMap;
+
+use crate::vector::squared_distance;
+
+/// Names a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Key {
+    /// One that was inserted, by the caller's number.
+    Inserted(u64),
+    /// One of the support vectors of the classifier that was built on.
+    Support(u32),
+}
+
+/// A sample, and its kernel with all samples.
+#[derive(Debug)]
+pub(super) struct Sample {
+    pub key: Key,
+    pub vector: Vec<f32>,
+    /// For each class, the kernel with its samples, in their order: what a pair of classes needs of the matrix lies
+    /// side by side.
+    pub kernel: Vec<Vec<f32>>,
+}
+
+/// Where a sample stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub class: usize,
+    /// In the order of its class, which changes: the last sample takes the place of one that goes.
+    pub position: usize,
+}
+
+/// The samples by class. The kernel matrix costs n² · 4 bytes for n samples, and up to an eighth more to grow into.
+#[derive(Debug)]
+pub(super) struct Samples {
+    gamma: f32,
+    classes: Vec<Vec<Sample>>,
+    places: BTreeMap<Key, Place>,
+}
+
+impl Samples {
+    pub fn new(classes: usize, gamma: f32) -> Self {
+        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places: BTreeMap::new() }
+    }
+
+    /// The samples of a class, in its order.
+    pub fn of(&self, class: usize) -> &[Sample] {
+        &self.classes[class]
+    }
+
+    pub fn at(&self, place: Place) -> &Sample {
+        &self.classes[place.class][place.position]
+    }
+
+    pub fn place(&self, key: Key) -> Option<Place> {
+        self.places.get(&key).copied()
+    }
+
+    /// All samples by key.
+    pub fn places(&self) -> &BTreeMap<Key, Place> {
+        &self.places
+    }
+
+    /// Puts a sample at the end of its class.
+    pub fn insert(&mut self, key: Key, class: usize, vector: &[f32]) -> Place {
+        let gamma = self.gamma;
+        let mut kernel: Vec<Vec<f32>> = Vec::with_capacity(self.classes.len());
+        for samples in &mut self.classes {
+            let mut row = Vec::with_capacity(roomy(samples.len() + 1));
+            for sample in samples {
+                let value = (-gamma * squared_distance(&sample.vector, vector)).exp();
+                row.push(value);
+                push(&mut sample.kernel[class], value);
+            }
+            kernel.push(row);
+        }
+        kernel[class].push(1.0);
+        self.append(class, Sample { key, vector: vector.to_vec(), kernel })
+    }
+
+    /// Takes a sample out.
+    pub fn remove(&mut self, place: Place) {
+        let Place { class, position } = place;
+        let gone = self.classes[class].swap_remove(position);
+        for sample in self.classes.iter_mut().flatten() {
+            sample.kernel[class].swap_remove(position);
+        }
+        self.places.remove(&gone.key);
+        self.moved(place);
+    }
+
+    /// Moves a sample to the end of another class.
+    pub fn relabel(&mut self, place: Place, class: usize) -> Place {
+        for sample in self.classes.iter_mut().flatten() {
+            let value = sample.kernel[place.class].swap_remove(place.position);
+            push(&mut sample.kernel[class], value);
+        }
+        let sample = self.classes[place.class].swap_remove(place.position);
+        self.moved(place);
+        self.append(class, sample)
+    }
+
+    fn append(&mut self, class: usize, sample: Sample) -> Place {
+        let place = Place { class, position: self.classes[class].len() };
+        self.places.insert(sample.key, place);
+        self.classes[class].push(sample);
+        place
+    }
+
+    /// Notes that the last sample of a class has taken the place of one that has gone.
+    fn moved(&mut self, place: Place) {
+        if let Some(sample) = self.classes[place.class].get(place.position) {
+            self.places.insert(sample.key, place);
+        }
+    }
+}
+
+/// Pushes into a vector that grows by an eighth, not by the half: there are as many as samples.
+fn push(row: &mut Vec<f32>, value: f32) {
+    if row.len() == row.capacity() {
+        row.reserve_exact(roomy(row.len()) - row.len());
+    }
+    row.push(value);
+}
+
+fn roomy(length: usize) -> usize {
+    length + length / 8 + 4
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::RngExt;
+
+    use super::super::tests::{generator, vector};
+    use super::*;
+
+    #[test]
+    fn the_matrix_stays_true_and_small_whatever_comes_and_goes() {
+        let mut rng = generator(1);
+        let mut samples = Samples::new(3, 0.3);
+        let mut peak = 0;
+        for step in 0..600 {
+            let keys: Vec<Key> = samples.places().keys().copied().collect();
+            let any = keys.get(rng.random_range(0..keys.len().max(1) as u64) as usize);
+            let class = rng.random_range(0..3_u64) as usize;
+            match (rng.random_range(0..5_u64), any.and_then(|key| samples.place(*key))) {
+                (0 | 1, Some(place)) => samples.remove(place),
+                (2, Some(place)) if place.class != class => drop(samples.relabel(place, class)),
+                _ => drop(samples.insert(Key::Inserted(step), class, &vector(class, &mut rng))),
+            }
+            peak = peak.max(samples.places().len());
+        }
+        assert!(peak > 30);
+        let mut held = 0;
+        for (key, place) in samples.places() {
+            let sample = samples.at(*place);
+            assert_eq!(sample.key, *key);
+            for class in 0..3 {
+                let row = &sample.kernel[class];
+                held += row.capacity();
+                let expected: Vec<f32> = samples
+                    .of(class)
+                    .iter()
+                    .map(|other| (-0.3 * squared_distance(&sample.vector, &other.vector)).exp())
+                    .collect();
+                assert_eq!(*row, expected);
+            }
+        }
+        assert!(held <= samples.places().len() * (peak + peak / 8 + 3 * 4), "{held} for {peak}");
+    }
+}

@@ -1,0 +1,117 @@
+//! What holds inside a learner; how it is used is tested from outside.
+
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::*;
+use crate::reduction::Components;
+use crate::scaling::ScalingMethod;
+use crate::sigmoid::Sigmoid;
+
+const CLASSES: usize = 4;
+const WIDTH: usize = 5;
+
+pub(super) fn generator(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// A vector of a class, overlapping with the other classes.
+pub(super) fn vector(class: usize, rng: &mut impl Rng) -> Vec<f32> {
+    let mut vector: Vec<f32> = (0..WIDTH).map(|_| rng.random_range(-1.5..1.5)).collect();
+    vector[class % WIDTH] += 1.0;
+    vector
+}
+
+fn learner() -> Learner {
+    let mut rng = generator(1);
+    let rows: Vec<Vec<f32>> = (0..200).map(|i| vector(i % CLASSES, &mut rng)).collect();
+    let rows = rows.iter().map(Vec::as_slice);
+    let keep = Components::Count(WIDTH);
+    let space = FeatureSpace::fit("toy-1", rows, ScalingMethod::Common, keep, &mut rng);
+    let vocabulary = Vocabulary::new((0..CLASSES).map(|k| k.to_string())).unwrap();
+    Learner::new(Arc::new(space), vocabulary, LearnerOptions::default()).unwrap()
+}
+
+fn taught(count: usize, rng: &mut impl Rng) -> Learner {
+    let mut learner = learner();
+    for key in 0..count {
+        let class = key % CLASSES;
+        learner.insert(key as u64, ClassId(class as u8), &vector(class, rng)).unwrap();
+    }
+    learner.learn().unwrap();
+    learner
+}
+
+fn decisions(machine: &Machine, x: &[f32]) -> Vec<f64> {
+    let mut decisions = Vec::new();
+    machine.decide(x, &mut decisions);
+    decisions
+}
+
+#[test]
+fn its_machines_decide_as_those_of_the_offline_trainer() {
+    let mut rng = generator(2);
+    let learner = taught(160, &mut rng);
+    let members: Vec<Vec<&[f32]>> = (0..CLASSES)
+        .map(|class| learner.samples.of(class).iter().map(|sample| sample.vector.as_slice()).collect())
+        .collect();
+    let offline = Machine::fit(&members, WIDTH, 10.0, f64::from(learner.gamma)).unwrap();
+    let online = learner.machine(&learner.present());
+    for i in 0..400 {
+        let x = vector(i % CLASSES, &mut rng);
+        for (a, b) in decisions(&online, &x).into_iter().zip(decisions(&offline, &x)) {
+            // The tolerance, which is the same, leaves this much open.
+            assert!((a - b).abs() < 1e-2, "{a} for {b}");
+        }
+    }
+}
+
+#[test]
+fn pairs_of_other_classes_are_not_touched() {
+    let mut rng = generator(3);
+    let mut learner = taught(120, &mut rng);
+    let probes: Vec<Vec<f32>> = (0..50).map(|i| vector(i % CLASSES, &mut rng)).collect();
+    let judge = |learner: &Learner| -> Vec<Vec<f64>> {
+        let machine = learner.machine(&learner.present());
+        probes.iter().map(|x| decisions(&machine, x)).collect()
+    };
+    let before = judge(&learner);
+    let sigmoids =
+        |learner: &Learner| -> Vec<Sigmoid> { learner.pairs.iter().map(|pair| pair.sigmoid).collect() };
+    let sigmoids_before = sigmoids(&learner);
+    for key in 0..10 {
+        assert!(learner.remove(key * CLASSES as u64 + 3));
+        learner.insert(1000 + key, ClassId(3), &vector(3, &mut rng)).unwrap();
+    }
+    learner.learn().unwrap();
+    let after = judge(&learner);
+    for (pair, (i, j)) in pairs(CLASSES).enumerate() {
+        let same = before.iter().zip(&after).all(|(a, b)| a[pair].to_bits() == b[pair].to_bits());
+        assert_eq!(same, i != 3 && j != 3, "machine of {i} and {j}");
+        let same = sigmoids_before[pair] == sigmoids(&learner)[pair];
+        assert_eq!(same, i != 3 && j != 3, "sigmoid of {i} and {j}");
+    }
+}
+
+#[test]
+fn stale_pairs_take_turns() {
+    let mut rng = generator(4);
+    let mut learner = taught(400, &mut rng);
+    assert!(learner.pairs.iter().all(|pair| pair.changes == 0), "calibrated at first");
+    let mut most = 0;
+    for round in 0..40_u64 {
+        for class in 0..CLASSES as u64 {
+            learner.remove(round * 4 + class);
+            learner
+                .insert(1000 + round * 4 + class, ClassId(class as u8), &vector(class as usize, &mut rng))
+                .unwrap();
+        }
+        learner.learn().unwrap();
+        most = most.max(learner.pairs.iter().filter(|pair| pair.changes == 0).count());
+        for pair in &learner.pairs {
+            assert!(pair.staleness(&learner.samples) <= 0.2, "{round}");
+        }
+    }
+    assert_eq!(most, 1, "of six pairs, in one call");
+}

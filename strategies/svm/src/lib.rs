@@ -1,0 +1,39 @@
+//! How a robot of a Gestalt swarm tells gestures apart: support vector machines in a small feature space.
+//!
+//! Pure: no clock, no entropy, no socket, no file. Random generators are arguments. The entry types are [`Learner`], which
+//! brings machines up to date as samples come and go, and the [`Classifier`] it makes.
+//!
+//! ```text
+//! raw features ─► Scaling ─► Reduction ─► coordinates ─► Machine: a decision per pair ─► Calibration: P(k)
+//!                 └────── FeatureSpace ──────┘               └────── Classifier ──────────────┘
+//! ```
+//!
+//! With the feature `offline`, `train` makes a classifier of many samples at once: it searches for C and γ by
+//! cross-validation, with linfa's solver, which nothing else compiles.
+
+mod calibration;
+mod classifier;
+mod coupling;
+mod evaluation;
+mod feature_space;
+mod labelled;
+mod learner;
+mod machine;
+mod model_codec;
+mod reduction;
+mod scaling;
+mod sigmoid;
+#[cfg(feature = "offline")]
+mod training;
+mod vector;
+
+pub use classifier::Classifier;
+pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
+pub use feature_space::FeatureSpace;
+pub use labelled::Sample;
+pub use learner::{LearnError, Learner, LearnerOptions};
+pub use model_codec::{MAX_MODEL, ModelError};
+pub use reduction::{Components, Pca, Ranking, Reduction};
+pub use scaling::{Scaling, ScalingMethod};
+#[cfg(feature = "offline")]
+pub use training::{Folding, MIN_SAMPLES, Progress, TrainError, TrainOptions, Trained, train};

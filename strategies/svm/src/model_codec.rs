@@ -1,0 +1,120 @@
+//! A classifier as bytes.
+
+use std::sync::Arc;
+
+use gestalt_rounds::Vocabulary;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::calibration::Calibration;
+use crate::classifier::Classifier;
+use crate::feature_space::FeatureSpace;
+use crate::machine::{MAX_COORDINATE, Machine, pairs};
+
+/// Longest encoding that is read, in bytes.
+pub const MAX_MODEL: usize = 64 * 1024 * 1024;
+/// The layout below; another layout gets another number.
+const VERSION: u8 = 3;
+
+/// Bytes that are no classifier.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ModelError {
+    /// More than [`MAX_MODEL`] bytes.
+    #[error("{0} bytes are more than a classifier takes ({MAX_MODEL})")]
+    TooLarge(usize),
+    /// Written by another version of the program.
+    #[error("the classifier has layout {0}, this program reads layout {VERSION}: train it anew")]
+    Version(u8),
+    /// Cut short, or not a classifier at all.
+    #[error("the classifier is cut short or damaged")]
+    Malformed,
+    /// Well-formed, but its parts do not fit each other or hold impossible numbers.
+    #[error("the classifier is damaged: {0}")]
+    Inconsistent(&'static str),
+}
+
+#[derive(Serialize, Deserialize)]
+struct Parts {
+    vocabulary: Vocabulary,
+    space: FeatureSpace,
+    learned: Vec<u32>,
+    machine: Machine,
+    calibration: Calibration,
+}
+
+impl Classifier {
+    /// The classifier as bytes: a layout number, then its parts in postcard.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        let parts = Parts {
+            vocabulary: self.vocabulary.clone(),
+            space: FeatureSpace::clone(&self.space),
+            learned: self.learned.clone(),
+            machine: self.machine.clone(),
+            calibration: self.calibration.clone(),
+        };
+        postcard::to_extend(&parts, vec![VERSION])
+            .expect("postcard writes every value of known length into a vector")
+    }
+
+    /// Reads a classifier. Any bytes give a classifier whose answers are finite, or an error; memory stays
+    /// within a small multiple of the bytes.
+    ///
+    /// # Errors
+    /// See [`ModelError`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, ModelError> {
+        if bytes.len() > MAX_MODEL {
+            return Err(ModelError::TooLarge(bytes.len()));
+        }
+        let (&version, body) = bytes.split_first().ok_or(ModelError::Malformed)?;
+        if version != VERSION {
+            return Err(ModelError::Version(version));
+        }
+        let (parts, rest) = postcard::take_from_bytes::<Parts>(body).map_err(|_| ModelError::Malformed)?;
+        if !rest.is_empty() {
+            return Err(ModelError::Inconsistent("bytes after its end"));
+        }
+        parts.check().map_err(ModelError::Inconsistent)?;
+        let Parts { vocabulary, space, learned, machine, calibration } = parts;
+        Ok(Self::new(vocabulary, Arc::new(space), learned, machine, calibration))
+    }
+}
+
+impl Parts {
+    /// Whether all dimensions agree, and all numbers lie where sums of them stay finite.
+    fn check(&self) -> Result<(), &'static str> {
+        if self.learned.len() != self.vocabulary.classes() {
+            return Err("samples of another vocabulary");
+        }
+        let classes = self.learned.iter().filter(|count| **count > 0).count();
+        let pairs = pairs(classes).count();
+        let machine = &self.machine;
+        let all_within = |values: &[f32], limit: f32| values.iter().all(|v| v.abs() <= limit);
+
+        self.space.check()?;
+        if machine.width != self.space.components() || machine.counts.len() != classes {
+            return Err("machines for another space or vocabulary");
+        }
+        let vectors = machine.counts.iter().try_fold(0_usize, |sum, &count| sum.checked_add(count));
+        let vectors = vectors.filter(|&n| n <= MAX_MODEL).ok_or("too many support vectors")?;
+        if machine.vectors.len() != vectors * machine.width
+            || machine.weights.len() != vectors * classes.saturating_sub(1)
+            || machine.offsets.len() != pairs
+            || self.calibration.sigmoids.len() != pairs
+        {
+            return Err("support vectors, weights and pairs that do not match");
+        }
+        if machine.gamma.is_nan()
+            || machine.gamma <= 0.0
+            || machine.gamma.is_infinite()
+            || !all_within(&machine.vectors, MAX_COORDINATE)
+            || !all_within(&machine.weights, 1e9)
+            || !machine.offsets.iter().all(|v| v.abs() <= 1e12)
+            || !(0.01..=100.0).contains(&self.calibration.sharpness)
+            || !self.calibration.sigmoids.iter().all(|s| s.a.abs() <= 1e12 && s.b.abs() <= 1e12)
+        {
+            return Err("numbers out of range in the machines");
+        }
+        Ok(())
+    }
+}

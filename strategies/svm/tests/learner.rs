@@ -1,0 +1,360 @@
+//! The learner as its users see it: samples come and go, classifiers come out.
+
+mod side_by_side;
+
+use std::sync::Arc;
+
+use gestalt_protocol::ClassId;
+use gestalt_rounds::{Classify, Vocabulary};
+use gestalt_svm::{
+    Classifier, Components, Evaluation, FeatureSpace, LearnError, Learner, LearnerOptions, Sample,
+    ScalingMethod,
+};
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+const CLASSES: usize = 4;
+const FEATURES: usize = 6;
+
+fn generator(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// About a standard normal variable: the sum of twelve uniform ones.
+fn normal(rng: &mut impl Rng) -> f32 {
+    (0..12).map(|_| rng.random_range(-0.5_f32..0.5)).sum()
+}
+
+/// Raw features of a class: on a circle, overlapping with its neighbours.
+fn features(class: usize, rng: &mut impl Rng) -> Vec<f32> {
+    let angle = class as f32 / CLASSES as f32 * std::f32::consts::TAU;
+    let mut features: Vec<f32> = (0..FEATURES).map(|_| 0.6 * normal(rng)).collect();
+    features[0] += angle.cos();
+    features[1] += angle.sin();
+    features
+}
+
+fn space() -> Arc<FeatureSpace> {
+    let mut rng = generator(1);
+    let rows: Vec<Vec<f32>> = (0..200).map(|i| features(i % CLASSES, &mut rng)).collect();
+    let rows = rows.iter().map(Vec::as_slice);
+    Arc::new(FeatureSpace::fit(
+        "toy-1",
+        rows,
+        ScalingMethod::PerComponent,
+        Components::Count(FEATURES),
+        &mut rng,
+    ))
+}
+
+fn vocabulary() -> Vocabulary {
+    Vocabulary::new((0..CLASSES).map(|k| k.to_string())).unwrap()
+}
+
+fn learner(space: &Arc<FeatureSpace>) -> Learner {
+    Learner::new(space.clone(), vocabulary(), LearnerOptions::default()).unwrap()
+}
+
+/// Vectors in the space, of classes in turn.
+fn samples(space: &FeatureSpace, count: usize, rng: &mut impl Rng) -> Vec<(ClassId, Vec<f32>)> {
+    let sample =
+        |i: usize| (ClassId((i % CLASSES) as u8), space.project(&features(i % CLASSES, rng)).unwrap());
+    (0..count).map(sample).collect()
+}
+
+fn judge(classifier: &Classifier, vector: &[f32]) -> Vec<f64> {
+    classifier.probabilities_in_space(vector).unwrap()
+}
+
+fn taught(space: &Arc<FeatureSpace>, samples: &[(ClassId, Vec<f32>)]) -> Learner {
+    let mut learner = learner(space);
+    for (key, (class, vector)) in samples.iter().enumerate() {
+        learner.insert(key as u64, *class, vector).unwrap();
+    }
+    learner
+}
+
+#[test]
+fn gestures_never_met_keep_the_chance_of_the_next_sample() {
+    let space = space();
+    let samples = samples(&space, 80, &mut generator(2));
+    let mut learner = learner(&space);
+    let met = |class: u8| samples.iter().filter(move |(of, _)| of.0 < class).enumerate();
+    let x = &samples[0].1;
+
+    let nothing = learner.learn().unwrap();
+    assert_eq!(judge(&nothing, x), [0.25; 4], "nothing met");
+    for (key, (class, vector)) in met(1) {
+        learner.insert(key as u64, *class, vector).unwrap();
+    }
+    let one = learner.learn().unwrap();
+    let unmet = 1.0 / (20.0 + 4.0);
+    assert_eq!(judge(&one, x), [1.0 - 3.0 * unmet, unmet, unmet, unmet], "one met");
+    for (key, (class, vector)) in met(2) {
+        learner.insert(key as u64, *class, vector).unwrap();
+    }
+    let two = learner.learn().unwrap();
+    let p = judge(&two, x);
+    let unmet = 1.0 / (40.0 + 4.0);
+    assert_eq!(p[2..], [unmet, unmet], "two met");
+    assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    for classifier in [nothing, one, two] {
+        let read = Classifier::decode(&classifier.encode()).unwrap();
+        assert_eq!(read, *classifier, "on disk");
+    }
+}
+
+#[test]
+fn what_cannot_be_learned_from_is_refused_and_changes_nothing() {
+    let space = space();
+    let samples = samples(&space, 40, &mut generator(3));
+    let mut learner = taught(&space, &samples);
+    let before = learner.learn().unwrap();
+    let good = &samples[0].1;
+    let with = |value: f32| {
+        let mut vector = good.clone();
+        vector[3] = value;
+        vector
+    };
+    for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e30] {
+        assert_eq!(learner.insert(0, ClassId(1), &with(value)), Err(LearnError::Range(3)));
+    }
+    assert_eq!(
+        learner.insert(0, ClassId(1), &good[1..]),
+        Err(LearnError::Length { found: FEATURES - 1, expected: FEATURES })
+    );
+    assert_eq!(learner.insert(0, ClassId(4), good), Err(LearnError::Class(ClassId(4))));
+    assert_eq!(learner.relabel(0, ClassId(4)), Err(LearnError::Class(ClassId(4))));
+    assert_eq!(learner.relabel(99, ClassId(1)), Ok(false));
+    assert!(!learner.remove(99));
+    assert_eq!(learner.len(), 40);
+    assert!(Arc::ptr_eq(&before, &learner.learn().unwrap()), "nothing to learn");
+}
+
+fn best(p: &[f64]) -> usize {
+    (0..p.len()).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap()
+}
+
+/// Of so many new vectors, how many two classifiers judge differently.
+fn differences(a: &Classifier, b: &Classifier, count: usize, rng: &mut impl Rng) -> usize {
+    let probes = samples(a.space(), count, rng);
+    probes.iter().filter(|(_, x)| best(&judge(a, x)) != best(&judge(b, x))).count()
+}
+
+#[test]
+fn what_came_and_went_leaves_no_trace() {
+    let space = space();
+    let exact = LearnerOptions { staleness: 0.0, ..LearnerOptions::default() };
+    let new = || Learner::new(space.clone(), vocabulary(), exact.clone()).unwrap();
+    let mut different = 0;
+    for seed in 0..20 {
+        let mut rng = generator(100 + seed);
+        let pool = samples(&space, 300, &mut rng);
+        let mut warm = new();
+        let mut held: Vec<(u64, ClassId, usize)> = Vec::new();
+        for (step, (class, vector)) in pool.iter().enumerate() {
+            let at = rng.random_range(0..held.len().max(1) as u64) as usize;
+            match rng.random_range(0..6_u64) {
+                0 if at < held.len() => assert!(warm.remove(held.swap_remove(at).0)),
+                1 if at < held.len() => {
+                    held[at].1 = ClassId(rng.random_range(0..CLASSES as u64) as u8);
+                    assert!(warm.relabel(held[at].0, held[at].1).unwrap());
+                }
+                2 if at < held.len() => {
+                    held[at] = (held[at].0, *class, step);
+                    warm.insert(held[at].0, *class, vector).unwrap();
+                }
+                _ => {
+                    held.push((step as u64, *class, step));
+                    warm.insert(step as u64, *class, vector).unwrap();
+                }
+            }
+            if rng.random_bool(0.1) {
+                warm.learn().unwrap();
+            }
+        }
+        let mut cold = new();
+        for (key, class, index) in &held {
+            cold.insert(*key, *class, &pool[*index].1).unwrap();
+        }
+        assert_eq!(warm.len(), held.len());
+        different += differences(&warm.learn().unwrap(), &cold.learn().unwrap(), 1000, &mut rng);
+    }
+    assert!(different <= 20, "{different} of 20,000 judged differently");
+}
+
+#[test]
+fn a_sigmoid_that_is_kept_hardly_changes_an_answer() {
+    let space = space();
+    let mut rng = generator(7);
+    let pool = samples(&space, 1400, &mut rng);
+    let mut warm = taught(&space, &pool[..1000]);
+    warm.learn().unwrap();
+    let mut different = 0;
+    for round in 0..20 {
+        for i in round * 12..(round + 1) * 12 {
+            assert!(warm.remove(i as u64));
+            warm.insert(1000 + i as u64, pool[1000 + i].0, &pool[1000 + i].1).unwrap();
+        }
+        let now = warm.learn().unwrap();
+        let mut cold = learner(&space);
+        for (i, (class, vector)) in pool.iter().enumerate().skip((round + 1) * 12).take(1000) {
+            cold.insert(i as u64, *class, vector).unwrap();
+        }
+        different += differences(&now, &cold.learn().unwrap(), 1000, &mut rng);
+    }
+    assert!(different <= 20, "{different} of 20,000 judged differently");
+}
+
+#[test]
+fn the_same_operations_give_the_same_bytes() {
+    let space = space();
+    let pool = samples(&space, 200, &mut generator(8));
+    let run = |last: usize| {
+        let mut learner = taught(&space, &pool[..120]);
+        learner.learn().unwrap();
+        for (i, (class, vector)) in pool.iter().enumerate().take(last).skip(120) {
+            learner.remove(i as u64 - 100);
+            learner.insert(i as u64, *class, vector).unwrap();
+            learner.relabel(i as u64 - 50, ClassId(2)).unwrap();
+            learner.learn().unwrap();
+        }
+        learner.learn().unwrap().encode()
+    };
+    assert_eq!(run(150), run(150));
+    assert_ne!(run(150), run(151));
+    assert_eq!(*Classifier::decode(&run(150)).unwrap().encode(), *run(150));
+}
+
+#[test]
+fn a_key_names_one_sample() {
+    let space = space();
+    let pool = samples(&space, 80, &mut generator(9));
+    let mut learner = taught(&space, &pool[..60]);
+    let before = learner.learn().unwrap();
+    for (key, (class, vector)) in pool[..60].iter().enumerate() {
+        learner.insert(key as u64, *class, vector).unwrap();
+    }
+    assert!(Arc::ptr_eq(&before, &learner.learn().unwrap()), "nothing new");
+    learner.insert(5, pool[70].0, &pool[70].1).unwrap();
+    assert_eq!(learner.len(), 60);
+    assert_ne!(*before, *learner.learn().unwrap());
+    learner.relabel(5, pool[5].0).unwrap();
+    learner.insert(5, pool[5].0, &pool[5].1).unwrap();
+    let after = learner.learn().unwrap();
+    assert_eq!(after.learned(), before.learned());
+    for key in 0..60 {
+        assert!(learner.remove(key));
+    }
+    assert!(learner.is_empty());
+    assert_eq!(judge(&learner.learn().unwrap(), &pool[0].1), [0.25; CLASSES]);
+}
+
+#[test]
+fn it_goes_on_from_what_a_classifier_knows() {
+    let space = space();
+    let mut rng = generator(10);
+    let pool = samples(&space, 400, &mut rng);
+    let offline = taught(&space, &pool[..300]).learn().unwrap();
+    let mut learner = learner(&space);
+    learner.build_on(&offline).unwrap();
+    assert!(learner.is_empty(), "support vectors are not inserted samples");
+    let first = learner.learn().unwrap();
+    assert_eq!(first.learned().iter().sum::<u32>() as usize, offline.support_vectors());
+    let accuracy = |classifier: &Classifier, rng: &mut ChaCha8Rng| {
+        let probes = samples(&space, 4000, rng);
+        probes.iter().filter(|(class, x)| best(&judge(classifier, x)) == class.index()).count() as f64
+            / 4000.0
+    };
+    let (theirs, ours) = (accuracy(&offline, &mut generator(11)), accuracy(&first, &mut generator(11)));
+    assert!((theirs - ours).abs() < 0.02, "{ours} built on {theirs}");
+
+    learner.build_on(&offline).unwrap();
+    assert_eq!(learner.learn().unwrap().learned(), first.learned(), "twice is once");
+    for (key, (class, vector)) in pool[300..].iter().enumerate() {
+        learner.insert(key as u64, *class, vector).unwrap();
+    }
+    assert_eq!(learner.len(), 100);
+    for key in 0..100 {
+        assert!(learner.remove(key));
+    }
+    assert_eq!(learner.learn().unwrap().learned(), first.learned(), "never removed");
+
+    let mut rng = generator(12);
+    let rows: Vec<Vec<f32>> = (0..50).map(|i| features(i % CLASSES, &mut rng)).collect();
+    let rows = rows.iter().map(Vec::as_slice);
+    let keep = Components::Count(FEATURES);
+    let other = FeatureSpace::fit("toy-1", rows, ScalingMethod::PerComponent, keep, &mut rng);
+    let mut elsewhere = Learner::new(Arc::new(other), vocabulary(), LearnerOptions::default()).unwrap();
+    assert_eq!(elsewhere.build_on(&offline), Err(LearnError::Space));
+    let words = Vocabulary::new(["a", "b", "c", "d"]).unwrap();
+    let mut others = Learner::new(space.clone(), words, LearnerOptions::default()).unwrap();
+    assert_eq!(others.build_on(&offline), Err(LearnError::Vocabulary));
+}
+
+#[test]
+fn options_out_of_range_are_refused() {
+    let good = LearnerOptions::default();
+    let bad = [
+        LearnerOptions { cost: 0.0, ..good.clone() },
+        LearnerOptions { cost: f64::NAN, ..good.clone() },
+        LearnerOptions { gamma: f64::INFINITY, ..good.clone() },
+        LearnerOptions { folds: 1, ..good.clone() },
+        LearnerOptions { staleness: 0.5, ..good.clone() },
+    ];
+    for options in bad {
+        let error = Learner::new(space(), vocabulary(), options).unwrap_err();
+        assert!(matches!(error, LearnError::Option(_)), "{error}");
+    }
+    let rows = [vec![1.0; FEATURES], vec![1.0; FEATURES]];
+    let rows = rows.iter().map(Vec::as_slice);
+    let keep = Components::Count(FEATURES);
+    let flat = FeatureSpace::fit("toy-1", rows, ScalingMethod::PerComponent, keep, &mut generator(1));
+    assert_eq!(Learner::new(Arc::new(flat), vocabulary(), good).unwrap_err(), LearnError::NoVariance);
+}
+
+/// Six classes in 40 features, by the noise about their centres.
+fn wide_samples(noise: f32, count: usize, seed: u64) -> Vec<Sample> {
+    let mut centres = generator(20);
+    let centres: Vec<Vec<f32>> = (0..6).map(|_| (0..40).map(|_| normal(&mut centres)).collect()).collect();
+    let mut rng = generator(seed);
+    let sample = |i: usize| {
+        let features = centres[i % 6].iter().map(|c| c + noise * normal(&mut rng)).collect();
+        Sample { features, class: ClassId((i % 6) as u8), group: None }
+    };
+    (0..count).map(sample).collect()
+}
+
+#[test]
+fn it_judges_as_well_as_libsvm() {
+    for (noise, expected) in [(1.0, 0.99..=1.0), (2.2, 0.85..=0.95)] {
+        let (fitted, learned) = (wide_samples(noise, 1000, 1), wide_samples(noise, 1000, 2));
+        let unseen = wide_samples(noise, 6000, 3);
+        let rows = fitted.iter().map(|sample| sample.features.as_slice());
+        let keep = Components::Count(40);
+        let space = FeatureSpace::fit("wide-1", rows, ScalingMethod::PerComponent, keep, &mut generator(4));
+        let vocabulary = Vocabulary::new((0..6).map(|k| k.to_string())).unwrap();
+        let mut learner = Learner::new(Arc::new(space), vocabulary, LearnerOptions::default()).unwrap();
+        for (key, sample) in learned.iter().enumerate() {
+            let vector = learner.space().project(&sample.features).unwrap();
+            learner.insert(key as u64, sample.class, &vector).unwrap();
+        }
+        let classifier = learner.learn().unwrap();
+        let mut ours = Evaluation::new(6);
+        for sample in &unseen {
+            ours.record(sample.class, &classifier.probabilities(&sample.features).unwrap());
+        }
+        let accuracy = |e: &Evaluation| e.accuracy().unwrap().value;
+        assert!(expected.contains(&accuracy(&ours)), "{}", accuracy(&ours));
+        let name = format!("learner-{noise}");
+        let Some(theirs) = side_by_side::libsvm(&classifier, (10.0, 1.0), &learned, &unseen, &name) else {
+            return;
+        };
+        side_by_side::print("ours", &ours);
+        side_by_side::print("LIBSVM", &theirs);
+        assert!(accuracy(&ours) >= accuracy(&theirs) - 0.005);
+        let error = |e: &Evaluation| e.calibration_error().unwrap();
+        assert!(error(&ours) <= error(&theirs) + 0.02, "{} and {}", error(&ours), error(&theirs));
+    }
+}
