@@ -15,6 +15,7 @@ mod decision;
 mod envelope;
 mod fnv;
 mod frame;
+mod fusion_rule;
 mod id;
 mod instruction;
 mod key;
@@ -23,12 +24,13 @@ mod message;
 mod sample;
 mod status;
 
-pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
+pub use decision::{Certificate, CountedVote, Decision, Rank};
 pub use envelope::{
     DecodeError, Envelope, MAX_ALLOCATION, MAX_JSON, MAX_MESSAGE, PROTOCOL_VERSION, decode_json,
 };
 pub use fnv::Fnv1a;
 pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
+pub use fusion_rule::{FusionRule, RuleName, RuleNameError};
 pub use id::{
     ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,
 };
