@@ -138,7 +138,8 @@ pub struct Stamp {
 pub struct SampleId {
     /// Who made and shared it.
     pub author: RobotId,
-    /// Counts from 1 without gaps, also across restarts.
+    /// Counts up without gaps from the author's boot number at its first start, also across restarts. An author that lost
+    /// its memory goes on from its boot number again, which lies beyond all that it used.
     pub number: u32,
 }
 

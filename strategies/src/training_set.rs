@@ -18,6 +18,9 @@ use crate::forgetting::Forgetting;
 use crate::sample::{HeldSample, MAX_AUTHORS, Part, Samples, Seen, SeenError};
 use crate::selection::Selection;
 
+/// How far a number of this robot's own may lie beyond the ones that it knows it used.
+const FAR_AHEAD: u32 = 1_000_000;
+
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
 
@@ -124,6 +127,12 @@ impl TrainingSet {
             next_key: 1,
             next_number: 1,
         }
+    }
+
+    /// The numbers of what this robot shares begin there, unless they are further already: for a robot that does not know
+    /// which it used before.
+    pub fn number_from(&mut self, first: u32) {
+        self.next_number = self.next_number.max(first);
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
@@ -250,6 +259,10 @@ impl TrainingSet {
             && self.seen.authors().count() >= MAX_AUTHORS - 1
         {
             return Receipt::Refused(SeenError::TooManyAuthors(id));
+        }
+        // Whoever could push this robot's numbers up to the last one could keep it from sharing.
+        if id.author == self.me && id.number.saturating_sub(self.next_number) > FAR_AHEAD {
+            return Receipt::Refused(SeenError::FarAhead(id));
         }
         match self.seen.insert(id) {
             Err(error) => return Receipt::Refused(error),

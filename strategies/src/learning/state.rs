@@ -45,8 +45,6 @@ pub(crate) struct Learning {
     pub(super) aside: Shelf,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
-    /// Whether the numbers of this robot's samples are sure not to have been used before.
-    pub(super) numbered: bool,
     /// What is to be trained and remembered, and was not yet said.
     pub(super) training: Vec<TrainingChange>,
     pub(super) dirty: BTreeSet<Item>,
@@ -67,7 +65,8 @@ impl fmt::Debug for Learning {
 }
 
 impl Learning {
-    pub fn new(me: RobotId, setup: LearningSetup) -> Result<Self, LearningError> {
+    /// What that robot learned so far, in its `boot`th life.
+    pub fn new(me: RobotId, boot: u32, setup: LearningSetup) -> Result<Self, LearningError> {
         let LearningSetup { config, space, vocabulary, rng, memory } = setup;
         config.validate()?;
         let durable = memory.is_some();
@@ -81,6 +80,10 @@ impl Learning {
         let Memory { counters, samples, seen, lessons: heard, aside, .. } = memory;
         if !fresh {
             set.restore(samples, seen, counters.next_key, counters.next_number)?;
+        } else {
+            // An empty memory proves nothing: a disk may have been lost, with the numbers used before. Boots grow by more
+            // than a robot can share in a life, so these numbers are new, and nobody has to be asked.
+            set.number_from(boot);
         }
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
@@ -104,7 +107,6 @@ impl Learning {
             lessons,
             lives: Lives::default(),
             credit: 0.0,
-            numbered: durable,
             training,
             dirty,
             durable,
@@ -219,11 +221,6 @@ impl Learning {
                 }
             }
         }
-    }
-
-    /// This robot's numbers are sure not to be used by samples it does not remember: it has heard from others.
-    pub fn note_heard_from_others(&mut self) {
-        self.numbered = true;
     }
 
     /// What is to be trained, since the last time.

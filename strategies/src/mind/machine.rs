@@ -73,7 +73,7 @@ impl Mind {
     /// # Errors
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
-        self.learning = Some(Learning::new(self.me(), setup)?);
+        self.learning = Some(Learning::new(self.me(), self.rounds.boot(), setup)?);
         Ok(self)
     }
 
@@ -152,7 +152,7 @@ impl Mind {
     pub(super) fn share(&mut self) {
         if let Some(learning) = &mut self.learning {
             let classifier = self.rounds.classifier().map(|classifier| &**classifier);
-            learning.share(classifier, self.rounds.alive().is_empty());
+            learning.share(classifier);
         }
     }
 

@@ -30,10 +30,8 @@ const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
 impl Mind {
     /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length.
     pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
-        let (Some(theirs), Some(learning)) = (theirs, &mut self.learning) else { return };
-        if theirs == learning.digest() {
-            learning.note_heard_from_others();
-        } else {
+        let (Some(theirs), Some(learning)) = (theirs, &self.learning) else { return };
+        if theirs != learning.digest() {
             self.tell_know(from, theirs, false, out);
         }
     }
@@ -83,8 +81,6 @@ impl Mind {
         }
         if lacking_here && !know.answer {
             self.tell_know(from, know.digest, true, out);
-        } else if let Some(learning) = &mut self.learning {
-            learning.note_heard_from_others();
         }
     }
 

@@ -4,4 +4,4 @@ mod samples;
 mod seen;
 
 pub use samples::{HeldSample, Part, Samples, draw};
-pub use seen::{FAR_AHEAD, MAX_AUTHORS, MAX_GAPS, Seen, SeenError};
+pub use seen::{LAST_NUMBER, MAX_AUTHORS, MAX_GAPS, Seen, SeenError};

@@ -9,8 +9,11 @@ use thiserror::Error;
 pub const MAX_AUTHORS: usize = 4096;
 /// Intervals of numbers kept per author: more gaps than that mean that something other than loss is at work.
 pub const MAX_GAPS: usize = 256;
-/// How far a number may lie beyond the highest one seen of its author.
-pub const FAR_AHEAD: u32 = 1_000_000;
+/// How far a number may lie beyond the highest one seen of its author, once it is beyond [`LAST_NUMBER`].
+const FAR_AHEAD: u32 = 1_000_000;
+/// Up to here an author may begin with any number, as one does that has lost its memory. The last ones are for who came
+/// there in sequence: nobody may use up the numbers of another.
+pub const LAST_NUMBER: u32 = u32::MAX - FAR_AHEAD;
 
 /// An identifier that cannot be remembered. What was seen is unchanged.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -24,8 +27,8 @@ pub enum SeenError {
     /// The number would leave one gap too many between the numbers seen.
     #[error("sample {0}: more than {MAX_GAPS} gaps between the numbers seen; send the earlier ones first")]
     TooManyGaps(SampleId),
-    /// The number lies further ahead than an author can have come unnoticed.
-    #[error("sample {0}: more than {FAR_AHEAD} beyond the highest number seen of its author")]
+    /// The number lies further ahead than its author can have come.
+    #[error("sample {0}: no author can have come so far")]
     FarAhead(SampleId),
     /// Intervals that touch, overlap, run backwards or are out of order.
     #[error("the intervals of author {0} are not ascending and apart")]
@@ -125,7 +128,7 @@ impl Seen {
         }
         let intervals = self.intervals(id.author);
         let highest = intervals.last().map_or(0, |(_, to)| *to);
-        if id.number.saturating_sub(highest) > FAR_AHEAD {
+        if id.number > LAST_NUMBER.max(highest.saturating_add(FAR_AHEAD)) {
             return Err(SeenError::FarAhead(id));
         }
         if intervals.is_empty() && self.authors.len() >= MAX_AUTHORS {
@@ -234,13 +237,13 @@ mod tests {
         let before = seen.clone();
         for (id, error) in [
             (id(1, 0), SeenError::Zero(id(1, 0))),
-            (id(1, 6 + FAR_AHEAD), SeenError::FarAhead(id(1, 6 + FAR_AHEAD))),
-            (id(2, 1 + FAR_AHEAD), SeenError::FarAhead(id(2, 1 + FAR_AHEAD))),
+            (id(1, LAST_NUMBER + 1), SeenError::FarAhead(id(1, LAST_NUMBER + 1))),
+            (id(2, u32::MAX), SeenError::FarAhead(id(2, u32::MAX))),
         ] {
             assert_eq!(seen.insert(id), Err(error));
         }
         assert_eq!(seen, before);
-        assert_eq!(seen.insert(id(1, 5 + FAR_AHEAD)), Ok(true));
+        assert_eq!(seen.insert(id(1, LAST_NUMBER)), Ok(true));
     }
 
     #[test]

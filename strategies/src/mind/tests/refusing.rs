@@ -50,7 +50,7 @@ fn a_memory_of_another_robot_or_space_is_refused() {
         rng: Box::new(ChaCha8Rng::seed_from_u64(1)),
         memory: Some(memory.clone()),
     };
-    let new = |me, setup| Learning::new(RobotId(me), setup).map(|_| ());
+    let new = |me, setup| Learning::new(RobotId(me), 1, setup).map(|_| ());
     assert_eq!(new(1, setup(space(), vocabulary())), Ok(()));
     let robot = new(2, setup(space(), vocabulary())).unwrap_err();
     assert!(matches!(robot, LearningError::Memory(MemoryError::Robot { .. })));
