@@ -16,7 +16,7 @@
 //! needs of both is re-exported here.
 
 pub mod forgetting;
-mod geometry;
+pub mod geometry;
 mod learning;
 mod lessons;
 pub mod mind;
@@ -27,7 +27,7 @@ mod vector_codec;
 
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
-    Ballot, Classify, ClassifyError, Evidence, Look, Observation, Refusal, Refusals, Vocabulary,
+    Ballot, Classify, ClassifyError, Evidence, Fuse, Look, Observation, Refusal, Refusals, Vocabulary,
     VocabularyError, Voter, fusion,
 };
 pub use gestalt_svm::{
@@ -37,7 +37,7 @@ pub use gestalt_svm::{
 #[cfg(feature = "offline")]
 pub use gestalt_svm::{Folding, MIN_SAMPLES, Progress, TrainError, TrainOptions, Trained, train};
 pub use learning::{
-    Change, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory, MemoryError,
+    Change, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory, MemoryError, OwnRules,
     TrainingChange,
 };
 pub use lessons::{Candidates, Heard, LessonBook, Verdict};

@@ -46,9 +46,9 @@ impl Forgetting for HerdingForgetting {
 
     fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
         let Class { came, held } = self.classes.get(&samples.draw_largest_class(rng)?)?;
-        let others = held.sum.count() - 1.0;
-        let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum.total(j) - others * mean).collect();
-        self.named = held.points.nearest_to(&narrow(target));
+        let others = held.sum().count() - 1.0;
+        let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum().total(j) - others * mean).collect();
+        self.named = held.points().nearest_to(&narrow(target));
         self.named
     }
 }

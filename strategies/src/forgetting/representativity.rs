@@ -29,6 +29,6 @@ impl Forgetting for RepresentativityForgetting {
 
     fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
         let class = self.classes.get(&samples.draw_largest_class(rng)?)?;
-        class.points.farthest_from(&class.centroid()?)
+        class.points().farthest_from(&class.centroid()?)
     }
 }

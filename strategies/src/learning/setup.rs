@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use super::config::{LearningConfig, LearningConfigError};
 use super::memory::{Memory, MemoryError};
+use super::own_rules::OwnRules;
 use crate::training_set::RestoreError;
 
 /// What a robot needs to learn.
@@ -24,6 +25,8 @@ pub struct LearningSetup {
     /// What the robot remembers from before; `None` for a robot whose host keeps nothing: such a one is never owed an
     /// [`Input::Remembered`](crate::Input::Remembered).
     pub memory: Option<Memory>,
+    /// Rules of one's own in place of those that the parameters name.
+    pub rules: OwnRules,
 }
 
 impl fmt::Debug for LearningSetup {

@@ -67,15 +67,15 @@ impl fmt::Debug for Learning {
 impl Learning {
     /// What that robot learned so far, in its `boot`th life.
     pub fn new(me: RobotId, boot: u32, setup: LearningSetup) -> Result<Self, LearningError> {
-        let LearningSetup { config, space, vocabulary, rng, memory } = setup;
+        let LearningSetup { config, space, vocabulary, rng, memory, rules } = setup;
         config.validate()?;
         let durable = memory.is_some();
         let memory = memory.unwrap_or_default();
         let space_id = space.id();
         let owner = Owner::new(me, space_id, vocabulary.id());
         memory.check(owner, space.components(), vocabulary.classes())?;
-        let mut set =
-            TrainingSet::new(me, config.capacity, config.selection.build(), config.forgetting.build());
+        let (selection, forgetting) = rules.make(&config);
+        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting);
         let fresh = memory.is_empty();
         let Memory { counters, samples, seen, lessons: heard, aside, .. } = memory;
         if !fresh {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message, RobotId};
-use gestalt_rounds::{Classify, Follow, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
+use gestalt_rounds::{Classify, Follow, Fuse, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
 
 use super::answers::Answers;
 use super::input::{Concern, Input};
@@ -66,6 +66,13 @@ impl Mind {
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
     pub fn new(me: RobotId, boot: u32, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
         Ok(Self { rounds: Rounds::new(me, boot, config)?, learning: None, answers: Answers::default() })
+    }
+
+    /// The same mind, in which votes are fused by a rule of one's own, see [`Rounds::fused_by`].
+    #[must_use]
+    pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {
+        self.rounds = self.rounds.fused_by(rule);
+        self
     }
 
     /// The same mind, set up to learn: it keeps what it sees, labels it by what instructors say, shares and forgets.

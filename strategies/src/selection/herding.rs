@@ -49,13 +49,13 @@ impl Selection for HerdingSelection {
 
     fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let Own { personal, shared } = self.classes.get(&samples.draw_personal_class(rng)?)?;
-        let (k, count) = (shared.count(), shared.count() + personal.sum.count());
-        let target = (0..personal.points.dimension())
+        let (k, count) = (shared.count(), shared.count() + personal.sum().count());
+        let target = (0..personal.points().dimension())
             .map(|j| {
-                let mean = (shared.total(j) + personal.sum.total(j)) / count;
+                let mean = (shared.total(j) + personal.sum().total(j)) / count;
                 (k + 1.0) * mean - shared.total(j)
             })
             .collect();
-        personal.points.nearest_to(&narrow(target))
+        personal.points().nearest_to(&narrow(target))
     }
 }

@@ -36,6 +36,6 @@ impl Selection for RepresentativitySelection {
 
     fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let personal = self.classes.get(&samples.draw_personal_class(rng)?)?;
-        personal.points.nearest_to(&personal.centroid()?)
+        personal.points().nearest_to(&personal.centroid()?)
     }
 }

@@ -21,8 +21,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Input, Instructed, Mind, Output};
 use crate::learning::{
-    Change, Learning, LearningConfig, LearningError, LearningSetup, Memory, MemoryError, TrainingChange,
-    training_key,
+    Change, Learning, LearningConfig, LearningError, LearningSetup, Memory, MemoryError, OwnRules,
+    TrainingChange, training_key,
 };
 use crate::sample::Part;
 use crate::selection::SelectionRule;
@@ -69,6 +69,7 @@ struct Swarm {
     minds: Vec<Mind>,
     disks: Vec<BTreeMap<Vec<u8>, Vec<u8>>>,
     config: LearningConfig,
+    rules: OwnRules,
     now: Duration,
     loss: f64,
     rng: ChaCha8Rng,
@@ -79,10 +80,15 @@ struct Swarm {
 
 impl Swarm {
     fn new(n: usize, config: LearningConfig, seed: u64) -> Self {
+        Self::with_rules(n, config, OwnRules::default(), seed)
+    }
+
+    fn with_rules(n: usize, config: LearningConfig, rules: OwnRules, seed: u64) -> Self {
         let mut swarm = Self {
             minds: Vec::new(),
             disks: vec![BTreeMap::new(); n],
             config,
+            rules,
             now: Duration::ZERO,
             loss: 0.0,
             rng: ChaCha8Rng::seed_from_u64(seed),
@@ -112,6 +118,7 @@ impl Swarm {
             vocabulary: vocabulary(),
             rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(id.0) * 1000 + u64::from(boot))),
             memory: Some(Memory::read(records).unwrap()),
+            rules: self.rules.clone(),
         };
         self.trained[i].clear();
         Mind::new(id, boot, config).unwrap().learning(setup).unwrap()

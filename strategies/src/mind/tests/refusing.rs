@@ -49,6 +49,7 @@ fn a_memory_of_another_robot_or_space_is_refused() {
         vocabulary,
         rng: Box::new(ChaCha8Rng::seed_from_u64(1)),
         memory: Some(memory.clone()),
+        rules: OwnRules::default(),
     };
     let new = |me, setup| Learning::new(RobotId(me), 1, setup).map(|_| ());
     assert_eq!(new(1, setup(space(), vocabulary())), Ok(()));
