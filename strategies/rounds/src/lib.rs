@@ -28,7 +28,7 @@ mod voter;
 pub use ballot::{Ballot, Cast, Scale};
 pub use classify::{Classify, ClassifyError};
 pub use config::{RoundsConfig, RoundsConfigError};
-pub use evidence::{Evidence, Look};
+pub use evidence::{Evidence, JudgedFrame};
 pub use fuse::Fuse;
 pub use machine::{Follow, Input, Output, Rounds};
 pub use observation::Observation;

@@ -11,7 +11,7 @@ use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
 use crate::classify::Classify;
 use crate::config::RoundsConfig;
-use crate::evidence::{Evidence, Look};
+use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::observation::Observation;
 
@@ -71,7 +71,7 @@ impl Round {
                 } else {
                     Vec::new()
                 };
-                self.look(Look { at: now, probabilities: &p, quality, view: &view }, config);
+                self.add(JudgedFrame { at: now, probabilities: &p, quality, view: &view }, config);
                 true
             }
             Ok(_) | Err(_) => false,
@@ -79,13 +79,13 @@ impl Round {
     }
 
     /// Counts a frame.
-    fn look(&mut self, look: Look<'_>, config: &RoundsConfig) {
-        let classes = look.probabilities.len();
+    fn add(&mut self, frame: JudgedFrame<'_>, config: &RoundsConfig) {
+        let classes = frame.probabilities.len();
         let evidence = self.evidence.get_or_insert_with(|| Evidence::new(classes));
         if evidence.classes() != classes {
             *evidence = Evidence::new(classes);
         }
-        if evidence.add(look, config.decorrelation)
+        if evidence.add(frame, config.decorrelation)
             && let Some(said) = &mut self.said
         {
             said.outdated = true;

@@ -1,14 +1,14 @@
 //! Samples that lie together, and where.
 
 use super::points::Points;
-use super::sum::{Sum, narrow};
+use super::sum::{ExactSum, narrow};
 use crate::sample::HeldSample;
 
 /// Samples with their sum: who lies nearest to their mean is found in one pass.
 #[derive(Clone, Debug, Default)]
 pub struct Cluster {
     points: Points,
-    sum: Sum,
+    sum: ExactSum,
 }
 
 impl Cluster {
@@ -20,7 +20,7 @@ impl Cluster {
 
     /// Their sum.
     #[must_use]
-    pub fn sum(&self) -> &Sum {
+    pub fn sum(&self) -> &ExactSum {
         &self.sum
     }
 

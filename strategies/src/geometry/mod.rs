@@ -1,7 +1,7 @@
 //! Distances and means that are kept up to date: what a rule of one's own needs to be as fast as those that come with
 //! Gestalt.
 //!
-//! [`Points`] measures from one point to many, [`Neighbours`] knows who is whose nearest, [`Sum`] and [`Cluster`] have
+//! [`Points`] measures from one point to many, [`Neighbours`] knows who is whose nearest, [`ExactSum`] and [`Cluster`] have
 //! means that do not depend on the order of what was added and taken out. All distances are squared and Euclidean, in the
 //! units of the feature space, and ties go to the smaller key.
 
@@ -11,6 +11,6 @@ mod points;
 mod sum;
 
 pub use cluster::Cluster;
-pub use neighbours::{Neighbours, Pair};
+pub use neighbours::{NearestPair, Neighbours};
 pub use points::Points;
-pub use sum::{Sum, narrow};
+pub use sum::{ExactSum, narrow};

@@ -31,7 +31,7 @@ struct Nearest {
 
 /// A seeker and its nearest neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
+pub struct NearestPair {
     /// The key of the seeker.
     pub seeker: u64,
     /// The key of its nearest neighbour; `None` when there is none.
@@ -94,7 +94,7 @@ impl Neighbours {
     }
 
     /// The seeker whose nearest neighbour is farthest; of equals the smaller key.
-    pub fn farthest(&mut self) -> Option<Pair> {
+    pub fn farthest(&mut self) -> Option<NearestPair> {
         for place in 0..self.nearest.len() {
             // Only the distance matters, and there is none below the lower bound: where many are equally near, as
             // copies of one sample are, the search ends at the first of them.
@@ -105,7 +105,7 @@ impl Neighbours {
     }
 
     /// The seeker whose nearest neighbour is closest, and that neighbour; of equals the smaller keys.
-    pub fn closest(&mut self) -> Option<Pair> {
+    pub fn closest(&mut self) -> Option<NearestPair> {
         loop {
             // Only a lower bound that nothing undercuts has to be looked into.
             let place = self.first_by(|a, b| a < b)?;
@@ -124,8 +124,8 @@ impl Neighbours {
         })
     }
 
-    fn pair(&self, place: usize) -> Pair {
-        Pair { seeker: self.seekers.keys()[place], neighbour: self.nearest[place].key }
+    fn pair(&self, place: usize) -> NearestPair {
+        NearestPair { seeker: self.seekers.keys()[place], neighbour: self.nearest[place].key }
     }
 
     /// Looks for the nearest neighbour again if it has gone, until one is near `enough` for the lower bound of the

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 /// Points side by side in a block: four vector registers of the smallest instruction set.
 const LANES: usize = 16;
 
-/// Points kept component by component in blocks of [`LANES`], each with a key; removal moves the last into the gap.
+/// Points kept component by component in blocks of 16, each with a key; removal moves the last into the gap.
 ///
 /// The distances from one point to all are then sums side by side, at a sixth of what one after the other takes. Each
 /// is the sum over the components in their order, in `f32`, so the formula written plainly gives the same bits. Points

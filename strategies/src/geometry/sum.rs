@@ -8,12 +8,12 @@ const GREATEST: f64 = 1_099_511_627_776.0;
 /// Vectors added up exactly, in fixed point: adding and taking out commute, so the mean of what is left is the same
 /// bits as if it alone had been added. Components are exact from 2⁻⁴⁰ to 2⁴⁰; a missing one counts as 0.
 #[derive(Clone, Debug, Default)]
-pub struct Sum {
+pub struct ExactSum {
     total: Vec<i128>,
     count: i64,
 }
 
-impl Sum {
+impl ExactSum {
     /// Adds a vector.
     pub fn add(&mut self, vector: &[f32]) {
         self.accumulate(vector, 1);

@@ -13,7 +13,7 @@ type Make<T> = Arc<dyn Fn() -> Box<T> + Send + Sync>;
 /// keeps starts empty at each start of the robot, and is told of all samples remembered: hence a way to make it.
 ///
 /// ```
-/// use gestalt_strategies::sample::Samples;
+/// use gestalt_strategies::sample::HeldSamples;
 /// use gestalt_strategies::{Forgetting, OwnRules};
 /// use rand::Rng;
 ///
@@ -22,7 +22,7 @@ type Make<T> = Arc<dyn Fn() -> Box<T> + Send + Sync>;
 /// struct FirstImpression;
 ///
 /// impl Forgetting for FirstImpression {
-///     fn victim(&mut self, samples: &Samples, _: &mut dyn Rng) -> Option<u64> {
+///     fn victim(&mut self, samples: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
 ///         samples.iter().next_back().map(|newest| newest.key)
 ///     }
 /// }

@@ -8,7 +8,7 @@ use gestalt_svm::FeatureSpace;
 use thiserror::Error;
 
 use super::config::{LearningConfig, LearningConfigError};
-use super::memory::{Memory, MemoryError};
+use super::memory::{MemoryError, RobotMemory};
 use super::own_rules::OwnRules;
 use crate::training_set::RestoreError;
 
@@ -24,7 +24,7 @@ pub struct LearningSetup {
     pub rng: Box<dyn rand::Rng + Send>,
     /// What the robot remembers from before; `None` for a robot whose host keeps nothing: such a one is never owed an
     /// [`Input::Remembered`](crate::Input::Remembered).
-    pub memory: Option<Memory>,
+    pub memory: Option<RobotMemory>,
     /// Rules of one's own in place of those that the parameters name.
     pub rules: OwnRules,
 }

@@ -36,14 +36,15 @@ pub enum SeenError {
 }
 
 /// A set of sample identifiers: for each author the numbers seen, as intervals. A robot that misses nothing holds
-/// one interval per author, however long it lives; the bounds of this module hold whatever arrives.
+/// one interval per author, however long it lives, and one more for each time that the author lost its memory and
+/// numbered on from its boot number; the bounds of this module hold whatever arrives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub struct SeenSamples {
     authors: BTreeMap<RobotId, Vec<(u32, u32)>>,
     digest: u64,
 }
 
-impl Seen {
+impl SeenSamples {
     /// Takes up what was stored: each author with its intervals (inclusive, ascending, neither overlapping nor
     /// touching).
     ///
@@ -91,7 +92,7 @@ impl Seen {
     /// Remembers a sample; says whether it is new.
     ///
     /// # Errors
-    /// See [`Seen::would_accept`]. Nothing is remembered then.
+    /// See [`SeenSamples::would_accept`]. Nothing is remembered then.
     pub fn insert(&mut self, id: SampleId) -> Result<bool, SeenError> {
         if !self.would_accept(id)? {
             return Ok(false);
@@ -114,7 +115,7 @@ impl Seen {
         Ok(true)
     }
 
-    /// What [`Seen::insert`] would say: whether the sample is new.
+    /// What [`SeenSamples::insert`] would say: whether the sample is new.
     ///
     /// # Errors
     /// [`SeenError::Zero`], [`SeenError::FarAhead`], [`SeenError::TooManyAuthors`] and [`SeenError::TooManyGaps`]:
@@ -216,8 +217,8 @@ mod tests {
         SampleId { author: RobotId(author), number }
     }
 
-    fn of(ids: impl IntoIterator<Item = (u32, u32)>) -> Seen {
-        let mut seen = Seen::default();
+    fn of(ids: impl IntoIterator<Item = (u32, u32)>) -> SeenSamples {
+        let mut seen = SeenSamples::default();
         for (author, number) in ids {
             seen.insert(id(author, number)).unwrap();
         }
@@ -266,7 +267,7 @@ mod tests {
     #[test]
     fn the_last_number_of_all_overflows_nothing() {
         let author = RobotId(3);
-        let mut seen = Seen::from_intervals([(author, vec![(1, u32::MAX - 1)])]).unwrap();
+        let mut seen = SeenSamples::from_intervals([(author, vec![(1, u32::MAX - 1)])]).unwrap();
         assert_eq!(seen.insert(id(3, u32::MAX)), Ok(true));
         assert_eq!(seen.insert(id(3, u32::MAX)), Ok(false));
         assert!(!seen.lacks(&seen.clone()));
@@ -276,12 +277,12 @@ mod tests {
     #[test]
     fn disordered_intervals_are_refused() {
         for bad in [vec![(3, 2)], vec![(1, 2), (3, 4)], vec![(5, 6), (1, 2)], vec![(1, 4), (2, 6)]] {
-            let found = Seen::from_intervals([(RobotId(1), bad.clone())]);
+            let found = SeenSamples::from_intervals([(RobotId(1), bad.clone())]);
             assert_eq!(found, Err(SeenError::Disorder(RobotId(1))), "{bad:?}");
         }
-        let zero = Seen::from_intervals([(RobotId(1), vec![(0, 2)])]);
+        let zero = SeenSamples::from_intervals([(RobotId(1), vec![(0, 2)])]);
         assert_eq!(zero, Err(SeenError::Zero(id(1, 0))));
-        let twice = Seen::from_intervals([(RobotId(1), vec![(1, 2)]), (RobotId(1), vec![(4, 5)])]);
+        let twice = SeenSamples::from_intervals([(RobotId(1), vec![(1, 2)]), (RobotId(1), vec![(4, 5)])]);
         assert_eq!(twice, Err(SeenError::Disorder(RobotId(1))));
     }
 
@@ -292,7 +293,7 @@ mod tests {
     proptest! {
         #[test]
         fn it_is_a_set(ids in ids()) {
-            let mut seen = Seen::default();
+            let mut seen = SeenSamples::default();
             let mut model = BTreeSet::new();
             for (author, number) in ids {
                 prop_assert_eq!(seen.insert(id(author, number)), Ok(model.insert((author, number))));
@@ -303,7 +304,7 @@ mod tests {
                 }
             }
             let stored = seen.authors().map(|a| (a, seen.intervals(a).to_vec())).collect::<Vec<_>>();
-            prop_assert_eq!(Seen::from_intervals(stored), Ok(seen));
+            prop_assert_eq!(SeenSamples::from_intervals(stored), Ok(seen));
         }
 
         #[test]

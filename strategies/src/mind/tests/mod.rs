@@ -21,10 +21,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Input, Instructed, Mind, Output};
 use crate::learning::{
-    Change, Learning, LearningConfig, LearningError, LearningSetup, Memory, MemoryError, OwnRules,
+    Learning, LearningConfig, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange, RobotMemory,
     TrainingChange, training_key,
 };
-use crate::sample::Part;
+use crate::sample::SetPart;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
 
@@ -117,7 +117,7 @@ impl Swarm {
             space: space(),
             vocabulary: vocabulary(),
             rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(id.0) * 1000 + u64::from(boot))),
-            memory: Some(Memory::read(records).unwrap()),
+            memory: Some(RobotMemory::read(records).unwrap()),
             rules: self.rules.clone(),
         };
         self.trained[i].clear();
@@ -170,7 +170,7 @@ impl Swarm {
                         self.answers.push(answer);
                     }
                     Output::Remember { revision, changes } => {
-                        for Change { key, value } in changes {
+                        for RecordChange { key, value } in changes {
                             match value {
                                 Some(value) => self.disks[i].insert(key, value),
                                 None => self.disks[i].remove(&key),
@@ -252,7 +252,7 @@ impl Swarm {
 
     fn sizes(&self, i: usize) -> [usize; 3] {
         let set = self.minds[i].training_set().unwrap();
-        [Part::Personal, Part::Shared, Part::External].map(|part| set.total(part))
+        [SetPart::Personal, SetPart::Shared, SetPart::External].map(|part| set.total(part))
     }
 
     fn common(&self) -> BTreeSet<String> {
@@ -269,7 +269,7 @@ impl Swarm {
             trained.split_off(&training_key(0));
             assert_eq!(held, trained, "robot {} trains on what it holds", i + 1);
             let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
-            let memory = Memory::read(records).unwrap();
+            let memory = RobotMemory::read(records).unwrap();
             let kept: BTreeMap<u64, ClassId> = memory.samples.iter().map(|s| (s.key, s.class)).collect();
             assert_eq!(held, kept, "robot {} remembers what it holds", i + 1);
             assert_eq!(&memory.seen, set.seen());

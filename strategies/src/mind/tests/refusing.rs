@@ -42,7 +42,7 @@ fn a_memory_of_another_robot_or_space_is_refused() {
     let round = swarm.show(1);
     swarm.was(round, 1);
     let records = swarm.disks[0].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
-    let memory = Memory::read(records).unwrap();
+    let memory = RobotMemory::read(records).unwrap();
     let setup = |space: Arc<FeatureSpace>, vocabulary| LearningSetup {
         config: config(2, 1.0),
         space,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::forgetting::Forgetting;
-use crate::sample::Samples;
+use crate::sample::HeldSamples;
 use crate::selection::Selection;
 
 #[test]
@@ -42,7 +42,7 @@ fn bytes_bound_what_a_round_shares() {
     swarm.was(round, 1);
     for mind in &swarm.minds {
         let learning = mind.learning.as_ref().unwrap();
-        let own = learning.set().common().filter(|sample| sample.part == Part::Shared);
+        let own = learning.set().common().filter(|sample| sample.part == SetPart::Shared);
         let message = Message::Samples(learning.told(own));
         let stamp = Stamp { boot: 1, sequence: 100 };
         let length = Envelope { author: mind.me(), stamp, message }.encode().len();
@@ -55,9 +55,14 @@ fn bytes_bound_what_a_round_shares() {
 struct Newest;
 
 impl Selection for Newest {
-    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, _: &mut dyn rand::Rng) -> Option<u64> {
+    fn select(
+        &mut self,
+        samples: &HeldSamples,
+        _: Option<&dyn Classify>,
+        _: &mut dyn rand::Rng,
+    ) -> Option<u64> {
         let classes = samples.classes().filter(|class| *class != ClassId(3));
-        classes.filter_map(|class| samples.part_keys(Part::Personal, class).last().copied()).max()
+        classes.filter_map(|class| samples.part_keys(SetPart::Personal, class).last().copied()).max()
     }
 }
 
@@ -66,7 +71,7 @@ impl Selection for Newest {
 struct FirstImpression;
 
 impl Forgetting for FirstImpression {
-    fn victim(&mut self, samples: &Samples, _: &mut dyn rand::Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, _: &mut dyn rand::Rng) -> Option<u64> {
         samples.iter().rev().nth(1).map(|sample| sample.key)
     }
 }
