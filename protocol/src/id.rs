@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// A text that is no valid identifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum IdError {
     /// Not a decimal number within the range of the identifier.
     #[error("'{0}' is not a whole number from 0 to {max}", max = u32::MAX)]

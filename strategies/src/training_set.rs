@@ -50,6 +50,7 @@ pub enum SampleReceipt {
 
 /// A stored set that contradicts itself. The training set is unchanged.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RestoreError {
     /// Two samples have one key.
     #[error("two stored samples have the key {0}")]

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// Parameters no robot can work with; each names the field and the mend.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum RoundsConfigError {
     /// α outside its range.
     #[error("alpha is {0}: choose it above 0 and below 0.5, for example 0.05")]

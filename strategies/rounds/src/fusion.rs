@@ -1,7 +1,8 @@
 //! From the evidence of many robots to one distribution over the gestures.
 //!
 //! All sums run in the order given (a ballot gives [`RobotId`](gestalt_protocol::RobotId) order) in `f64`, and ties
-//! go to the smaller class, so that every robot with the same votes gets the same bits.
+//! go to the smaller class, so that robots of one kind with the same votes get the same bits. Robots of different kinds may
+//! differ in the last ones: exponentials and logarithms are those of the platform.
 
 use gestalt_protocol::{ClassId, FusionRule};
 

@@ -22,6 +22,7 @@ pub struct RecordChange {
 
 /// Records that are no memory of this robot.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MemoryError {
     /// Written by another version of the program.
     #[error(

@@ -37,6 +37,7 @@ impl fmt::Debug for LearningSetup {
 
 /// Why a robot cannot learn.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum LearningError {
     /// Its parameters.
     #[error(transparent)]

@@ -13,8 +13,8 @@ use crate::learning::{Learning, LearningError, LearningSetup};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
 ///
-/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
-/// inputs at the same times give the same outputs.
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. On one machine
+/// the same inputs at the same times give the same outputs.
 ///
 /// A robot alone, whose classifier takes the features for the probabilities:
 ///
@@ -59,7 +59,9 @@ pub struct Mind {
 
 impl Mind {
     /// The mind of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
-    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
+    /// taken for old ones. A robot that learns takes it from a clock, in tenths of a second or finer, so that it grows also
+    /// when all that was on the disk is lost, and faster than samples are made: their numbers begin there. It has no
+    /// classifier until [`Input::Learned`]: until then it relays, fuses and decides,
     /// but gives no evidence.
     ///
     /// # Errors

@@ -17,6 +17,7 @@ pub const LAST_NUMBER: u32 = u32::MAX - FAR_AHEAD;
 
 /// An identifier that cannot be remembered. What was seen is unchanged.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SeenError {
     /// Authors number their samples from 1.
     #[error("sample {0}: numbers count from 1")]

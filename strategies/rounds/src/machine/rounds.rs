@@ -18,8 +18,8 @@ use crate::round::Round;
 
 /// The rounds of one robot: what the world tells it goes in, what it wants done comes out.
 ///
-/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
-/// inputs at the same times give the same outputs.
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. On one machine
+/// the same inputs at the same times give the same outputs.
 ///
 /// Two robots that decide together, each with a classifier of its own, and a network of five lines:
 ///

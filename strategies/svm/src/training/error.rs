@@ -11,6 +11,7 @@ use crate::reduction::Components;
 
 /// Samples or options that nothing can be learned from.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum TrainError {
     /// An option out of its range.
     #[error("training option out of range: {0}")]
