@@ -4,8 +4,10 @@ use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use crate::message::{MAX_CLASSES, MAX_ROBOTS};
-use crate::{ClassId, FusionRule, RobotId, RoundId, Stamp, VocabularyId, bounded};
+use crate::bounded;
+use crate::fusion_rule::FusionRule;
+use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
+use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 
 /// The outcome of a round in the eyes of one robot.
 ///

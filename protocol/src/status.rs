@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{RobotId, RoundId};
+use crate::id::{RobotId, RoundId};
 
 /// A robot's account of itself, JSON: the reply to a query on `robot/<id>/status`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
