@@ -52,8 +52,7 @@ impl Body {
             Robot::start(RobotConfig {
                 id: config.robot.id,
                 name: config.name(),
-                // Starts that are counted on disk begin at one.
-                boot: if learning.as_ref().is_some_and(|l| l.memory.is_some()) { 1 } else { boot },
+                boot,
                 swarm: config.swarm.0.clone(),
                 mind: config.mind(),
                 link: config.link(),
