@@ -1,4 +1,4 @@
-//! Finds other robots by multicast and keeps the links that [`topology`](super::topology) chooses.
+//! Finds other robots by multicast and keeps the links that [`neighbourhood`](super::neighbourhood) chooses.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -12,8 +12,8 @@ use zenoh::session::ZenohId;
 use super::account::Account;
 use super::identity::{robot_of, swarm_checksum};
 use super::inbox::Inbox;
+use super::neighbourhood::{Neighbourhood, View};
 use super::session::Node;
-use super::topology::{Topology, View};
 
 /// How often links are looked after.
 const PERIOD: Duration = Duration::from_millis(500);
@@ -35,7 +35,7 @@ const MAX_FAILURES: u32 = 3;
 pub(super) struct Keeper {
     me: RobotId,
     swarm: u32,
-    topology: Topology,
+    neighbourhood: Neighbourhood,
     node: Node,
     inbox: Arc<Inbox>,
     account: Arc<Account>,
@@ -70,7 +70,7 @@ impl Keeper {
         Self {
             me,
             swarm: swarm_checksum(swarm),
-            topology: Topology::new(me, max_links),
+            neighbourhood: Neighbourhood::new(me, max_links),
             node,
             inbox,
             account,
@@ -150,7 +150,7 @@ impl Keeper {
             linked: links.values().copied().collect(),
             alive: self.inbox.alive(),
         };
-        let plan = self.topology.plan(started.elapsed(), &view);
+        let plan = self.neighbourhood.plan(started.elapsed(), &view);
         for robot in plan.dial {
             self.dial(robot);
         }

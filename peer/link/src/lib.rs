@@ -24,11 +24,11 @@ mod identity;
 mod inbox;
 mod keeper;
 mod memory;
+mod neighbourhood;
 mod news;
 mod presence;
 mod robot;
 mod session;
-mod topology;
 mod trainer;
 mod worker;
 
