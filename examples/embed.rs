@@ -35,6 +35,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         boot: 1,
         swarm: "embed".to_owned(),
         mind: MindConfig::default(),
+        fusion: None,
         link: LinkConfig { connect: std::env::args().skip(1).collect(), ..LinkConfig::default() },
         vocabulary: None,
         learning: None,

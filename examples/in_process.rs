@@ -40,6 +40,7 @@ async fn robot(id: u32, connect: &[String]) -> Robot {
         // Tests that run side by side must not hear each other.
         swarm: format!("example-{}", std::process::id()),
         mind: MindConfig::default(),
+        fusion: None,
         link,
         vocabulary: None,
         learning: None,

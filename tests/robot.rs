@@ -196,6 +196,8 @@ fn described(event: &Event) -> Value {
         Event::Answered(_, answer) => json!({"event": "answered", "answer": answer}),
         Event::Remembered(revision) => json!({"event": "remembered", "revision": revision}),
         Event::Alive(robots) => json!({"event": "alive", "robots": ids(robots)}),
+        Event::Failed { part, cause } => json!({"event": "failed", "part": part.name(), "cause": cause}),
+        _ => json!({"event": "other"}),
     }
 }
 

@@ -55,6 +55,7 @@ impl Body {
                 boot,
                 swarm: config.swarm.0.clone(),
                 mind: config.mind(),
+                fusion: None,
                 link: config.link(),
                 vocabulary: None,
                 learning: learning.clone(),
@@ -116,5 +117,6 @@ fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearni
         base: (section.from == LearnFrom::Model).then(|| model.classifier.clone()),
         memory: section.memory.clone(),
         seed: section.seed,
+        rules: gestalt_strategies::OwnRules::default(),
     })
 }

@@ -58,6 +58,7 @@ pub fn learning(keep: usize, fraction: f64, memory: Option<PathBuf>) -> RobotLea
         base: None,
         memory,
         seed: 1,
+        rules: gestalt_strategies::OwnRules::default(),
     }
 }
 

@@ -30,6 +30,7 @@ pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         boot: 1,
         swarm: swarm.to_owned(),
         mind: MindConfig::default(),
+        fusion: None,
         link: LinkConfig {
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             connect: connect.to_vec(),

@@ -22,6 +22,7 @@ async fn main() {
         boot: 1,
         swarm: SWARM.to_owned(),
         mind: MindConfig::default(),
+        fusion: None,
         link: LinkConfig { listen: vec!["tcp/127.0.0.1:0".to_owned()], ..LinkConfig::default() },
         vocabulary: None,
         learning: None,

@@ -2,23 +2,29 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, Reported, Status};
 
 const MAX_ERRORS: usize = 16;
 const MAX_ERROR_LENGTH: usize = 400;
 
+/// How many errors are logged in one such span; the status has the others too.
+const MAX_LOGGED: u32 = 20;
+const LOG_SPAN: Duration = Duration::from_secs(10);
+
 /// The status of a robot, kept up to date from several threads.
 #[derive(Debug)]
 pub(super) struct Account {
     started: Instant,
     status: Mutex<Status>,
+    /// Since when, and how many, errors were logged in the present span.
+    logged: Mutex<(Instant, u32)>,
 }
 
 impl Account {
     pub(super) fn new(status: Status, started: Instant) -> Self {
-        Self { started, status: Mutex::new(status) }
+        Self { started, status: Mutex::new(status), logged: Mutex::new((started, 0)) }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Status> {
@@ -72,16 +78,30 @@ impl Account {
         self.lock().counters.insert(name.to_owned(), value);
     }
 
-    /// Puts an error among the latest; one that stands there already moves to the end.
+    /// Whether one more error may be logged now: whoever can make a robot refuse something must not fill its disk.
+    fn may_log(&self) -> bool {
+        let mut logged = self.logged.lock().unwrap_or_else(PoisonError::into_inner);
+        if logged.0.elapsed() >= LOG_SPAN {
+            *logged = (Instant::now(), 0);
+        }
+        logged.1 = logged.1.saturating_add(1);
+        logged.1 <= MAX_LOGGED
+    }
+
+    /// Puts an error among the latest; one that stands there already moves to the end. Part of it may be a stranger's own
+    /// words: what controls a terminal is shown, not done.
     pub(super) fn error(&self, what: &str) {
-        let what: String = what.chars().take(MAX_ERROR_LENGTH).collect();
+        let shown = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
+        let what: String = what.chars().map(shown).take(MAX_ERROR_LENGTH).collect();
         let at_ms = u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX);
         let mut status = self.lock();
         let known = status.errors.iter().position(|error| error.what == what);
         if let Some(known) = known {
             status.errors.remove(known);
-        } else {
+        } else if self.may_log() {
             tracing::warn!(robot = status.robot.0, "{what}");
+        } else {
+            add(&mut status.counters, "errors_not_logged".to_owned(), 1);
         }
         if status.errors.len() == MAX_ERRORS {
             status.errors.remove(0);
@@ -156,6 +176,17 @@ mod tests {
         assert_eq!(status.errors.len(), MAX_ERRORS);
         assert_eq!(status.errors.last().unwrap().what, "error 19");
         account_is_distinct(&status);
+    }
+
+    #[test]
+    fn a_flood_of_errors_is_not_logged_whole_and_controls_no_terminal() {
+        let account = account();
+        for i in 0..100 {
+            account.error(&format!("refused \u{1b}[2J {i}"));
+        }
+        let status = account.lock();
+        assert_eq!(status.counters["errors_not_logged"], 100 - u64::from(MAX_LOGGED));
+        assert!(!status.errors.iter().any(|error| error.what.contains('\u{1b}')));
     }
 
     fn account_is_distinct(status: &Status) {

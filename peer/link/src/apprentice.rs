@@ -3,20 +3,24 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 use gestalt_protocol::{Digest, Learning, RobotId};
 use gestalt_strategies::{
-    Change, Classifier, FeatureSpace, Input, Learner, LearningConfig, LearningSetup, Memory, Mind, OwnRules,
-    TrainingChange, Vocabulary,
+    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, OwnRules,
+    RecordChange, RobotMemory, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use tokio::sync::mpsc;
 
-use super::LinkError;
-use super::account::Account;
-use super::inbox::Inbox;
-use super::trainer::Trainer;
-use crate::memory::{Scribe, Store};
+use crate::account::Account;
+use crate::boot::boot_number;
+use crate::error::LinkError;
+use crate::inbox::Inbox;
+use crate::memory::{Assignment, FilePlace, Found, Place, Records, Scribe, Store, StoreError, Told};
+use crate::supervisor::Supervisor;
+use crate::trainer::Trainer;
 
 /// How a robot learns, and where it keeps what it learned.
 #[derive(Clone, Debug)]
@@ -30,38 +34,104 @@ pub struct RobotLearning {
     /// The offline classifier it builds on; `None` to learn from nothing.
     pub base: Option<Arc<Classifier>>,
     /// The file it keeps its memory in; `None` for a robot that forgets all when it stops.
+    ///
+    /// A file that is damaged, or another's, is refused at the start. Where the disk is not there, full or read-only, the
+    /// robot starts, says so in its status, and goes on trying; until it succeeds, nothing counts as learned for good:
+    /// nothing is shared, and no instructor answered.
     pub memory: Option<PathBuf>,
     /// What its random choices follow from, together with its id and the number of its start.
     pub seed: u64,
+    /// Your own rules of selection and forgetting, in place of those that `config` names; none by default.
+    pub rules: OwnRules,
+}
+
+impl RobotLearning {
+    /// What a mind needs of it in that life.
+    pub(crate) fn setup(&self, id: RobotId, boot: u32, memory: Option<RobotMemory>) -> LearningSetup {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(u64::from(id.0) << 32 | u64::from(boot));
+        LearningSetup {
+            config: self.config.clone(),
+            space: self.space.clone(),
+            vocabulary: self.vocabulary.clone(),
+            rng: Box::new(rng),
+            memory,
+            rules: self.rules.clone(),
+        }
+    }
+
+    /// The classifier to start with: the one trained last, or the one to build on.
+    pub(crate) fn first_classifier(&self, remembered: Option<Arc<Classifier>>) -> Option<Arc<Classifier>> {
+        let same = |known: &Arc<Classifier>| known.space().id() == self.space.id();
+        remembered.filter(same).or_else(|| self.base.clone())
+    }
+
+    fn learner(&self) -> Result<Learner, LearnError> {
+        let mut learner =
+            Learner::new(self.space.clone(), self.vocabulary.clone(), self.config.learner.clone())?;
+        if let Some(base) = &self.base {
+            learner.build_on(base)?;
+        }
+        Ok(learner)
+    }
 }
 
 /// An opened memory, before there is a mind.
-pub(super) struct Prepared {
-    learning: RobotLearning,
+pub(crate) struct Prepared {
+    pub learning: RobotLearning,
+    pub boot: u32,
+    place: Option<Arc<dyn Place>>,
     store: Option<Store>,
-    memory: Option<Memory>,
+    records: Records,
+    memory: Option<RobotMemory>,
     remembered: Option<Arc<Classifier>>,
     /// Why there is no store, where there should be one.
-    failure: Option<String>,
-    pub boot: u32,
+    failure: Option<StoreError>,
+    new: bool,
 }
 
 impl Prepared {
     /// Opens the memory. A disk that fails is no error yet: the robot goes on without, and says so.
     pub fn open(id: RobotId, boot: u32, learning: RobotLearning) -> Result<Self, LinkError> {
-        let mut prepared =
-            Self { learning, store: None, memory: None, remembered: None, failure: None, boot };
-        let Some(path) = prepared.learning.memory.clone() else { return Ok(prepared) };
-        let opened =
-            Store::open(&path, id, boot).and_then(|store| Ok((store.memory()?, store.classifier()?, store)));
+        let place = learning.memory.clone().map(|path| Arc::new(FilePlace::new(path)) as Arc<dyn Place>);
+        Self::open_at(place, id, boot, learning)
+    }
+
+    fn open_at(
+        place: Option<Arc<dyn Place>>,
+        id: RobotId,
+        boot: u32,
+        learning: RobotLearning,
+    ) -> Result<Self, LinkError> {
+        let mut prepared = Self {
+            learning,
+            boot,
+            place: place.clone(),
+            store: None,
+            records: Records::new(),
+            memory: place.as_ref().map(|_| RobotMemory::default()),
+            remembered: None,
+            failure: None,
+            new: false,
+        };
+        let Some(place) = place else { return Ok(prepared) };
+        let opened = Store::open(place, id, boot).and_then(|(store, new)| {
+            Ok((store.memory()?, store.records()?, store.classifier()?, store, new))
+        });
         match opened {
-            Ok((memory, remembered, store)) => {
+            Ok((memory, records, remembered, store, new)) => {
                 prepared.boot = store.boot();
                 prepared.memory = Some(memory);
+                prepared.records = records;
                 prepared.remembered = remembered.map(Arc::new);
                 prepared.store = Some(store);
+                prepared.new = new;
             }
-            Err(error) if error.is_of_the_disk() => prepared.failure = Some(error.to_string()),
+            Err(error) if error.is_of_the_disk() => {
+                // The starts are counted on the disk: until it is there, the clock has to do.
+                prepared.boot = boot.max(boot_number(SystemTime::now()));
+                prepared.failure = Some(error);
+            }
             Err(error) => return Err(error.into()),
         }
         Ok(prepared)
@@ -69,134 +139,180 @@ impl Prepared {
 
     /// What the mind needs of it.
     pub fn setup(&mut self, id: RobotId) -> LearningSetup {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.learning.seed);
-        rng.set_stream(u64::from(id.0) << 32 | u64::from(self.boot));
-        LearningSetup {
-            config: self.learning.config.clone(),
-            space: self.learning.space.clone(),
-            vocabulary: self.learning.vocabulary.clone(),
-            rng: Box::new(rng),
-            memory: self.memory.take(),
-            rules: OwnRules::default(),
-        }
+        self.learning.setup(id, self.boot, self.memory.take())
     }
 
-    /// The classifier to start with: the one trained last, or the one to build on.
+    /// The classifier to start with.
     pub fn classifier(&self) -> Option<Arc<Classifier>> {
-        let same = |known: &&Arc<Classifier>| known.space().id() == self.learning.space.id();
-        self.remembered.as_ref().filter(same).or(self.learning.base.as_ref()).cloned()
+        self.learning.first_classifier(self.remembered.clone())
     }
 }
 
 /// The two threads, and what they have done so far.
-pub(super) struct Apprentice {
+pub(crate) struct Apprentice {
     // In this order: what is trained last is still to be written.
     trainer: Trainer,
     scribe: Option<Arc<Scribe>>,
+    learning: RobotLearning,
+    found: mpsc::Receiver<Found>,
     trainings: Arc<AtomicU64>,
-    memory: Arc<Mutex<String>>,
+    memory: Arc<MemoryState>,
     /// What the status says: keys used, samples held, digest, trainings; and of the memory.
     reported: Option<((u64, usize, Digest, u64), String)>,
 }
 
+/// What the status says of the memory.
+#[derive(Default)]
+struct MemoryState(Mutex<String>);
+
+impl MemoryState {
+    fn set(&self, to: String) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = to;
+    }
+
+    fn get(&self) -> String {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
 impl Apprentice {
-    pub fn start(prepared: Prepared, inbox: &Arc<Inbox>, account: &Arc<Account>) -> Result<Self, LinkError> {
-        let Prepared { learning, store, failure, .. } = prepared;
-        let RobotLearning { config, space, vocabulary, base, .. } = learning;
-        let mut learner = Learner::new(space, vocabulary, config.learner.clone())?;
-        if let Some(base) = &base {
-            learner.build_on(base)?;
+    pub fn start(
+        prepared: Prepared,
+        id: RobotId,
+        inbox: &Arc<Inbox>,
+        account: &Arc<Account>,
+        supervisor: &Arc<Supervisor>,
+    ) -> Result<Self, LinkError> {
+        let Prepared { learning, boot, place, store, records, failure, new, .. } = prepared;
+        // What cannot be learned on is an error of the start, not of the thread.
+        learning.learner()?;
+        if new {
+            account.count("memory_begun");
+            tracing::info!(robot = id.0, "a new memory was begun");
         }
-        let state = match (&store, &failure) {
-            (Some(store), _) => store.path().display().to_string(),
-            (None, Some(failure)) => format!("failing: {failure}"),
-            (None, None) => "none".to_owned(),
-        };
+        let memory = Arc::new(MemoryState::default());
+        memory.set(match (&place, &failure) {
+            (None, _) => "none".to_owned(),
+            (Some(place), None) => place.path().display().to_string(),
+            (Some(_), Some(failure)) => format!("failing: {failure}"),
+        });
         if let Some(failure) = failure {
-            account.error(&failure);
+            account.count("memory_failed");
+            account.error(&failure.to_string());
         }
-        let memory = Arc::new(Mutex::new(state.clone()));
-        let scribe = match store {
-            Some(store) => Some(Arc::new(start_scribe(store, state, &memory, inbox, account)?)),
-            None => None,
-        };
-        let trainings = Arc::new(AtomicU64::new(0));
-        let learned = {
-            let (inbox, account, scribe, trainings) =
-                (inbox.clone(), account.clone(), scribe.clone(), trainings.clone());
-            move |classifier: Arc<Classifier>| {
-                trainings.fetch_add(1, Ordering::Relaxed);
-                let mut status = account.lock();
-                status.model = format!("learned, {} support vectors", classifier.support_vectors());
-                drop(status);
-                if let Some(scribe) = &scribe {
-                    scribe.remember_classifier(classifier.clone());
+        // One at most: a file is found late only once.
+        let (tell_found, found) = mpsc::channel(1);
+        let scribe = place.map(|place| {
+            let sound = place.path().display().to_string();
+            let (inbox, account, memory) = (inbox.clone(), account.clone(), memory.clone());
+            let tell = move |told| match told {
+                Told::Wrote(revision) => {
+                    memory.set(sound.clone());
+                    inbox.deliver(Input::Remembered(revision));
                 }
-                inbox.deliver(Input::Learned(classifier));
-            }
-        };
-        let failed = {
-            let account = account.clone();
-            move |error: &gestalt_strategies::LearnError| account.error(&format!("training: {error}"))
-        };
-        let trainer = Trainer::start(learner, learned, failed)?;
-        Ok(Self { trainer, scribe, trainings, memory, reported: None })
+                Told::Failed(error) => {
+                    memory.set(format!("failing: {error}"));
+                    account.count("memory_failed");
+                    account.error(&error.to_string());
+                }
+                Told::Found(found) => {
+                    // There is room for the only one; an error says that the robot is ending.
+                    let _ = tell_found.try_send(found);
+                }
+            };
+            Scribe::start(
+                Assignment { place, robot: id, boot, known: records, store },
+                supervisor.clone(),
+                tell,
+            )
+        });
+        let scribe = scribe.transpose()?.map(Arc::new);
+        let trainings = Arc::new(AtomicU64::new(0));
+        let trainer =
+            start_trainer(&learning, inbox, account, supervisor, scribe.clone(), trainings.clone())?;
+        Ok(Self { trainer, scribe, learning, found, trainings, memory, reported: None })
     }
 
     pub fn train(&self, changes: Vec<TrainingChange>) {
         self.trainer.train(changes);
     }
 
-    pub fn remember(&self, revision: u64, changes: Vec<Change>) {
+    pub fn remember(&self, revision: u64, changes: Vec<RecordChange>) {
         if let Some(scribe) = &self.scribe {
             scribe.remember(revision, changes);
         }
+    }
+
+    /// Waits for a memory that came late.
+    pub async fn found(&mut self) -> Found {
+        match self.found.recv().await {
+            Some(found) => found,
+            // Without a scribe nothing is ever found.
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Makes both threads follow a mind that knows what was found, from its first change on.
+    pub fn take_up(&self) {
+        self.trainer.forget();
+        if let Some(scribe) = &self.scribe {
+            scribe.take_up();
+        }
+    }
+
+    /// Says why what was found is not taken up. Nothing is remembered from then on.
+    pub fn refuse(&self, why: &str) {
+        self.memory.set(format!("failing: {why}"));
+    }
+
+    pub fn learning(&self) -> &RobotLearning {
+        &self.learning
     }
 
     /// Whether there is anything that the status does not say yet.
     pub fn has_news(&mut self, mind: &Mind) -> bool {
         let Some((keys, held, digest)) = mind.learned_so_far() else { return false };
         let now = (keys, held, digest, self.trainings.load(Ordering::Relaxed));
-        let memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.reported.as_ref().is_some_and(|(before, known)| *before == now && *known == *memory) {
+        let memory = self.memory.get();
+        if self.reported.as_ref().is_some_and(|(before, known)| *before == now && *known == memory) {
             return false;
         }
-        self.reported = Some((now, memory.clone()));
+        self.reported = Some((now, memory));
         true
     }
 
     pub fn status(&self, mind: &Mind) -> Option<Learning> {
         let trainings = self.trainings.load(Ordering::Relaxed);
-        Some(Learning { memory: self.memory(), trainings, ..mind.learned()? })
-    }
-
-    fn memory(&self) -> String {
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        Some(Learning { memory: self.memory.get(), trainings, ..mind.learned()? })
     }
 }
 
-fn start_scribe(
-    store: Store,
-    sound: String,
-    state: &Arc<Mutex<String>>,
+fn start_trainer(
+    learning: &RobotLearning,
     inbox: &Arc<Inbox>,
     account: &Arc<Account>,
-) -> std::io::Result<Scribe> {
-    let set = |state: &Mutex<String>, to: String| {
-        *state.lock().unwrap_or_else(PoisonError::into_inner) = to;
+    supervisor: &Arc<Supervisor>,
+    scribe: Option<Arc<Scribe>>,
+    trainings: Arc<AtomicU64>,
+) -> std::io::Result<Trainer> {
+    let begin = {
+        let learning = learning.clone();
+        move || learning.learner()
     };
-    let (of_success, of_failure) = (state.clone(), state.clone());
-    let (inbox, account) = (inbox.clone(), account.clone());
-    Scribe::start(
-        store,
-        move |revision| {
-            set(&of_success, sound.clone());
-            inbox.deliver(Input::Remembered(revision));
-        },
-        move |error| {
-            set(&of_failure, format!("failing: {error}"));
-            account.count("memory_failed");
-            account.error(&error.to_string());
-        },
-    )
+    let learned = {
+        let (inbox, account) = (inbox.clone(), account.clone());
+        move |classifier: Arc<Classifier>| {
+            trainings.fetch_add(1, Ordering::Relaxed);
+            let mut status = account.lock();
+            status.model = format!("learned, {} support vectors", classifier.support_vectors());
+            drop(status);
+            if let Some(scribe) = &scribe {
+                scribe.remember_classifier(classifier.clone());
+            }
+            inbox.deliver(Input::Learned(classifier));
+        }
+    };
+    let account = account.clone();
+    let failed = move |error: &LearnError| account.error(&format!("training: {error}"));
+    Trainer::start(begin, supervisor.clone(), learned, failed)
 }

@@ -8,12 +8,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Keys, RobotId, Topic};
-use tokio::sync::watch;
-use zenoh::Session;
-use zenoh::liveliness::LivelinessToken;
 
-use super::inbox::Inbox;
-use super::session::Node;
+use crate::inbox::Inbox;
+use crate::session::Node;
 
 /// How long after a change the census is taken, and after that one the next, in a swarm of a few robots.
 const AFTER: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
@@ -21,14 +18,11 @@ const AFTER: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Du
 /// This many robots more take a census the same time later: it costs every robot an answer to every robot.
 const FEW: u32 = 20;
 
-/// How long after a lost link a token is declared anew: by then the links have found themselves.
-const REDECLARE: Duration = Duration::from_secs(3);
-
 /// How long answers are waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Takes a census some time after every change. Runs until it is aborted.
-pub(super) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) {
+/// Takes a census some time after every change. Never returns.
+pub(crate) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) -> Result<(), String> {
     loop {
         inbox.unrest().await;
         let mut absent = None;
@@ -41,29 +35,6 @@ pub(super) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) {
             let twice = absent.map(|absent: BTreeSet<_>| &absent & &missing).unwrap_or_default();
             inbox.on_census(&present, &twice);
             absent = Some(missing);
-        }
-    }
-}
-
-/// Keeps a robot's liveliness token declared, and declares it anew some time after it lost a link: of a robot that
-/// was frozen or cut off and came back, some others were measured never to learn again, in about one case of eight,
-/// neither by Zenoh's news nor by a query, until the token was new. Runs until it is aborted.
-pub(super) async fn keep_token(
-    session: Session,
-    key: String,
-    mut lost_links: watch::Receiver<u64>,
-    mut token: LivelinessToken,
-) {
-    // An error says that the robot has gone.
-    while lost_links.changed().await.is_ok() {
-        tokio::time::sleep(REDECLARE).await;
-        if let Err(error) = token.undeclare().await {
-            tracing::debug!("withdrawing the liveliness token: {error}");
-        }
-        match session.liveliness().declare_token(&key).await {
-            Ok(anew) => token = anew,
-            // The session is closed, and this task about to end.
-            Err(error) => return tracing::debug!("declaring the liveliness token: {error}"),
         }
     }
 }

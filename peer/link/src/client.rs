@@ -88,6 +88,8 @@ impl Client {
             .get(key)
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
+            // Replies go at the query's priority, and must not be lost: on their own, they hold up nothing else.
+            .priority(Priority::DataLow)
             .timeout(patience)
             .await
             .map_err(|error| LinkError::open(&*error))?;
@@ -112,7 +114,8 @@ impl Client {
         self.session
             .put(self.keys.key(&Topic::Feedback(as_whom.clone())), json)
             .encoding(Encoding::APPLICATION_JSON)
-            .priority(Priority::InteractiveHigh)
+            // On its own: a link that takes nothing must hold up no decision because of a word that is not to be lost.
+            .priority(Priority::InteractiveLow)
             .congestion_control(CongestionControl::Block)
             .await
             .map_err(|error| LinkError::open(&*error))

@@ -27,7 +27,7 @@ pub enum LinkError {
     /// The classifier to learn on is none to build on.
     #[error("learning: {0}")]
     Learner(#[from] LearnError),
-    /// The robot's memory is not its own, in use, or damaged.
+    /// The robot's memory is damaged, not its own, another program's file, or in use. A disk that fails is no error here.
     #[error(transparent)]
     Memory(#[from] StoreError),
     /// The machine has no room for another thread.

@@ -1,16 +1,22 @@
 //! A robot without a mind of its own: it sees and votes through another robot's session, and that one decides.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use gestalt_protocol::{RobotId, Status};
 use gestalt_strategies::{Classify, Input, Voter};
-use tokio::sync::{Notify, broadcast, mpsc};
+use tokio::sync::{broadcast, mpsc};
 
-use super::account::Account;
-use super::presence::Presence;
-use super::robot::{MAX_COMMANDS, MAX_EVENTS};
-use super::{Event, LinkError, Robot};
+use crate::account::Account;
+use crate::error::LinkError;
+use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
+use crate::failure::{Failure, Part};
+use crate::guard::Sight;
+use crate::guests::Guests;
+use crate::presence::Presence;
+use crate::robot::Robot;
+use crate::supervisor::{Supervisor, run_apart};
+use crate::wake::sleep_until;
 
 /// A robot that is a guest of another.
 #[derive(Clone, Debug)]
@@ -21,59 +27,6 @@ pub struct GuestConfig {
     pub name: String,
     /// Grows at every start of this robot, so that what it says outranks what it said before.
     pub boot: u32,
-}
-
-/// The guests of one robot: its task is told of every change.
-#[derive(Debug, Default)]
-pub(super) struct Guests {
-    state: Mutex<State>,
-    changed: Notify,
-}
-
-#[derive(Debug, Default)]
-struct State {
-    present: BTreeSet<RobotId>,
-    /// Those before which a hand holds still now.
-    shown: BTreeSet<RobotId>,
-}
-
-impl Guests {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Waits until a guest has come or gone since the last time.
-    pub async fn changed(&self) {
-        self.changed.notified().await;
-    }
-
-    pub fn present(&self) -> BTreeSet<RobotId> {
-        self.lock().present.clone()
-    }
-
-    /// Adds a guest; `false` when there is one of that id.
-    fn come(&self, guest: RobotId) -> bool {
-        let new = self.lock().present.insert(guest);
-        self.changed.notify_one();
-        new
-    }
-
-    fn go(&self, guest: RobotId) {
-        self.lock().present.remove(&guest);
-        self.changed.notify_one();
-    }
-
-    /// A hand holds still before that guest.
-    fn shown(&self, guest: RobotId) {
-        self.lock().shown.insert(guest);
-    }
-
-    /// No hand holds still before that guest any more. Says whether it was the last one to see it: as long as one of them
-    /// does, there is something to be seen.
-    fn left(&self, guest: RobotId) -> bool {
-        let mut state = self.lock();
-        state.shown.remove(&guest) && state.shown.is_empty()
-    }
 }
 
 impl Robot {
@@ -94,12 +47,14 @@ impl Robot {
         let vocabulary = self.account.lock().vocabulary.clone();
         let status = Status { vocabulary, neighbours: vec![host], ..Status::new(id, name, boot) };
         let account = Arc::new(Account::new(status, self.started));
-        let lost_links = self.lost_links.clone();
-        let presence = Presence::declare(&self.session, &self.keys, id, account.clone(), lost_links)
-            .await
-            .map_err(|error| LinkError::open(&*error))?;
-        let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
         let (events, first_events) = broadcast::channel(MAX_EVENTS);
+        let supervisor = Supervisor::new(account.clone(), events.clone());
+        let lost_links = self.lost_links.clone();
+        let presence =
+            Presence::declare(&self.session, &self.keys, id, account.clone(), lost_links, &supervisor)
+                .await
+                .map_err(|error| LinkError::open(&*error))?;
+        let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
         let classifier = Arc::default();
         let guest = Guest {
             voter,
@@ -110,9 +65,10 @@ impl Robot {
             events: events.clone(),
             classifier: Arc::clone(&classifier),
             departure,
+            sight: Sight::new(supervisor.clone()),
         };
-        let host_events = self.events.subscribe();
-        let task = tokio::spawn(guest.run(host_events));
+        let (host_events, host_ended) = (self.events.subscribe(), self.supervisor.ended());
+        let task = tokio::spawn(serve(guest, host_events, host_ended, supervisor.clone()));
         Ok(Self {
             account,
             started: self.started,
@@ -122,6 +78,7 @@ impl Robot {
             classifier,
             locators: self.locators.clone(),
             host: task,
+            supervisor,
             session: self.session.clone(),
             keys: self.keys.clone(),
             rounds: self.rounds.clone(),
@@ -141,6 +98,28 @@ struct Guest {
     events: broadcast::Sender<Event>,
     classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
     departure: Departure,
+    sight: Sight,
+}
+
+/// Runs a guest's task, and what is kept beside it, to the end.
+async fn serve(
+    guest: Guest,
+    host_events: broadcast::Receiver<Event>,
+    host_ended: impl Future<Output = Failure> + Send + 'static,
+    supervisor: Arc<Supervisor>,
+) {
+    let run = async move {
+        tokio::select! {
+            () = guest.run(host_events) => Ok(()),
+            failure = host_ended => Err(failure),
+        }
+    };
+    match run_apart(supervisor.clone(), Part::Mind, run).await {
+        Ok(Ok(())) => {}
+        Ok(Err(failure)) => supervisor.end(Part::Host, failure.to_string()),
+        Err(cause) => supervisor.end(Part::Mind, cause),
+    }
+    supervisor.stop().await;
 }
 
 /// Takes a guest off the host's list when it is dropped.
@@ -179,7 +158,11 @@ impl Guest {
                     Err(broadcast::error::RecvError::Lagged(_)) => self.catch_up(),
                     Err(broadcast::error::RecvError::Closed) => break,
                 },
-                () = super::host::sleep_until(wake) => {}
+                () = sleep_until(wake) => {}
+            }
+            // The classifier may just have failed.
+            if let Some(blind) = self.sight.news() {
+                self.voter.blind(blind);
             }
             if let Some(vote) = self.voter.speak(self.account.started().elapsed()) {
                 self.presence.vote(&vote);
@@ -224,7 +207,8 @@ impl Guest {
             | Event::Neighbours(_)
             | Event::Shared(_)
             | Event::Answered(..)
-            | Event::Remembered(_) => return,
+            | Event::Remembered(_)
+            | Event::Failed { .. } => return,
         }
         // An error says that nobody listens, which is fine.
         let _ = self.events.send(event);
@@ -243,10 +227,11 @@ impl Guest {
                 }
             }
             Input::Learned(classifier) => {
-                self.voter.learned(classifier.clone());
+                let Some(guarded) = self.sight.guard(classifier.clone()) else { return };
+                self.voter.learned(guarded);
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier);
             }
-            Input::Blind(blind) => self.voter.blind(blind),
+            Input::Blind(blind) => self.sight.told(blind),
             Input::Shown(_) => {
                 self.departure.guests.shown(self.departure.guest);
                 self.tell_host(command).await;

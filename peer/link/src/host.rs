@@ -2,384 +2,255 @@
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{Decision, RobotId};
 use gestalt_strategies::mind::Mind;
-use gestalt_strategies::{Classify, Input, Output, Vocabulary};
+use gestalt_strategies::{Classify, Fuse, Input, Output, Vocabulary};
 use tokio::sync::{broadcast, mpsc};
-use zenoh::bytes::Encoding;
-use zenoh::pubsub::Publisher;
-use zenoh::qos::{CongestionControl, Priority};
-use zenoh::query::Query;
-use zenoh::sample::Locality;
-use zenoh::time::Timestamp;
-use zenoh::{Session, Wait};
 
-use super::account::Account;
-use super::apprentice::Apprentice;
-use super::census::take_census;
-use super::guest::Guests;
-use super::inbox::Inbox;
-use super::keeper::Keeper;
-use super::presence::Presence;
-use super::session::Node;
-use super::{Announcement, Event, LinkError};
+use crate::account::Account;
+use crate::announcement::Announcement;
+use crate::apprentice::Apprentice;
+use crate::event::Event;
+use crate::guard::Sight;
+use crate::guests::Guests;
+use crate::inbox::Inbox;
+use crate::memory::Found;
+use crate::mind::new_mind;
+use crate::supervisor::Supervisor;
+use crate::voice::Voice;
+use crate::wake::sleep_until;
 
-/// A robot that draws another decision of the same round within this time says so only once.
-const OWN_HOLD_INTERVAL: Duration = Duration::from_millis(50);
-
-/// How long a robot holds another's decision before it says so: all have heard it from its author.
-const ADOPTED_HOLD_DELAY: Duration = Duration::from_millis(300);
-
-/// Everything the task needs; [`Host::declare`] makes it known to the swarm.
-pub(super) struct Host {
-    pub(super) me: RobotId,
-    pub(super) mind: Mind,
-    pub(super) started: Instant,
-    pub(super) node: Node,
-    pub(super) keys: Keys,
-    pub(super) inbox: Arc<Inbox>,
-    pub(super) account: Arc<Account>,
-    pub(super) commands: mpsc::Receiver<Input>,
-    pub(super) guests: Arc<Guests>,
-    pub(super) events: broadcast::Sender<Event>,
-    pub(super) vocabulary: Option<Vocabulary>,
-    pub(super) apprentice: Option<Apprentice>,
+/// The mind, and everything around it that its task needs.
+pub(crate) struct Host {
+    pub me: RobotId,
+    pub mind: Mind,
+    pub started: Instant,
+    pub inbox: Arc<Inbox>,
+    pub account: Arc<Account>,
+    pub supervisor: Arc<Supervisor>,
+    pub commands: mpsc::Receiver<Input>,
+    pub guests: Arc<Guests>,
+    pub events: broadcast::Sender<Event>,
+    /// Your own fusion rule.
+    pub fusion: Option<Arc<dyn Fuse>>,
+    pub vocabulary: Option<Vocabulary>,
+    pub apprentice: Option<Apprentice>,
     /// For the program around the robot to look at.
-    pub(super) classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
+    pub classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
+    pub voice: Voice,
+    pub sight: Sight,
 }
-
-/// A host with its keys declared.
-pub(super) struct Declared {
-    host: Host,
-    presence: Presence,
-    sample: Publisher<'static>,
-    held: Publisher<'static>,
-    swarm: Publisher<'static>,
-    last: Arc<Last>,
-    /// The decision still to be published on `robot/<me>/decision`, and when.
-    unsaid: Option<(Announcement, Instant)>,
-    /// The round of the decision published last, and when.
-    said: Option<(u32, Instant)>,
-}
-
-/// The decision this robot holds, as the queryable on `decision` gives it.
-#[derive(Default)]
-struct Last(Mutex<Option<(String, Option<Timestamp>)>>);
 
 impl Host {
-    pub(super) async fn declare(self) -> Result<Declared, LinkError> {
-        let last = Arc::new(Last::default());
-        // Not of `self`: a mind is not to be shared between threads, and this future may move between them.
-        let (session, keys) = (self.node.session().clone(), self.keys.clone());
-        listen(&session, &keys, self.me, &self.inbox.clone(), &last)
-            .await
-            .map_err(|error| LinkError::open(&*error))?;
-        self.announce_itself(last).await.map_err(|error| LinkError::open(&*error))
-    }
-
-    async fn announce_itself(self, last: Arc<Last>) -> zenoh::Result<Declared> {
-        let session = self.node.session();
-        let sample = session
-            .declare_publisher(self.keys.key(&Topic::Sample(self.me)))
-            .priority(Priority::Data)
-            .congestion_control(CongestionControl::Block)
-            .await?;
-        let decision = |topic| {
-            session
-                .declare_publisher(self.keys.key(&topic))
-                .encoding(Encoding::APPLICATION_JSON)
-                .priority(Priority::InteractiveHigh)
-                .congestion_control(CongestionControl::Block)
-                .express(true)
-        };
-        let held = decision(Topic::RobotDecision(self.me)).await?;
-        let swarm = decision(Topic::Decision).await?;
-        let (account, lost_links) = (self.account.clone(), self.inbox.lost_links());
-        let presence = Presence::declare(session, &self.keys, self.me, account, lost_links).await?;
-        Ok(Declared { host: self, presence, sample, held, swarm, last, unsaid: None, said: None })
-    }
-}
-
-/// Takes in everything that concerns a robot.
-async fn listen(
-    session: &Session,
-    keys: &Keys,
-    me: RobotId,
-    inbox: &Arc<Inbox>,
-    last: &Arc<Last>,
-) -> zenoh::Result<()> {
-    let of_interest = [
-        keys.every_robot("vote"),
-        keys.every_robot("sample"),
-        keys.key(&Topic::Repair(me)),
-        keys.every_robot("decision"),
-        keys.key(&Topic::Decision),
-        keys.every_instructor("feedback"),
-        keys.every_instructor("answer"),
-    ];
-    for key in of_interest {
-        let inbox = inbox.clone();
-        session
-            .declare_subscriber(key)
-            .allowed_origin(Locality::Remote)
-            .callback(move |sample| inbox.on_sample(&sample))
-            .background()
-            .await?;
-    }
-    let inbox = inbox.clone();
-    session
-        .liveliness()
-        .declare_subscriber(keys.every_robot("alive"))
-        .history(true)
-        .callback(move |sample| inbox.on_liveliness(&sample))
-        .background()
-        .await?;
-    let last = last.clone();
-    session
-        .declare_queryable(keys.key(&Topic::Decision))
-        .callback(move |query| last.on_query(&query))
-        .background()
-        .await?;
-    Ok(())
-}
-
-impl Declared {
-    /// Serves the mind until the robot's handle is gone, then leaves the swarm.
-    pub(super) async fn run(mut self, keeper: Option<Keeper>) {
-        let keeper = keeper.map(|keeper| tokio::spawn(keeper.run()));
-        let census = tokio::spawn(take_census(
-            self.host.node.clone(),
-            self.host.keys.clone(),
-            self.host.inbox.clone(),
-        ));
-        let (inbox, guests) = (self.host.inbox.clone(), self.host.guests.clone());
+    /// Serves the mind until the robot's handle is gone, or a part has failed that it cannot do without.
+    pub async fn run(mut self) {
+        let (inbox, guests) = (self.inbox.clone(), self.guests.clone());
+        let ended = self.supervisor.ended();
+        tokio::pin!(ended);
         loop {
-            let wake = self.host.mind.next_wake().map(|wake| self.host.started + wake);
-            let wake = wake.into_iter().chain(self.unsaid.as_ref().map(|(_, due)| *due)).min();
+            let wake = self.mind.next_wake().map(|wake| self.started + wake);
+            let wake = wake.into_iter().chain(self.voice.due()).min();
             tokio::select! {
                 () = inbox.ready() => {
                     for input in inbox.take() {
                         self.step(input);
                     }
                 }
-                command = self.host.commands.recv() => match command {
+                command = self.commands.recv() => match command {
                     Some(input) => self.step(input),
                     None => break,
                 },
+                found = found(&mut self.apprentice) => self.take_up(found),
                 () = guests.changed() => self.step(Input::Guests(guests.present())),
                 () = sleep_until(wake) => self.step(Input::Tick),
+                _ = &mut ended => break,
             }
         }
-        census.abort();
-        if let Some(keeper) = keeper {
-            keeper.abort();
-        }
-        drop(self.presence);
-        // What is still to be written is written before the robot is gone.
-        tokio::task::block_in_place(|| drop(self.host.apprentice.take()));
-        self.host.node.close().await;
+        // What is still to be written and said is, before the robot is gone.
+        tokio::task::block_in_place(|| drop(self));
     }
 
     fn step(&mut self, input: Input) {
+        let Some(input) = self.note(input) else { return };
+        self.handle(input);
+        // The classifier may just have failed.
+        if let Some(blind) = self.sight.news() {
+            self.handle(Input::Blind(blind));
+        }
+        self.voice.publish_hold();
+        self.report_learning();
+        for (refusal, count) in self.mind.refusals().iter() {
+            if count > 0 {
+                self.account.set(refusal.name(), count);
+            }
+        }
+    }
+
+    fn handle(&mut self, input: Input) {
+        for output in self.mind.handle(self.started.elapsed(), input) {
+            self.carry_out(output);
+        }
+    }
+
+    /// Tells the program of what arrives, and says what of it is for the mind.
+    fn note(&mut self, input: Input) -> Option<Input> {
         match &input {
             Input::Alive(alive) => {
-                self.tell_alive(alive | &self.host.guests.present());
+                self.tell_alive(alive | &self.guests.present());
             }
             Input::Guests(guests) => {
-                let tokens = self.host.inbox.tokens();
+                let tokens = self.inbox.tokens();
                 self.tell_alive(&tokens | guests);
             }
             Input::Neighbours(neighbours) => {
-                self.host.account.lock().neighbours = neighbours.iter().copied().collect();
+                self.account.lock().neighbours = neighbours.iter().copied().collect();
                 self.tell(Event::Neighbours(neighbours.clone()));
             }
             Input::Announced(decision) => self.tell(Event::Announced(self.announcement(decision))),
             Input::Learned(classifier) => {
-                self.host.vocabulary = Some(classifier.vocabulary().clone());
-                *self.host.classifier.lock().unwrap_or_else(PoisonError::into_inner) =
-                    Some(classifier.clone());
+                let guarded = self.sight.guard(classifier.clone())?;
+                self.vocabulary = Some(guarded.vocabulary().clone());
+                *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier.clone());
+                return Some(Input::Learned(guarded));
+            }
+            // Blind is also one whose classifier failed, whatever its camera shows.
+            Input::Blind(blind) => {
+                self.sight.told(*blind);
+                return Some(Input::Tick);
             }
             Input::Remembered(revision) => self.tell(Event::Remembered(*revision)),
             _ => {}
         }
-        let now = self.host.started.elapsed();
-        for output in self.host.mind.handle(now, input) {
-            self.carry_out(output);
-        }
-        self.publish_hold();
-        self.report_learning();
-        for (refusal, count) in self.host.mind.refusals().iter() {
-            if count > 0 {
-                self.host.account.set(refusal.name(), count);
+        Some(input)
+    }
+
+    /// Begins anew with what this robot knew before, on a disk that came late. What it learned since its start was
+    /// acknowledged to nobody; of that, what others know comes back from them.
+    fn take_up(&mut self, found: Found) {
+        let Some(apprentice) = &self.apprentice else { return };
+        let Found { memory, classifier, boot } = found;
+        let learning = apprentice.learning().clone();
+        let mind = new_mind(self.me, boot, self.mind.config().clone(), self.fusion.clone())
+            .map_err(|error| error.to_string())
+            .and_then(|mind| {
+                mind.learning(learning.setup(self.me, boot, Some(memory))).map_err(|error| error.to_string())
+            });
+        let mind = match mind {
+            Ok(mind) => mind,
+            Err(error) => {
+                let why =
+                    format!("the memory that came late is not taken up, and nothing is remembered: {error}");
+                apprentice.refuse(&why);
+                return self.account.error(&why);
             }
+        };
+        apprentice.take_up();
+        self.mind = mind;
+        self.sight.begin_anew();
+        self.account.count("memory_taken_up");
+        let open = {
+            let mut status = self.account.lock();
+            status.boot = boot;
+            std::mem::take(&mut status.open).then_some(status.round).flatten()
+        };
+        if let Some(round) = open {
+            self.tell(Event::Closed(round));
         }
+        let known = self.classifier.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let classifier =
+            learning.first_classifier(classifier).map(|first| first as Arc<dyn Classify>).or(known);
+        if let Some(classifier) = classifier {
+            self.step(Input::Learned(classifier));
+        }
+        self.step(Input::Alive(self.inbox.tokens()));
+        self.step(Input::Neighbours(self.inbox.links().into_values().collect()));
+        self.step(Input::Guests(self.guests.present()));
     }
 
     fn tell_alive(&self, mut alive: BTreeSet<RobotId>) {
-        alive.remove(&self.host.me);
-        self.host.account.lock().alive = alive.iter().copied().chain([self.host.me]).collect();
+        alive.remove(&self.me);
+        self.account.lock().alive = alive.iter().copied().chain([self.me]).collect();
         self.tell(Event::Alive(alive));
     }
 
     /// Puts what was learned into the status, when it has changed.
     fn report_learning(&mut self) {
-        if let Some(apprentice) = &mut self.host.apprentice
-            && apprentice.has_news(&self.host.mind)
+        if let Some(apprentice) = &mut self.apprentice
+            && apprentice.has_news(&self.mind)
         {
-            let learning = apprentice.status(&self.host.mind);
-            self.host.account.lock().learning = learning;
+            let learning = apprentice.status(&self.mind);
+            self.account.lock().learning = learning;
         }
     }
 
     fn carry_out(&mut self, output: Output) {
         match output {
-            Output::Broadcast(envelope) => self.broadcast(&envelope),
-            Output::Tell(neighbour, envelope) => self.repair(neighbour, &envelope),
+            Output::Broadcast(envelope) => {
+                self.voice.broadcast(&envelope);
+                if let gestalt_protocol::Message::Samples(samples) = envelope.message {
+                    self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
+                }
+            }
+            Output::Tell(neighbour, envelope) => self.voice.tell(neighbour, &envelope),
             Output::Hold(decision) => {
-                let mut status = self.host.account.lock();
+                let mut status = self.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
-                self.unsaid = Some((self.announcement(&decision), self.hold_due(&decision)));
+                self.voice.hold(self.announcement(&decision));
                 self.tell(Event::Held(decision));
             }
             Output::Announce(decision) => {
                 let announcement = self.announcement(&decision);
-                self.publish("decision", &self.swarm, &announcement);
+                self.voice.announce(&announcement);
                 self.tell(Event::Announced(announcement));
             }
             Output::Opened(round) => {
-                let mut status = self.host.account.lock();
+                let mut status = self.account.lock();
                 (status.round, status.open) = (Some(round), true);
                 drop(status);
                 self.tell(Event::Opened(round));
             }
             Output::Closed(round) => {
                 // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
-                let mut status = self.host.account.lock();
+                let mut status = self.account.lock();
                 (status.round, status.open) = (Some(round), false);
                 drop(status);
                 self.tell(Event::Closed(round));
             }
-            Output::Answer(instructor, answer) => self.answer(instructor, answer),
+            Output::Answer(instructor, answer) => {
+                self.voice.answer(&instructor, &answer);
+                self.tell(Event::Answered(instructor, answer));
+            }
             Output::Train(changes) => {
-                if let Some(apprentice) = &self.host.apprentice {
+                if let Some(apprentice) = &self.apprentice {
                     apprentice.train(changes);
                 }
             }
             Output::Remember { revision, changes } => {
-                if let Some(apprentice) = &self.host.apprentice {
+                if let Some(apprentice) = &self.apprentice {
                     apprentice.remember(revision, changes);
                 }
             }
         }
     }
 
-    fn broadcast(&self, envelope: &Envelope) {
-        if let Message::Samples(samples) = &envelope.message {
-            let bytes = envelope.encode();
-            self.host.account.sent("sample", bytes.len());
-            self.host.account.check(self.sample.put(bytes).wait());
-            return self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
-        }
-        let bytes = self.presence.vote(envelope);
-        self.host.inbox.said(&bytes);
-    }
-
-    fn answer(&self, instructor: InstructorId, answer: Answer) {
-        let json = serde_json::to_string(&answer).expect("an answer has a place in JSON");
-        self.host.account.sent("answer", json.len());
-        let put = self
-            .host
-            .node
-            .session()
-            .put(self.host.keys.key(&Topic::Answer(instructor.clone())), json)
-            .encoding(Encoding::APPLICATION_JSON)
-            .priority(Priority::InteractiveHigh)
-            .congestion_control(CongestionControl::Block)
-            .wait();
-        self.host.account.check(put);
-        self.tell(Event::Answered(instructor, answer));
-    }
-
-    /// When a decision now held is to be published. Robots that are just settling among each other would otherwise
-    /// each say every step of it to all.
-    fn hold_due(&self, decision: &Decision) -> Instant {
-        let now = Instant::now();
-        if decision.author != self.host.me {
-            return now + ADOPTED_HOLD_DELAY;
-        }
-        let before = self.said.filter(|(round, _)| *round == decision.round.counter);
-        before.map_or(now, |(_, at)| at + OWN_HOLD_INTERVAL)
-    }
-
-    fn publish_hold(&mut self) {
-        if let Some((announcement, _)) = self.unsaid.take_if(|(_, due)| Instant::now() >= *due) {
-            let json = self.publish("robot_decision", &self.held, &announcement);
-            self.last.set(json, self.host.node.session().new_timestamp());
-            self.said = Some((announcement.decision.round.counter, Instant::now()));
-        }
-    }
-
-    fn repair(&self, neighbour: RobotId, envelope: &Envelope) {
-        let bytes = envelope.encode();
-        let kind = match &envelope.message {
-            Message::Have(_) | Message::Know(_) => "have",
-            Message::Vote(_) | Message::Give(_) | Message::Samples(_) | Message::Lessons(_) => "give",
-        };
-        self.host.account.sent(kind, bytes.len());
-        let key = self.host.keys.key(&Topic::Repair(neighbour));
-        let put = self
-            .host
-            .node
-            .session()
-            .put(key, bytes)
-            .priority(Priority::Data)
-            .congestion_control(CongestionControl::Drop)
-            .express(true)
-            .wait();
-        self.host.account.check(put);
-    }
-
-    fn publish(&self, kind: &str, publisher: &Publisher<'_>, announcement: &Announcement) -> String {
-        let json = serde_json::to_string(announcement)
-            .expect("every field of a decision, with string keys and finite numbers, has a place in JSON");
-        self.host.account.sent(kind, json.len());
-        self.host.account.check(publisher.put(json.as_str()).wait());
-        json
-    }
-
     fn announcement(&self, decision: &Decision) -> Announcement {
-        let vocabulary = self.host.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
+        let vocabulary = self.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
         let label = decision.class.and_then(|class| vocabulary?.label(class)).map(str::to_owned);
         Announcement { decision: decision.clone(), label }
     }
 
     fn tell(&self, event: Event) {
         // An error says that nobody listens, which is fine.
-        let _ = self.host.events.send(event);
+        let _ = self.events.send(event);
     }
 }
 
-pub(super) async fn sleep_until(wake: Option<Instant>) {
-    match wake {
-        Some(wake) => tokio::time::sleep_until(wake.into()).await,
+async fn found(apprentice: &mut Option<Apprentice>) -> Found {
+    match apprentice {
+        Some(apprentice) => apprentice.found().await,
         None => std::future::pending().await,
-    }
-}
-
-impl Last {
-    fn set(&self, json: String, at: Timestamp) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((json, Some(at)));
-    }
-
-    fn on_query(&self, query: &Query) {
-        let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((json, at)) = last {
-            let key = query.key_expr().clone();
-            // A client that has gone meanwhile is no error of this robot's.
-            let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(at).wait();
-        }
     }
 }

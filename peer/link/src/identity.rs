@@ -11,7 +11,8 @@ use zenoh::session::ZenohId;
 
 const HIGHEST: u64 = 1 << 63;
 
-/// A number that no earlier start had, from the operating system's entropy.
+/// A number that no earlier start had, from the operating system's entropy: the standard library draws the keys of its
+/// hash maps there. It need not be secret, so that serves without a crate for it.
 #[must_use]
 pub fn fresh_nonce() -> u64 {
     RandomState::new().build_hasher().finish()

@@ -254,8 +254,12 @@ impl Inbox {
     pub(super) fn on_census(&self, present: &BTreeSet<RobotId>, gone: &BTreeSet<RobotId>) {
         let mut state = self.lock();
         let before = state.alive.clone();
-        state.alive.extend(present);
         state.alive.retain(|id| !gone.contains(id));
+        for robot in present {
+            if state.alive.len() < MAX_ROBOTS {
+                state.alive.insert(*robot);
+            }
+        }
         if state.alive != before {
             self.account.count("census_corrections");
             state.alive_changed = true;

@@ -1,4 +1,4 @@
-//! Finds other robots by multicast and keeps the links that [`topology`](super::topology) chooses.
+//! Finds other robots by multicast and keeps the links that [`neighbourhood`](crate::neighbourhood) chooses.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -9,11 +9,11 @@ use tokio::sync::mpsc;
 use zenoh::config::WhatAmI;
 use zenoh::session::ZenohId;
 
-use super::account::Account;
-use super::identity::{robot_of, swarm_checksum};
-use super::inbox::Inbox;
-use super::session::Node;
-use super::topology::{Topology, View};
+use crate::account::Account;
+use crate::identity::{robot_of, swarm_checksum};
+use crate::inbox::Inbox;
+use crate::neighbourhood::{Neighbourhood, View};
+use crate::session::Node;
 
 /// How often links are looked after.
 const PERIOD: Duration = Duration::from_millis(500);
@@ -35,24 +35,24 @@ const MAX_FAILURES: u32 = 3;
 pub(super) struct Keeper {
     me: RobotId,
     swarm: u32,
-    topology: Topology,
+    neighbourhood: Neighbourhood,
     node: Node,
     inbox: Arc<Inbox>,
     account: Arc<Account>,
     scouting: zenoh::Config,
-    heard: BTreeMap<RobotId, Heard>,
+    heard: BTreeMap<RobotId, Sighting>,
     busy: BTreeSet<RobotId>,
-    news: (mpsc::UnboundedSender<News>, mpsc::UnboundedReceiver<News>),
+    news: (mpsc::UnboundedSender<Sign>, mpsc::UnboundedReceiver<Sign>),
 }
 
-struct Heard {
+struct Sighting {
     id: ZenohId,
     locators: Vec<String>,
     at: Instant,
     failures: u32,
 }
 
-enum News {
+enum Sign {
     Heard(ZenohId, Vec<String>),
     Dialled(RobotId, bool),
 }
@@ -70,7 +70,7 @@ impl Keeper {
         Self {
             me,
             swarm: swarm_checksum(swarm),
-            topology: Topology::new(me, max_links),
+            neighbourhood: Neighbourhood::new(me, max_links),
             node,
             inbox,
             account,
@@ -81,8 +81,8 @@ impl Keeper {
         }
     }
 
-    /// Runs until it is aborted.
-    pub(super) async fn run(mut self) {
+    /// Never returns.
+    pub(super) async fn run(mut self) -> Result<(), String> {
         let started = Instant::now();
         let mut busy_until = started + UNREST;
         let mut before = BTreeMap::new();
@@ -97,7 +97,7 @@ impl Keeper {
             tokio::pin!(next);
             loop {
                 tokio::select! {
-                    Some(news) = self.news.1.recv() => self.on_news(news),
+                    Some(sign) = self.news.1.recv() => self.on_sign(sign),
                     () = &mut next => break,
                 }
             }
@@ -105,10 +105,10 @@ impl Keeper {
         }
     }
 
-    fn on_news(&mut self, news: News) {
-        match news {
-            News::Heard(id, locators) => self.on_heard(id, locators),
-            News::Dialled(robot, stands) => {
+    fn on_sign(&mut self, sign: Sign) {
+        match sign {
+            Sign::Heard(id, locators) => self.on_heard(id, locators),
+            Sign::Dialled(robot, stands) => {
                 self.busy.remove(&robot);
                 if !stands {
                     self.account.count("dial_failed");
@@ -135,7 +135,7 @@ impl Keeper {
             return;
         }
         if self.heard.len() < MAX_HEARD || self.heard.contains_key(&robot) {
-            self.heard.insert(robot, Heard { id, locators, at: Instant::now(), failures: 0 });
+            self.heard.insert(robot, Sighting { id, locators, at: Instant::now(), failures: 0 });
         }
     }
 
@@ -150,7 +150,7 @@ impl Keeper {
             linked: links.values().copied().collect(),
             alive: self.inbox.alive(),
         };
-        let plan = self.topology.plan(started.elapsed(), &view);
+        let plan = self.neighbourhood.plan(started.elapsed(), &view);
         for robot in plan.dial {
             self.dial(robot);
         }
@@ -174,9 +174,11 @@ impl Keeper {
         let (node, news, id, locators) =
             (self.node.clone(), self.news.0.clone(), heard.id, heard.locators.clone());
         tokio::spawn(async move {
-            let stands = node.dial(id, &locators).await;
+            // A panic inside Zenoh makes no link.
+            let dialled = tokio::spawn(async move { node.dial(id, &locators).await });
+            let stands = dialled.await.unwrap_or(false);
             // The keeper may be gone: then nobody needs to know.
-            let _ = news.send(News::Dialled(robot, stands));
+            let _ = news.send(Sign::Dialled(robot, stands));
         });
     }
 
@@ -187,7 +189,7 @@ impl Keeper {
         let scouting = zenoh::scout(WhatAmI::Router, self.scouting.clone())
             .callback(move |hello| {
                 let locators = hello.locators().iter().map(ToString::to_string).collect();
-                let _ = news.send(News::Heard(hello.zid(), locators));
+                let _ = news.send(Sign::Heard(hello.zid(), locators));
             })
             .await;
         match scouting {

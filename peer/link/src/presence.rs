@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Keys, RobotId, Topic};
 use tokio::sync::watch;
-use tokio::task::JoinHandle;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
@@ -13,19 +12,20 @@ use zenoh::query::{Query, Queryable};
 use zenoh::sample::Locality;
 use zenoh::{Session, Wait};
 
-use super::account::Account;
-use super::census::keep_token;
+use crate::account::Account;
+use crate::failure::Part;
+use crate::supervisor::Supervisor;
+use crate::token::keep_token;
 
 /// When a new robot asks whether its id is taken: late enough that its links stand.
 const TWIN_CHECK: Duration = Duration::from_secs(3);
 
-/// A robot's declarations on a session. Dropping it withdraws them.
-pub(super) struct Presence {
+/// A robot's declarations on a session. Dropping it withdraws them; its liveliness token goes when the supervisor's parts
+/// are ended.
+pub(crate) struct Presence {
     vote: Publisher<'static>,
     account: Arc<Account>,
     _status: Queryable<()>,
-    /// One keeps the liveliness token declared, and takes it along when it ends; one asks for a twin.
-    tasks: [JoinHandle<()>; 2],
 }
 
 impl Presence {
@@ -35,6 +35,7 @@ impl Presence {
         me: RobotId,
         account: Arc<Account>,
         lost_links: watch::Receiver<u64>,
+        supervisor: &Arc<Supervisor>,
     ) -> zenoh::Result<Self> {
         let status_key = keys.key(&Topic::Status(me));
         let (of_status, node) = (account.clone(), session.zid().to_string());
@@ -50,11 +51,13 @@ impl Presence {
             .await?;
         let alive = keys.key(&Topic::Alive(me));
         let token = session.liveliness().declare_token(&alive).await?;
-        let tasks = [
-            tokio::spawn(keep_token(session.clone(), alive, lost_links, token)),
-            tokio::spawn(ask_for_twin(session.clone(), status_key, account.clone())),
-        ];
-        Ok(Self { vote, account, _status: status, tasks })
+        let (session, asking, mut first) = (session.clone(), account.clone(), Some(token));
+        supervisor.keep(Part::Presence, move || {
+            let token = keep_token(session.clone(), alive.clone(), lost_links.clone(), first.take());
+            let twin = ask_for_twin(session.clone(), status_key.clone(), asking.clone());
+            async { tokio::try_join!(token, twin).map(|_| ()) }
+        });
+        Ok(Self { vote, account, _status: status })
     }
 
     /// Says a vote to all.
@@ -63,12 +66,6 @@ impl Presence {
         self.account.sent("vote", bytes.len());
         self.account.check(self.vote.put(bytes.as_slice()).wait());
         bytes
-    }
-}
-
-impl Drop for Presence {
-    fn drop(&mut self) {
-        self.tasks.iter().for_each(JoinHandle::abort);
     }
 }
 
@@ -84,13 +81,15 @@ fn on_status(account: &Account, node: &str, query: &Query) {
 }
 
 /// Asks once whether anyone else answers to this robot's id.
-async fn ask_for_twin(session: Session, status_key: String, account: Arc<Account>) {
+async fn ask_for_twin(session: Session, status_key: String, account: Arc<Account>) -> Result<(), String> {
     tokio::time::sleep(TWIN_CHECK).await;
     let query = format!("{status_key}?from={}", session.zid());
-    let Ok(replies) = session.get(query).allowed_destination(Locality::Remote).await else { return };
+    let replies = session.get(query).priority(Priority::DataLow).allowed_destination(Locality::Remote);
+    let replies = replies.await.map_err(|error| format!("asking for a robot of the same id: {error}"))?;
     while let Ok(reply) = replies.recv_async().await {
         if reply.result().is_ok() {
             account.twin();
         }
     }
+    Ok(())
 }

@@ -1,32 +1,35 @@
 //! A robot of a swarm, as the program around it holds it.
 
-use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Answer, Camera, Decision, InstructorId, Keys, RobotId, RoundId, SampleId, Status};
-use gestalt_strategies::mind::Mind;
-use gestalt_strategies::{Classify, Input, MindConfig, Observation, Vocabulary};
+use gestalt_protocol::{Camera, Keys, RobotId, RoundId, Status};
+use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary};
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
 use zenoh::Session;
 
-use super::account::Account;
-use super::apprentice::{Apprentice, Prepared, RobotLearning};
-use super::guest::Guests;
-use super::host::Host;
-use super::identity::swarm_checksum;
-use super::inbox::Inbox;
-use super::keeper::Keeper;
-use super::session::Node;
-use super::{Announcement, LinkConfig, LinkError};
-
-/// How many observations and instructions of the program may wait for the robot's task.
-pub(super) const MAX_COMMANDS: usize = 1024;
-
-/// How many events a receiver may lag behind before it misses some.
-pub(super) const MAX_EVENTS: usize = 1024;
+use crate::account::Account;
+use crate::apprentice::{Apprentice, Prepared, RobotLearning};
+use crate::census::take_census;
+use crate::config::LinkConfig;
+use crate::error::LinkError;
+use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
+use crate::failure::{Failure, Part};
+use crate::guard::Sight;
+use crate::guests::Guests;
+use crate::host::Host;
+use crate::identity::swarm_checksum;
+use crate::inbox::Inbox;
+use crate::keeper::Keeper;
+use crate::mind::new_mind;
+use crate::outbox::Outbox;
+use crate::presence::Presence;
+use crate::session::{Node, watch_session};
+use crate::subscriptions::listen;
+use crate::supervisor::{Supervisor, run_apart};
+use crate::voice::Voice;
 
 /// Everything a robot needs to take part in a swarm.
 #[derive(Clone, Debug)]
@@ -42,6 +45,8 @@ pub struct RobotConfig {
     pub swarm: String,
     /// How it takes part in rounds.
     pub mind: MindConfig,
+    /// Your own fusion rule, in place of the one that `mind` names: the same at all robots of a swarm.
+    pub fusion: Option<Arc<dyn Fuse>>,
     /// How it is linked to others.
     pub link: LinkConfig,
     /// The gestures' labels, for a robot that announces decisions without a classifier of its own.
@@ -52,33 +57,11 @@ pub struct RobotConfig {
     pub nonce: u64,
 }
 
-/// What a robot lets the program around it know.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// It takes part in that round: show it frames.
-    Opened(RoundId),
-    /// That round is over for it.
-    Closed(RoundId),
-    /// It now holds that decision.
-    Held(Decision),
-    /// That decision was announced for the swarm, by this robot or another.
-    Announced(Announcement),
-    /// The robots it is linked to now.
-    Neighbours(BTreeSet<RobotId>),
-    /// The robots alive now, itself aside.
-    Alive(BTreeSet<RobotId>),
-    /// It shared these samples.
-    Shared(Vec<SampleId>),
-    /// It answered that instructor.
-    Answered(InstructorId, Answer),
-    /// All that it knew at that revision of its memory is on the disk.
-    Remembered(u64),
-}
-
 /// A running robot. Dropping it ends it without waiting; [`Robot::stop`] waits until its session is closed.
 #[derive(Debug)]
 pub struct Robot {
     pub(super) account: Arc<Account>,
+    pub(super) supervisor: Arc<Supervisor>,
     pub(super) started: Instant,
     pub(super) commands: mpsc::Sender<Input>,
     pub(super) events: broadcast::Sender<Event>,
@@ -103,12 +86,12 @@ impl Robot {
         if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
             return Err(LinkError::Runtime);
         }
-        let RobotConfig { id, name, boot, swarm, mind, link, vocabulary, learning, nonce } = config;
+        let RobotConfig { id, name, boot, swarm, mind, fusion, link, vocabulary, learning, nonce } = config;
         let vocabulary = vocabulary.or_else(|| learning.as_ref().map(|learning| learning.vocabulary.clone()));
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
         let rounds = mind;
-        let mut mind = Mind::new(id, boot, rounds.clone())?;
+        let mut mind = new_mind(id, boot, rounds.clone(), fusion.clone())?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
         }
@@ -121,13 +104,15 @@ impl Robot {
             ..Status::new(id, name, boot)
         };
         let account = Arc::new(Account::new(status, started));
+        let (events, first_events) = broadcast::channel(MAX_EVENTS);
+        let supervisor = Supervisor::new(account.clone(), events.clone());
         let inbox =
             Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone(), link.loss));
         let mut first_classifier = None;
         let apprentice = match prepared {
             Some(prepared) => {
                 first_classifier = prepared.classifier();
-                Some(Apprentice::start(prepared, &inbox, &account)?)
+                Some(Apprentice::start(prepared, id, &inbox, &account, &supervisor)?)
             }
             None => None,
         };
@@ -137,47 +122,59 @@ impl Robot {
         };
         let node = Node::open(zenoh.clone(), on_link).await?;
         let locators = node.locators();
-        let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
-        let (events, first_events) = broadcast::channel(MAX_EVENTS);
-        let keeper = link.scouting.is_some().then(|| {
-            Keeper::new(id, &swarm, link.max_links, node.clone(), inbox.clone(), account.clone(), zenoh)
-        });
         account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));
+        let declared = declare(id, &node, &keys, &inbox, &account, &supervisor).await;
+        let voice = match declared {
+            Ok(voice) => voice,
+            Err(error) => {
+                supervisor.stop().await;
+                node.close().await;
+                return Err(error);
+            }
+        };
+        if link.scouting.is_some() {
+            let (node, inbox, account) = (node.clone(), inbox.clone(), account.clone());
+            supervisor.keep(Part::Links, move || {
+                let (node, inbox, account) = (node.clone(), inbox.clone(), account.clone());
+                Keeper::new(id, &swarm, link.max_links, node, inbox, account, zenoh.clone()).run()
+            });
+        }
+        let (of_census, of_keys, counted) = (node.clone(), keys.clone(), inbox.clone());
+        supervisor
+            .keep(Part::Census, move || take_census(of_census.clone(), of_keys.clone(), counted.clone()));
+        let (watched, watching) = (node.session().clone(), supervisor.clone());
+        supervisor.keep(Part::Session, move || watch_session(watched.clone(), watching.clone()));
+        let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
         let classifier = Arc::new(Mutex::new(None));
         let guests = Arc::<Guests>::default();
         let (session, lost_links) = (node.session().clone(), inbox.lost_links());
         let host = Host {
             me: id,
+            fusion,
             mind,
             started,
-            node: node.clone(),
-            keys: keys.clone(),
             inbox,
             account: account.clone(),
+            supervisor: supervisor.clone(),
             commands: command_queue,
             guests: guests.clone(),
             events: events.clone(),
             vocabulary,
             apprentice,
             classifier: classifier.clone(),
+            voice,
+            sight: Sight::new(supervisor.clone()),
         };
-        let host = match host.declare().await {
-            Ok(declared) => tokio::spawn(declared.run(keeper)),
-            Err(error) => {
-                node.close().await;
-                return Err(error);
-            }
-        };
-        let first_events = Mutex::new(Some(first_events));
         let robot = Self {
             account,
             started,
             commands,
             events,
-            first_events,
+            first_events: Mutex::new(Some(first_events)),
             classifier,
             locators,
-            host,
+            host: tokio::spawn(serve(host, supervisor.clone(), node)),
+            supervisor,
             session,
             keys,
             rounds,
@@ -289,6 +286,18 @@ impl Robot {
         &self.locators
     }
 
+    /// Waits until the robot has ended though nobody stopped it: a part of it failed that it cannot do without. Its status
+    /// stays readable here; all it could still write is written, and its session is closed, when [`Robot::stop`] returns.
+    pub async fn ended(&self) -> Failure {
+        self.supervisor.ended().await
+    }
+
+    /// Makes a part of this robot panic, so that a test sees what becomes of it.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub fn make_fail(&self, part: Part) {
+        self.supervisor.make_fail(part);
+    }
+
     /// Leaves the swarm and waits until its session is closed.
     pub async fn stop(self) {
         drop(self.commands);
@@ -296,4 +305,33 @@ impl Robot {
             tracing::error!("the robot's task ended badly: {error}");
         }
     }
+}
+
+/// Makes a robot known to the swarm.
+async fn declare(
+    id: RobotId,
+    node: &Node,
+    keys: &Keys,
+    inbox: &Arc<Inbox>,
+    account: &Arc<Account>,
+    supervisor: &Arc<Supervisor>,
+) -> Result<Voice, LinkError> {
+    let session = node.session();
+    let outbox = Outbox::start(session.clone(), account.clone(), supervisor.clone())?;
+    let declared = async {
+        listen(session, keys, id, inbox).await?;
+        let lost_links = inbox.lost_links();
+        let presence = Presence::declare(session, keys, id, account.clone(), lost_links, supervisor).await?;
+        Voice::declare(id, session, keys, inbox.clone(), outbox, presence, account.clone()).await
+    };
+    declared.await.map_err(|error| LinkError::open(&*error))
+}
+
+/// Runs the mind's task, and all that is kept beside it, to the end.
+async fn serve(host: Host, supervisor: Arc<Supervisor>, node: Node) {
+    if let Err(cause) = run_apart(supervisor.clone(), Part::Mind, host.run()).await {
+        supervisor.end(Part::Mind, cause);
+    }
+    supervisor.stop().await;
+    node.close().await;
 }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use zenoh::Session;
 use zenoh::internal::runtime::{DynamicRuntime, Runtime, RuntimeBuilder};
@@ -17,8 +18,12 @@ use zenoh_transport::{
     TransportMulticastEventHandler, TransportPeer, TransportPeerEventHandler,
 };
 
-use super::LinkError;
-use super::error::reason;
+use crate::error::{LinkError, reason};
+use crate::failure::Part;
+use crate::supervisor::Supervisor;
+
+/// How often it is made sure that a session is still open.
+const LOOK_AFTER: Duration = Duration::from_millis(500);
 
 /// A Zenoh session with a handle on each of its links.
 #[derive(Clone)]
@@ -99,6 +104,17 @@ impl Node {
         }
         if let Err(error) = self.runtime.close().await {
             tracing::debug!("closing the Zenoh runtime: {error}");
+        }
+    }
+}
+
+/// Ends a robot whose session has been closed, by whomever. Never returns before.
+pub(crate) async fn watch_session(session: Session, supervisor: Arc<Supervisor>) -> Result<(), String> {
+    loop {
+        tokio::time::sleep(LOOK_AFTER).await;
+        if session.is_closed() {
+            supervisor.end(Part::Session, "Zenoh closed it".to_owned());
+            return Ok(());
         }
     }
 }

@@ -1,17 +1,19 @@
 //! A thread beside a robot's task: it is handed work, and takes all that has gathered at once.
 
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A running thread, and the desk where its work gathers. Dropping it waits for the thread's end.
+/// A running thread, and the tray where its work gathers. Dropping it waits for the thread's end.
 pub(crate) struct Worker<P> {
-    desk: Arc<Desk<P>>,
+    tray: Arc<Tray<P>>,
     thread: Option<JoinHandle<()>>,
 }
 
 /// Where work gathers.
-pub(crate) struct Desk<P> {
+pub(crate) struct Tray<P> {
     state: Mutex<State<P>>,
     changed: Condvar,
 }
@@ -21,50 +23,62 @@ struct State<P> {
     ended: bool,
 }
 
-impl<P: Default + Send + 'static> Worker<P> {
-    /// Starts a thread of that name, which `work`s until the desk says that it has ended.
-    pub fn start(name: &str, work: impl FnOnce(&Desk<P>) + Send + 'static) -> std::io::Result<Self> {
-        let state = State { pending: P::default(), ended: false };
-        let desk = Arc::new(Desk { state: Mutex::new(state), changed: Condvar::new() });
-        let of_thread = desk.clone();
-        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || work(&of_thread))?;
-        Ok(Self { desk, thread: Some(thread) })
+impl<P: Send + 'static> Worker<P> {
+    /// Starts a thread of that name, which `work`s until the tray says that it has ended; `died` is told of a panic that
+    /// `work` did not catch itself.
+    pub fn start(
+        name: &str,
+        pending: P,
+        work: impl FnOnce(&Tray<P>) + Send + 'static,
+        died: impl FnOnce(&(dyn Any + Send)) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let state = State { pending, ended: false };
+        let tray = Arc::new(Tray { state: Mutex::new(state), changed: Condvar::new() });
+        let of_thread = tray.clone();
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
+            if let Err(panic) = catch_unwind(AssertUnwindSafe(|| work(&of_thread))) {
+                died(&*panic);
+            }
+        })?;
+        Ok(Self { tray, thread: Some(thread) })
     }
 
     /// Adds to what is pending.
-    pub fn hand_over(&self, add: impl FnOnce(&mut P)) {
-        add(&mut self.desk.lock().pending);
-        self.desk.changed.notify_one();
+    pub fn hand_over<T>(&self, add: impl FnOnce(&mut P) -> T) -> T {
+        let added = add(&mut self.tray.lock().pending);
+        self.tray.changed.notify_one();
+        added
     }
 }
 
 impl<P> Drop for Worker<P> {
     fn drop(&mut self) {
-        self.desk.lock().ended = true;
-        self.desk.changed.notify_one();
+        self.tray.lock().ended = true;
+        self.tray.changed.notify_one();
         if let Some(thread) = self.thread.take() {
-            let name = thread.thread().name().unwrap_or("a worker").to_owned();
-            if thread.join().is_err() {
-                tracing::error!("the thread '{name}' ended badly");
-            }
+            // Its panic was told of when it happened.
+            let _ = thread.join();
         }
     }
 }
 
-impl<P> Desk<P> {
+impl<P> Tray<P> {
     fn lock(&self) -> MutexGuard<'_, State<P>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until there is work, or no more will come. What is pending is taken; the second value says whether this
-    /// was the last of it.
-    pub fn take(&self, is_work: impl Fn(&P) -> bool) -> (P, bool)
-    where
-        P: Default,
-    {
+    /// Waits until there is work, but no longer than `patience`, or no more will come; and takes what there is. The second
+    /// value says whether this was the last of it.
+    pub fn take<T>(
+        &self,
+        is_work: impl Fn(&P) -> bool,
+        patience: Duration,
+        take: impl FnOnce(&mut P) -> T,
+    ) -> (T, bool) {
         let idle = |state: &mut State<P>| !is_work(&state.pending) && !state.ended;
-        let mut state = self.changed.wait_while(self.lock(), idle).unwrap_or_else(PoisonError::into_inner);
-        (std::mem::take(&mut state.pending), state.ended)
+        let waited = self.changed.wait_timeout_while(self.lock(), patience, idle);
+        let mut state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        (take(&mut state.pending), state.ended)
     }
 
     /// Puts back what could not be done, and waits so long, or until the end. Says whether that has come.

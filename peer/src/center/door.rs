@@ -148,6 +148,7 @@ impl Door {
                     boot,
                     swarm: self.config.swarm.0.clone(),
                     mind: self.config.mind(),
+                    fusion: None,
                     link,
                     vocabulary: Some(self.model.classifier.vocabulary().clone()),
                     learning: None,

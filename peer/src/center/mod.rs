@@ -87,6 +87,7 @@ impl Center {
                 boot,
                 swarm: config.swarm.0.clone(),
                 mind: config.mind(),
+                fusion: None,
                 link: link(config),
                 vocabulary: Some(model.classifier.vocabulary().clone()),
                 learning: None,

@@ -120,5 +120,12 @@ pub(super) fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
             &json!({"event": "remembered", "revision": revision}),
             &format!("remembers revision {revision}"),
         ),
+        Event::Failed { part, cause } => line(
+            as_json,
+            &json!({"event": "failed", "part": part.name(), "cause": cause}),
+            &format!("{part} failed: {cause}"),
+        ),
+        // What a later release may have to tell.
+        _ => Ok(()),
     }
 }

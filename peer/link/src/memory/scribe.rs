@@ -1,16 +1,45 @@
 //! The thread that writes a robot's memory, so that a slow disk never delays a vote.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_strategies::{Change, Classifier};
+use gestalt_protocol::RobotId;
+use gestalt_strategies::{Change, Classifier, Memory};
 
-use super::{Store, StoreError};
-use crate::worker::{Desk, Worker};
+use super::error::StoreError;
+use super::place::Place;
+use super::store::{Records, Reopened, Run, Store};
+use crate::failure::Part;
+use crate::panics::said;
+use crate::supervisor::Supervisor;
+use crate::worker::{Tray, Worker};
 
-/// How long after a failure the disk is tried again.
-const RETRY: Duration = Duration::from_secs(2);
+/// How long after a failure the disk is tried again: at first, and at most.
+const RETRY: Duration = Duration::from_secs(1);
+const MAX_RETRY: Duration = Duration::from_secs(5);
+
+/// How often a robot with nothing to write makes sure that its file is still there.
+const LOOK_AFTER: Duration = Duration::from_secs(1);
+
+/// What the scribe has to tell.
+pub(crate) enum Told {
+    /// All up to that revision is on the disk.
+    Wrote(u64),
+    /// Something failed; what could not be written is tried again.
+    Failed(StoreError),
+    /// The disk came late, and holds what this robot knew before. Nothing is written until [`Scribe::take_up`].
+    Found(Found),
+}
+
+/// What a disk that came late holds.
+pub(crate) struct Found {
+    pub memory: Memory,
+    pub classifier: Option<Arc<Classifier>>,
+    /// The number of this life, now that all starts are counted.
+    pub boot: u32,
+}
 
 /// Writes what it is given, in order, many changes at once when they come faster than the disk takes them. Dropping it
 /// waits until what was handed over is written, or has failed once more.
@@ -23,127 +52,223 @@ struct Pending {
     records: BTreeMap<Vec<u8>, Option<Vec<u8>>>,
     revision: u64,
     classifier: Option<Arc<Classifier>>,
+    /// What is handed over now is of a mind that will give way to one that knows what was found.
+    found: bool,
 }
 
 impl Pending {
     fn is_work(&self) -> bool {
-        !self.records.is_empty() || self.classifier.is_some()
+        !self.found && (!self.records.is_empty() || self.classifier.is_some())
     }
 }
 
+/// Where a scribe writes, and for whom.
+pub(crate) struct Assignment {
+    pub place: Arc<dyn Place>,
+    pub robot: RobotId,
+    /// The number of this life.
+    pub boot: u32,
+    /// What stands in the store.
+    pub known: Records,
+    /// `None` where the disk is not there yet.
+    pub store: Option<Store>,
+}
+
 impl Scribe {
-    /// Starts to write to `store`. `wrote` is told of each revision that is safe, `failed` of each failure; what
-    /// could not be written is tried again.
+    /// Starts to write.
     pub fn start(
-        store: Store,
-        wrote: impl Fn(u64) + Send + 'static,
-        failed: impl Fn(&StoreError) + Send + 'static,
+        assignment: Assignment,
+        supervisor: Arc<Supervisor>,
+        tell: impl Fn(Told) + Send + 'static,
     ) -> std::io::Result<Self> {
-        Worker::start("memory", move |desk| write_all(desk, store, &wrote, &failed)).map(Self)
+        let of_death = supervisor.clone();
+        let work = move |tray: &Tray<Pending>| Writing::new(assignment, supervisor).run(tray, &tell);
+        let died = move |panic: &(dyn std::any::Any + Send)| of_death.end(Part::Memory, said(panic));
+        Worker::start("memory", Pending::default(), work, died).map(Self)
     }
 
-    /// Hands over changes, which `wrote` will name by their revision.
+    /// Hands over changes, which [`Told::Wrote`] will name by their revision.
     pub fn remember(&self, revision: u64, changes: Vec<Change>) {
         self.0.hand_over(|pending| {
-            pending.records.extend(changes.into_iter().map(|change| (change.key, change.value)));
-            pending.revision = revision;
+            if !pending.found {
+                pending.records.extend(changes.into_iter().map(|change| (change.key, change.value)));
+                pending.revision = revision;
+            }
         });
     }
 
     /// Hands over a new classifier.
     pub fn remember_classifier(&self, classifier: Arc<Classifier>) {
-        self.0.hand_over(|pending| pending.classifier = Some(classifier));
+        self.0.hand_over(|pending| {
+            if !pending.found {
+                pending.classifier = Some(classifier);
+            }
+        });
+    }
+
+    /// What is handed over from now on is of a mind that knows what was found.
+    pub fn take_up(&self) {
+        self.0.hand_over(|pending| pending.found = false);
     }
 }
 
-fn write_all(desk: &Desk<Pending>, store: Store, wrote: &impl Fn(u64), failed: &impl Fn(&StoreError)) {
-    let (path, boot) = (store.path().to_owned(), store.boot());
-    let mut store = Some(store);
-    // A classifier alone is written under the revision before.
-    let mut latest = 0;
-    loop {
-        let (pending, ended) = desk.take(Pending::is_work);
-        if ended && !pending.is_work() {
-            return;
-        }
-        let Pending { records, revision, classifier } = pending;
-        latest = revision.max(latest);
-        let changes: Vec<Change> = records.into_iter().map(|(key, value)| Change { key, value }).collect();
-        let opened = store.take().map_or_else(|| Store::reopen(&path, boot), Ok);
-        let written = opened.and_then(|open| open.write(&changes, classifier.as_deref()).map(|()| open));
-        match written {
-            Ok(open) => {
-                store = Some(open);
-                wrote(latest);
+/// What came of trying to write.
+enum Done {
+    /// There was nothing to write, and the file is still there.
+    Nothing,
+    Wrote,
+    Found(Found),
+}
+
+/// The thread's own side.
+struct Writing {
+    place: Arc<dyn Place>,
+    robot: RobotId,
+    boot: u32,
+    store: Option<Store>,
+    /// Set once a file of this run was open.
+    run: Option<Run>,
+    /// All that the file should hold, for one that is removed while the robot runs. Bounded as the robot's own knowledge.
+    known: Records,
+    classifier: Option<Arc<Classifier>>,
+    supervisor: Arc<Supervisor>,
+}
+
+impl Writing {
+    fn new(assignment: Assignment, supervisor: Arc<Supervisor>) -> Self {
+        let Assignment { place, robot, boot, known, store } = assignment;
+        let run = store.as_ref().map(Store::run);
+        Self { place, robot, boot, store, run, known, classifier: None, supervisor }
+    }
+
+    fn run(mut self, tray: &Tray<Pending>, tell: &impl Fn(Told)) {
+        // A classifier alone is written under the revision before.
+        let mut latest = 0;
+        let mut pause = RETRY;
+        loop {
+            let take = |pending: &mut Pending| {
+                let (records, classifier) = (std::mem::take(&mut pending.records), pending.classifier.take());
+                (records, pending.revision, classifier)
+            };
+            let ready = |pending: &Pending| pending.is_work() || self.supervisor.is_doomed(Part::Memory);
+            let ((records, revision, classifier), ended) = tray.take(ready, LOOK_AFTER, take);
+            if ended && records.is_empty() && classifier.is_none() {
+                return;
             }
-            Err(error) => {
-                failed(&error);
-                // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
-                let ended = desk.put_back(
-                    |pending| {
-                        for Change { key, value } in changes {
-                            pending.records.entry(key).or_insert(value);
-                        }
-                        pending.classifier = pending.classifier.take().or(classifier);
-                    },
-                    RETRY,
-                );
-                if ended {
-                    return;
+            latest = revision.max(latest);
+            let changes: Vec<Change> =
+                records.into_iter().map(|(key, value)| Change { key, value }).collect();
+            let written = catch_unwind(AssertUnwindSafe(|| {
+                self.supervisor.stumble(Part::Memory);
+                match &self.store {
+                    Some(store) if changes.is_empty() && classifier.is_none() => {
+                        store.check().map(|()| Done::Nothing)
+                    }
+                    _ => self.write(&changes, classifier.as_ref()),
                 }
+            }));
+            let error = match written {
+                Ok(Ok(Done::Nothing)) => continue,
+                Ok(Ok(Done::Wrote)) => {
+                    pause = RETRY;
+                    tell(Told::Wrote(latest));
+                    continue;
+                }
+                Ok(Ok(Done::Found(found))) => {
+                    // Revisions are counted anew, as the mind is.
+                    latest = 0;
+                    tray.put_back(
+                        |pending| *pending = Pending { found: true, ..Pending::default() },
+                        Duration::ZERO,
+                    );
+                    tell(Told::Found(found));
+                    continue;
+                }
+                Ok(Err(error)) => Some(error),
+                Err(panic) => {
+                    self.supervisor.failed(Part::Memory, &said(&*panic));
+                    None
+                }
+            };
+            // The database takes nothing more until it is opened again.
+            self.store = None;
+            if let Some(error) = error {
+                tell(Told::Failed(error));
+            }
+            // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
+            let ended = tray.put_back(
+                |pending| {
+                    for Change { key, value } in changes {
+                        pending.records.entry(key).or_insert(value);
+                    }
+                    pending.classifier = pending.classifier.take().or(classifier);
+                },
+                pause,
+            );
+            pause = (pause * 2).min(MAX_RETRY);
+            if ended {
+                return;
             }
         }
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use std::sync::mpsc;
-
-    use gestalt_protocol::RobotId;
-
-    use super::*;
-
-    fn change(key: u8, value: u8) -> Change {
-        Change { key: vec![key], value: Some(vec![value]) }
-    }
-
-    #[test]
-    fn what_is_handed_over_is_written_and_said_to_be() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("m");
-        let (wrote, written) = mpsc::channel();
-        let store = Store::open(&path, RobotId(1), 1).unwrap();
-        let scribe =
-            Scribe::start(store, move |revision| wrote.send(revision).unwrap(), |e| panic!("{e}")).unwrap();
-        for revision in 1..=20 {
-            scribe.remember(revision, vec![change(revision as u8, 1)]);
+    /// Writes, to a file that is opened first where there is none open.
+    fn write(
+        &mut self,
+        changes: &[Change],
+        classifier: Option<&Arc<Classifier>>,
+    ) -> Result<Done, StoreError> {
+        if self.store.is_none()
+            && let Some(found) = self.open()?
+        {
+            return Ok(Done::Found(found));
         }
-        drop(scribe);
-        assert_eq!(written.iter().last(), Some(20));
-        let read = Store::open(&path, RobotId(1), 1).unwrap().memory();
-        assert!(read.is_err(), "twenty records of no kind");
+        for Change { key, value } in changes {
+            match value {
+                Some(value) => self.known.insert(key.clone(), value.clone()),
+                None => self.known.remove(key),
+            };
+        }
+        self.classifier = classifier.or(self.classifier.as_ref()).cloned();
+        if let Some(store) = &self.store {
+            store.write(changes, classifier.map(|classifier| &**classifier))?;
+        }
+        Ok(Done::Wrote)
     }
 
-    #[test]
-    fn a_disk_that_fails_is_reported_and_tried_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("m");
-        let store = Store::open(&path, RobotId(1), 1).unwrap();
-        // A table of another type under the same name is refused at every write.
-        let (failed, failures) = mpsc::channel();
-        store.spoil();
-        let scribe = Scribe::start(
-            store,
-            |_| panic!("nothing was written"),
-            move |e| {
-                let _ = failed.send(e.to_string());
-            },
-        )
-        .unwrap();
-        scribe.remember(1, vec![change(1, 1)]);
-        let patience = Duration::from_secs(20);
-        assert!(failures.recv_timeout(patience).unwrap().contains("make room"));
-        assert!(failures.recv_timeout(patience).is_ok(), "tried again");
+    /// Opens the file. `Some` when it came late and knows something.
+    fn open(&mut self) -> Result<Option<Found>, StoreError> {
+        let Some(run) = self.run else { return self.open_late() };
+        let Reopened { store, removed } = Store::reopen(self.place.clone(), self.robot, run)?;
+        self.run = Some(store.run());
+        // What the file should hold and does not: all of it, where it is a new one.
+        let holds = store.records()?;
+        let lacks = self.known.iter().filter(|(key, value)| holds.get(*key) != Some(value));
+        let lacks = lacks.map(|(key, value)| Change { key: key.clone(), value: Some(value.clone()) });
+        let surplus = holds.keys().filter(|key| !self.known.contains_key(*key));
+        let surplus = surplus.map(|key| Change { key: key.clone(), value: None });
+        let changes: Vec<Change> = lacks.chain(surplus).collect();
+        let classifier = self.classifier.as_deref().filter(|_| removed);
+        if classifier.is_some() || !changes.is_empty() {
+            store.write(&changes, classifier)?;
+        }
+        self.store = Some(store);
+        Ok(None)
+    }
+
+    /// A disk that was not there at the start may hold what this robot knew before.
+    fn open_late(&mut self) -> Result<Option<Found>, StoreError> {
+        let (store, new) = Store::open(self.place.clone(), self.robot, self.boot)?;
+        let memory = store.memory()?;
+        let found = if new || memory.is_empty() {
+            None
+        } else {
+            let classifier = store.classifier()?.map(Arc::new);
+            Some(Found { memory, classifier, boot: store.boot() })
+        };
+        self.known = store.records()?;
+        self.run = Some(store.run());
+        self.store = Some(store);
+        Ok(found)
     }
 }

@@ -1,12 +1,19 @@
 //! The file: an embedded database in which a change is written whole or not at all.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::{Change, Classifier, Memory, MemoryError};
-use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, TableDefinition};
-use thiserror::Error;
+use gestalt_strategies::{Change, Classifier, Memory};
+use redb::{Builder, Database, ReadableDatabase, ReadableTable, StorageBackend, TableDefinition};
+
+use super::bytes::Bytes;
+use super::error::StoreError;
+use super::place::{FileId, Place};
+use crate::identity::fresh_nonce;
+use crate::panics::said;
 
 /// Facts about the file itself.
 const ABOUT: TableDefinition<'_, &str, u64> = TableDefinition::new("about");
@@ -18,128 +25,111 @@ const CLASSIFIER: TableDefinition<'_, (), &[u8]> = TableDefinition::new("classif
 /// The layout of the tables; another layout gets another number.
 const SCHEMA: u64 = 1;
 
-/// Why a memory cannot be opened, read or written. Nothing that was written before is lost.
-#[derive(Debug, Error)]
-pub enum StoreError {
-    /// The disk: no room, no right to write, no such folder.
-    #[error("memory {path}: {cause}; make room, or give the robot another file")]
-    Disk {
-        /// Which file.
-        path: PathBuf,
-        /// What the database says.
-        cause: Box<redb::Error>,
-    },
-    /// Another process has it open.
-    #[error("memory {0} is in use by another process: give each robot a file of its own")]
-    InUse(PathBuf),
-    /// Written by another release.
-    #[error(
-        "memory {path} has schema {found}, this release reads {SCHEMA}: move the file away, or run the release that wrote it"
-    )]
-    Schema {
-        /// Which file.
-        path: PathBuf,
-        /// The schema found.
-        found: u64,
-    },
-    /// Another robot's.
-    #[error("memory {path} is robot {found}'s, this is robot {expected}: give each robot a file of its own")]
-    Robot {
-        /// Which file.
-        path: PathBuf,
-        /// Whose it is.
-        found: u64,
-        /// Who opened it.
-        expected: RobotId,
-    },
-    /// No memory at all, or a damaged one.
-    #[error("memory {path}: {cause}")]
-    Content {
-        /// Which file.
-        path: PathBuf,
-        /// What is wrong.
-        cause: MemoryError,
-    },
-}
+/// What every file of the database begins with.
+const MAGIC: [u8; 9] = [b'r', b'e', b'd', b'b', 0x1A, 0x0A, 0xA9, 0x0D, 0x0A];
 
-impl StoreError {
-    /// Whether the disk is at fault, and not what stands on it: a robot can do without for now.
-    #[must_use]
-    pub fn is_of_the_disk(&self) -> bool {
-        matches!(self, Self::Disk { .. })
-    }
+/// How much of the file is kept in memory while it is open, in bytes: it is read once, then only written.
+const CACHE: usize = 4 << 20;
+
+/// Records as they stand in the file.
+pub(crate) type Records = BTreeMap<Vec<u8>, Vec<u8>>;
+
+/// What the file says of itself.
+struct About {
+    schema: u64,
+    robot: u64,
+    boot: u64,
+    mark: u64,
 }
 
 /// An open memory.
 #[derive(Debug)]
-pub struct Store {
+pub(crate) struct Store {
     database: Database,
-    path: PathBuf,
+    place: Arc<dyn Place>,
+    file: FileId,
     boot: u32,
+    /// Differs at every start: tells this run's file from a copy put in its place.
+    mark: u64,
 }
 
 impl Store {
-    /// Opens a robot's memory, or makes a new one, and counts this start. The first start has number `first_boot`.
+    /// Opens a robot's memory, or makes a new one, and counts this start. The first start has number `first_boot`. Says
+    /// whether it is new.
     ///
     /// # Errors
     /// See [`StoreError`].
-    pub fn open(path: &Path, robot: RobotId, first_boot: u32) -> Result<Self, StoreError> {
-        let disk = |cause: redb::Error| StoreError::Disk { path: path.to_owned(), cause: Box::new(cause) };
-        let database = Database::create(path).map_err(|error| match error {
-            DatabaseError::DatabaseAlreadyOpen => StoreError::InUse(path.to_owned()),
-            other => disk(other.into()),
+    pub fn open(place: Arc<dyn Place>, robot: RobotId, first_boot: u32) -> Result<(Self, bool), StoreError> {
+        let there = place.is_there().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
+        if !there {
+            Self::make(&place, robot, first_boot)?;
+        }
+        let mut store = Self::read(place, robot)?;
+        if there {
+            store.boot = first_boot.max(store.boot.saturating_add(1));
+        }
+        store.mark = fresh_nonce();
+        guarded(store.place.path(), || {
+            sign(&store.database, robot, store.boot, store.mark)?;
+            store.commit(&[], None)
         })?;
-        let mut store = Self { database, path: path.to_owned(), boot: first_boot };
-        let before = store.about().map_err(disk)?;
-        if let Some((schema, owner, last_boot)) = before {
-            if schema != SCHEMA {
-                return Err(StoreError::Schema { path: store.path, found: schema });
-            }
-            if owner != u64::from(robot.0) {
-                return Err(StoreError::Robot { path: store.path, found: owner, expected: robot });
-            }
-            let next = u32::try_from(last_boot).unwrap_or(u32::MAX).saturating_add(1);
-            store.boot = first_boot.max(next);
-        }
-        store.sign(robot).map_err(disk)?;
-        Ok(store)
+        Ok((store, !there))
     }
 
-    /// Opens it again after the disk failed: the database takes nothing more until then.
+    /// Opens it again after it failed, or makes a new one where it was removed: see [`Reopened`].
     ///
     /// # Errors
-    /// See [`StoreError`].
-    pub(super) fn reopen(path: &Path, boot: u32) -> Result<Self, StoreError> {
-        let disk =
-            |cause: DatabaseError| StoreError::Disk { path: path.to_owned(), cause: Box::new(cause.into()) };
-        let database = Database::create(path).map_err(disk)?;
-        Ok(Self { database, path: path.to_owned(), boot })
-    }
-
-    /// Schema, robot and number of the last start, of a file that was written before.
-    fn about(&self) -> Result<Option<(u64, u64, u64)>, redb::Error> {
-        let read = self.database.begin_read()?;
-        let table = match read.open_table(ABOUT) {
-            Ok(table) => table,
-            Err(redb::TableError::TableDoesNotExist(_)) => return Ok(None),
-            Err(error) => return Err(error.into()),
-        };
-        let fact = |name| Ok::<_, redb::Error>(table.get(name)?.map(|value| value.value()));
-        Ok(Some((fact("schema")?.unwrap_or(0), fact("robot")?.unwrap_or(0), fact("boot")?.unwrap_or(0))))
-    }
-
-    fn sign(&self, robot: RobotId) -> Result<(), redb::Error> {
-        let write = self.database.begin_write()?;
-        {
-            let mut table = write.open_table(ABOUT)?;
-            table.insert("schema", SCHEMA)?;
-            table.insert("robot", u64::from(robot.0))?;
-            table.insert("boot", u64::from(self.boot))?;
-            write.open_table(RECORDS)?;
-            write.open_table(CLASSIFIER)?;
+    /// [`StoreError::Replaced`] for another file than before, and the others of [`StoreError`].
+    pub fn reopen(place: Arc<dyn Place>, robot: RobotId, before: Run) -> Result<Reopened, StoreError> {
+        let there = place.is_there().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
+        if !there {
+            let store = Self::open(place, robot, before.boot)?.0;
+            return Ok(Reopened { store, removed: true });
         }
-        write.commit()?;
-        Ok(())
+        let store = Self::read(place, robot)?;
+        if store.mark != before.mark {
+            return Err(StoreError::Replaced(store.place.path().to_owned()));
+        }
+        Ok(Reopened { store, removed: false })
+    }
+
+    /// Makes a new file, signed.
+    fn make(place: &Arc<dyn Place>, robot: RobotId, boot: u32) -> Result<(), StoreError> {
+        let path = place.path();
+        place.make(&|bytes| {
+            let signed = || {
+                let database = Builder::new().set_cache_size(CACHE).create_with_backend(bytes)?;
+                sign(&database, robot, boot, fresh_nonce())?;
+                Ok(database.close()?)
+            };
+            guarded(path, signed)
+        })
+    }
+
+    /// Opens a file that is there, every byte of it checked, and owner and schema too.
+    fn read(place: Arc<dyn Place>, robot: RobotId) -> Result<Self, StoreError> {
+        let path = place.path().to_owned();
+        let (bytes, file) = place.open().map_err(|cause| StoreError::of_system(&path, &cause))?;
+        check_head(&path, &bytes)?;
+        let (database, about) = guarded(&path, || {
+            let database = Builder::new()
+                .set_cache_size(CACHE)
+                .set_check_integrity_on_open(true)
+                .create_with_backend(bytes)?;
+            let about = about(&database)?;
+            Ok((database, about))
+        })?;
+        let About { schema, robot: owner, boot, mark } =
+            about.ok_or_else(|| StoreError::Foreign(path.clone()))?;
+        if schema != SCHEMA {
+            return Err(StoreError::Schema { path, found: schema, expected: SCHEMA });
+        }
+        if owner != u64::from(robot.0) {
+            return Err(StoreError::Robot { path, found: owner, expected: robot });
+        }
+        let boot =
+            u32::try_from(boot).map_err(|_| StoreError::damaged(&path, "an impossible number of starts"))?;
+        Ok(Self { database, place, file, boot, mark })
     }
 
     /// Which start of the robot this is: higher than at any before.
@@ -148,57 +138,89 @@ impl Store {
         self.boot
     }
 
-    /// Where it stands.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// What tells this run's file from any other.
+    pub fn run(&self) -> Run {
+        Run { boot: self.boot, mark: self.mark }
     }
 
     /// What the robot remembered up to its end.
     ///
     /// # Errors
-    /// [`StoreError::Disk`] and [`StoreError::Content`].
+    /// [`StoreError::Damaged`], [`StoreError::Content`], and those of the disk.
     pub fn memory(&self) -> Result<Memory, StoreError> {
-        let records = self.records().map_err(|cause| self.disk(cause))?;
-        Memory::read(records.iter().map(|(key, value)| (key.as_slice(), value.as_slice())))
-            .map_err(|cause| StoreError::Content { path: self.path.clone(), cause })
+        let path = self.place.path();
+        let records = self.records()?;
+        let read = Memory::read(records.iter().map(|(key, value)| (key.as_slice(), value.as_slice())));
+        read.map_err(|cause| match cause {
+            gestalt_strategies::MemoryError::Damaged(what) => StoreError::damaged(path, what),
+            cause => StoreError::Content { path: path.to_owned(), cause },
+        })
     }
 
-    fn records(&self) -> Result<BTreeMap<Vec<u8>, Vec<u8>>, redb::Error> {
-        let table = self.database.begin_read()?.open_table(RECORDS)?;
-        let mut records = BTreeMap::new();
-        for record in table.iter()? {
-            let (key, value) = record?;
-            records.insert(key.value().to_vec(), value.value().to_vec());
-        }
-        Ok(records)
+    /// The records as they stand in the file.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] and those of the disk.
+    pub fn records(&self) -> Result<Records, StoreError> {
+        guarded(self.place.path(), || {
+            let table = self.database.begin_read()?.open_table(RECORDS)?;
+            let mut records = Records::new();
+            for record in table.iter()? {
+                let (key, value) = record?;
+                records.insert(key.value().to_vec(), value.value().to_vec());
+            }
+            Ok(records)
+        })
     }
 
     /// The classifier as it was last trained. One that cannot be read is none: it is trained again.
     ///
     /// # Errors
-    /// [`StoreError::Disk`].
+    /// [`StoreError::Damaged`] and those of the disk.
     pub fn classifier(&self) -> Result<Option<Classifier>, StoreError> {
-        let bytes = || {
+        let bytes = guarded(self.place.path(), || {
             let table = self.database.begin_read()?.open_table(CLASSIFIER)?;
-            Ok::<_, redb::Error>(table.get(())?.map(|value| value.value().to_vec()))
-        };
-        let bytes = bytes().map_err(|cause| self.disk(cause))?;
+            Ok(table.get(())?.map(|value| value.value().to_vec()))
+        })?;
         Ok(bytes.and_then(|bytes| Classifier::decode(&bytes).ok()))
     }
 
     /// Writes changes, and a classifier if there is a new one: all of it or nothing, and when this returns it is on
-    /// the disk.
+    /// the disk, in the file that has the memory's name.
     ///
     /// # Errors
-    /// [`StoreError::Disk`].
+    /// [`StoreError::Removed`] and [`StoreError::Replaced`] when it was written to a file that has lost its name; those of
+    /// the disk; [`StoreError::Damaged`].
     pub fn write(&self, changes: &[Change], classifier: Option<&Classifier>) -> Result<(), StoreError> {
-        self.commit(changes, classifier).map_err(|cause| self.disk(cause))
+        let path = self.place.path();
+        guarded(path, || {
+            self.commit(changes, classifier)?;
+            // The database keeps two commits, and falls back to the earlier where the later is damaged. So each change
+            // stands in both before it counts as written.
+            self.commit(&[], None)
+        })?;
+        self.check()
+    }
+
+    /// Makes sure that the open file still has the memory's name.
+    ///
+    /// # Errors
+    /// [`StoreError::Removed`], [`StoreError::Replaced`] and those of the disk.
+    pub fn check(&self) -> Result<(), StoreError> {
+        let path = self.place.path();
+        match self.place.present().map_err(|cause| StoreError::of_system(path, &cause))? {
+            Some(file) if file == self.file => Ok(()),
+            Some(_) => Err(StoreError::Replaced(path.to_owned())),
+            None => Err(StoreError::Removed(path.to_owned())),
+        }
     }
 
     fn commit(&self, changes: &[Change], classifier: Option<&Classifier>) -> Result<(), redb::Error> {
         let write = self.database.begin_write()?;
         {
+            let mut about = write.open_table(ABOUT)?;
+            let commits = about.get("commits")?.map_or(0, |commits| commits.value());
+            about.insert("commits", commits.wrapping_add(1))?;
             let mut table = write.open_table(RECORDS)?;
             for Change { key, value } in changes {
                 match value {
@@ -210,77 +232,74 @@ impl Store {
                 write.open_table(CLASSIFIER)?.insert((), classifier.encode().as_slice())?;
             }
         }
-        write.commit()?;
-        Ok(())
-    }
-
-    /// Makes every write fail from now on.
-    #[cfg(test)]
-    pub(super) fn spoil(&self) {
-        let write = self.database.begin_write().unwrap();
-        write.delete_table(RECORDS).unwrap();
-        write.open_table(TableDefinition::<u64, u64>::new("records")).unwrap();
-        write.commit().unwrap();
-    }
-
-    fn disk(&self, cause: redb::Error) -> StoreError {
-        StoreError::Disk { path: self.path.clone(), cause: Box::new(cause) }
+        Ok(write.commit()?)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Which run of a robot a file was signed in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Run {
+    pub boot: u32,
+    mark: u64,
+}
 
-    fn change(key: u8, value: Option<u8>) -> Change {
-        Change { key: vec![key], value: value.map(|value| vec![value]) }
+/// A memory opened again.
+pub(crate) struct Reopened {
+    pub store: Store,
+    /// Whether it is a new one: the file had gone.
+    pub removed: bool,
+}
+
+/// Tells another program's file from a damaged one, before the database tries to make sense of it.
+fn check_head(path: &Path, bytes: &Bytes) -> Result<(), StoreError> {
+    let system = |cause: std::io::Error| StoreError::of_system(path, &cause);
+    let length = bytes.len().map_err(system)?;
+    if length < MAGIC.len() as u64 {
+        return Err(StoreError::damaged(path, format!("it is {length} bytes long")));
     }
-
-    #[test]
-    fn what_was_written_is_there_again_and_each_start_counts() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("robot.memory");
-        for start in 1..4 {
-            let store = Store::open(&path, RobotId(7), 1).unwrap();
-            assert_eq!(store.boot(), start);
-            let records = store.records().unwrap();
-            assert_eq!(records.len(), start as usize - 1);
-            store.write(&[change(start as u8, Some(9)), change(99, Some(1))], None).unwrap();
-            store.write(&[change(99, None)], None).unwrap();
-        }
+    let mut head = [0; MAGIC.len()];
+    bytes.read(0, &mut head).map_err(system)?;
+    let right = head.iter().zip(MAGIC).filter(|(found, expected)| **found == *expected).count();
+    match right {
+        9 => Ok(()),
+        // So many do not agree by chance.
+        5..9 => Err(StoreError::damaged(path, "its first bytes are others")),
+        _ => Err(StoreError::Foreign(path.to_owned())),
     }
+}
 
-    #[test]
-    fn a_boot_number_never_falls_below_the_clocks() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("robot.memory");
-        assert_eq!(Store::open(&path, RobotId(7), 5).unwrap().boot(), 5);
-        assert_eq!(Store::open(&path, RobotId(7), 1).unwrap().boot(), 6);
-        assert_eq!(Store::open(&path, RobotId(7), 100).unwrap().boot(), 100);
+/// What a file says of itself; `None` for a database of another program.
+fn about(database: &Database) -> Result<Option<About>, redb::Error> {
+    let read = database.begin_read()?;
+    let table = match read.open_table(ABOUT) {
+        Ok(table) => table,
+        Err(redb::TableError::TableDoesNotExist(_)) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let fact = |name| Ok::<_, redb::Error>(table.get(name)?.map(|value| value.value()));
+    let (Some(schema), Some(robot)) = (fact("schema")?, fact("robot")?) else { return Ok(None) };
+    let (boot, mark) = (fact("boot")?.unwrap_or(0), fact("mark")?.unwrap_or(0));
+    Ok(Some(About { schema, robot, boot, mark }))
+}
+
+fn sign(database: &Database, robot: RobotId, boot: u32, mark: u64) -> Result<(), redb::Error> {
+    let write = database.begin_write()?;
+    {
+        let mut table = write.open_table(ABOUT)?;
+        table.insert("schema", SCHEMA)?;
+        table.insert("robot", u64::from(robot.0))?;
+        table.insert("boot", u64::from(boot))?;
+        table.insert("mark", mark)?;
+        write.open_table(RECORDS)?;
+        write.open_table(CLASSIFIER)?;
     }
+    Ok(write.commit()?)
+}
 
-    #[test]
-    fn a_file_in_use_of_another_robot_or_of_no_kind_is_refused_by_name() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("robot.memory");
-        let store = Store::open(&path, RobotId(7), 1).unwrap();
-        assert!(matches!(Store::open(&path, RobotId(7), 1), Err(StoreError::InUse(_))));
-        drop(store);
-        assert!(matches!(Store::open(&path, RobotId(8), 1), Err(StoreError::Robot { found: 7, .. })));
-        let text = folder.path().join("text");
-        std::fs::write(&text, "no database").unwrap();
-        let error = Store::open(&text, RobotId(7), 1).unwrap_err();
-        assert!(error.to_string().contains("text"), "{error}");
-        let missing = folder.path().join("no/such/folder");
-        assert!(Store::open(&missing, RobotId(7), 1).unwrap_err().is_of_the_disk());
-    }
-
-    #[test]
-    fn records_that_are_no_memory_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(&folder.path().join("m"), RobotId(7), 1).unwrap();
-        assert!(store.memory().unwrap().is_empty());
-        store.write(&[change(200, Some(1))], None).unwrap();
-        assert!(matches!(store.memory(), Err(StoreError::Content { .. })));
+/// Calls the database, which may panic at bytes that it never wrote.
+fn guarded<T>(path: &Path, call: impl FnOnce() -> Result<T, redb::Error>) -> Result<T, StoreError> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(done) => done.map_err(|cause| StoreError::of_database(path, cause)),
+        Err(panic) => Err(StoreError::damaged(path, said(&*panic))),
     }
 }

@@ -1,0 +1,130 @@
+//! Where a memory lies: a file that appears whole or not at all. A trait, so that a test can be a disk that fails.
+
+use std::fmt::Debug;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use redb::backends::FileBackend;
+
+use super::bytes::Bytes;
+use super::error::StoreError;
+
+/// Fills the bytes of a new memory, and has them on the disk when it returns.
+pub(crate) type Fill<'a> = &'a dyn Fn(Bytes) -> Result<(), StoreError>;
+
+/// Where a memory lies.
+pub(crate) trait Place: Debug + Send + Sync {
+    /// Its name for people.
+    fn path(&self) -> &Path;
+
+    /// Whether a file is there.
+    fn is_there(&self) -> io::Result<bool>;
+
+    /// Opens the file that is there, and says which it is.
+    fn open(&self) -> io::Result<(Bytes, FileId)>;
+
+    /// Makes a file that `fill` has filled: until it is complete and on the disk, none is there. One that appears
+    /// meanwhile stays.
+    fn make(&self, fill: Fill<'_>) -> Result<(), StoreError>;
+
+    /// Which file is there now; `None` when there is none.
+    fn present(&self) -> io::Result<Option<FileId>>;
+}
+
+/// Tells a file from another of the same name: device and number on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FileId(pub u64, pub u64);
+
+/// A file of a file system.
+#[derive(Debug)]
+pub(crate) struct FilePlace(PathBuf);
+
+impl FilePlace {
+    pub fn new(path: PathBuf) -> Self {
+        Self(path)
+    }
+
+    /// Where a new memory is filled, before it has its name.
+    fn draft(&self) -> PathBuf {
+        let mut name = self.0.clone().into_os_string();
+        name.push(".new");
+        PathBuf::from(name)
+    }
+
+    /// Without this, a power cut soon after could leave the file without its name.
+    fn sync_folder(&self) -> io::Result<()> {
+        let folder = match self.0.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        File::open(folder)?.sync_all()
+    }
+
+    fn make_draft(&self, draft: &Path, fill: Fill<'_>) -> Result<(), StoreError> {
+        let system = |cause: io::Error| StoreError::of_system(&self.0, &cause);
+        match fs::remove_file(draft) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(system(error)),
+            // What a power cut left half-filled is nobody's.
+            _ => {}
+        }
+        let file = OpenOptions::new().read(true).write(true).create_new(true).open(draft).map_err(system)?;
+        let bytes = FileBackend::new(file)
+            .map_err(|error| StoreError::of_database(&self.0, redb::Error::from(error)))?;
+        fill(Bytes::new(bytes))?;
+        File::open(draft).and_then(|file| file.sync_all()).map_err(system)?;
+        // Unlike a renaming, a second name never takes the place of a file that has appeared meanwhile.
+        match fs::hard_link(draft, &self.0) {
+            Ok(()) => {}
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            // A file system without second names, such as FAT.
+            Err(_) => fs::rename(draft, &self.0).map_err(system)?,
+        }
+        self.sync_folder().map_err(system)
+    }
+}
+
+impl Place for FilePlace {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn is_there(&self) -> io::Result<bool> {
+        self.0.try_exists()
+    }
+
+    fn open(&self) -> io::Result<(Bytes, FileId)> {
+        let file = OpenOptions::new().read(true).write(true).open(&self.0)?;
+        let id = file_id(&file.metadata()?);
+        let bytes = FileBackend::new(file).map_err(io::Error::other)?;
+        Ok((Bytes::new(bytes), id))
+    }
+
+    fn make(&self, fill: Fill<'_>) -> Result<(), StoreError> {
+        let draft = self.draft();
+        let made = self.make_draft(&draft, fill);
+        // Gone already where it was renamed; what a full disk holds back is removed at the next attempt.
+        let _ = fs::remove_file(&draft);
+        made
+    }
+
+    fn present(&self) -> io::Result<Option<FileId>> {
+        match fs::metadata(&self.0) {
+            Ok(metadata) => Ok(Some(file_id(&metadata))),
+            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+#[cfg(unix)]
+fn file_id(metadata: &fs::Metadata) -> FileId {
+    use std::os::unix::fs::MetadataExt;
+    FileId(metadata.dev(), metadata.ino())
+}
+
+/// Other systems do not let an open file be removed.
+#[cfg(not(unix))]
+fn file_id(_: &fs::Metadata) -> FileId {
+    FileId(0, 0)
+}

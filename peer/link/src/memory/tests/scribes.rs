@@ -1,0 +1,155 @@
+//! What the writing thread makes of disks that fail, come late, or lose the file.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::Status;
+use tokio::sync::broadcast;
+
+use super::super::{Assignment, Place, Records, Scribe, Store, Told};
+use super::faulty::Disk;
+use super::{ME, change, open, place};
+use crate::account::Account;
+use crate::event::Event;
+use crate::failure::Part;
+use crate::supervisor::Supervisor;
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A scribe, and all that it tells.
+struct Watched {
+    scribe: Scribe,
+    told: Receiver<Told>,
+    supervisor: Arc<Supervisor>,
+    events: broadcast::Receiver<Event>,
+}
+
+fn start(place: Arc<dyn Place>, store: Option<Store>) -> Watched {
+    let account = Account::new(Status::new(ME, "seven".to_owned(), 1), Instant::now());
+    let (sender, events) = broadcast::channel(64);
+    let supervisor = Supervisor::new(Arc::new(account), sender);
+    let (tell, told) = channel();
+    let known = store.as_ref().map_or_else(Records::new, |store| store.records().unwrap());
+    let assignment = Assignment { place, robot: ME, boot: 1, known, store };
+    let tell = move |what| drop(tell.send(what));
+    Watched { scribe: Scribe::start(assignment, supervisor.clone(), tell).unwrap(), told, supervisor, events }
+}
+
+fn start_at(path: &Path) -> Watched {
+    start(place(path), Some(open(path).unwrap()))
+}
+
+impl Watched {
+    /// Waits for the first of what is told that suits.
+    fn wait<T>(&self, what: &str, suits: impl Fn(Told) -> Option<T>) -> T {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            let told = self.told.recv_timeout(left).unwrap_or_else(|_| panic!("never told: {what}"));
+            if let Some(found) = suits(told) {
+                return found;
+            }
+        }
+    }
+
+    fn wait_for_revision(&self, revision: u64) {
+        self.wait("written", |told| matches!(told, Told::Wrote(wrote) if wrote >= revision).then_some(()));
+    }
+
+    fn wait_for_error(&self, words: &str) {
+        self.wait(words, |told| match told {
+            Told::Failed(error) => error.to_string().contains(words).then_some(()),
+            _ => None,
+        });
+    }
+}
+
+#[test]
+fn what_is_handed_over_is_written_and_said_to_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m");
+    let watched = start_at(&path);
+    for revision in 1..=20_u8 {
+        watched.scribe.remember(u64::from(revision), vec![change(revision, Some(1))]);
+    }
+    watched.wait_for_revision(20);
+    drop(watched);
+    assert_eq!(open(&path).unwrap().records().unwrap().len(), 20);
+}
+
+#[test]
+fn a_full_disk_is_told_and_tried_again_until_all_is_written() {
+    let disk = Disk::default();
+    let (store, _) = Store::open(Arc::new(disk.clone()), ME, 1).unwrap();
+    let watched = start(Arc::new(disk.clone()), Some(store));
+    disk.fill(true);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_error("make room");
+    watched.wait_for_error("make room");
+    disk.fill(false);
+    watched.wait_for_revision(1);
+}
+
+#[test]
+fn a_file_removed_while_running_is_written_anew_with_all_that_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m");
+    open(&path).unwrap().write(&[change(1, Some(1))], None).unwrap();
+    let watched = start_at(&path);
+    watched.scribe.remember(1, vec![change(2, Some(2))]);
+    watched.wait_for_revision(1);
+    fs::remove_file(&path).unwrap();
+    // Noticed though nothing is to be written.
+    watched.wait_for_error("removed while running");
+    watched.wait_for_revision(1);
+    watched.scribe.remember(2, vec![change(3, Some(3))]);
+    watched.wait_for_revision(2);
+    drop(watched);
+    let records = open(&path).unwrap().records().unwrap();
+    assert_eq!(records.into_keys().collect::<Vec<_>>(), [[1], [2], [3]]);
+}
+
+#[test]
+fn a_disk_that_comes_late_and_empty_takes_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = folder.path().join("late");
+    let watched = start(place(&late.join("m")), None);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_error("its folder is not there");
+    fs::create_dir(&late).unwrap();
+    watched.wait_for_revision(1);
+    drop(watched);
+    assert_eq!(open(&late.join("m")).unwrap().records().unwrap().len(), 1);
+}
+
+#[test]
+fn a_file_damaged_late_is_refused_again_and_again_and_never_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = folder.path().join("late");
+    let watched = start(place(&late.join("m")), None);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_error("its folder is not there");
+    fs::create_dir(folder.path().join("made")).unwrap();
+    fs::write(folder.path().join("made/m"), "redb\x1a, but no more").unwrap();
+    fs::rename(folder.path().join("made"), &late).unwrap();
+    watched.wait_for_error("damaged");
+    watched.wait_for_error("damaged");
+    assert_eq!(fs::read(late.join("m")).unwrap(), b"redb\x1a, but no more");
+}
+
+#[test]
+fn a_panic_is_told_and_what_waits_is_written_then() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m");
+    let mut watched = start_at(&path);
+    watched.supervisor.make_fail(Part::Memory);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_revision(1);
+    let told = watched.events.try_recv().unwrap();
+    assert!(matches!(told, Event::Failed { part: Part::Memory, .. }), "{told:?}");
+    drop(watched);
+    assert_eq!(open(&path).unwrap().records().unwrap().len(), 1);
+}

@@ -1,0 +1,80 @@
+//! What a robot starts with when its memory is damaged, missing, or comes late.
+
+use std::fs;
+use std::path::Path;
+
+use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
+use tokio::time::timeout;
+
+use super::{PATIENCE, Watched, config, learning, swarm, unique};
+use crate::{Client, LinkConfig, LinkError, Robot, RobotConfig, StoreError};
+
+fn with_memory(name: &str, path: &Path) -> RobotConfig {
+    RobotConfig { learning: Some(learning(Some(path.to_owned()))), ..config(1, name, &[]) }
+}
+
+/// Says which gesture a round showed, and waits until that is acknowledged.
+async fn teach(watched: &Watched, name: &str, round: RoundId, class: u8) {
+    let link = LinkConfig { connect: watched.robot.locators().to_vec(), ..LinkConfig::default() };
+    let client = Client::open(name, &link).await.unwrap();
+    let was = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+    let answer = client.teach(&"ada".parse().unwrap(), &was, PATIENCE).await.unwrap();
+    assert!(answer.is_some(), "what is remembered is acknowledged");
+    client.close().await;
+}
+
+fn samples(robot: &Robot) -> usize {
+    robot
+        .status()
+        .learning
+        .map_or(0, |learning| [learning.personal, learning.shared, learning.external].iter().flatten().sum())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_or_foreign_memory_refuses_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("memory");
+    fs::write(&path, "something else altogether").unwrap();
+    let error = Robot::start(with_memory(&unique(), &path)).await.unwrap_err();
+    assert!(matches!(error, LinkError::Memory(StoreError::Foreign(_))), "{error}");
+    let name = unique();
+    swarm(&name, 1, with_memory(&name, &folder.path().join("sound"))).await.pop().unwrap().stop().await;
+    let mut bytes = fs::read(folder.path().join("sound")).unwrap();
+    bytes.truncate(bytes.len() / 2);
+    fs::write(&path, bytes).unwrap();
+    let error = Robot::start(with_memory(&name, &path)).await.unwrap_err();
+    assert!(matches!(error, LinkError::Memory(StoreError::Damaged { .. })), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_memory_that_comes_late_is_taken_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let (name, disk) = (unique(), folder.path().join("disk"));
+    fs::create_dir(&disk).unwrap();
+    let mut robot = swarm(&name, 1, with_memory(&name, &disk.join("memory"))).await.pop().unwrap();
+    let taught = robot.decide(0).await.round;
+    teach(&robot, &name, taught, 1).await;
+    let learned = samples(&robot.robot);
+    assert!(learned > 0);
+    robot.stop().await;
+    // The disk is not mounted when the robot starts again.
+    let unmounted = folder.path().join("unmounted");
+    fs::rename(&disk, &unmounted).unwrap();
+    let mut robot = swarm(&name, 1, with_memory(&name, &disk.join("memory"))).await.pop().unwrap();
+    let failing = |status: &gestalt_protocol::Status| {
+        let says =
+            |learning: &gestalt_protocol::Learning| learning.memory.contains("its folder is not there");
+        status.learning.as_ref().is_some_and(says)
+    };
+    robot.status("it says so", failing).await;
+    let decision = robot.decide(0).await;
+    assert!(decision.class.is_some(), "it votes");
+    let boot = robot.robot.status().boot;
+    fs::rename(&unmounted, &disk).unwrap();
+    robot.status("it is taken up", |status| status.counters.contains_key("memory_taken_up")).await;
+    assert!(samples(&robot.robot) >= learned, "what it knew is back");
+    assert!(robot.robot.status().boot >= boot);
+    // And what it hears now is remembered: a correction of what it was taught before.
+    teach(&robot, &name, taught, 0).await;
+    timeout(PATIENCE, robot.stop()).await.expect("it stops");
+}

@@ -1,0 +1,116 @@
+//! A neighbour that does not read holds up nobody.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use gestalt_protocol::Keys;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+use tokio::time::{sleep, timeout};
+use zenoh::Wait;
+use zenoh::qos::{CongestionControl, Priority};
+
+use super::{PATIENCE, config, swarm, unique};
+use crate::RobotConfig;
+
+/// Forwards between who connects and a robot, until it is told to forward nothing more from the robot. Gives where to
+/// connect.
+async fn proxy(robot: String, open: watch::Receiver<bool>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let at = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        let (stream, _) = listener.accept().await.unwrap();
+        let (mut from, mut to) = stream.into_split();
+        let (mut back, mut forth) = TcpStream::connect(robot).await.unwrap().into_split();
+        let other = tokio::spawn(async move { tokio::io::copy(&mut from, &mut forth).await });
+        let mut bytes = vec![0; 1 << 16];
+        while *open.borrow() {
+            let Ok(length @ 1..) = back.read(&mut bytes).await else { break };
+            to.write_all(&bytes[..length]).await.unwrap();
+        }
+        // Both ends stay open; what the robot sends is read no more.
+        let _ = other.await;
+    });
+    format!("tcp/{at}")
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn a_neighbour_that_does_not_read_delays_no_decision() {
+    let name = unique();
+    let mut first: RobotConfig = config(1, &name, &[]);
+    // A link that is silent stays, and a message that is not to be lost would wait for a minute.
+    first.link.lease = Duration::from_secs(60);
+    let patient = serde_json::json!({"link": {"tx": {"queue": {"congestion_control": {"block": {"wait_before_close": 60_000_000}}}}}});
+    first.link.zenoh.insert("transport".to_owned(), patient);
+    let mut robots = swarm(&name, 2, first).await;
+    let (open, is_open) = watch::channel(true);
+    let at = robots[0].robot.locators()[0].trim_start_matches("tcp/").to_owned();
+    let mut deaf = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", serde_json::json!("router")),
+        ("listen/endpoints", serde_json::json!([])),
+        ("connect/endpoints", serde_json::json!([proxy(at, is_open).await])),
+        ("scouting/multicast/enabled", serde_json::json!(false)),
+        ("transport/link/tx/lease", serde_json::json!(60_000)),
+    ] {
+        deaf.insert_json5(key, &value.to_string()).unwrap();
+    }
+    let deaf = zenoh::open(deaf).await.unwrap();
+    let keys = Keys::new(&name).unwrap();
+    let all = keys.key(&gestalt_protocol::Topic::Decision);
+    let all = format!("{}/**", all.rsplit_once('/').unwrap().0);
+    let heard = deaf.declare_subscriber(&all).await.unwrap();
+    // Until it hears a decision, the link and the subscription may not stand yet.
+    let mut counter = 0;
+    while heard.try_recv().unwrap().is_none() {
+        counter = robots[1].decide(counter).await.round.counter;
+    }
+    open.send_replace(false);
+    // Fills every buffer between the robot and the neighbour: those of the system take some megabytes.
+    let filler = format!("{}/filler", all.trim_end_matches("/**"));
+    let session = robots[0].robot.session.clone();
+    let sent = Arc::new(AtomicU32::new(0));
+    let counting = sent.clone();
+    std::thread::spawn(move || {
+        loop {
+            let put = session.put(&filler, vec![0_u8; 60_000]);
+            let put = put.priority(Priority::RealTime).congestion_control(CongestionControl::Block);
+            if put.wait().is_err() || session.is_closed() {
+                return;
+            }
+            counting.fetch_add(1, Ordering::Relaxed);
+        }
+    });
+    let mut seen = 0;
+    loop {
+        sleep(Duration::from_secs(1)).await;
+        match sent.load(Ordering::Relaxed) {
+            now if now == seen && now > 0 => break,
+            now => seen = now,
+        }
+    }
+    let before = counter;
+    for _ in 0..4 {
+        counter = robots[1].decide(counter).await.round.counter;
+        // The robot beside the deaf one decides as well.
+        let such =
+            |status: &gestalt_protocol::Status| status.round.is_some_and(|round| round.counter >= counter);
+        robots[0].status("it takes part", such).await;
+        let held = |event: &crate::Event| match event {
+            crate::Event::Held(held) if held.round.counter >= counter => Some(()),
+            _ => None,
+        };
+        robots[0].event("it decides", held).await;
+    }
+    assert!(counter >= before + 4);
+    let still = robots[0].robot.session.info().routers_zid().await.any(|id| id == deaf.zid());
+    assert!(still, "the deaf one is linked all the while");
+    drop(heard);
+    // Its end frees the thread that fills.
+    timeout(PATIENCE, deaf.close()).await.expect("it closes").unwrap();
+    for robot in robots {
+        timeout(PATIENCE, robot.stop()).await.expect("it stops");
+    }
+}

@@ -1,0 +1,191 @@
+//! What a robot says to the swarm, none of which waits for a slow link: what finds no room is dropped, and repaired.
+//!
+//! Votes and decisions go out at once, at priorities at which nobody sends what must not be lost: a link that takes
+//! nothing costs a millisecond, and only once. All else goes by way of the [`Outbox`].
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use zenoh::bytes::Encoding;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Query;
+use zenoh::time::Timestamp;
+use zenoh::{Session, Wait};
+
+use crate::account::Account;
+use crate::announcement::Announcement;
+use crate::inbox::Inbox;
+use crate::outbox::{Outbox, Parcel};
+use crate::presence::Presence;
+
+/// A robot that draws another decision of the same round within this time says so only once.
+const OWN_HOLD_INTERVAL: Duration = Duration::from_millis(50);
+
+/// How long a robot holds another's decision before it says so: all have heard it from its author.
+const ADOPTED_HOLD_DELAY: Duration = Duration::from_millis(300);
+
+/// What a robot says.
+pub(crate) struct Voice {
+    me: RobotId,
+    session: Session,
+    keys: Keys,
+    account: Arc<Account>,
+    inbox: Arc<Inbox>,
+    outbox: Outbox,
+    presence: Presence,
+    held: Publisher<'static>,
+    swarm: Publisher<'static>,
+    last: Arc<Last>,
+    /// The decision still to be published on `robot/<me>/decision`, and when.
+    unsaid: Option<(Announcement, Instant)>,
+    /// The round of the decision published last, and when.
+    said: Option<(u32, Instant)>,
+}
+
+impl Voice {
+    pub async fn declare(
+        me: RobotId,
+        session: &Session,
+        keys: &Keys,
+        inbox: Arc<Inbox>,
+        outbox: Outbox,
+        presence: Presence,
+        account: Arc<Account>,
+    ) -> zenoh::Result<Self> {
+        let decision = |topic| {
+            session
+                .declare_publisher(keys.key(&topic))
+                .encoding(Encoding::APPLICATION_JSON)
+                .priority(Priority::InteractiveHigh)
+                .congestion_control(CongestionControl::Drop)
+                .express(true)
+        };
+        let held = decision(Topic::RobotDecision(me)).await?;
+        let swarm = decision(Topic::Decision).await?;
+        let last = Arc::new(Last::default());
+        let of_query = last.clone();
+        session
+            .declare_queryable(keys.key(&Topic::Decision))
+            .callback(move |query| of_query.on_query(&query))
+            .background()
+            .await?;
+        let (session, keys) = (session.clone(), keys.clone());
+        Ok(Self {
+            me,
+            session,
+            keys,
+            account,
+            inbox,
+            outbox,
+            presence,
+            held,
+            swarm,
+            last,
+            unsaid: None,
+            said: None,
+        })
+    }
+
+    /// Says something to all.
+    pub fn broadcast(&self, envelope: &Envelope) {
+        if matches!(envelope.message, Message::Samples(_)) {
+            let key = self.keys.key(&Topic::Sample(self.me));
+            return self.outbox.send(Parcel {
+                kind: "sample",
+                key,
+                bytes: envelope.encode(),
+                express: false,
+            });
+        }
+        let bytes = self.presence.vote(envelope);
+        self.inbox.said(&bytes);
+    }
+
+    /// Says something to one neighbour.
+    pub fn tell(&self, neighbour: RobotId, envelope: &Envelope) {
+        let kind = match &envelope.message {
+            Message::Have(_) | Message::Know(_) => "have",
+            Message::Vote(_) | Message::Give(_) | Message::Samples(_) | Message::Lessons(_) => "give",
+        };
+        let key = self.keys.key(&Topic::Repair(neighbour));
+        self.outbox.send(Parcel { kind, key, bytes: envelope.encode(), express: true });
+    }
+
+    /// Answers an instructor.
+    pub fn answer(&self, instructor: &InstructorId, answer: &Answer) {
+        let json = serde_json::to_string(answer).expect("an answer has a place in JSON");
+        self.account.sent("answer", json.len());
+        let put = self
+            .session
+            .put(self.keys.key(&Topic::Answer(instructor.clone())), json)
+            .encoding(Encoding::APPLICATION_JSON)
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Drop)
+            .wait();
+        self.account.check(put);
+    }
+
+    /// Announces a decision for the swarm.
+    pub fn announce(&self, announcement: &Announcement) {
+        self.publish("decision", &self.swarm, announcement);
+    }
+
+    /// Notes the decision that the robot holds now; it is published when it is due. Robots that are just settling among
+    /// each other would otherwise each say every step of it to all.
+    pub fn hold(&mut self, announcement: Announcement) {
+        let due = self.hold_due(&announcement.decision);
+        self.unsaid = Some((announcement, due));
+    }
+
+    fn hold_due(&self, decision: &Decision) -> Instant {
+        let now = Instant::now();
+        if decision.author != self.me {
+            return now + ADOPTED_HOLD_DELAY;
+        }
+        let before = self.said.filter(|(round, _)| *round == decision.round.counter);
+        before.map_or(now, |(_, at)| at + OWN_HOLD_INTERVAL)
+    }
+
+    /// When [`publish_hold`](Self::publish_hold) is to be called.
+    pub fn due(&self) -> Option<Instant> {
+        self.unsaid.as_ref().map(|(_, due)| *due)
+    }
+
+    /// Publishes the decision that the robot holds, when it is due.
+    pub fn publish_hold(&mut self) {
+        if let Some((announcement, _)) = self.unsaid.take_if(|(_, due)| Instant::now() >= *due) {
+            let json = self.publish("robot_decision", &self.held, &announcement);
+            self.last.set(json, self.session.new_timestamp());
+            self.said = Some((announcement.decision.round.counter, Instant::now()));
+        }
+    }
+
+    fn publish(&self, kind: &str, publisher: &Publisher<'_>, announcement: &Announcement) -> String {
+        let json = serde_json::to_string(announcement)
+            .expect("every field of a decision, with string keys and finite numbers, has a place in JSON");
+        self.account.sent(kind, json.len());
+        self.account.check(publisher.put(json.as_str()).wait());
+        json
+    }
+}
+
+/// The decision this robot holds, as the queryable on `decision` gives it.
+#[derive(Default)]
+struct Last(Mutex<Option<(String, Timestamp)>>);
+
+impl Last {
+    fn set(&self, json: String, at: Timestamp) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((json, at));
+    }
+
+    fn on_query(&self, query: &Query) {
+        let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((json, at)) = last {
+            let key = query.key_expr().clone();
+            // A client that has gone meanwhile is no error of this robot's.
+            let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(Some(at)).wait();
+        }
+    }
+}
