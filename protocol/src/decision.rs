@@ -4,23 +4,10 @@ use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use crate::message::{MAX_CLASSES, MAX_ROBOTS};
-use crate::{ClassId, RobotId, RoundId, Stamp, VocabularyId, bounded};
-
-/// How the votes of a ballot become one distribution over the classes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FusionRule {
-    /// Frequency counting: each robot counts once, for its top class.
-    Majority,
-    /// Averaging: the mean of the robots' probabilities.
-    MeanProbability,
-    /// Logarithmic opinion pool: the softmax of the sum of the robots' log-evidence.
-    #[default]
-    LogPool,
-    /// A log-opinion pool in which each robot weighs by its own certainty.
-    ConfidenceWeighted,
-}
+use crate::bounded;
+use crate::fusion_rule::FusionRule;
+use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
+use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 
 /// The outcome of a round in the eyes of one robot.
 ///

@@ -1,55 +1,12 @@
 //! The envelope around every message between robots, and the bounded reading of it.
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use thiserror::Error;
+use serde::{Deserialize, Serialize};
 
-use crate::{ClassId, Decision, Message, RobotId, Stamp, Vote};
-
-/// The version byte in front of every envelope. Another version is refused, not guessed at.
-pub const PROTOCOL_VERSION: u8 = 2;
-
-/// The longest envelope accepted, in bytes.
-pub const MAX_MESSAGE: usize = 512 * 1024;
-
-/// The longest JSON document accepted, in bytes.
-pub const MAX_JSON: usize = 1024 * 1024;
-
-/// The most memory that reading one message can allocate, in bytes, whatever the message claims: a message of
-/// [`MAX_MESSAGE`] bytes, each element of which is larger in memory than on the wire.
-pub const MAX_ALLOCATION: usize = 64 * MAX_MESSAGE;
-
-/// Bytes that are no message. Nothing of a refused message is kept.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-pub enum DecodeError {
-    /// No bytes at all.
-    #[error("empty message")]
-    Empty,
-    /// Longer than the limit; it was not looked into.
-    #[error("message of {length} bytes, at most {limit} are accepted")]
-    TooLong {
-        /// How long it is.
-        length: usize,
-        /// How long it may be.
-        limit: usize,
-    },
-    /// Written by another version of the protocol.
-    #[error(
-        "protocol version {found}, this robot speaks {PROTOCOL_VERSION}: run the same release on all robots"
-    )]
-    Version {
-        /// The version byte found.
-        found: u8,
-    },
-    /// Not the encoding of any message, or cut short.
-    #[error("malformed message: {0}")]
-    Malformed(String),
-    /// A message followed by further bytes.
-    #[error("{0} bytes after the end of the message")]
-    Trailing(usize),
-    /// Well-formed, but with a value no robot may say.
-    #[error("impossible value: {0}")]
-    Impossible(&'static str),
-}
+use crate::decision::Decision;
+use crate::decode::DecodeError;
+use crate::id::{ClassId, RobotId, Stamp};
+use crate::limits::{MAX_MESSAGE, PROTOCOL_VERSION};
+use crate::message::{Message, Vote};
 
 /// A message with its author's name and stamp on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -90,20 +47,6 @@ impl Envelope {
         envelope.message.check()?;
         Ok(envelope)
     }
-}
-
-/// Reads a JSON document of at most [`MAX_JSON`] bytes, as clients and instructors write it.
-///
-/// # Errors
-/// [`DecodeError::TooLong`] and [`DecodeError::Malformed`].
-pub fn decode_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> {
-    if bytes.is_empty() {
-        return Err(DecodeError::Empty);
-    }
-    if bytes.len() > MAX_JSON {
-        return Err(DecodeError::TooLong { length: bytes.len(), limit: MAX_JSON });
-    }
-    serde_json::from_slice(bytes).map_err(|error| DecodeError::Malformed(error.to_string()))
 }
 
 impl Message {

@@ -6,7 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{DecodeError, PROTOCOL_VERSION, RoundId};
+use crate::decode::DecodeError;
+use crate::id::RoundId;
+use crate::limits::PROTOCOL_VERSION;
 
 /// The largest encoded picture accepted, in bytes.
 pub const MAX_FRAME: usize = 4 * 1024 * 1024;

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// A text that is no valid identifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum IdError {
     /// Not a decimal number within the range of the identifier.
     #[error("'{0}' is not a whole number from 0 to {max}", max = u32::MAX)]
@@ -138,7 +139,8 @@ pub struct Stamp {
 pub struct SampleId {
     /// Who made and shared it.
     pub author: RobotId,
-    /// Counts from 1 without gaps, also across restarts.
+    /// Counts up without gaps from the author's boot number at its first start, also across restarts. An author that lost
+    /// its memory goes on from its boot number again, which lies beyond all that it used.
     pub number: u32,
 }
 

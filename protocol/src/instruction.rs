@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ClassId, RobotId, RoundId};
+use crate::id::{ClassId, RobotId, RoundId};
 
 /// A human's word to the swarm, JSON on `instructor/<id>/feedback`. For example:
 ///

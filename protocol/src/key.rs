@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::{InstructorId, RobotId};
+use crate::id::{InstructorId, RobotId};
 
 /// A swarm name that could not stand in a key expression.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ClassId, InstructorId, RoundId};
+use crate::id::{ClassId, InstructorId, RoundId};
 
 /// The most rounds of which a robot keeps what was said.
 pub const MAX_LESSONS: usize = 1024;

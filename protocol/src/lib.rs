@@ -12,31 +12,39 @@
 
 mod bounded;
 mod decision;
+mod decode;
 mod envelope;
 mod fnv;
 mod frame;
+mod fusion_rule;
 mod id;
 mod instruction;
 mod key;
 mod lesson;
+mod limits;
 mod message;
 mod sample;
 mod status;
 
-pub use decision::{Certificate, CountedVote, Decision, FusionRule, Rank};
-pub use envelope::{
-    DecodeError, Envelope, MAX_ALLOCATION, MAX_JSON, MAX_MESSAGE, PROTOCOL_VERSION, decode_json,
-};
+pub use decision::{Certificate, CountedVote, Decision, Rank};
+pub use decode::{DecodeError, decode_json};
+pub use envelope::Envelope;
 pub use fnv::Fnv1a;
 pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
+pub use fusion_rule::{FusionRule, RuleName, RuleNameError};
 pub use id::{
     ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,
 };
 pub use instruction::{Answer, Gesture, Instruction, Outcome};
 pub use key::{Keys, SwarmNameError, Topic};
 pub use lesson::{Lesson, MAX_LESSONS, Word};
-pub use message::{Give, Have, HeldVote, MAX_CLASSES, MAX_ROBOTS, Message, Vote};
+pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
+pub use message::{Give, Have, HeldVote, Message, Vote};
 pub use sample::{
     Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
-pub use status::{Camera, CameraState, Learning, Motion, MotionState, Opinion, Reported, Status};
+pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
+
+// The former name, for hosts that still say it.
+#[doc(hidden)]
+pub use status::LearningStatus as Learning;

@@ -2,13 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Decision, Digest, Know, Lessons, Rank, RobotId, RoundId, Samples, Stamp, VocabularyId, bounded};
-
-/// The largest vocabulary: more classes than this are refused at both ends.
-pub const MAX_CLASSES: usize = 64;
-
-/// The largest swarm one ballot can hold.
-pub const MAX_ROBOTS: usize = 4096;
+use crate::bounded;
+use crate::decision::{Decision, Rank};
+use crate::id::{RobotId, RoundId, Stamp, VocabularyId};
+use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::sample::{Digest, Know, Lessons, Samples};
 
 /// Everything a robot says to other robots. The variants' order is part of the wire format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    ClassId, DecodeError, FeatureSpaceId, Lesson, MAX_CLASSES, MAX_LESSONS, MAX_ROBOTS, RobotId, RoundId,
-    SampleId, Word, bounded,
-};
+use crate::bounded;
+use crate::decode::DecodeError;
+use crate::id::{ClassId, FeatureSpaceId, RobotId, RoundId, SampleId};
+use crate::lesson::{Lesson, MAX_LESSONS, Word};
+use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 
 /// The most components of a shared vector.
 pub const MAX_COMPONENTS: usize = 2048;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{RobotId, RoundId};
+use crate::id::{RobotId, RoundId};
 
 /// A robot's account of itself, JSON: the reply to a query on `robot/<id>/status`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,7 +30,7 @@ pub struct Status {
     /// Whether that round is open.
     pub open: bool,
     /// What it has learned from; absent for a robot that does not learn.
-    pub learning: Option<Learning>,
+    pub learning: Option<LearningStatus>,
     /// Counters since its start, by name: messages, bytes, frames, and everything refused, by cause.
     pub counters: BTreeMap<String, u64>,
     /// The latest errors, newest last, at most sixteen.
@@ -134,7 +134,7 @@ pub struct Opinion {
 
 /// What a robot has learned from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Learning {
+pub struct LearningStatus {
     /// The feature space of its samples, 16 hexadecimal digits.
     pub space: String,
     /// T: how many samples it may hold.

@@ -7,7 +7,7 @@ mod plain;
 
 use divan::{Bencher, black_box};
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
-use gestalt_strategies::sample::{Part, Samples};
+use gestalt_strategies::sample::{HeldSamples, SetPart};
 use gestalt_strategies::{
     Classify, ClassifyError, Forgetting, ForgettingRule, Selection, SelectionRule, TrainingSet, Vocabulary,
 };
@@ -34,8 +34,8 @@ fn vector(rng: &mut ChaCha8Rng) -> Vec<f32> {
 struct OldestCommon;
 
 impl Forgetting for OldestCommon {
-    fn victim(&mut self, samples: &Samples, _: &mut dyn Rng) -> Option<u64> {
-        let parts = [Part::Shared, Part::External];
+    fn victim(&mut self, samples: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
+        let parts = [SetPart::Shared, SetPart::External];
         parts.iter().filter_map(|part| samples.part_keys(*part, CLASS).first().copied()).min()
     }
 }

@@ -56,7 +56,7 @@ impl Candidates {
 
 /// What came of a lesson.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heard {
+pub enum LessonReceipt {
     /// It changed what is known.
     New,
     /// It, or a later word of the same instructor, was known.
@@ -74,24 +74,24 @@ pub struct LessonBook {
 
 impl LessonBook {
     /// Takes in one lesson. Of two words at one time the greater counts, so that all robots keep the same.
-    pub fn hear(&mut self, lesson: &Lesson) -> Heard {
+    pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
         let said = (lesson.at, lesson.word);
         let words = self.rounds.get(&lesson.round);
         match words.and_then(|words| words.get(&lesson.instructor)) {
-            Some(known) if *known >= said => return Heard::Known,
-            None if words.is_some_and(|words| words.len() >= MAX_INSTRUCTORS) => return Heard::Full,
+            Some(known) if *known >= said => return LessonReceipt::Known,
+            None if words.is_some_and(|words| words.len() >= MAX_INSTRUCTORS) => return LessonReceipt::Full,
             _ => {}
         }
         if words.is_none() && self.rounds.len() >= MAX_LESSONS {
             if self.oldest() > Some(lesson.round) {
-                return Heard::Full;
+                return LessonReceipt::Full;
             }
             self.forget_oldest();
         }
         self.digest ^= self.digest_of(lesson.round);
         self.rounds.entry(lesson.round).or_default().insert(lesson.instructor.clone(), said);
         self.digest ^= self.digest_of(lesson.round);
-        Heard::New
+        LessonReceipt::New
     }
 
     fn forget_oldest(&mut self) {
@@ -261,10 +261,10 @@ mod tests {
     fn the_oldest_rounds_are_forgotten_and_not_taken_up_again() {
         let mut book = LessonBook::default();
         for counter in 0..MAX_LESSONS as u32 + 10 {
-            assert_eq!(book.hear(&lesson(counter + 5, "ada", 1, was(1))), Heard::New);
+            assert_eq!(book.hear(&lesson(counter + 5, "ada", 1, was(1))), LessonReceipt::New);
         }
         assert_eq!(book.len(), MAX_LESSONS);
-        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), Heard::Full);
+        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), LessonReceipt::Full);
         let mut fresh = LessonBook::default();
         book.rounds.keys().for_each(|round| {
             fresh.hear(&lesson(round.counter, "ada", 1, was(1)));
@@ -276,9 +276,13 @@ mod tests {
     fn a_round_has_only_so_many_instructors() {
         let mut book = LessonBook::default();
         for i in 0..MAX_INSTRUCTORS {
-            assert_eq!(book.hear(&lesson(1, &format!("i{i}"), 1, was(1))), Heard::New);
+            assert_eq!(book.hear(&lesson(1, &format!("i{i}"), 1, was(1))), LessonReceipt::New);
         }
-        assert_eq!(book.hear(&lesson(1, "one-more", 1, was(1))), Heard::Full);
-        assert_eq!(book.hear(&lesson(1, "i3", 2, was(2))), Heard::New, "who is known may speak again");
+        assert_eq!(book.hear(&lesson(1, "one-more", 1, was(1))), LessonReceipt::Full);
+        assert_eq!(
+            book.hear(&lesson(1, "i3", 2, was(2))),
+            LessonReceipt::New,
+            "who is known may speak again"
+        );
     }
 }

@@ -16,7 +16,7 @@
 //! needs of both is re-exported here.
 
 pub mod forgetting;
-mod geometry;
+pub mod geometry;
 mod learning;
 mod lessons;
 pub mod mind;
@@ -27,22 +27,36 @@ mod vector_codec;
 
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
-    Ballot, Classify, ClassifyError, Evidence, Look, Observation, Refusal, Refusals, Vocabulary,
+    Ballot, Classify, ClassifyError, Evidence, Fuse, JudgedFrame, Observation, Refusal, Refusals, Vocabulary,
     VocabularyError, Voter, fusion,
 };
 pub use gestalt_svm::{
-    CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LearnError, Learner, LearnerOptions,
-    MAX_MODEL, ModelError, Pca, Proportion, Ranking, Reduction, Sample, Scaling, ScalingMethod,
+    CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LabelledFeatures, LearnError,
+    Learner, LearnerOptions, MAX_MODEL, ModelError, Pca, Proportion, Ranking, Reduction, Scaling,
+    ScalingMethod,
 };
 #[cfg(feature = "offline")]
-pub use gestalt_svm::{Folding, MIN_SAMPLES, Progress, TrainError, TrainOptions, Trained, train};
+pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};
 pub use learning::{
-    Change, LearningConfig, LearningConfigError, LearningError, LearningSetup, Memory, MemoryError,
-    TrainingChange,
+    LearningConfig, LearningConfigError, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange,
+    RobotMemory, TrainingChange,
 };
-pub use lessons::{Candidates, Heard, LessonBook, Verdict};
+pub use lessons::{Candidates, LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
-pub use sample::{HeldSample, Part, Samples, Seen, SeenError};
+pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};
 pub use selection::{Selection, SelectionRule};
-pub use training_set::{Receipt, RestoreError, SetChange, TrainingSet};
+pub use training_set::{RestoreError, SampleReceipt, SetChange, TrainingSet};
 pub use vector_codec::{Precision, VectorError, decode_vector};
+
+// The former names of some of these, for hosts that still say them.
+#[doc(hidden)]
+pub use gestalt_rounds::JudgedFrame as Look;
+#[doc(hidden)]
+pub use gestalt_svm::LabelledFeatures as Sample;
+#[cfg(feature = "offline")]
+#[doc(hidden)]
+pub use gestalt_svm::TrainProgress as Progress;
+#[doc(hidden)]
+pub use learning::{RecordChange as Change, RobotMemory as Memory};
+#[doc(hidden)]
+pub use sample::SetPart as Part;

@@ -15,8 +15,11 @@ use rand::Rng;
 use thiserror::Error;
 
 use crate::forgetting::Forgetting;
-use crate::sample::{HeldSample, MAX_AUTHORS, Part, Samples, Seen, SeenError};
+use crate::sample::{HeldSample, HeldSamples, MAX_AUTHORS, SeenError, SeenSamples, SetPart};
 use crate::selection::Selection;
+
+/// How far a number of this robot's own may lie beyond the ones that it knows it used.
+const FAR_AHEAD: u32 = 1_000_000;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -36,7 +39,7 @@ pub enum SetChange {
 
 /// What became of a received sample.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Receipt {
+pub enum SampleReceipt {
     /// It was taken in.
     New(Vec<SetChange>),
     /// It was seen before, whether it is still held or not: nothing changed.
@@ -47,6 +50,7 @@ pub enum Receipt {
 
 /// A stored set that contradicts itself. The training set is unchanged.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RestoreError {
     /// Two samples have one key.
     #[error("two stored samples have the key {0}")]
@@ -79,28 +83,28 @@ pub enum RestoreError {
 
 /// The bounded set of samples of one robot.
 ///
-/// A sample is in one [`Part`] at a time. It is shared at most once, under a number that counts up without gaps, and
+/// A sample is in one [`SetPart`] at a time. It is shared at most once, under a number that counts up without gaps, and
 /// taken in at most once under one name, also after it was forgotten. After [`keep`](Self::keep) and
 /// [`receive`](Self::receive) at most `capacity` samples are held: the [`Forgetting`] rule says which one goes.
 ///
 /// Vectors are coordinates in one feature space: the caller has checked their length and that they are finite.
-/// Everything that can be asked is asked through [`Samples`], which the set dereferences to.
+/// Everything that can be asked is asked through [`HeldSamples`], which the set dereferences to.
 #[derive(Debug)]
 pub struct TrainingSet {
     me: RobotId,
     capacity: usize,
     selection: Box<dyn Selection>,
     forgetting: Box<dyn Forgetting>,
-    samples: Samples,
-    seen: Seen,
+    samples: HeldSamples,
+    seen: SeenSamples,
     next_key: u64,
     next_number: u32,
 }
 
 impl Deref for TrainingSet {
-    type Target = Samples;
+    type Target = HeldSamples;
 
-    fn deref(&self) -> &Samples {
+    fn deref(&self) -> &HeldSamples {
         &self.samples
     }
 }
@@ -119,11 +123,17 @@ impl TrainingSet {
             capacity: capacity.max(1),
             selection,
             forgetting,
-            samples: Samples::default(),
-            seen: Seen::default(),
+            samples: HeldSamples::default(),
+            seen: SeenSamples::default(),
             next_key: 1,
             next_number: 1,
         }
+    }
+
+    /// The numbers of what this robot shares begin there, unless they are further already: for a robot that does not know
+    /// which it used before.
+    pub fn number_from(&mut self, first: u32) {
+        self.next_number = self.next_number.max(first);
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
@@ -138,7 +148,7 @@ impl TrainingSet {
     pub fn restore(
         &mut self,
         samples: Vec<HeldSample>,
-        seen: Seen,
+        seen: SeenSamples,
         next_key: u64,
         next_number: u32,
     ) -> Result<(), RestoreError> {
@@ -151,7 +161,7 @@ impl TrainingSet {
         {
             return Err(RestoreError::NumberAhead(SampleId { author: self.me, number: last }));
         }
-        let mut restored = Samples::default();
+        let mut restored = HeldSamples::default();
         for sample in samples {
             let key = sample.key;
             if key >= next_key {
@@ -161,7 +171,7 @@ impl TrainingSet {
                 return Err(RestoreError::Key(key));
             }
             let fits = match (sample.part, sample.id) {
-                (Part::Personal, id) => id.is_none(),
+                (SetPart::Personal, id) => id.is_none(),
                 (part, id) => id.is_some_and(|id| part == self.part_of(id)),
             };
             if !fits {
@@ -197,7 +207,7 @@ impl TrainingSet {
         vector: Vec<f32>,
         rng: &mut dyn Rng,
     ) -> Vec<SetChange> {
-        self.add(Part::Personal, None, class, round, vector.into(), rng)
+        self.add(SetPart::Personal, None, class, round, vector.into(), rng)
     }
 
     /// Selects up to `n` personal samples, one after the other: each choice sees the effect of the one before. Each
@@ -215,7 +225,7 @@ impl TrainingSet {
         let mut changes = Vec::new();
         while changes.len() < n {
             let Some(key) = self.selection.select(&self.samples, classifier, rng) else { break };
-            let Some(sample) = self.samples.get(key).filter(|sample| sample.part == Part::Personal) else {
+            let Some(sample) = self.samples.get(key).filter(|sample| sample.part == SetPart::Personal) else {
                 break;
             };
             let id = SampleId { author: self.me, number: self.next_number };
@@ -225,7 +235,7 @@ impl TrainingSet {
             }
             self.next_number = following;
             let vector = Arc::from(as_sent(&sample.vector));
-            self.replace(HeldSample { part: Part::Shared, id: Some(id), vector, ..sample.clone() });
+            self.replace(HeldSample { part: SetPart::Shared, id: Some(id), vector, ..sample.clone() });
             changes.push(SetChange::Shared(key, id));
         }
         changes
@@ -242,24 +252,28 @@ impl TrainingSet {
         round: RoundId,
         vector: Vec<f32>,
         rng: &mut dyn Rng,
-    ) -> Receipt {
+    ) -> SampleReceipt {
         // A place is kept for this robot, or the names of strangers could keep it from sharing.
         let stranger = id.author != self.me && self.seen.intervals(id.author).is_empty();
         if stranger
             && self.seen.intervals(self.me).is_empty()
             && self.seen.authors().count() >= MAX_AUTHORS - 1
         {
-            return Receipt::Refused(SeenError::TooManyAuthors(id));
+            return SampleReceipt::Refused(SeenError::TooManyAuthors(id));
+        }
+        // Whoever could push this robot's numbers up to the last one could keep it from sharing.
+        if id.author == self.me && id.number.saturating_sub(self.next_number) > FAR_AHEAD {
+            return SampleReceipt::Refused(SeenError::FarAhead(id));
         }
         match self.seen.insert(id) {
-            Err(error) => return Receipt::Refused(error),
-            Ok(false) => return Receipt::Known,
+            Err(error) => return SampleReceipt::Refused(error),
+            Ok(false) => return SampleReceipt::Known,
             Ok(true) => {}
         }
         if id.author == self.me {
             self.next_number = self.next_number.max(id.number.saturating_add(1));
         }
-        Receipt::New(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng))
+        SampleReceipt::New(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng))
     }
 
     /// Takes a shared sample in again that was [retracted](Self::retract), under the class it turned out to have. One
@@ -321,7 +335,7 @@ impl TrainingSet {
 
     /// Which shared samples this robot ever had, its own included.
     #[must_use]
-    pub fn seen(&self) -> &Seen {
+    pub fn seen(&self) -> &SeenSamples {
         &self.seen
     }
 
@@ -341,13 +355,13 @@ impl TrainingSet {
         self.samples.iter().filter(move |sample| sample.round == round)
     }
 
-    fn part_of(&self, id: SampleId) -> Part {
-        if id.author == self.me { Part::Shared } else { Part::External }
+    fn part_of(&self, id: SampleId) -> SetPart {
+        if id.author == self.me { SetPart::Shared } else { SetPart::External }
     }
 
     fn add(
         &mut self,
-        part: Part,
+        part: SetPart,
         id: Option<SampleId>,
         class: ClassId,
         round: RoundId,

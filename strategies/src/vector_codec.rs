@@ -22,6 +22,7 @@ pub enum Precision {
 
 /// A received vector that is no vector of this space.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VectorError {
     /// Of another space.
     #[error(

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
-    Classify, ClassifyError, Forgetting, ForgettingRule, Receipt, Selection, SelectionRule, SetChange,
+    Classify, ClassifyError, Forgetting, ForgettingRule, SampleReceipt, Selection, SelectionRule, SetChange,
     TrainingSet, Vocabulary,
 };
 use operations::{ME, Operation, Store, as_is, generator, id, operations, round, rules, run, set};
@@ -145,7 +145,7 @@ fn fast_and_plain_pick_the_same_among_many() {
                 let (own, other) = (vector(&mut rng), vector(&mut rng));
                 changes.extend(set.keep(class, round(number), own, &mut rng));
                 match set.receive(id(1, number), class, round(number), other, &mut rng) {
-                    Receipt::New(more) => changes.extend(more),
+                    SampleReceipt::New(more) => changes.extend(more),
                     other => panic!("a new sample is new: {other:?}"),
                 }
                 if number.is_multiple_of(50) {

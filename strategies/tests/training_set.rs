@@ -5,10 +5,10 @@ mod operations;
 use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{ClassId, RobotId, SampleId};
-use gestalt_strategies::sample::Samples;
+use gestalt_strategies::sample::HeldSamples;
 use gestalt_strategies::{
-    Classify, Forgetting, ForgettingRule, HeldSample, Part, Receipt, RestoreError, Seen, SeenError,
-    Selection, SelectionRule, SetChange, TrainingSet,
+    Classify, Forgetting, ForgettingRule, HeldSample, RestoreError, SampleReceipt, SeenError, SeenSamples,
+    Selection, SelectionRule, SetChange, SetPart, TrainingSet,
 };
 use operations::{ME, Operation, Store, as_is, generator, id, operations, round, rounded, rules, run, set};
 use proptest::prelude::*;
@@ -48,24 +48,24 @@ proptest! {
 
             // The counts agree with the samples.
             for class in (0..4).map(ClassId) {
-                for part in Part::ALL {
+                for part in SetPart::ALL {
                     let found = held.values().filter(|s| s.class == class && s.part == part).count();
                     prop_assert_eq!(set.count(part, class), found);
                 }
                 prop_assert_eq!(set.class_count(class), held.values().filter(|s| s.class == class).count());
             }
-            for part in Part::ALL {
+            for part in SetPart::ALL {
                 prop_assert_eq!(set.total(part), held.values().filter(|s| s.part == part).count());
             }
-            prop_assert_eq!(set.common().count(), held.values().filter(|s| s.part != Part::Personal).count());
+            prop_assert_eq!(set.common().count(), held.values().filter(|s| s.part != SetPart::Personal).count());
 
             // Each sample is in the part its name says, once.
             let mut names = BTreeSet::new();
             for sample in held.values() {
                 let part = match sample.id {
-                    None => Part::Personal,
-                    Some(id) if id.author == ME => Part::Shared,
-                    Some(_) => Part::External,
+                    None => SetPart::Personal,
+                    Some(id) if id.author == ME => SetPart::Shared,
+                    Some(_) => SetPart::External,
                 };
                 prop_assert_eq!(sample.part, part);
                 if let Some(id) = sample.id {
@@ -82,7 +82,7 @@ proptest! {
                     prop_assert_eq!(*id, SampleId { author: ME, number });
                     prop_assert!(shared_keys.insert(*key));
                     let personal = &before.samples[key];
-                    prop_assert_eq!(personal.part, Part::Personal);
+                    prop_assert_eq!(personal.part, SetPart::Personal);
                     prop_assert_eq!(held[key].vector.to_vec(), rounded(&personal.vector));
                 }
             }
@@ -95,7 +95,7 @@ proptest! {
                 }
                 // As many are shared as were asked for, or all.
                 Operation::Share { n, .. } => {
-                    let personal = before.samples.values().filter(|s| s.part == Part::Personal).count();
+                    let personal = before.samples.values().filter(|s| s.part == SetPart::Personal).count();
                     prop_assert_eq!(changes.len(), personal.min(*n));
                 }
                 Operation::Relabel { round: r, class } => {
@@ -186,7 +186,7 @@ fn swarm(
             }
             let share = (part * (k * m) as f64).round() as usize;
             robot.share(share, None, &as_is, &mut rng);
-            said.extend(robot.iter().filter(|sample| sample.part == Part::Shared).cloned());
+            said.extend(robot.iter().filter(|sample| sample.part == SetPart::Shared).cloned());
             robot
         })
         .collect();
@@ -205,7 +205,7 @@ fn ten_robots_hold_eighty_four_samples_each() {
         let robots = swarm(10, 6, 5, 0.2, (selection, ForgettingRule::default()));
         for robot in &robots {
             assert_eq!(robot.len(), 84);
-            assert_eq!(Part::ALL.map(|part| robot.total(part)), [24, 6, 54]);
+            assert_eq!(SetPart::ALL.map(|part| robot.total(part)), [24, 6, 54]);
             assert_eq!(robot.common().count(), 60);
             assert_eq!(robot.seen().digest(), robots[0].seen().digest());
         }
@@ -220,7 +220,7 @@ fn the_set_grows_with_the_swarm_and_with_what_it_shares() {
             for robot in swarm(n, k, m, part, Default::default()) {
                 assert_eq!(robot.len(), k * m + shared * (n - 1), "N = {n}, B = {part}");
                 assert_eq!(
-                    Part::ALL.map(|part| robot.total(part)),
+                    SetPart::ALL.map(|part| robot.total(part)),
                     [k * m - shared, shared, shared * (n - 1)]
                 );
             }
@@ -234,12 +234,12 @@ fn a_robot_that_lost_its_memory_gets_its_samples_back_and_numbers_on() {
     let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
     for number in [2, 5] {
         let receipt = robot.receive(id(0, number), ClassId(1), round(1), vec![1.0], &mut rng);
-        assert!(matches!(receipt, Receipt::New(_)));
-        assert_eq!(robot.find(id(0, number)).unwrap().part, Part::Shared);
+        assert!(matches!(receipt, SampleReceipt::New(_)));
+        assert_eq!(robot.find(id(0, number)).unwrap().part, SetPart::Shared);
     }
     robot.keep(ClassId(0), round(2), vec![2.0], &mut rng);
     assert_eq!(robot.share(3, None, &as_is, &mut rng), [SetChange::Shared(3, id(0, 6))]);
-    assert_eq!(robot.receive(id(0, 6), ClassId(0), round(2), vec![2.0], &mut rng), Receipt::Known);
+    assert_eq!(robot.receive(id(0, 6), ClassId(0), round(2), vec![2.0], &mut rng), SampleReceipt::Known);
 }
 
 #[test]
@@ -248,10 +248,10 @@ fn a_name_beyond_the_bounds_is_refused_and_changes_nothing() {
     let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
     for bad in [id(3, 0), id(3, u32::MAX), id(0, u32::MAX)] {
         let receipt = robot.receive(bad, ClassId(1), round(1), vec![1.0], &mut rng);
-        assert!(matches!(receipt, Receipt::Refused(_)), "{bad}");
+        assert!(matches!(receipt, SampleReceipt::Refused(_)), "{bad}");
     }
     assert!(robot.is_empty());
-    assert_eq!((robot.seen(), robot.next_key(), robot.next_number()), (&Seen::default(), 1, 1));
+    assert_eq!((robot.seen(), robot.next_key(), robot.next_number()), (&SeenSamples::default(), 1, 1));
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn strangers_cannot_keep_a_robot_from_sharing() {
     let mut refused = 0;
     for author in 1..=gestalt_strategies::sample::MAX_AUTHORS as u32 {
         let receipt = robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng);
-        refused += u32::from(matches!(receipt, Receipt::Refused(SeenError::TooManyAuthors(_))));
+        refused += u32::from(matches!(receipt, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
     }
     assert_eq!(refused, 1);
     robot.keep(ClassId(0), round(1), vec![1.0], &mut rng);
@@ -279,10 +279,10 @@ fn a_stored_set_that_contradicts_itself_is_refused() {
         vector: vec![1.0].into(),
     };
     let seen = |intervals: &[(u32, u32)]| {
-        Seen::from_intervals([(RobotId(0), intervals.to_vec()), (RobotId(4), vec![(1, 3)])]).unwrap()
+        SeenSamples::from_intervals([(RobotId(0), intervals.to_vec()), (RobotId(4), vec![(1, 3)])]).unwrap()
     };
     let (own, other) = (Some(id(0, 1)), Some(id(4, 2)));
-    use Part::{External, Personal, Shared};
+    use SetPart::{External, Personal, Shared};
     for (samples, error) in [
         (vec![sample(1, Personal, None), sample(1, Personal, None)], RestoreError::Key(1)),
         (vec![sample(9, Personal, None)], RestoreError::KeyAhead { key: 9, next: 9 }),
@@ -295,7 +295,7 @@ fn a_stored_set_that_contradicts_itself_is_refused() {
     ] {
         let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
         assert_eq!(robot.restore(samples, seen(&[(1, 2)]), 9, 3), Err(error));
-        assert!(robot.is_empty() && robot.seen() == &Seen::default());
+        assert!(robot.is_empty() && robot.seen() == &SeenSamples::default());
     }
     let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
     assert_eq!(robot.restore(vec![], seen(&[(1, 3)]), 9, 3), Err(RestoreError::NumberAhead(id(0, 3))));
@@ -322,13 +322,13 @@ fn a_set_stored_under_a_greater_capacity_is_trimmed() {
 struct Stubborn(u64);
 
 impl Selection for Stubborn {
-    fn select(&mut self, _: &Samples, _: Option<&dyn Classify>, _: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, _: &HeldSamples, _: Option<&dyn Classify>, _: &mut dyn Rng) -> Option<u64> {
         Some(self.0)
     }
 }
 
 impl Forgetting for Stubborn {
-    fn victim(&mut self, _: &Samples, _: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, _: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
         Some(self.0)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use gestalt_protocol::{Digest, Learning, RobotId};
 use gestalt_strategies::{
-    Change, Classifier, FeatureSpace, Input, Learner, LearningConfig, LearningSetup, Memory, Mind,
+    Change, Classifier, FeatureSpace, Input, Learner, LearningConfig, LearningSetup, Memory, Mind, OwnRules,
     TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
@@ -77,6 +77,7 @@ impl Prepared {
             vocabulary: self.learning.vocabulary.clone(),
             rng: Box::new(rng),
             memory: self.memory.take(),
+            rules: OwnRules::default(),
         }
     }
 

@@ -20,11 +20,12 @@ pub(super) fn decision(decision: &Decision, label: Option<&str>) -> String {
         (Some(class), None) => format!("class {class}"),
         (None, _) => "no decision".to_owned(),
     };
-    let rule = match certificate.rule {
+    let rule = match &certificate.rule {
         FusionRule::Majority => "majority",
         FusionRule::MeanProbability => "mean of probabilities",
         FusionRule::LogPool => "log pool",
         FusionRule::ConfidenceWeighted => "confidence-weighted pool",
+        FusionRule::Other(name) => name.as_str(),
     };
     let mut words = format!(
         "round {round}: {what} {confidence:.3} ({} robots in {} ms, {rule}:",

@@ -20,8 +20,8 @@ fn ballot(robots: u32) -> Ballot {
     ballot
 }
 
-#[divan::bench(args = [FusionRule::Majority, FusionRule::MeanProbability, FusionRule::LogPool, FusionRule::ConfidenceWeighted])]
+#[divan::bench(args = FusionRule::ALL)]
 fn a_ballot_of_100_robots(bencher: divan::Bencher, rule: FusionRule) {
     let ballot = ballot(100);
-    bencher.bench(|| divan::black_box(&ballot).fuse(rule, 6.0, SCALE));
+    bencher.bench(|| divan::black_box(&ballot).fuse(&rule, 6.0, SCALE));
 }

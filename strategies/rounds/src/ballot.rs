@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use gestalt_protocol::{CountedVote, FusionRule, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
+use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
 
+use crate::fuse::Fuse;
 use crate::fusion::{self, Fusion};
 
 /// What became of a vote put into a [`Ballot`].
@@ -109,21 +110,23 @@ impl Ballot {
         self.on(scale).count()
     }
 
-    /// All evidence on that scale as one distribution; `None` when there is none.
+    /// All evidence on that scale as one distribution; `None` when there is none, or the rule makes none of it.
     #[must_use]
-    pub fn fuse(&self, rule: FusionRule, clip: f64, scale: Scale) -> Option<Fusion> {
-        fusion::fuse(rule, clip, scale.classes, self.on(scale).map(|(_, _, vote)| vote.evidence.as_slice()))
+    pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
+        let votes: Vec<&[f32]> = self.on(scale).map(|(_, _, vote)| vote.evidence.as_slice()).collect();
+        rule.fuse(clip, scale.classes, &votes).filter(|fusion| fusion.is_sound(scale.classes))
     }
 
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
     #[must_use]
-    pub fn counted(&self, rule: FusionRule, clip: f64, scale: Scale) -> Vec<CountedVote> {
+    pub fn counted(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Vec<CountedVote> {
+        let weight = |vote: &Vote| Some(rule.weight(clip, &vote.evidence) as f32);
         self.on(scale)
             .map(|(robot, stamp, vote)| CountedVote {
                 robot,
                 stamp,
                 class: fusion::top_of(&vote.evidence),
-                weight: fusion::weight(rule, clip, &vote.evidence) as f32,
+                weight: weight(vote).filter(|w| w.is_finite() && *w >= 0.0).unwrap_or(0.0),
             })
             .collect()
     }
@@ -140,6 +143,7 @@ impl Ballot {
 
 #[cfg(test)]
 mod tests {
+    use gestalt_protocol::FusionRule;
     use gestalt_protocol::RoundId;
     use proptest::prelude::*;
 
@@ -165,9 +169,9 @@ mod tests {
         let mut ballot = Ballot::default();
         assert_eq!(ballot.cast(RobotId(1), stamp(1, 5), vote(&[3.0, 0.0, 0.0])), Cast::Counted);
         assert_eq!(ballot.cast(RobotId(1), stamp(1, 4), vote(&[0.0, 3.0, 0.0])), Cast::Known);
-        assert_eq!(ballot.fuse(FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 0);
+        assert_eq!(ballot.fuse(&FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 0);
         assert_eq!(ballot.cast(RobotId(1), stamp(2, 0), vote(&[0.0, 0.0, 3.0])), Cast::Counted);
-        assert_eq!(ballot.fuse(FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 2);
+        assert_eq!(ballot.fuse(&FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 2);
         assert_eq!(ballot.len(), 1);
     }
 
@@ -179,7 +183,7 @@ mod tests {
         assert_eq!(ballot.len(), 1);
         assert_eq!(ballot.contributors(SCALE), 0);
         assert_eq!(ballot.prevailing_scale(), None);
-        assert_eq!(ballot.fuse(FusionRule::Majority, 6.0, SCALE), None);
+        assert_eq!(ballot.fuse(&FusionRule::Majority, 6.0, SCALE), None);
     }
 
     #[test]
@@ -192,7 +196,7 @@ mod tests {
         ballot.cast(RobotId(4), stamp(1, 1), vote(&[0.0, 6.0]));
         assert_eq!(ballot.prevailing_scale(), Some(SCALE));
         assert_eq!(ballot.contributors(SCALE), 2);
-        let counted: Vec<_> = ballot.counted(FusionRule::LogPool, 6.0, SCALE);
+        let counted: Vec<_> = ballot.counted(&FusionRule::LogPool, 6.0, SCALE);
         assert_eq!(
             counted.iter().map(|v| (v.robot.0, v.class.0, v.weight)).collect::<Vec<_>>(),
             [(1, 0, 1.0), (2, 0, 1.0)]
@@ -239,13 +243,8 @@ mod tests {
             };
             let (once, again) = (count(&votes), count(&shuffled));
             prop_assert_eq!(&once, &again);
-            for rule in [
-                FusionRule::Majority,
-                FusionRule::MeanProbability,
-                FusionRule::LogPool,
-                FusionRule::ConfidenceWeighted,
-            ] {
-                prop_assert_eq!(once.fuse(rule, 6.0, SCALE), again.fuse(rule, 6.0, SCALE));
+            for rule in FusionRule::ALL {
+                prop_assert_eq!(once.fuse(&rule, 6.0, SCALE), again.fuse(&rule, 6.0, SCALE));
             }
         }
     }

@@ -8,6 +8,7 @@ use crate::vocabulary::Vocabulary;
 
 /// A feature vector that a classifier cannot judge. The classifier is unchanged.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ClassifyError {
     /// It has another number of components than the classifier was trained on.
     #[error(

@@ -2,16 +2,23 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{FusionRule, MAX_ROBOTS};
+use gestalt_protocol::{FusionRule, MAX_ROBOTS, RuleName};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Parameters no robot can work with; each names the field and the mend.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum RoundsConfigError {
     /// α outside its range.
     #[error("alpha is {0}: choose it above 0 and below 0.5, for example 0.05")]
     Alpha(f64),
+    /// A rule that Gestalt does not have.
+    #[error(
+        "the fusion rule '{0}' is none of Gestalt's: take one of majority, mean_probability, log_pool and \
+         confidence_weighted; a rule of one's own is handed to the robot by its program"
+    )]
+    Rule(RuleName),
     /// A quorum that is always or never met.
     #[error("quorum is {0}: choose from 1 to {MAX_ROBOTS} robots")]
     Quorum(u32),
@@ -39,7 +46,8 @@ pub enum RoundsConfigError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoundsConfig {
-    /// How votes are fused.
+    /// How votes are fused: one of Gestalt's rules. One's own is handed in by
+    /// [`Rounds::fused_by`](crate::Rounds::fused_by).
     pub rule: FusionRule,
     /// α: decide once the fused probability of the top class reaches 1 − α. Range `0.0 < α < 0.5`.
     pub alpha: f64,
@@ -118,6 +126,9 @@ impl RoundsConfig {
         if !(self.alpha > 0.0 && self.alpha < 0.5) {
             return Err(RoundsConfigError::Alpha(self.alpha));
         }
+        if let FusionRule::Other(name) = self.rule {
+            return Err(RoundsConfigError::Rule(name));
+        }
         if !(1..=MAX_ROBOTS).contains(&(self.quorum as usize)) {
             return Err(RoundsConfigError::Quorum(self.quorum));
         }
@@ -169,6 +180,7 @@ mod tests {
         for (config, field) in [
             (RoundsConfig { alpha: 0.5, ..default() }, "alpha"),
             (RoundsConfig { alpha: f64::NAN, ..default() }, "alpha"),
+            (RoundsConfig { rule: FusionRule::Other("mine".parse().unwrap()), ..default() }, "mine"),
             (RoundsConfig { quorum: 0, ..default() }, "quorum"),
             (RoundsConfig { clip: f64::INFINITY, ..default() }, "clip"),
             (RoundsConfig { repair_busy: ms(0), ..default() }, "repair_busy"),

@@ -13,7 +13,7 @@ const JITTER: f64 = 0.1;
 
 /// A frame, as evidence takes it.
 #[derive(Clone, Copy, Debug)]
-pub struct Look<'a> {
+pub struct JudgedFrame<'a> {
     /// When it was taken.
     pub at: Duration,
     /// The probability of each class.
@@ -71,32 +71,32 @@ impl Evidence {
     }
 
     /// Counts a frame over as many classes; `decorrelation` is τ, above zero. Says whether it weighed anything.
-    pub fn add(&mut self, look: Look<'_>, decorrelation: Duration) -> bool {
-        if !(look.quality > 0.0 && look.quality.is_finite()) {
+    pub fn add(&mut self, frame: JudgedFrame<'_>, decorrelation: Duration) -> bool {
+        if !(frame.quality > 0.0 && frame.quality.is_finite()) {
             return false;
         }
         let next = self.current.as_ref().and_then(|current| {
             let due = current.began + decorrelation;
-            (look.at >= due.saturating_sub(decorrelation.mul_f64(JITTER))).then_some(due)
+            (frame.at >= due.saturating_sub(decorrelation.mul_f64(JITTER))).then_some(due)
         });
         if let Some(due) = next {
             self.end_look();
             // On the grid of τ, unless there was a pause: so that no rate of frames gains or loses by rounding.
-            let began = if look.at < due + decorrelation { due } else { look.at };
-            self.begin_look(began, look);
+            let began = if frame.at < due + decorrelation { due } else { frame.at };
+            self.begin_look(began, frame);
         } else if self.current.is_none() {
-            self.begin_look(look.at, look);
+            self.begin_look(frame.at, frame);
         }
         let Some(current) = &mut self.current else { return false };
         current.frames += 1.0;
-        current.quality += look.quality;
-        let logs: Vec<f64> = look.probabilities.iter().map(|p| p.max(FLOOR).ln()).collect();
+        current.quality += frame.quality;
+        let logs: Vec<f64> = frame.probabilities.iter().map(|p| p.max(FLOOR).ln()).collect();
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;
         for (sum, log) in current.logs.iter_mut().zip(logs) {
-            *sum += look.quality * (log - mean);
+            *sum += frame.quality * (log - mean);
         }
-        for (sum, x) in current.view.iter_mut().zip(look.view) {
-            *sum += look.quality * f64::from(*x);
+        for (sum, x) in current.view.iter_mut().zip(frame.view) {
+            *sum += frame.quality * f64::from(*x);
         }
         let view: Vec<f64> = current.view.iter().map(|sum| sum / current.quality).collect();
         let alike = |other: &Vec<f64>| {
@@ -107,13 +107,13 @@ impl Evidence {
         current.novelty > 0.0
     }
 
-    fn begin_look(&mut self, began: Duration, look: Look<'_>) {
+    fn begin_look(&mut self, began: Duration, frame: JudgedFrame<'_>) {
         self.current = Some(Current {
             began,
             frames: 0.0,
             quality: 0.0,
             logs: vec![0.0; self.sums.len()],
-            view: vec![0.0; look.view.len()],
+            view: vec![0.0; frame.view.len()],
             novelty: 1.0,
         });
     }
@@ -161,8 +161,8 @@ mod tests {
         Duration::from_millis(ms)
     }
 
-    fn look(ms: u64, probabilities: &[f64], quality: f64) -> Look<'_> {
-        Look { at: at(ms), probabilities, quality, view: &[] }
+    fn look(ms: u64, probabilities: &[f64], quality: f64) -> JudgedFrame<'_> {
+        JudgedFrame { at: at(ms), probabilities, quality, view: &[] }
     }
 
     #[test]
@@ -180,7 +180,7 @@ mod tests {
     fn watched(period_ms: u64, view: impl Fn(u64) -> Vec<f32>) -> Evidence {
         let mut evidence = Evidence::new(2);
         for t in (0..=3000).step_by(period_ms as usize) {
-            evidence.add(Look { view: &view(t), ..look(t, &[0.6, 0.4], 1.0) }, TAU);
+            evidence.add(JudgedFrame { view: &view(t), ..look(t, &[0.6, 0.4], 1.0) }, TAU);
         }
         evidence
     }
@@ -212,7 +212,7 @@ mod tests {
     fn a_view_seen_before_is_known_again() {
         let mut evidence = Evidence::new(2);
         for (t, x) in [(0, 0.0), (500, 5.0), (1000, 0.0)] {
-            evidence.add(Look { view: &[x], ..look(t, &[0.6, 0.4], 1.0) }, TAU);
+            evidence.add(JudgedFrame { view: &[x], ..look(t, &[0.6, 0.4], 1.0) }, TAU);
         }
         assert!((evidence.looks() - 2.0).abs() < 1e-6, "{}", evidence.looks());
     }
@@ -226,7 +226,7 @@ mod tests {
             for t in (0..3000).step_by(period as usize) {
                 // Ten that sway a little, one that stands like a rock.
                 let view = [bearing + if period == 500 { (t / 500) as f32 * 0.5 } else { 0.0 }];
-                evidence.add(Look { view: &view, ..look(t, p, 1.0) }, TAU);
+                evidence.add(JudgedFrame { view: &view, ..look(t, p, 1.0) }, TAU);
             }
             // No bound on what one robot may say.
             evidence.clipped(1e9)
@@ -281,7 +281,7 @@ mod tests {
     fn what_is_remembered_of_a_long_round_is_bounded() {
         let mut evidence = Evidence::new(2);
         for t in 0..10_000 {
-            evidence.add(Look { view: &[t as f32 * 10.0], ..look(t * 500, &[0.6, 0.4], 1.0) }, TAU);
+            evidence.add(JudgedFrame { view: &[t as f32 * 10.0], ..look(t * 500, &[0.6, 0.4], 1.0) }, TAU);
         }
         assert_eq!(evidence.views.len(), MAX_VIEWS);
         assert_eq!(evidence.looks(), 10_000.0);

@@ -1,7 +1,8 @@
 //! From the evidence of many robots to one distribution over the gestures.
 //!
 //! All sums run in the order given (a ballot gives [`RobotId`](gestalt_protocol::RobotId) order) in `f64`, and ties
-//! go to the smaller class, so that every robot with the same votes gets the same bits.
+//! go to the smaller class, so that robots of one kind with the same votes get the same bits. Robots of different kinds may
+//! differ in the last ones: exponentials and logarithms are those of the platform.
 
 use gestalt_protocol::{ClassId, FusionRule};
 
@@ -18,6 +19,16 @@ pub struct Fusion {
     pub margin: f64,
 }
 
+impl Fusion {
+    /// Whether it is over so many classes, and every value is one that a decision may carry.
+    pub(crate) fn is_sound(&self, classes: usize) -> bool {
+        self.probabilities.len() == classes
+            && self.probabilities.iter().all(|p| (0.0..=1.0).contains(p))
+            && self.top.index() < classes
+            && self.margin >= 0.0
+    }
+}
+
 /// Fuses one row of centred log-evidence per robot, each of `classes` values, after clipping it to ±`clip`.
 ///
 /// With ℓ the clipped evidence of a robot, p its softmax and H the entropy, the total of class k is
@@ -26,7 +37,7 @@ pub struct Fusion {
 /// - log pool: Σ ℓ(k); P is the softmax (Genest & Zidek 1986, external Bayes, equal weights of 1);
 /// - confidence-weighted: Σ (1 − H(p) / ln K) ℓ(k); P is the softmax.
 ///
-/// `None` when there is no row. A row of another length is a mistake of the caller; its excess or lack is ignored.
+/// `None` when there is no row, and for a rule that is not Gestalt's own. A row of another length is a mistake of the caller; its excess or lack is ignored.
 pub fn fuse<'a>(
     rule: FusionRule,
     clip: f64,
@@ -55,6 +66,7 @@ pub fn fuse<'a>(
                 scratch.copy_from_slice(&row);
                 add(&mut totals, &row, certainty(&mut scratch));
             }
+            FusionRule::Other(_) => return None,
         }
     }
     if robots == 0.0 || classes < 2 {
@@ -64,6 +76,7 @@ pub fn fuse<'a>(
     let one_robot = match rule {
         FusionRule::Majority | FusionRule::MeanProbability => 1.0,
         FusionRule::LogPool | FusionRule::ConfidenceWeighted => 2.0 * clip,
+        FusionRule::Other(_) => return None,
     };
     let mut probabilities = totals.clone();
     match rule {
@@ -71,6 +84,7 @@ pub fn fuse<'a>(
             probabilities.iter_mut().for_each(|p| *p /= robots);
         }
         FusionRule::LogPool | FusionRule::ConfidenceWeighted => softmax(&mut probabilities),
+        FusionRule::Other(_) => return None,
     }
     // The top is that of the probabilities, which the certificate shows: totals a rounding apart may be equal there.
     let top = top_of(&probabilities);
@@ -88,7 +102,9 @@ pub fn fuse<'a>(
 #[must_use]
 pub fn weight(rule: FusionRule, clip: f64, evidence: &[f32]) -> f64 {
     match rule {
-        FusionRule::Majority | FusionRule::MeanProbability | FusionRule::LogPool => 1.0,
+        FusionRule::Majority | FusionRule::MeanProbability | FusionRule::LogPool | FusionRule::Other(_) => {
+            1.0
+        }
         FusionRule::ConfidenceWeighted => {
             let mut row = vec![0.0; evidence.len()];
             clip_into(&mut row, evidence, clip);
@@ -139,12 +155,7 @@ fn certainty(row: &mut [f64]) -> f64 {
 mod tests {
     use super::*;
 
-    const RULES: [FusionRule; 4] = [
-        FusionRule::Majority,
-        FusionRule::MeanProbability,
-        FusionRule::LogPool,
-        FusionRule::ConfidenceWeighted,
-    ];
+    const RULES: [FusionRule; 4] = FusionRule::ALL;
 
     fn fused(rule: FusionRule, rows: &[&[f32]]) -> Fusion {
         fuse(rule, 6.0, rows[0].len(), rows.iter().copied()).unwrap()

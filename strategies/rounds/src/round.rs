@@ -11,7 +11,8 @@ use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
 use crate::classify::Classify;
 use crate::config::RoundsConfig;
-use crate::evidence::{Evidence, Look};
+use crate::evidence::{Evidence, JudgedFrame};
+use crate::fuse::Fuse;
 use crate::observation::Observation;
 
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
@@ -70,7 +71,7 @@ impl Round {
                 } else {
                     Vec::new()
                 };
-                self.look(Look { at: now, probabilities: &p, quality, view: &view }, config);
+                self.add(JudgedFrame { at: now, probabilities: &p, quality, view: &view }, config);
                 true
             }
             Ok(_) | Err(_) => false,
@@ -78,13 +79,13 @@ impl Round {
     }
 
     /// Counts a frame.
-    fn look(&mut self, look: Look<'_>, config: &RoundsConfig) {
-        let classes = look.probabilities.len();
+    fn add(&mut self, frame: JudgedFrame<'_>, config: &RoundsConfig) {
+        let classes = frame.probabilities.len();
         let evidence = self.evidence.get_or_insert_with(|| Evidence::new(classes));
         if evidence.classes() != classes {
             *evidence = Evidence::new(classes);
         }
-        if evidence.add(look, config.decorrelation)
+        if evidence.add(frame, config.decorrelation)
             && let Some(said) = &mut self.said
         {
             said.outdated = true;
@@ -178,6 +179,7 @@ impl Round {
         me: RobotId,
         alive: &BTreeSet<RobotId>,
         scale: Option<Scale>,
+        rule: &dyn Fuse,
         config: &RoundsConfig,
     ) {
         // One of its own per round: what is concluded is held at once.
@@ -197,7 +199,7 @@ impl Round {
         if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
             return;
         }
-        let fusion = scale.and_then(|scale| self.ballot.fuse(config.rule, config.clip, scale));
+        let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
         let class = fusion
             .as_ref()
             .filter(|fusion| {
@@ -209,11 +211,13 @@ impl Round {
         if class.is_none() && !late {
             return;
         }
+        // Where nothing was fused nothing was counted.
+        let counted = scale.filter(|_| fusion.is_some());
+        let votes = counted.map_or(Vec::new(), |scale| self.ballot.counted(rule, config.clip, scale));
         let (probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
             let confidence = fusion.probabilities[fusion.top.index()];
             (fusion.probabilities, confidence)
         });
-        let votes = scale.map_or(Vec::new(), |s| self.ballot.counted(config.rule, config.clip, s));
         self.agreement.believe(Decision {
             round: self.id,
             class,
@@ -221,7 +225,7 @@ impl Round {
             author: me,
             certificate: Certificate {
                 vocabulary: scale.map_or(VocabularyId::NONE, |scale| scale.vocabulary),
-                rule: config.rule,
+                rule: rule.rule(),
                 probabilities,
                 votes,
                 elapsed_ms: u32::try_from(now.saturating_sub(self.since).as_millis()).unwrap_or(u32::MAX),

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// A list of labels that is no vocabulary.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum VocabularyError {
     /// Fewer than two labels: nothing to tell apart.
     #[error("a vocabulary needs at least 2 gestures, this one has {0}")]

@@ -6,7 +6,7 @@ use gestalt_protocol::ClassId;
 use rand::{Rng, RngExt};
 
 use super::contract::Forgetting;
-use crate::sample::{HeldSample, Samples, draw};
+use crate::sample::{HeldSample, HeldSamples, draw};
 
 /// Class-balancing reservoir sampling (Chrysakis & Moens, "Online continual learning from imbalanced data", ICML
 /// 2020). A class that is or once was the largest of a full set is *full*. The newest sample, of class c,
@@ -41,7 +41,7 @@ impl Forgetting for ClassBalancedReservoir {
         }
     }
 
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let newest = samples.iter().next_back()?;
         let held = |class| samples.class_count(class) - usize::from(class == newest.class);
         let most = samples.classes().map(held).max()?;

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use rand::Rng;
 
-use crate::sample::{HeldSample, Samples};
+use crate::sample::{HeldSample, HeldSamples};
 
 /// Says which sample goes when the set holds more than its capacity.
 ///
@@ -14,7 +14,7 @@ use crate::sample::{HeldSample, Samples};
 ///
 /// ```
 /// use gestalt_protocol::{ClassId, RobotId, RoundId};
-/// use gestalt_strategies::sample::Samples;
+/// use gestalt_strategies::sample::HeldSamples;
 /// use gestalt_strategies::{Forgetting, SelectionRule, TrainingSet};
 /// use rand::{Rng, SeedableRng};
 /// use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ use crate::sample::{HeldSample, Samples};
 /// struct FirstImpression;
 ///
 /// impl Forgetting for FirstImpression {
-///     fn victim(&mut self, samples: &Samples, _: &mut dyn Rng) -> Option<u64> {
+///     fn victim(&mut self, samples: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
 ///         samples.iter().next_back().map(|newest| newest.key)
 ///     }
 /// }
@@ -57,5 +57,5 @@ pub trait Forgetting: Debug + Send {
 
     /// The key of the sample to forget. Asked when the set, the newest sample included, holds more than its
     /// capacity. If the answer is no sample that is held, the oldest goes.
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64>;
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64>;
 }

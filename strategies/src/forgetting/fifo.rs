@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use super::contract::Forgetting;
-use crate::sample::Samples;
+use crate::sample::HeldSamples;
 
 /// The oldest sample of the whole set goes, whatever its class.
 ///
@@ -12,7 +12,7 @@ use crate::sample::Samples;
 pub struct Fifo;
 
 impl Forgetting for Fifo {
-    fn victim(&mut self, samples: &Samples, _: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
         samples.iter().next().map(|oldest| oldest.key)
     }
 }

@@ -6,8 +6,8 @@ use gestalt_protocol::ClassId;
 use rand::Rng;
 
 use super::contract::Forgetting;
-use crate::geometry::{Cluster, Sum, narrow};
-use crate::sample::{HeldSample, Samples};
+use crate::geometry::{Cluster, ExactSum, narrow};
+use crate::sample::{HeldSample, HeldSamples};
 
 /// Of the class K with the most samples (ties at random)
 /// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that ever came, S the sum of the m held.
@@ -25,7 +25,7 @@ pub struct HerdingForgetting {
 
 #[derive(Clone, Debug, Default)]
 struct Class {
-    came: Sum,
+    came: ExactSum,
     held: Cluster,
 }
 
@@ -44,11 +44,11 @@ impl Forgetting for HerdingForgetting {
         }
     }
 
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let Class { came, held } = self.classes.get(&samples.draw_largest_class(rng)?)?;
-        let others = held.sum.count() - 1.0;
-        let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum.total(j) - others * mean).collect();
-        self.named = held.points.nearest_to(&narrow(target));
+        let others = held.sum().count() - 1.0;
+        let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum().total(j) - others * mean).collect();
+        self.named = held.points().nearest_to(&narrow(target));
         self.named
     }
 }

@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use super::contract::Forgetting;
-use crate::sample::{Samples, draw};
+use crate::sample::{HeldSamples, draw};
 
 /// Of the class with the most samples (ties at random) any one goes.
 ///
@@ -12,7 +12,7 @@ use crate::sample::{Samples, draw};
 pub struct RandomForgetting;
 
 impl Forgetting for RandomForgetting {
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let class = samples.draw_largest_class(rng)?;
         draw(samples.class_keys(class), rng)
     }

@@ -7,7 +7,7 @@ use rand::Rng;
 
 use super::contract::Forgetting;
 use crate::geometry::Neighbours;
-use crate::sample::{HeldSample, Samples, draw};
+use crate::sample::{HeldSample, HeldSamples, draw};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg min over x of min over x' ≠ x in K of ‖x − x'‖. The two of the closest pair tie: one of them goes at random.
@@ -37,7 +37,7 @@ impl Forgetting for Redundancy {
         class.remove_neighbour(sample.key);
     }
 
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let class = samples.draw_largest_class(rng)?;
         let pair = self.classes.entry(class).or_default().closest()?;
         match pair.neighbour {

@@ -7,7 +7,7 @@ use rand::Rng;
 
 use super::contract::Forgetting;
 use crate::geometry::Cluster;
-use crate::sample::{HeldSample, Samples};
+use crate::sample::{HeldSample, HeldSamples};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg max over x of ‖x − f_K‖, f_K the centroid of all samples of K. Ties go to the oldest.
@@ -27,8 +27,8 @@ impl Forgetting for RepresentativityForgetting {
         self.classes.entry(sample.class).or_default().remove(sample);
     }
 
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let class = self.classes.get(&samples.draw_largest_class(rng)?)?;
-        class.points.farthest_from(&class.centroid()?)
+        class.points().farthest_from(&class.centroid()?)
     }
 }

@@ -4,7 +4,7 @@ use rand::Rng;
 use rand::RngExt;
 
 use super::contract::Forgetting;
-use crate::sample::Samples;
+use crate::sample::HeldSamples;
 
 /// The newest sample, the i-th that ever came, stays with probability T / i in place of any of the T others; else it
 /// goes itself. Each sample of the stream is then held with the same probability, whatever its class.
@@ -14,7 +14,7 @@ use crate::sample::Samples;
 pub struct Reservoir;
 
 impl Forgetting for Reservoir {
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let others = samples.len().checked_sub(1)?;
         // One of the i that came: those beyond the others held stand for the newest going itself.
         let place = rng.random_range(0..samples.arrivals().max(samples.len() as u64));

@@ -13,7 +13,7 @@ use super::points::Points;
 /// Ask for the [`farthest`](Self::farthest) or for the [`closest`](Self::closest), not for both: the first does not
 /// look which of equally near neighbours has the smallest key.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Neighbours {
+pub struct Neighbours {
     seekers: Points,
     /// By place of the seeker.
     nearest: Vec<Nearest>,
@@ -31,21 +31,23 @@ struct Nearest {
 
 /// A seeker and its nearest neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Pair {
-    pub(crate) seeker: u64,
-    pub(crate) neighbour: Option<u64>,
+pub struct NearestPair {
+    /// The key of the seeker.
+    pub seeker: u64,
+    /// The key of its nearest neighbour; `None` when there is none.
+    pub neighbour: Option<u64>,
 }
 
 impl Neighbours {
     /// Takes a seeker in.
-    pub(crate) fn add_seeker(&mut self, key: u64, vector: &[f32]) {
+    pub fn add_seeker(&mut self, key: u64, vector: &[f32]) {
         self.seekers.push(key, vector);
         let nearest = self.nearest_to(key, vector, |_| false);
         self.nearest.push(nearest);
     }
 
     /// Takes a seeker out.
-    pub(crate) fn remove_seeker(&mut self, key: u64) {
+    pub fn remove_seeker(&mut self, key: u64) {
         if let Some(place) = self.seekers.place(key) {
             self.seekers.swap_remove(place);
             self.nearest.swap_remove(place);
@@ -53,7 +55,7 @@ impl Neighbours {
     }
 
     /// Takes a neighbour in.
-    pub(crate) fn add_neighbour(&mut self, key: u64, vector: &[f32]) {
+    pub fn add_neighbour(&mut self, key: u64, vector: &[f32]) {
         self.neighbours.push(key, vector);
         let seekers = self.seekers.keys();
         self.seekers.measure(vector, |place, distance| {
@@ -70,7 +72,7 @@ impl Neighbours {
     }
 
     /// Takes a neighbour out.
-    pub(crate) fn remove_neighbour(&mut self, key: u64) {
+    pub fn remove_neighbour(&mut self, key: u64) {
         if let Some(place) = self.neighbours.place(key) {
             self.neighbours.swap_remove(place);
             for nearest in self.nearest.iter_mut().filter(|nearest| nearest.key == Some(key)) {
@@ -80,17 +82,19 @@ impl Neighbours {
     }
 
     /// The seekers.
-    pub(crate) fn seekers(&self) -> &Points {
+    #[must_use]
+    pub fn seekers(&self) -> &Points {
         &self.seekers
     }
 
     /// Whether there is a neighbour at all.
-    pub(crate) fn has_neighbours(&self) -> bool {
+    #[must_use]
+    pub fn has_neighbours(&self) -> bool {
         !self.neighbours.keys().is_empty()
     }
 
     /// The seeker whose nearest neighbour is farthest; of equals the smaller key.
-    pub(crate) fn farthest(&mut self) -> Option<Pair> {
+    pub fn farthest(&mut self) -> Option<NearestPair> {
         for place in 0..self.nearest.len() {
             // Only the distance matters, and there is none below the lower bound: where many are equally near, as
             // copies of one sample are, the search ends at the first of them.
@@ -101,7 +105,7 @@ impl Neighbours {
     }
 
     /// The seeker whose nearest neighbour is closest, and that neighbour; of equals the smaller keys.
-    pub(crate) fn closest(&mut self) -> Option<Pair> {
+    pub fn closest(&mut self) -> Option<NearestPair> {
         loop {
             // Only a lower bound that nothing undercuts has to be looked into.
             let place = self.first_by(|a, b| a < b)?;
@@ -120,8 +124,8 @@ impl Neighbours {
         })
     }
 
-    fn pair(&self, place: usize) -> Pair {
-        Pair { seeker: self.seekers.keys()[place], neighbour: self.nearest[place].key }
+    fn pair(&self, place: usize) -> NearestPair {
+        NearestPair { seeker: self.seekers.keys()[place], neighbour: self.nearest[place].key }
     }
 
     /// Looks for the nearest neighbour again if it has gone, until one is near `enough` for the lower bound of the

@@ -5,13 +5,13 @@ use std::ops::ControlFlow;
 /// Points side by side in a block: four vector registers of the smallest instruction set.
 const LANES: usize = 16;
 
-/// Points kept component by component in blocks of [`LANES`], each with a key; removal moves the last into the gap.
+/// Points kept component by component in blocks of 16, each with a key; removal moves the last into the gap.
 ///
 /// The distances from one point to all are then sums side by side, at a sixth of what one after the other takes. Each
 /// is the sum over the components in their order, in `f32`, so the formula written plainly gives the same bits. Points
 /// are as wide as the widest: a component that one of them lacks counts as 0.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Points {
+pub struct Points {
     keys: Vec<u64>,
     dimension: usize,
     /// Component `j` of the point at place `i`: row `i / LANES * dimension + j`, lane `i % LANES`.
@@ -20,22 +20,25 @@ pub(crate) struct Points {
 
 impl Points {
     /// The keys, by place.
-    pub(crate) fn keys(&self) -> &[u64] {
+    #[must_use]
+    pub fn keys(&self) -> &[u64] {
         &self.keys
     }
 
     /// How many components the points have.
-    pub(crate) fn dimension(&self) -> usize {
+    #[must_use]
+    pub fn dimension(&self) -> usize {
         self.dimension
     }
 
     /// The place of a key.
-    pub(crate) fn place(&self, key: u64) -> Option<usize> {
+    #[must_use]
+    pub fn place(&self, key: u64) -> Option<usize> {
         self.keys.iter().position(|held| *held == key)
     }
 
     /// Puts a point at the last place.
-    pub(crate) fn push(&mut self, key: u64, vector: &[f32]) {
+    pub fn push(&mut self, key: u64, vector: &[f32]) {
         if vector.len() > self.dimension {
             self.widen(vector.len());
         }
@@ -48,7 +51,10 @@ impl Points {
     }
 
     /// Takes the point at a place out; the last one takes its place.
-    pub(crate) fn swap_remove(&mut self, place: usize) {
+    ///
+    /// # Panics
+    /// If there is no such place.
+    pub fn swap_remove(&mut self, place: usize) {
         let last = self.point(self.keys.len() - 1);
         self.write(place, &last);
         self.keys.swap_remove(place);
@@ -56,13 +62,17 @@ impl Points {
     }
 
     /// The point at a place.
-    pub(crate) fn point(&self, place: usize) -> Vec<f32> {
+    ///
+    /// # Panics
+    /// If there is no such place.
+    #[must_use]
+    pub fn point(&self, place: usize) -> Vec<f32> {
         let first = place / LANES * self.dimension;
         self.rows[first..first + self.dimension].iter().map(|row| row[place % LANES]).collect()
     }
 
     /// Calls with the place of each point and its squared distance to the given one, in the order of the places.
-    pub(crate) fn measure(&self, from: &[f32], mut each: impl FnMut(usize, f32)) {
+    pub fn measure(&self, from: &[f32], mut each: impl FnMut(usize, f32)) {
         self.measure_until(from, |place, distance| {
             each(place, distance);
             ControlFlow::Continue(())
@@ -70,7 +80,7 @@ impl Points {
     }
 
     /// The same, until the call says that it has seen enough.
-    pub(crate) fn measure_until(&self, from: &[f32], mut each: impl FnMut(usize, f32) -> ControlFlow<()>) {
+    pub fn measure_until(&self, from: &[f32], mut each: impl FnMut(usize, f32) -> ControlFlow<()>) {
         let mut padded = from.to_vec();
         padded.resize(self.dimension.max(from.len()), 0.0);
         let (from, beyond) = padded.split_at(self.dimension);
@@ -95,12 +105,14 @@ impl Points {
     }
 
     /// The key of the point nearest to the given one; of equals the smaller.
-    pub(crate) fn nearest_to(&self, point: &[f32]) -> Option<u64> {
+    #[must_use]
+    pub fn nearest_to(&self, point: &[f32]) -> Option<u64> {
         self.first_by(point, |a, b| a < b)
     }
 
     /// The key of the point farthest from the given one; of equals the smaller.
-    pub(crate) fn farthest_from(&self, point: &[f32]) -> Option<u64> {
+    #[must_use]
+    pub fn farthest_from(&self, point: &[f32]) -> Option<u64> {
         self.first_by(point, |a, b| a > b)
     }
 

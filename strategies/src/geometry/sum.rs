@@ -8,34 +8,37 @@ const GREATEST: f64 = 1_099_511_627_776.0;
 /// Vectors added up exactly, in fixed point: adding and taking out commute, so the mean of what is left is the same
 /// bits as if it alone had been added. Components are exact from 2⁻⁴⁰ to 2⁴⁰; a missing one counts as 0.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sum {
+pub struct ExactSum {
     total: Vec<i128>,
     count: i64,
 }
 
-impl Sum {
+impl ExactSum {
     /// Adds a vector.
-    pub(crate) fn add(&mut self, vector: &[f32]) {
+    pub fn add(&mut self, vector: &[f32]) {
         self.accumulate(vector, 1);
     }
 
     /// Takes a vector out that was added.
-    pub(crate) fn subtract(&mut self, vector: &[f32]) {
+    pub fn subtract(&mut self, vector: &[f32]) {
         self.accumulate(vector, -1);
     }
 
     /// How many vectors there are.
-    pub(crate) fn count(&self) -> f64 {
+    #[must_use]
+    pub fn count(&self) -> f64 {
         self.count as f64
     }
 
     /// Component `j` of the sum.
-    pub(crate) fn total(&self, j: usize) -> f64 {
+    #[must_use]
+    pub fn total(&self, j: usize) -> f64 {
         self.total.get(j).map_or(0.0, |total| *total as f64 / ONE)
     }
 
     /// The mean; `None` of none.
-    pub(crate) fn mean(&self) -> Option<Vec<f64>> {
+    #[must_use]
+    pub fn mean(&self) -> Option<Vec<f64>> {
         let components = 0..self.total.len();
         (self.count > 0).then(|| components.map(|j| self.total(j) / self.count()).collect())
     }
@@ -52,7 +55,8 @@ impl Sum {
     }
 }
 
-/// In the precision that distances are measured in.
-pub(crate) fn narrow(vector: Vec<f64>) -> Vec<f32> {
+/// A mean in the precision that distances are measured in.
+#[must_use]
+pub fn narrow(vector: Vec<f64>) -> Vec<f32> {
     vector.into_iter().map(|x| x as f32).collect()
 }

@@ -12,6 +12,7 @@ use crate::vector_codec::Precision;
 
 /// Parameters no robot can learn with; each names the field and the mend.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum LearningConfigError {
     /// A number of samples out of range.
     #[error("{field} is {value}: choose from {least} to {most}")]

@@ -3,12 +3,12 @@
 use gestalt_protocol::{ClassId, RoundId};
 use gestalt_rounds::Classify;
 
-use super::aside::{self, Aside};
 use super::changes::TrainingChange;
 use super::memory::Item;
 use super::state::Learning;
+use super::unresolved::{self, UnresolvedSample};
 use crate::lessons::{Candidates, Verdict};
-use crate::sample::{HeldSample, Part};
+use crate::sample::{HeldSample, SetPart};
 use crate::training_set::SetChange;
 
 impl Learning {
@@ -23,7 +23,7 @@ impl Learning {
                     self.note_not_aside(number, &aside);
                     self.take_back(aside, class);
                 }
-                for vector in self.lives.take_unlabelled(round) {
+                for vector in self.recent.take_unlabelled(round) {
                     self.keep(round, class, vector);
                 }
             }
@@ -32,7 +32,7 @@ impl Learning {
                     if let SetChange::Removed(sample) = &change {
                         let HeldSample { part, id, class, round, vector, .. } = sample.clone();
                         let shared = id.map(|id| (id, class));
-                        self.put_aside(Aside { part, shared, round, vector, guess: None });
+                        self.put_aside(UnresolvedSample { part, shared, round, vector, guess: None });
                     }
                     self.absorb(vec![change]);
                 }
@@ -43,9 +43,9 @@ impl Learning {
                 let refuted: Vec<u64> = refuted.map(|(number, _)| number).collect();
                 refuted.into_iter().for_each(|number| self.guess(number, None));
                 if verdict != Verdict::Retracted {
-                    for vector in self.lives.take_unlabelled(round) {
-                        let (part, vector) = (Part::Personal, vector.into());
-                        self.put_aside(Aside { part, shared: None, round, vector, guess: None });
+                    for vector in self.recent.take_unlabelled(round) {
+                        let (part, vector) = (SetPart::Personal, vector.into());
+                        self.put_aside(UnresolvedSample { part, shared: None, round, vector, guess: None });
                     }
                 }
             }
@@ -60,8 +60,8 @@ impl Learning {
         self.absorb(changes);
     }
 
-    fn take_back(&mut self, aside: Aside, class: ClassId) {
-        let Aside { shared, round, vector, .. } = aside;
+    fn take_back(&mut self, aside: UnresolvedSample, class: ClassId) {
+        let UnresolvedSample { shared, round, vector, .. } = aside;
         match shared {
             None => self.keep(round, class, vector.to_vec()),
             Some((id, _)) => {
@@ -71,7 +71,7 @@ impl Learning {
         }
     }
 
-    fn put_aside(&mut self, aside: Aside) {
+    fn put_aside(&mut self, aside: UnresolvedSample) {
         let (number, gone) = self.aside.put(aside);
         self.dirty.extend([Item::Counters, Item::Aside(number)]);
         for (number, aside) in gone {
@@ -80,10 +80,10 @@ impl Learning {
     }
 
     /// Notes that a sample is aside no longer.
-    fn note_not_aside(&mut self, number: u64, aside: &Aside) {
+    fn note_not_aside(&mut self, number: u64, aside: &UnresolvedSample) {
         self.dirty.insert(Item::Aside(number));
         if aside.guess.is_some() {
-            self.training.push(TrainingChange::Remove(aside::training_key(number)));
+            self.training.push(TrainingChange::Remove(unresolved::training_key(number)));
         }
     }
 
@@ -91,7 +91,7 @@ impl Learning {
     fn guess(&mut self, number: u64, class: Option<ClassId>) {
         self.aside.guess(number, class);
         self.dirty.insert(Item::Aside(number));
-        let key = aside::training_key(number);
+        let key = unresolved::training_key(number);
         self.training.push(match (class, self.aside.get(number)) {
             (Some(class), Some(aside)) => TrainingChange::Insert { key, class, vector: aside.vector.clone() },
             _ => TrainingChange::Remove(key),
@@ -101,7 +101,7 @@ impl Learning {
     /// Trains on own samples of which several gestures are possible and the classifier is sure of one.
     pub fn settle_aside(&mut self, classifier: &dyn Classify) {
         let classes = self.vocabulary.classes();
-        let sure = |aside: &Aside| {
+        let sure = |aside: &UnresolvedSample| {
             let Verdict::Among(candidates) = self.lessons.verdict(aside.round, classes) else { return None };
             let p = classifier.probabilities_in_space(&aside.vector)?;
             likeliest(&p, candidates).filter(|(_, p)| *p >= self.config.sure).map(|(class, _)| class)

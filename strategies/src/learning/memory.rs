@@ -8,12 +8,12 @@ use gestalt_protocol::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use super::aside::Aside;
-use crate::sample::{HeldSample, Part, Seen};
+use super::unresolved::UnresolvedSample;
+use crate::sample::{HeldSample, SeenSamples, SetPart};
 
 /// One change of a robot's memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Change {
+pub struct RecordChange {
     /// Which record.
     pub key: Vec<u8>,
     /// What it now holds; `None` when it is gone.
@@ -22,6 +22,7 @@ pub struct Change {
 
 /// Records that are no memory of this robot.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MemoryError {
     /// Written by another version of the program.
     #[error(
@@ -160,8 +161,8 @@ pub(super) fn encode_sample(sample: &HeldSample) -> Vec<u8> {
     })
 }
 
-pub(super) fn encode_aside(aside: &Aside) -> Vec<u8> {
-    let Aside { part, shared, round, vector, guess } = aside;
+pub(super) fn encode_aside(aside: &UnresolvedSample) -> Vec<u8> {
+    let UnresolvedSample { part, shared, round, vector, guess } = aside;
     encode(&StoredAside {
         part: part_number(*part),
         shared: *shared,
@@ -177,30 +178,30 @@ pub(super) fn encode_lessons(lessons: impl Iterator<Item = Lesson>) -> Vec<u8> {
     encode(&words)
 }
 
-fn part_number(part: Part) -> u8 {
+fn part_number(part: SetPart) -> u8 {
     match part {
-        Part::Personal => 0,
-        Part::Shared => 1,
-        Part::External => 2,
+        SetPart::Personal => 0,
+        SetPart::Shared => 1,
+        SetPart::External => 2,
     }
 }
 
-fn part_of(number: u8) -> Option<Part> {
-    [Part::Personal, Part::Shared, Part::External].get(usize::from(number)).copied()
+fn part_of(number: u8) -> Option<SetPart> {
+    [SetPart::Personal, SetPart::Shared, SetPart::External].get(usize::from(number)).copied()
 }
 
 /// A robot's memory as it was read back, not yet compared with the robot.
 #[derive(Clone, Debug, Default)]
-pub struct Memory {
+pub struct RobotMemory {
     owner: Option<Owner>,
     pub(super) counters: Counters,
     pub(crate) samples: Vec<HeldSample>,
-    pub(crate) seen: Seen,
+    pub(crate) seen: SeenSamples,
     pub(super) lessons: Vec<Lesson>,
-    pub(super) aside: Vec<(u64, Aside)>,
+    pub(super) aside: Vec<(u64, UnresolvedSample)>,
 }
 
-impl Memory {
+impl RobotMemory {
     /// Reads the records that the changes, one after the other, have left; an empty memory of none.
     ///
     /// # Errors
@@ -239,13 +240,13 @@ impl Memory {
                     let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
                     memory.aside.push((
                         number,
-                        Aside { part, shared, round, vector: Arc::from(finite(vector)?), guess },
+                        UnresolvedSample { part, shared, round, vector: Arc::from(finite(vector)?), guess },
                     ));
                 }
             }
         }
-        memory.seen =
-            Seen::from_intervals(seen).map_err(|_| MemoryError::Damaged("impossible sample numbers"))?;
+        memory.seen = SeenSamples::from_intervals(seen)
+            .map_err(|_| MemoryError::Damaged("impossible sample numbers"))?;
         Ok(memory)
     }
 

@@ -8,7 +8,8 @@ use gestalt_svm::FeatureSpace;
 use thiserror::Error;
 
 use super::config::{LearningConfig, LearningConfigError};
-use super::memory::{Memory, MemoryError};
+use super::memory::{MemoryError, RobotMemory};
+use super::own_rules::OwnRules;
 use crate::training_set::RestoreError;
 
 /// What a robot needs to learn.
@@ -23,7 +24,9 @@ pub struct LearningSetup {
     pub rng: Box<dyn rand::Rng + Send>,
     /// What the robot remembers from before; `None` for a robot whose host keeps nothing: such a one is never owed an
     /// [`Input::Remembered`](crate::Input::Remembered).
-    pub memory: Option<Memory>,
+    pub memory: Option<RobotMemory>,
+    /// Rules of one's own in place of those that the parameters name.
+    pub rules: OwnRules,
 }
 
 impl fmt::Debug for LearningSetup {
@@ -34,6 +37,7 @@ impl fmt::Debug for LearningSetup {
 
 /// Why a robot cannot learn.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum LearningError {
     /// Its parameters.
     #[error(transparent)]

@@ -10,10 +10,7 @@ use crate::vector_codec::decode_vector;
 
 impl Learning {
     /// Chooses what to share, within the bounds.
-    pub fn share(&mut self, classifier: Option<&dyn Classify>, alone: bool) {
-        if !(self.numbered || alone) {
-            return;
-        }
+    pub fn share(&mut self, classifier: Option<&dyn Classify>) {
         // A hair more than a whole: tenths do not add up to one exactly.
         let by_fraction = (self.credit + 1e-9).floor() as usize;
         let by_number = self.config.share_samples.map_or(usize::MAX, |n| n as usize);
@@ -47,7 +44,7 @@ impl Learning {
         let sample = SharedSample {
             id: SampleId { author: self.me, number: self.set.next_number().saturating_add(64) },
             class: ClassId(0),
-            round: self.lives.newest().unwrap_or(RoundId { counter: 1, opener: self.me }),
+            round: self.recent.newest().unwrap_or(RoundId { counter: 1, opener: self.me }),
             vector: self.config.precision.encode(&vector, &self.space),
         };
         let length = |samples: Vec<SharedSample>| {

@@ -6,21 +6,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Digest, FeatureSpaceId, Fnv1a, Learning as Status, Lesson, RobotId, RoundId, SampleId,
-    SharedSample,
+    ClassId, Digest, FeatureSpaceId, Fnv1a, LearningStatus, Lesson, RobotId, RoundId, SampleId, SharedSample,
 };
 use gestalt_rounds::{Follow, Vocabulary};
 use gestalt_svm::FeatureSpace;
 
-use super::aside::{self, Shelf};
 use super::changes::{TrainingChange, inserted};
 use super::config::LearningConfig;
-use super::lived::Lives;
-use super::memory::{self, Change, Counters, Item, Memory, Owner};
+use super::memory::{self, Counters, Item, Owner, RecordChange, RobotMemory};
+use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
-use crate::lessons::{Heard, LessonBook, Verdict};
-use crate::sample::Part;
-use crate::training_set::{Receipt, SetChange, TrainingSet};
+use super::unresolved::{self, Unresolved};
+use crate::lessons::{LessonBook, LessonReceipt, Verdict};
+use crate::sample::SetPart;
+use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
 /// Why a received sample was not taken.
@@ -41,12 +40,10 @@ pub(crate) struct Learning {
     pub(super) rng: Box<dyn rand::Rng + Send>,
     pub(super) set: TrainingSet,
     pub(super) lessons: LessonBook,
-    pub(super) lives: Lives,
-    pub(super) aside: Shelf,
+    pub(super) recent: RecentRounds,
+    pub(super) aside: Unresolved,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
-    /// Whether the numbers of this robot's samples are sure not to have been used before.
-    pub(super) numbered: bool,
     /// What is to be trained and remembered, and was not yet said.
     pub(super) training: Vec<TrainingChange>,
     pub(super) dirty: BTreeSet<Item>,
@@ -67,33 +64,38 @@ impl fmt::Debug for Learning {
 }
 
 impl Learning {
-    pub fn new(me: RobotId, setup: LearningSetup) -> Result<Self, LearningError> {
-        let LearningSetup { config, space, vocabulary, rng, memory } = setup;
+    /// What that robot learned so far, in its `boot`th life.
+    pub fn new(me: RobotId, boot: u32, setup: LearningSetup) -> Result<Self, LearningError> {
+        let LearningSetup { config, space, vocabulary, rng, memory, rules } = setup;
         config.validate()?;
         let durable = memory.is_some();
         let memory = memory.unwrap_or_default();
         let space_id = space.id();
         let owner = Owner::new(me, space_id, vocabulary.id());
         memory.check(owner, space.components(), vocabulary.classes())?;
-        let mut set =
-            TrainingSet::new(me, config.capacity, config.selection.build(), config.forgetting.build());
+        let (selection, forgetting) = rules.make(&config);
+        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting);
         let fresh = memory.is_empty();
-        let Memory { counters, samples, seen, lessons: heard, aside, .. } = memory;
+        let RobotMemory { counters, samples, seen, lessons: heard, aside, .. } = memory;
         if !fresh {
             set.restore(samples, seen, counters.next_key, counters.next_number)?;
+        } else {
+            // An empty memory proves nothing: a disk may have been lost, with the numbers used before. Boots grow by more
+            // than a robot can share in a life, so these numbers are new, and nobody has to be asked.
+            set.number_from(boot);
         }
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
             lessons.hear(lesson);
         });
         let guesses = aside.iter().filter_map(|(number, aside)| {
-            let key = aside::training_key(*number);
+            let key = unresolved::training_key(*number);
             Some(TrainingChange::Insert { key, class: aside.guess?, vector: aside.vector.clone() })
         });
         let training = set.iter().map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
         Ok(Self {
-            aside: Shelf::new(aside, counters.next_aside, config.aside),
+            aside: Unresolved::new(aside, counters.next_aside, config.aside),
             config,
             me,
             space,
@@ -102,9 +104,8 @@ impl Learning {
             rng,
             set,
             lessons,
-            lives: Lives::default(),
+            recent: RecentRounds::default(),
             credit: 0.0,
-            numbered: durable,
             training,
             dirty,
             durable,
@@ -117,7 +118,7 @@ impl Learning {
     /// Notes a look at the gesture of a round; says whether it was kept.
     pub fn look(&mut self, now: Duration, round: RoundId, features: &[f32]) -> bool {
         let Ok(vector) = self.space.project(features) else { return false };
-        self.lives.look(now, round, vector, self.config.keep, self.config.spacing) && {
+        self.recent.look(now, round, vector, self.config.keep, self.config.spacing) && {
             self.apply_to_round(round);
             true
         }
@@ -125,12 +126,12 @@ impl Learning {
 
     /// What was decided in a round that this robot remembers.
     pub fn decision(&self, round: RoundId) -> Option<ClassId> {
-        self.lives.decision(round)
+        self.recent.decision(round)
     }
 
     /// Whether this robot knows anything of a round.
     pub fn knows(&self, round: RoundId) -> bool {
-        self.lives.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
+        self.recent.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
     }
 
     /// How many samples of that round are held.
@@ -155,10 +156,10 @@ impl Learning {
     }
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
-    pub fn hear(&mut self, lesson: &Lesson) -> Heard {
+    pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
         let oldest = self.lessons.oldest();
         let heard = self.lessons.hear(lesson);
-        if heard == Heard::New {
+        if heard == LessonReceipt::New {
             self.dirty.insert(Item::Lessons(lesson.round));
             let forgotten = oldest.filter(|round| !self.lessons.contains(*round));
             self.dirty.extend(forgotten.map(Item::Lessons));
@@ -180,7 +181,7 @@ impl Learning {
         let verdict = self.verdict(round);
         let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
-            Receipt::New(changes) => {
+            SampleReceipt::New(changes) => {
                 self.dirty.insert(Item::Seen(id.author));
                 self.absorb(changes);
                 // A class is what it was taken under; anything else concerns all samples of the round.
@@ -189,8 +190,8 @@ impl Learning {
                 }
                 Ok(true)
             }
-            Receipt::Known => Ok(false),
-            Receipt::Refused(_) => Err(Declined::Number),
+            SampleReceipt::Known => Ok(false),
+            SampleReceipt::Refused(_) => Err(Declined::Number),
         }
     }
 
@@ -221,11 +222,6 @@ impl Learning {
         }
     }
 
-    /// This robot's numbers are sure not to be used by samples it does not remember: it has heard from others.
-    pub fn note_heard_from_others(&mut self) {
-        self.numbered = true;
-    }
-
     /// What is to be trained, since the last time.
     pub fn take_training(&mut self) -> Vec<TrainingChange> {
         std::mem::take(&mut self.training)
@@ -233,7 +229,7 @@ impl Learning {
 
     /// What is to be remembered, since the last time, as which revision. A robot without a memory on disk remembers
     /// at once what little it can.
-    pub fn take_changes(&mut self) -> Option<(u64, Vec<Change>)> {
+    pub fn take_changes(&mut self) -> Option<(u64, Vec<RecordChange>)> {
         if !self.durable {
             self.dirty.clear();
             self.revision += 1;
@@ -245,7 +241,8 @@ impl Learning {
         }
         self.revision += 1;
         let dirty = std::mem::take(&mut self.dirty);
-        let changes = dirty.into_iter().map(|item| Change { key: item.key(), value: self.record(item) });
+        let changes =
+            dirty.into_iter().map(|item| RecordChange { key: item.key(), value: self.record(item) });
         Some((self.revision, changes.collect()))
     }
 
@@ -286,21 +283,21 @@ impl Learning {
     }
 
     /// Where it stands, for the status. What the host knows of memory and training is left to it.
-    pub fn status(&self) -> Status {
+    pub fn status(&self) -> LearningStatus {
         let classes = (0..self.vocabulary.classes()).map(|class| ClassId(class as u8));
-        let counts = |part: Part| classes.clone().map(|class| self.set.count(part, class)).collect();
+        let counts = |part: SetPart| classes.clone().map(|class| self.set.count(part, class)).collect();
         let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
         let mut fnv = Fnv1a::default();
         for (id, class) in common.collect::<BTreeMap<_, _>>() {
             let number = id.author.0.to_le_bytes().into_iter().chain(id.number.to_le_bytes());
             fnv.add(number.chain([class.0]));
         }
-        Status {
+        LearningStatus {
             space: self.space_id.to_string(),
             capacity: self.config.capacity,
-            personal: counts(Part::Personal),
-            shared: counts(Part::Shared),
-            external: counts(Part::External),
+            personal: counts(SetPart::Personal),
+            shared: counts(SetPart::Shared),
+            external: counts(SetPart::External),
             aside: self.aside.len(),
             common: format!("{:016x}", fnv.hash()),
             lessons: self.lessons.len(),
@@ -312,17 +309,17 @@ impl Learning {
 
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
-        if self.lives.enter(round) {
+        if self.recent.enter(round) {
             self.apply_to_round(round);
         }
     }
 
     fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
-        self.lives.decided(round, class);
+        self.recent.decided(round, class);
     }
 
     fn wants_more(&self, round: RoundId) -> bool {
-        (1..self.config.keep).contains(&self.lives.looks(round))
+        (1..self.config.keep).contains(&self.recent.looks(round))
     }
 
     fn knowledge(&self) -> Option<Digest> {

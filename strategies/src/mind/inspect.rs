@@ -54,7 +54,7 @@ impl Mind {
 
     /// What it has learned from; `None` for one that does not learn.
     #[must_use]
-    pub fn learned(&self) -> Option<gestalt_protocol::Learning> {
+    pub fn learned(&self) -> Option<gestalt_protocol::LearningStatus> {
         self.learning.as_ref().map(Learning::status)
     }
 

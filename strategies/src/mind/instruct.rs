@@ -10,7 +10,7 @@ use super::input::Instructed;
 use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Learning;
-use crate::lessons::{Heard, Verdict};
+use crate::lessons::{LessonReceipt, Verdict};
 
 /// How much longer a robot waits that saw nothing of the round: another may have.
 const SAW_NOTHING: Duration = Duration::from_millis(500);
@@ -55,11 +55,13 @@ impl Mind {
         let again = learning.lessons().word(round, &instructed.by) == Some(word);
         let lesson = Lesson { round, instructor: instructed.by.clone(), at: instructed.at, word };
         match learning.hear(&lesson) {
-            Heard::New if again => Outcome::Known,
-            Heard::New if word != Word::Retracted && learning.held_of(round) == 0 => Outcome::NothingSeen,
-            Heard::New => Outcome::Learned,
-            Heard::Known => Outcome::Known,
-            Heard::Full => Outcome::UnknownRound,
+            LessonReceipt::New if again => Outcome::Known,
+            LessonReceipt::New if word != Word::Retracted && learning.held_of(round) == 0 => {
+                Outcome::NothingSeen
+            }
+            LessonReceipt::New => Outcome::Learned,
+            LessonReceipt::Known => Outcome::Known,
+            LessonReceipt::Full => Outcome::UnknownRound,
         }
     }
 

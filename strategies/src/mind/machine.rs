@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message, RobotId};
-use gestalt_rounds::{Classify, Follow, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
+use gestalt_rounds::{Classify, Follow, Fuse, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
 
 use super::answers::Answers;
 use super::input::{Concern, Input};
@@ -13,8 +13,8 @@ use crate::learning::{Learning, LearningError, LearningSetup};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
 ///
-/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
-/// inputs at the same times give the same outputs.
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. On one machine
+/// the same inputs at the same times give the same outputs.
 ///
 /// A robot alone, whose classifier takes the features for the probabilities:
 ///
@@ -59,7 +59,9 @@ pub struct Mind {
 
 impl Mind {
     /// The mind of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
-    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
+    /// taken for old ones. A robot that learns takes it from a clock, in tenths of a second or finer, so that it grows also
+    /// when all that was on the disk is lost, and faster than samples are made: their numbers begin there. It has no
+    /// classifier until [`Input::Learned`]: until then it relays, fuses and decides,
     /// but gives no evidence.
     ///
     /// # Errors
@@ -68,12 +70,19 @@ impl Mind {
         Ok(Self { rounds: Rounds::new(me, boot, config)?, learning: None, answers: Answers::default() })
     }
 
+    /// The same mind, in which votes are fused by a rule of one's own, see [`Rounds::fused_by`].
+    #[must_use]
+    pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {
+        self.rounds = self.rounds.fused_by(rule);
+        self
+    }
+
     /// The same mind, set up to learn: it keeps what it sees, labels it by what instructors say, shares and forgets.
     ///
     /// # Errors
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
-        self.learning = Some(Learning::new(self.me(), setup)?);
+        self.learning = Some(Learning::new(self.me(), self.rounds.boot(), setup)?);
         Ok(self)
     }
 
@@ -152,7 +161,7 @@ impl Mind {
     pub(super) fn share(&mut self) {
         if let Some(learning) = &mut self.learning {
             let classifier = self.rounds.classifier().map(|classifier| &**classifier);
-            learning.share(classifier, self.rounds.alive().is_empty());
+            learning.share(classifier);
         }
     }
 

@@ -3,7 +3,7 @@
 use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, RobotId, RoundId};
 use gestalt_rounds::Output as OfRounds;
 
-use crate::learning::{Change, TrainingChange};
+use crate::learning::{RecordChange, TrainingChange};
 
 /// What the mind wants done. The host carries out all of them, in order.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub enum Output {
         /// Counts up.
         revision: u64,
         /// What has changed since the one before.
-        changes: Vec<Change>,
+        changes: Vec<RecordChange>,
     },
 }
 

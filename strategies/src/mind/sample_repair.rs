@@ -11,8 +11,8 @@ use gestalt_rounds::Refusal;
 use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Declined;
-use crate::lessons::Heard;
-use crate::sample::{MAX_GAPS, Seen};
+use crate::lessons::LessonReceipt;
+use crate::sample::{MAX_GAPS, SeenSamples};
 use crate::vector_codec::VectorError;
 
 /// About how many bytes of samples one message takes, so that a vote never waits long behind it.
@@ -30,10 +30,8 @@ const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
 impl Mind {
     /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length.
     pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
-        let (Some(theirs), Some(learning)) = (theirs, &mut self.learning) else { return };
-        if theirs == learning.digest() {
-            learning.note_heard_from_others();
-        } else {
+        let (Some(theirs), Some(learning)) = (theirs, &self.learning) else { return };
+        if theirs != learning.digest() {
             self.tell_know(from, theirs, false, out);
         }
     }
@@ -61,7 +59,7 @@ impl Mind {
         let mut given = Vec::new();
         if mine.samples != know.digest.samples {
             let theirs = know.samples.iter().map(|known| (known.author, known.numbers.clone()));
-            let Ok(theirs) = Seen::from_intervals(theirs) else {
+            let Ok(theirs) = SeenSamples::from_intervals(theirs) else {
                 return self.rounds.note_refusal(Refusal::SampleNumber);
             };
             lacking_here |= learning.set().seen().lacks(&theirs);
@@ -83,8 +81,6 @@ impl Mind {
         }
         if lacking_here && !know.answer {
             self.tell_know(from, know.digest, true, out);
-        } else if let Some(learning) = &mut self.learning {
-            learning.note_heard_from_others();
         }
     }
 
@@ -114,7 +110,7 @@ impl Mind {
         let Some(learning) = &mut self.learning else { return };
         let mut news = false;
         for lesson in lessons {
-            news |= learning.hear(lesson) == Heard::New;
+            news |= learning.hear(lesson) == LessonReceipt::New;
         }
         if news {
             self.rounds.hurry_repair();

@@ -3,5 +3,5 @@
 mod samples;
 mod seen;
 
-pub use samples::{HeldSample, Part, Samples, draw};
-pub use seen::{FAR_AHEAD, MAX_AUTHORS, MAX_GAPS, Seen, SeenError};
+pub use samples::{HeldSample, HeldSamples, SetPart, draw};
+pub use seen::{LAST_NUMBER, MAX_AUTHORS, MAX_GAPS, SeenError, SeenSamples};

@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 
 /// The part of a training set that a sample is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum SetPart {
     /// Own, not shared yet.
     Personal,
     /// Own, broadcast.
@@ -17,7 +17,7 @@ pub enum Part {
     External,
 }
 
-impl Part {
+impl SetPart {
     /// All parts.
     pub const ALL: [Self; 3] = [Self::Personal, Self::Shared, Self::External];
 }
@@ -28,7 +28,7 @@ pub struct HeldSample {
     /// Local arrival number: from 1, grows, is never used twice, also across restarts.
     pub key: u64,
     /// Where it is.
-    pub part: Part,
+    pub part: SetPart,
     /// Its name in the swarm; `None` while it is personal.
     pub id: Option<SampleId>,
     /// The gesture shown.
@@ -42,7 +42,7 @@ pub struct HeldSample {
 /// The samples held, as selection and forgetting rules see them. Every list is in the order of the keys, so what a
 /// rule picks depends on what is held and not on how it came to be.
 #[derive(Debug, Default)]
-pub struct Samples {
+pub struct HeldSamples {
     held: BTreeMap<u64, HeldSample>,
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
@@ -56,7 +56,7 @@ struct ClassKeys {
     parts: [Vec<u64>; 3],
 }
 
-impl Samples {
+impl HeldSamples {
     /// The sample with that key.
     #[must_use]
     pub fn get(&self, key: u64) -> Option<&HeldSample> {
@@ -76,7 +76,7 @@ impl Samples {
 
     /// Shared and external samples, by key: what the swarm knows together.
     pub fn common(&self) -> impl Iterator<Item = &HeldSample> {
-        self.iter().filter(|sample| sample.part != Part::Personal)
+        self.iter().filter(|sample| sample.part != SetPart::Personal)
     }
 
     /// How many samples are held.
@@ -99,13 +99,13 @@ impl Samples {
 
     /// How many samples of a class are in a part.
     #[must_use]
-    pub fn count(&self, part: Part, class: ClassId) -> usize {
+    pub fn count(&self, part: SetPart, class: ClassId) -> usize {
         self.part_keys(part, class).len()
     }
 
     /// How many samples are in a part.
     #[must_use]
-    pub fn total(&self, part: Part) -> usize {
+    pub fn total(&self, part: SetPart) -> usize {
         self.classes.values().map(|keys| keys.parts[part as usize].len()).sum()
     }
 
@@ -128,7 +128,7 @@ impl Samples {
 
     /// The keys of a class in a part, ascending.
     #[must_use]
-    pub fn part_keys(&self, part: Part, class: ClassId) -> &[u64] {
+    pub fn part_keys(&self, part: SetPart, class: ClassId) -> &[u64] {
         self.classes.get(&class).map_or(&[], |keys| &keys.parts[part as usize])
     }
 
@@ -143,7 +143,7 @@ impl Samples {
     /// A class at random among those with personal samples: where selection begins.
     pub fn draw_personal_class(&self, rng: &mut dyn Rng) -> Option<ClassId> {
         let candidates: Vec<ClassId> =
-            self.classes().filter(|class| self.count(Part::Personal, *class) > 0).collect();
+            self.classes().filter(|class| self.count(SetPart::Personal, *class) > 0).collect();
         draw(&candidates, rng)
     }
 

@@ -9,11 +9,15 @@ use thiserror::Error;
 pub const MAX_AUTHORS: usize = 4096;
 /// Intervals of numbers kept per author: more gaps than that mean that something other than loss is at work.
 pub const MAX_GAPS: usize = 256;
-/// How far a number may lie beyond the highest one seen of its author.
-pub const FAR_AHEAD: u32 = 1_000_000;
+/// How far a number may lie beyond the highest one seen of its author, once it is beyond [`LAST_NUMBER`].
+const FAR_AHEAD: u32 = 1_000_000;
+/// Up to here an author may begin with any number, as one does that has lost its memory. The last ones are for who came
+/// there in sequence: nobody may use up the numbers of another.
+pub const LAST_NUMBER: u32 = u32::MAX - FAR_AHEAD;
 
 /// An identifier that cannot be remembered. What was seen is unchanged.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SeenError {
     /// Authors number their samples from 1.
     #[error("sample {0}: numbers count from 1")]
@@ -24,8 +28,8 @@ pub enum SeenError {
     /// The number would leave one gap too many between the numbers seen.
     #[error("sample {0}: more than {MAX_GAPS} gaps between the numbers seen; send the earlier ones first")]
     TooManyGaps(SampleId),
-    /// The number lies further ahead than an author can have come unnoticed.
-    #[error("sample {0}: more than {FAR_AHEAD} beyond the highest number seen of its author")]
+    /// The number lies further ahead than its author can have come.
+    #[error("sample {0}: no author can have come so far")]
     FarAhead(SampleId),
     /// Intervals that touch, overlap, run backwards or are out of order.
     #[error("the intervals of author {0} are not ascending and apart")]
@@ -33,14 +37,15 @@ pub enum SeenError {
 }
 
 /// A set of sample identifiers: for each author the numbers seen, as intervals. A robot that misses nothing holds
-/// one interval per author, however long it lives; the bounds of this module hold whatever arrives.
+/// one interval per author, however long it lives, and one more for each time that the author lost its memory and
+/// numbered on from its boot number; the bounds of this module hold whatever arrives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Seen {
+pub struct SeenSamples {
     authors: BTreeMap<RobotId, Vec<(u32, u32)>>,
     digest: u64,
 }
 
-impl Seen {
+impl SeenSamples {
     /// Takes up what was stored: each author with its intervals (inclusive, ascending, neither overlapping nor
     /// touching).
     ///
@@ -88,7 +93,7 @@ impl Seen {
     /// Remembers a sample; says whether it is new.
     ///
     /// # Errors
-    /// See [`Seen::would_accept`]. Nothing is remembered then.
+    /// See [`SeenSamples::would_accept`]. Nothing is remembered then.
     pub fn insert(&mut self, id: SampleId) -> Result<bool, SeenError> {
         if !self.would_accept(id)? {
             return Ok(false);
@@ -111,7 +116,7 @@ impl Seen {
         Ok(true)
     }
 
-    /// What [`Seen::insert`] would say: whether the sample is new.
+    /// What [`SeenSamples::insert`] would say: whether the sample is new.
     ///
     /// # Errors
     /// [`SeenError::Zero`], [`SeenError::FarAhead`], [`SeenError::TooManyAuthors`] and [`SeenError::TooManyGaps`]:
@@ -125,7 +130,7 @@ impl Seen {
         }
         let intervals = self.intervals(id.author);
         let highest = intervals.last().map_or(0, |(_, to)| *to);
-        if id.number.saturating_sub(highest) > FAR_AHEAD {
+        if id.number > LAST_NUMBER.max(highest.saturating_add(FAR_AHEAD)) {
             return Err(SeenError::FarAhead(id));
         }
         if intervals.is_empty() && self.authors.len() >= MAX_AUTHORS {
@@ -213,8 +218,8 @@ mod tests {
         SampleId { author: RobotId(author), number }
     }
 
-    fn of(ids: impl IntoIterator<Item = (u32, u32)>) -> Seen {
-        let mut seen = Seen::default();
+    fn of(ids: impl IntoIterator<Item = (u32, u32)>) -> SeenSamples {
+        let mut seen = SeenSamples::default();
         for (author, number) in ids {
             seen.insert(id(author, number)).unwrap();
         }
@@ -234,13 +239,13 @@ mod tests {
         let before = seen.clone();
         for (id, error) in [
             (id(1, 0), SeenError::Zero(id(1, 0))),
-            (id(1, 6 + FAR_AHEAD), SeenError::FarAhead(id(1, 6 + FAR_AHEAD))),
-            (id(2, 1 + FAR_AHEAD), SeenError::FarAhead(id(2, 1 + FAR_AHEAD))),
+            (id(1, LAST_NUMBER + 1), SeenError::FarAhead(id(1, LAST_NUMBER + 1))),
+            (id(2, u32::MAX), SeenError::FarAhead(id(2, u32::MAX))),
         ] {
             assert_eq!(seen.insert(id), Err(error));
         }
         assert_eq!(seen, before);
-        assert_eq!(seen.insert(id(1, 5 + FAR_AHEAD)), Ok(true));
+        assert_eq!(seen.insert(id(1, LAST_NUMBER)), Ok(true));
     }
 
     #[test]
@@ -263,7 +268,7 @@ mod tests {
     #[test]
     fn the_last_number_of_all_overflows_nothing() {
         let author = RobotId(3);
-        let mut seen = Seen::from_intervals([(author, vec![(1, u32::MAX - 1)])]).unwrap();
+        let mut seen = SeenSamples::from_intervals([(author, vec![(1, u32::MAX - 1)])]).unwrap();
         assert_eq!(seen.insert(id(3, u32::MAX)), Ok(true));
         assert_eq!(seen.insert(id(3, u32::MAX)), Ok(false));
         assert!(!seen.lacks(&seen.clone()));
@@ -273,12 +278,12 @@ mod tests {
     #[test]
     fn disordered_intervals_are_refused() {
         for bad in [vec![(3, 2)], vec![(1, 2), (3, 4)], vec![(5, 6), (1, 2)], vec![(1, 4), (2, 6)]] {
-            let found = Seen::from_intervals([(RobotId(1), bad.clone())]);
+            let found = SeenSamples::from_intervals([(RobotId(1), bad.clone())]);
             assert_eq!(found, Err(SeenError::Disorder(RobotId(1))), "{bad:?}");
         }
-        let zero = Seen::from_intervals([(RobotId(1), vec![(0, 2)])]);
+        let zero = SeenSamples::from_intervals([(RobotId(1), vec![(0, 2)])]);
         assert_eq!(zero, Err(SeenError::Zero(id(1, 0))));
-        let twice = Seen::from_intervals([(RobotId(1), vec![(1, 2)]), (RobotId(1), vec![(4, 5)])]);
+        let twice = SeenSamples::from_intervals([(RobotId(1), vec![(1, 2)]), (RobotId(1), vec![(4, 5)])]);
         assert_eq!(twice, Err(SeenError::Disorder(RobotId(1))));
     }
 
@@ -289,7 +294,7 @@ mod tests {
     proptest! {
         #[test]
         fn it_is_a_set(ids in ids()) {
-            let mut seen = Seen::default();
+            let mut seen = SeenSamples::default();
             let mut model = BTreeSet::new();
             for (author, number) in ids {
                 prop_assert_eq!(seen.insert(id(author, number)), Ok(model.insert((author, number))));
@@ -300,7 +305,7 @@ mod tests {
                 }
             }
             let stored = seen.authors().map(|a| (a, seen.intervals(a).to_vec())).collect::<Vec<_>>();
-            prop_assert_eq!(Seen::from_intervals(stored), Ok(seen));
+            prop_assert_eq!(SeenSamples::from_intervals(stored), Ok(seen));
         }
 
         #[test]

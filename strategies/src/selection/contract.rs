@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use gestalt_rounds::Classify;
 use rand::Rng;
 
-use crate::sample::{HeldSample, Samples};
+use crate::sample::{HeldSample, HeldSamples};
 
 /// Says which personal sample to share next.
 ///
@@ -15,7 +15,7 @@ use crate::sample::{HeldSample, Samples};
 ///
 /// ```
 /// use gestalt_protocol::{ClassId, RobotId, RoundId};
-/// use gestalt_strategies::sample::{Part, Samples};
+/// use gestalt_strategies::sample::{SetPart, HeldSamples};
 /// use gestalt_strategies::{Classify, ForgettingRule, Selection, TrainingSet};
 /// use rand::{Rng, SeedableRng};
 /// use rand_chacha::ChaCha8Rng;
@@ -25,9 +25,9 @@ use crate::sample::{HeldSample, Samples};
 /// struct Newest;
 ///
 /// impl Selection for Newest {
-///     fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+///     fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
 ///         let class = samples.draw_personal_class(rng)?;
-///         samples.part_keys(Part::Personal, class).last().copied()
+///         samples.part_keys(SetPart::Personal, class).last().copied()
 ///     }
 /// }
 ///
@@ -63,7 +63,7 @@ pub trait Selection: Debug + Send {
     /// sharing.
     fn select(
         &mut self,
-        samples: &Samples,
+        samples: &HeldSamples,
         classifier: Option<&dyn Classify>,
         rng: &mut dyn Rng,
     ) -> Option<u64>;

@@ -7,8 +7,8 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 use super::contract::Selection;
-use crate::geometry::{Cluster, Sum, narrow};
-use crate::sample::{HeldSample, Part, Samples};
+use crate::geometry::{Cluster, ExactSum, narrow};
+use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖μ − (S + x) / (k + 1)‖: μ the mean of the own samples of K (personal and
@@ -25,37 +25,37 @@ pub struct HerdingSelection {
 #[derive(Clone, Debug, Default)]
 struct Own {
     personal: Cluster,
-    shared: Sum,
+    shared: ExactSum,
 }
 
 impl Selection for HerdingSelection {
     fn inserted(&mut self, sample: &HeldSample) {
         let own = self.classes.entry(sample.class).or_default();
         match sample.part {
-            Part::Personal => own.personal.insert(sample),
-            Part::Shared => own.shared.add(&sample.vector),
-            Part::External => {}
+            SetPart::Personal => own.personal.insert(sample),
+            SetPart::Shared => own.shared.add(&sample.vector),
+            SetPart::External => {}
         }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
         let own = self.classes.entry(sample.class).or_default();
         match sample.part {
-            Part::Personal => own.personal.remove(sample),
-            Part::Shared => own.shared.subtract(&sample.vector),
-            Part::External => {}
+            SetPart::Personal => own.personal.remove(sample),
+            SetPart::Shared => own.shared.subtract(&sample.vector),
+            SetPart::External => {}
         }
     }
 
-    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let Own { personal, shared } = self.classes.get(&samples.draw_personal_class(rng)?)?;
-        let (k, count) = (shared.count(), shared.count() + personal.sum.count());
-        let target = (0..personal.points.dimension())
+        let (k, count) = (shared.count(), shared.count() + personal.sum().count());
+        let target = (0..personal.points().dimension())
             .map(|j| {
-                let mean = (shared.total(j) + personal.sum.total(j)) / count;
+                let mean = (shared.total(j) + personal.sum().total(j)) / count;
                 (k + 1.0) * mean - shared.total(j)
             })
             .collect();
-        personal.points.nearest_to(&narrow(target))
+        personal.points().nearest_to(&narrow(target))
     }
 }

@@ -4,8 +4,8 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 use super::contract::Selection;
-use crate::geometry::{Neighbours, Sum, narrow};
-use crate::sample::{HeldSample, Part, Samples};
+use crate::geometry::{ExactSum, Neighbours, narrow};
+use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// arg max over all personal x of min over all shared and external x' of ‖x − x'‖, whatever their classes: the point
 /// that the centres so far cover worst becomes the next. With no common knowledge at all the one nearest to the
@@ -19,27 +19,27 @@ pub struct KCenter {
     /// The personal samples seek, the common ones are their neighbours.
     distances: Neighbours,
     /// The sum of the personal ones.
-    personal: Sum,
+    personal: ExactSum,
 }
 
 impl Selection for KCenter {
     fn inserted(&mut self, sample: &HeldSample) {
         match sample.part {
-            Part::Personal => {
+            SetPart::Personal => {
                 self.distances.add_seeker(sample.key, &sample.vector);
                 self.personal.add(&sample.vector);
             }
-            Part::Shared | Part::External => self.distances.add_neighbour(sample.key, &sample.vector),
+            SetPart::Shared | SetPart::External => self.distances.add_neighbour(sample.key, &sample.vector),
         }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
         match sample.part {
-            Part::Personal => {
+            SetPart::Personal => {
                 self.distances.remove_seeker(sample.key);
                 self.personal.subtract(&sample.vector);
             }
-            Part::Shared | Part::External => self.distances.remove_neighbour(sample.key),
+            SetPart::Shared | SetPart::External => self.distances.remove_neighbour(sample.key),
         }
     }
 
@@ -51,7 +51,7 @@ impl Selection for KCenter {
         }
     }
 
-    fn select(&mut self, _: &Samples, _: Option<&dyn Classify>, _: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, _: &HeldSamples, _: Option<&dyn Classify>, _: &mut dyn Rng) -> Option<u64> {
         if self.distances.has_neighbours() {
             self.distances.farthest().map(|pair| pair.seeker)
         } else {

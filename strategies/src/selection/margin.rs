@@ -4,7 +4,7 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 use super::contract::Selection;
-use crate::sample::{Part, Samples, draw};
+use crate::sample::{HeldSamples, SetPart, draw};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of p₁(x) − p₂(x), the probabilities of the classifier's first and second choice. Ties
@@ -19,12 +19,12 @@ pub struct Margin;
 impl Selection for Margin {
     fn select(
         &mut self,
-        samples: &Samples,
+        samples: &HeldSamples,
         classifier: Option<&dyn Classify>,
         rng: &mut dyn Rng,
     ) -> Option<u64> {
         let class = samples.draw_personal_class(rng)?;
-        let keys = samples.part_keys(Part::Personal, class);
+        let keys = samples.part_keys(SetPart::Personal, class);
         let judged = samples.with_keys(keys).filter_map(|sample| {
             let probabilities = classifier?.probabilities_in_space(&sample.vector)?;
             Some((margin(&probabilities), sample.key))

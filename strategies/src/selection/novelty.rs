@@ -7,8 +7,8 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 use super::contract::Selection;
-use crate::geometry::{Neighbours, Sum, narrow};
-use crate::sample::{HeldSample, Part, Samples};
+use crate::geometry::{ExactSum, Neighbours, narrow};
+use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// A class K at random among those with personal samples, then
 /// arg max over x personal in K of min over x' in K, shared or external, of ‖x − x'‖: the farthest from its nearest
@@ -29,33 +29,33 @@ struct Class {
     /// The personal samples seek, the common ones are their neighbours.
     distances: Neighbours,
     /// The sum of the personal ones.
-    personal: Sum,
+    personal: ExactSum,
 }
 
 impl Selection for Novelty {
     fn inserted(&mut self, sample: &HeldSample) {
         let class = self.classes.entry(sample.class).or_default();
         match sample.part {
-            Part::Personal => {
+            SetPart::Personal => {
                 class.distances.add_seeker(sample.key, &sample.vector);
                 class.personal.add(&sample.vector);
             }
-            Part::Shared | Part::External => class.distances.add_neighbour(sample.key, &sample.vector),
+            SetPart::Shared | SetPart::External => class.distances.add_neighbour(sample.key, &sample.vector),
         }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
         let class = self.classes.entry(sample.class).or_default();
         match sample.part {
-            Part::Personal => {
+            SetPart::Personal => {
                 class.distances.remove_seeker(sample.key);
                 class.personal.subtract(&sample.vector);
             }
-            Part::Shared | Part::External => class.distances.remove_neighbour(sample.key),
+            SetPart::Shared | SetPart::External => class.distances.remove_neighbour(sample.key),
         }
     }
 
-    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let Class { distances, personal } = self.classes.get_mut(&samples.draw_personal_class(rng)?)?;
         if distances.has_neighbours() {
             distances.farthest().map(|pair| pair.seeker)

@@ -4,7 +4,7 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 use super::contract::Selection;
-use crate::sample::{Part, Samples, draw};
+use crate::sample::{HeldSamples, SetPart, draw};
 
 /// A class K at random among those with personal samples, then one of its personal samples at random.
 ///
@@ -13,8 +13,8 @@ use crate::sample::{Part, Samples, draw};
 pub struct RandomSelection;
 
 impl Selection for RandomSelection {
-    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let class = samples.draw_personal_class(rng)?;
-        draw(samples.part_keys(Part::Personal, class), rng)
+        draw(samples.part_keys(SetPart::Personal, class), rng)
     }
 }

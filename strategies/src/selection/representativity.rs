@@ -8,7 +8,7 @@ use rand::Rng;
 
 use super::contract::Selection;
 use crate::geometry::Cluster;
-use crate::sample::{HeldSample, Part, Samples};
+use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖x − f_K‖, f_K the centroid of the personal samples of K. Ties go to the oldest.
@@ -23,19 +23,19 @@ pub struct RepresentativitySelection {
 
 impl Selection for RepresentativitySelection {
     fn inserted(&mut self, sample: &HeldSample) {
-        if sample.part == Part::Personal {
+        if sample.part == SetPart::Personal {
             self.classes.entry(sample.class).or_default().insert(sample);
         }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if sample.part == Part::Personal {
+        if sample.part == SetPart::Personal {
             self.classes.entry(sample.class).or_default().remove(sample);
         }
     }
 
-    fn select(&mut self, samples: &Samples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
+    fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {
         let personal = self.classes.get(&samples.draw_personal_class(rng)?)?;
-        personal.points.nearest_to(&personal.centroid()?)
+        personal.points().nearest_to(&personal.centroid()?)
     }
 }

@@ -3,7 +3,7 @@
 use divan::{Bencher, black_box};
 use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, Vocabulary};
-use gestalt_svm::{Classifier, Components, Sample, ScalingMethod, TrainOptions, train};
+use gestalt_svm::{Classifier, Components, LabelledFeatures, ScalingMethod, TrainOptions, train};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -15,7 +15,7 @@ fn main() {
 }
 
 /// As many samples as the people of one training set give, of as many features as `length`.
-fn samples(length: usize) -> Vec<Sample> {
+fn samples(length: usize) -> Vec<LabelledFeatures> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let centres: Vec<Vec<f32>> =
         (0..CLASSES).map(|_| (0..length).map(|_| rng.random_range(-1.0..1.0)).collect()).collect();
@@ -23,12 +23,12 @@ fn samples(length: usize) -> Vec<Sample> {
         .map(|i| {
             let class = i % CLASSES;
             let features = centres[class].iter().map(|c| c + rng.random_range(-4.0..4.0)).collect();
-            Sample { features, class: ClassId(class as u8), group: Some((i / CLASSES) as u32) }
+            LabelledFeatures { features, class: ClassId(class as u8), group: Some((i / CLASSES) as u32) }
         })
         .collect()
 }
 
-fn fit(samples: &[Sample]) -> Classifier {
+fn fit(samples: &[LabelledFeatures]) -> Classifier {
     let vocabulary = Vocabulary::new((0..CLASSES).map(|k| k.to_string())).expect("ten different labels");
     let options = TrainOptions {
         scaling: ScalingMethod::PerComponent,

@@ -24,6 +24,9 @@ pub struct FeatureSpace {
 impl FeatureSpace {
     /// Fits the space of these feature vectors: at least two, of one length, finite; with principal components as
     /// the reduction.
+    ///
+    /// # Panics
+    /// If there is no vector, or none has a component.
     pub fn fit<'a>(
         feature_set: &str,
         rows: impl Iterator<Item = &'a [f32]> + Clone,
@@ -43,6 +46,9 @@ impl FeatureSpace {
 
     /// Fits the space of these labelled feature vectors, at least two, of one length, finite; it keeps the features that
     /// rank best, at least one.
+    ///
+    /// # Panics
+    /// If a vector is shorter than the first.
     #[must_use]
     pub fn fit_ranked(
         feature_set: &str,
@@ -60,6 +66,9 @@ impl FeatureSpace {
 
     /// A space of a scaling and a reduction found elsewhere; `rows` are raw feature vectors, which tell how far each
     /// coordinate spreads.
+    ///
+    /// # Panics
+    /// If the reduction selects a feature that the scaling, or a row, does not have.
     pub fn with_reduction<'a>(
         feature_set: &str,
         rows: impl Iterator<Item = &'a [f32]>,

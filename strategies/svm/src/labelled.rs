@@ -4,7 +4,7 @@ use gestalt_protocol::ClassId;
 
 /// A labelled feature vector.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sample {
+pub struct LabelledFeatures {
     /// The raw features.
     pub features: Vec<f32>,
     /// The gesture shown.

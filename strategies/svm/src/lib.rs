@@ -30,10 +30,10 @@ mod vector;
 pub use classifier::Classifier;
 pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
 pub use feature_space::FeatureSpace;
-pub use labelled::Sample;
+pub use labelled::LabelledFeatures;
 pub use learner::{LearnError, Learner, LearnerOptions};
 pub use model_codec::{MAX_MODEL, ModelError};
 pub use reduction::{Components, Pca, Ranking, Reduction};
 pub use scaling::{Scaling, ScalingMethod};
 #[cfg(feature = "offline")]
-pub use training::{Folding, MIN_SAMPLES, Progress, TrainError, TrainOptions, Trained, train};
+pub use training::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};

@@ -18,6 +18,7 @@ const VERSION: u8 = 3;
 
 /// Bytes that are no classifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ModelError {
     /// More than [`MAX_MODEL`] bytes.
     #[error("{0} bytes are more than a classifier takes ({MAX_MODEL})")]

@@ -66,7 +66,7 @@ impl Scaling {
         self.mean.len()
     }
 
-    /// Writes the scaled `features`, of [`Self::width`] components, over `scaled`; each within ±[`LIMIT`].
+    /// Writes the scaled `features`, of [`Self::width`] components, over `scaled`; each within ±10.
     pub fn apply(&self, features: &[f32], scaled: &mut Vec<f32>) {
         scaled.clear();
         let components = features.iter().zip(&self.mean).zip(&self.factor);

@@ -3,7 +3,8 @@
 use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, ClassifyError, Vocabulary};
 use gestalt_svm::{
-    Classifier, Components, Evaluation, Folding, ModelError, Sample, TrainError, TrainOptions, Trained, train,
+    Classifier, Components, Evaluation, Folding, LabelledFeatures, ModelError, TrainError, TrainOptions,
+    Trained, train,
 };
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
@@ -25,7 +26,7 @@ fn normal(rng: &mut impl Rng) -> f32 {
 
 /// Three classes in five features; class 0 lies on both sides of the others, so no line parts it from them.
 /// `spread` 0.3 keeps the classes apart, 1.0 makes them overlap.
-fn samples(count: usize, spread: f32, rng: &mut impl Rng) -> Vec<Sample> {
+fn samples(count: usize, spread: f32, rng: &mut impl Rng) -> Vec<LabelledFeatures> {
     (0..count)
         .map(|i| {
             let class = i % 3;
@@ -36,7 +37,7 @@ fn samples(count: usize, spread: f32, rng: &mut impl Rng) -> Vec<Sample> {
                 _ => [-2.0, 2.0, 0.0, 5.0, 100.0],
             };
             let features = centre.iter().map(|c| c + spread * normal(rng)).collect();
-            Sample { features, class: ClassId(class as u8), group: Some((i / 12) as u32) }
+            LabelledFeatures { features, class: ClassId(class as u8), group: Some((i / 12) as u32) }
         })
         .collect()
 }
@@ -45,11 +46,11 @@ fn options() -> TrainOptions {
     TrainOptions { costs: vec![1.0, 10.0], gammas: vec![0.5, 2.0], ..TrainOptions::default() }
 }
 
-fn trained(samples: &[Sample], seed: u64) -> Trained {
+fn trained(samples: &[LabelledFeatures], seed: u64) -> Trained {
     train("shape-1", &vocabulary(), samples, &options(), &mut generator(seed), |_| ()).unwrap()
 }
 
-fn evaluate(classifier: &Classifier, samples: &[Sample]) -> Evaluation {
+fn evaluate(classifier: &Classifier, samples: &[LabelledFeatures]) -> Evaluation {
     let mut evaluation = Evaluation::new(3);
     for sample in samples {
         evaluation.record(sample.class, &classifier.probabilities(&sample.features).unwrap());
@@ -107,7 +108,7 @@ fn the_same_seed_gives_the_same_bytes() {
 #[test]
 fn samples_nothing_can_be_learned_from_are_refused() {
     let good = samples(60, 0.5, &mut generator(5));
-    let error = |samples: &[Sample]| {
+    let error = |samples: &[LabelledFeatures]| {
         train("shape-1", &vocabulary(), samples, &options(), &mut generator(5), |_| ()).unwrap_err()
     };
     let mut bad = good.clone();
@@ -122,7 +123,7 @@ fn samples_nothing_can_be_learned_from_are_refused() {
     bad[3].class = ClassId(3);
     assert_eq!(error(&bad), TrainError::Class { sample: 3, class: ClassId(3) });
 
-    let one_class: Vec<Sample> = good.iter().filter(|s| s.class == ClassId(1)).cloned().collect();
+    let one_class: Vec<LabelledFeatures> = good.iter().filter(|s| s.class == ClassId(1)).cloned().collect();
     assert_eq!(error(&one_class), TrainError::TooFew { label: "fist".to_owned(), found: 0 });
     assert_eq!(error(&[]), TrainError::TooFew { label: "fist".to_owned(), found: 0 });
 
@@ -151,11 +152,11 @@ fn options_out_of_range_are_refused() {
 #[test]
 fn two_samples_of_each_class_are_enough() {
     let mut rng = generator(6);
-    let few: Vec<Sample> = (0..6)
+    let few: Vec<LabelledFeatures> = (0..6)
         .map(|i| {
             let mut features: Vec<f32> = (0..5).map(|_| 0.1 * normal(&mut rng)).collect();
             features[i % 3] += 1.0;
-            Sample { features, class: ClassId((i % 3) as u8), group: None }
+            LabelledFeatures { features, class: ClassId((i % 3) as u8), group: None }
         })
         .collect();
     let classifier = trained(&few, 6).classifier;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, Vocabulary};
 use gestalt_svm::{
-    Classifier, Components, Evaluation, FeatureSpace, LearnError, Learner, LearnerOptions, Sample,
+    Classifier, Components, Evaluation, FeatureSpace, LabelledFeatures, LearnError, Learner, LearnerOptions,
     ScalingMethod,
 };
 use rand::{Rng, RngExt};
@@ -315,13 +315,13 @@ fn options_out_of_range_are_refused() {
 }
 
 /// Six classes in 40 features, by the noise about their centres.
-fn wide_samples(noise: f32, count: usize, seed: u64) -> Vec<Sample> {
+fn wide_samples(noise: f32, count: usize, seed: u64) -> Vec<LabelledFeatures> {
     let mut centres = generator(20);
     let centres: Vec<Vec<f32>> = (0..6).map(|_| (0..40).map(|_| normal(&mut centres)).collect()).collect();
     let mut rng = generator(seed);
     let sample = |i: usize| {
         let features = centres[i % 6].iter().map(|c| c + noise * normal(&mut rng)).collect();
-        Sample { features, class: ClassId((i % 6) as u8), group: None }
+        LabelledFeatures { features, class: ClassId((i % 6) as u8), group: None }
     };
     (0..count).map(sample).collect()
 }

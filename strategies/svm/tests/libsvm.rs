@@ -4,7 +4,7 @@ mod side_by_side;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, Vocabulary};
-use gestalt_svm::{Evaluation, Sample, TrainOptions, train};
+use gestalt_svm::{Evaluation, LabelledFeatures, TrainOptions, train};
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -13,7 +13,7 @@ const CLASSES: usize = 5;
 
 /// Classes on a circle in 6 features: each person shifts them all, so that people never
 /// seen are harder than more of the same.
-fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<Sample> {
+fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<LabelledFeatures> {
     let mut normal = || (0..12).map(|_| rng.random_range(-0.5_f32..0.5)).sum::<f32>();
     let mut samples = Vec::new();
     for person in people {
@@ -24,7 +24,7 @@ fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<Sample> {
                 let mut features: Vec<f32> = shift.iter().map(|shift| shift + 0.4 * normal()).collect();
                 features[0] += angle.cos();
                 features[1] += angle.sin();
-                samples.push(Sample { features, class: ClassId(class as u8), group: Some(person) });
+                samples.push(LabelledFeatures { features, class: ClassId(class as u8), group: Some(person) });
             }
         }
     }

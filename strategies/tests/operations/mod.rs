@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
 use gestalt_strategies::{
-    Classify, ClassifyError, ForgettingRule, HeldSample, Receipt, Seen, SelectionRule, SetChange,
-    TrainingSet, Vocabulary,
+    Classify, ClassifyError, ForgettingRule, HeldSample, SampleReceipt, SeenSamples, SelectionRule,
+    SetChange, TrainingSet, Vocabulary,
 };
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
@@ -104,8 +104,8 @@ impl Store {
         }
     }
 
-    pub fn seen(&self) -> Seen {
-        let mut seen = Seen::default();
+    pub fn seen(&self) -> SeenSamples {
+        let mut seen = SeenSamples::default();
         for id in &self.seen {
             seen.insert(*id).unwrap();
         }
@@ -161,9 +161,9 @@ pub fn run(set: &mut TrainingSet, operation: &Operation, rng: &mut ChaCha8Rng) -
         Operation::Keep { class, round: r, vector } => set.keep(ClassId(class), round(r), vector, rng),
         Operation::Receive { author, number, class, round: r, vector } => {
             match set.receive(id(author, number), ClassId(class), round(r), vector, rng) {
-                Receipt::New(changes) => return (changes, true),
-                Receipt::Known => Vec::new(),
-                Receipt::Refused(error) => panic!("{error}"),
+                SampleReceipt::New(changes) => return (changes, true),
+                SampleReceipt::Known => Vec::new(),
+                SampleReceipt::Refused(error) => panic!("{error}"),
             }
         }
         Operation::Share { n, judged } => {

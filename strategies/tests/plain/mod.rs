@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::sample::{HeldSample, Part, Samples};
+use gestalt_strategies::sample::{HeldSample, HeldSamples, SetPart};
 use gestalt_strategies::{Classify, Forgetting, ForgettingRule, Selection, SelectionRule};
 use rand::{Rng, RngExt};
 
@@ -33,12 +33,12 @@ type Class<'a> = Vec<&'a HeldSample>;
 impl Selection for PlainSelection {
     fn select(
         &mut self,
-        samples: &Samples,
+        samples: &HeldSamples,
         classifier: Option<&dyn Classify>,
         rng: &mut dyn Rng,
     ) -> Option<u64> {
         if self.0 == SelectionRule::KCenter {
-            let personal: Class = samples.iter().filter(|sample| sample.part == Part::Personal).collect();
+            let personal: Class = samples.iter().filter(|sample| sample.part == SetPart::Personal).collect();
             let common: Class = samples.common().collect();
             return if common.is_empty() {
                 let centre = (!personal.is_empty()).then(|| narrow(&mean(&personal)))?;
@@ -48,7 +48,7 @@ impl Selection for PlainSelection {
             };
         }
         let mut personal = BTreeMap::<ClassId, Class>::new();
-        for sample in samples.iter().filter(|sample| sample.part == Part::Personal) {
+        for sample in samples.iter().filter(|sample| sample.part == SetPart::Personal) {
             personal.entry(sample.class).or_default().push(sample);
         }
         let personal = draw(&personal.into_values().collect::<Vec<_>>(), rng)?;
@@ -63,7 +63,7 @@ impl Selection for PlainSelection {
             }
             SelectionRule::Herding => {
                 let shared: Class =
-                    common.iter().filter(|sample| sample.part == Part::Shared).copied().collect();
+                    common.iter().filter(|sample| sample.part == SetPart::Shared).copied().collect();
                 let own: Class = shared.iter().chain(&personal).copied().collect();
                 let (mean, sum) = (mean(&own), sum(&shared, mean(&own).len()));
                 let k = shared.len() as f64;
@@ -93,14 +93,14 @@ impl Forgetting for PlainForgetting {
         }
     }
 
-    fn victim(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         self.victim = self.pick(samples, rng);
         self.victim
     }
 }
 
 impl PlainForgetting {
-    fn pick(&mut self, samples: &Samples, rng: &mut dyn Rng) -> Option<u64> {
+    fn pick(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let oldest_first: Class = samples.iter().collect();
         match self.rule {
             ForgettingRule::Fifo => return Some(oldest_first[0].key),

@@ -7,7 +7,7 @@ use std::time::Duration;
 use gestalt_protocol::{ClassId, RobotId};
 use gestalt_strategies::{
     Change, Classifier, Components, FeatureSpace, LearnError, Learner, LearnerOptions, LearningConfig,
-    LearningSetup, Memory, Mind, MindConfig, ScalingMethod, TrainingChange, Vocabulary,
+    LearningSetup, Memory, Mind, MindConfig, OwnRules, ScalingMethod, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -149,6 +149,7 @@ impl Pupil {
             vocabulary: school.vocabulary.clone(),
             rng: Box::new(rng),
             memory: Some(memory),
+            rules: OwnRules::default(),
         };
         Mind::new(me, boot, mind)
             .expect("the scenario was validated")

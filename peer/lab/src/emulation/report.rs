@@ -238,12 +238,7 @@ impl fmt::Display for Table<'_> {
             "vote B/s"
         )?;
         for summary in self.0 {
-            let rule = match summary.rule {
-                FusionRule::Majority => "majority",
-                FusionRule::MeanProbability => "mean_probability",
-                FusionRule::LogPool => "log_pool",
-                FusionRule::ConfidenceWeighted => "confidence_weighted",
-            };
+            let rule = summary.rule;
             writeln!(
                 f,
                 "{rule:<20} {:>5}  {:<20} {:<18} {:<20} {:<20} {:>7.0} ± {:<4.0} {:>9.0}",

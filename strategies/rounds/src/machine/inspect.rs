@@ -19,6 +19,12 @@ impl Rounds {
         self.me
     }
 
+    /// Which life of that robot this is.
+    #[must_use]
+    pub fn boot(&self) -> u32 {
+        self.stamp.boot
+    }
+
     /// Their parameters.
     #[must_use]
     pub fn config(&self) -> &RoundsConfig {

@@ -12,13 +12,14 @@ use super::output::Output;
 use super::partners::Partners;
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
+use crate::fuse::Fuse;
 use crate::refusal::Refusals;
 use crate::round::Round;
 
 /// The rounds of one robot: what the world tells it goes in, what it wants done comes out.
 ///
-/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. The same
-/// inputs at the same times give the same outputs.
+/// Time is an argument, the duration since any fixed moment, the same for all calls; it never runs back. On one machine
+/// the same inputs at the same times give the same outputs.
 ///
 /// Two robots that decide together, each with a classifier of its own, and a network of five lines:
 ///
@@ -84,6 +85,7 @@ use crate::round::Round;
 pub struct Rounds {
     pub(super) me: RobotId,
     pub(super) config: RoundsConfig,
+    pub(super) fusion: Arc<dyn Fuse>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
     /// The stamp of the last message said.
     pub(super) stamp: Stamp,
@@ -133,6 +135,7 @@ impl Rounds {
             turns: 0,
             guests: BTreeSet::new(),
             partners: Partners::new(config.repair_idle),
+            fusion: Arc::new(config.rule),
             config,
             refusals: Refusals::default(),
             duplicate: None,
@@ -140,6 +143,15 @@ impl Rounds {
             shown: None,
             blind: false,
         })
+    }
+
+    /// The same rounds, in which votes are fused by a rule of one's own; the configuration's `rule` then names it. All
+    /// robots of a swarm need the same.
+    #[must_use]
+    pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {
+        self.config.rule = rule.rule();
+        self.fusion = rule;
+        self
     }
 
     /// Takes in one input at the time `now` and says what is to be done.

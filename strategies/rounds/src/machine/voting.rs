@@ -38,7 +38,7 @@ impl Rounds {
         let Some(round) = self.round.as_mut() else { return };
         let concludes = round.open && round.agreement.held().is_none();
         let scale = own_scale.or_else(|| concludes.then(|| round.ballot.prevailing_scale())?);
-        round.conclude(self.now, self.me, &self.alive, scale, &self.config);
+        round.conclude(self.now, self.me, &self.alive, scale, &*self.fusion, &self.config);
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {

@@ -54,6 +54,65 @@ fn a_robot_that_lost_its_disk_gets_its_own_samples_back_and_goes_on_counting() {
     assert_eq!(swarm.common().len(), 1);
 }
 
+/// Shows a gesture to one robot, which nobody hears, and tells it what it was.
+fn teach_alone(swarm: &mut Swarm, i: usize, class: u8) {
+    swarm.loss = 1.0;
+    swarm.input(i, Input::Open);
+    let round = swarm.minds[i].round().unwrap();
+    for _ in 0..swarm.config.keep {
+        let features = (0..8).map(|_| swarm.rng.random::<f32>()).collect();
+        swarm.input(i, Input::Observed(Observation { features, quality: 1.0 }));
+        swarm.now += swarm.config.spacing;
+    }
+    let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+    let at = swarm.now.as_millis() as u64;
+    swarm.input(i, Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction }));
+    swarm.loss = 0.0;
+}
+
+#[test]
+fn a_robot_that_lost_its_disk_and_is_taught_before_it_meets_another_repeats_no_number() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 14);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    assert_eq!(swarm.said.len(), 9);
+    swarm.disks[1].clear();
+    swarm.loss = 1.0;
+    swarm.restart(1);
+    teach_alone(&mut swarm, 1, 2);
+    assert_eq!(swarm.said.len(), 12, "it shares at once: there is nothing to wait for");
+    swarm.pass(Duration::from_secs(20));
+    let ids: BTreeSet<SampleId> = swarm.said.iter().map(|sample| sample.id).collect();
+    assert_eq!(ids.len(), 12, "no number twice");
+    assert_eq!(swarm.sizes(1), [0, 6, 6], "what it had shared has come back beside what it shares now");
+    assert_eq!(swarm.common().len(), 1);
+    for mind in &swarm.minds {
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(2)), 3, "all have what was taught anew");
+    }
+}
+
+#[test]
+fn a_robot_that_is_alone_from_the_first_shares_and_whoever_comes_is_given_it() {
+    let mut swarm = Swarm::new(2, config(3, 1.0), 15);
+    teach_alone(&mut swarm, 0, 4);
+    assert_eq!((swarm.sizes(0), swarm.sizes(1)), ([0, 3, 0], [0, 0, 0]));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.sizes(1), [0, 0, 3]);
+}
+
+#[test]
+fn a_robot_that_remembers_goes_on_counting_whatever_its_boot() {
+    let mut swarm = Swarm::new(1, config(2, 1.0), 16);
+    let first = swarm.show(1);
+    swarm.was(first, 1);
+    swarm.pass(Duration::from_secs(1000));
+    swarm.restart(0);
+    let second = swarm.show(2);
+    swarm.was(second, 2);
+    let numbers: Vec<u32> = swarm.said.iter().map(|sample| sample.id.number).collect();
+    assert_eq!(numbers, [1, 2, 3, 4]);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 

@@ -21,10 +21,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Input, Instructed, Mind, Output};
 use crate::learning::{
-    Change, Learning, LearningConfig, LearningError, LearningSetup, Memory, MemoryError, TrainingChange,
-    training_key,
+    Learning, LearningConfig, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange, RobotMemory,
+    TrainingChange, training_key,
 };
-use crate::sample::Part;
+use crate::sample::SetPart;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
 
@@ -69,6 +69,7 @@ struct Swarm {
     minds: Vec<Mind>,
     disks: Vec<BTreeMap<Vec<u8>, Vec<u8>>>,
     config: LearningConfig,
+    rules: OwnRules,
     now: Duration,
     loss: f64,
     rng: ChaCha8Rng,
@@ -79,10 +80,15 @@ struct Swarm {
 
 impl Swarm {
     fn new(n: usize, config: LearningConfig, seed: u64) -> Self {
+        Self::with_rules(n, config, OwnRules::default(), seed)
+    }
+
+    fn with_rules(n: usize, config: LearningConfig, rules: OwnRules, seed: u64) -> Self {
         let mut swarm = Self {
             minds: Vec::new(),
             disks: vec![BTreeMap::new(); n],
             config,
+            rules,
             now: Duration::ZERO,
             loss: 0.0,
             rng: ChaCha8Rng::seed_from_u64(seed),
@@ -111,7 +117,8 @@ impl Swarm {
             space: space(),
             vocabulary: vocabulary(),
             rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(id.0) * 1000 + u64::from(boot))),
-            memory: Some(Memory::read(records).unwrap()),
+            memory: Some(RobotMemory::read(records).unwrap()),
+            rules: self.rules.clone(),
         };
         self.trained[i].clear();
         Mind::new(id, boot, config).unwrap().learning(setup).unwrap()
@@ -163,7 +170,7 @@ impl Swarm {
                         self.answers.push(answer);
                     }
                     Output::Remember { revision, changes } => {
-                        for Change { key, value } in changes {
+                        for RecordChange { key, value } in changes {
                             match value {
                                 Some(value) => self.disks[i].insert(key, value),
                                 None => self.disks[i].remove(&key),
@@ -245,7 +252,7 @@ impl Swarm {
 
     fn sizes(&self, i: usize) -> [usize; 3] {
         let set = self.minds[i].training_set().unwrap();
-        [Part::Personal, Part::Shared, Part::External].map(|part| set.total(part))
+        [SetPart::Personal, SetPart::Shared, SetPart::External].map(|part| set.total(part))
     }
 
     fn common(&self) -> BTreeSet<String> {
@@ -262,7 +269,7 @@ impl Swarm {
             trained.split_off(&training_key(0));
             assert_eq!(held, trained, "robot {} trains on what it holds", i + 1);
             let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
-            let memory = Memory::read(records).unwrap();
+            let memory = RobotMemory::read(records).unwrap();
             let kept: BTreeMap<u64, ClassId> = memory.samples.iter().map(|s| (s.key, s.class)).collect();
             assert_eq!(held, kept, "robot {} remembers what it holds", i + 1);
             assert_eq!(&memory.seen, set.seen());

@@ -42,15 +42,16 @@ fn a_memory_of_another_robot_or_space_is_refused() {
     let round = swarm.show(1);
     swarm.was(round, 1);
     let records = swarm.disks[0].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
-    let memory = Memory::read(records).unwrap();
+    let memory = RobotMemory::read(records).unwrap();
     let setup = |space: Arc<FeatureSpace>, vocabulary| LearningSetup {
         config: config(2, 1.0),
         space,
         vocabulary,
         rng: Box::new(ChaCha8Rng::seed_from_u64(1)),
         memory: Some(memory.clone()),
+        rules: OwnRules::default(),
     };
-    let new = |me, setup| Learning::new(RobotId(me), setup).map(|_| ());
+    let new = |me, setup| Learning::new(RobotId(me), 1, setup).map(|_| ());
     assert_eq!(new(1, setup(space(), vocabulary())), Ok(()));
     let robot = new(2, setup(space(), vocabulary())).unwrap_err();
     assert!(matches!(robot, LearningError::Memory(MemoryError::Robot { .. })));

@@ -1,6 +1,9 @@
 //! How much is shared, and held.
 
 use super::*;
+use crate::forgetting::Forgetting;
+use crate::sample::HeldSamples;
+use crate::selection::Selection;
 
 #[test]
 fn ten_robots_hold_what_the_source_says() {
@@ -39,10 +42,53 @@ fn bytes_bound_what_a_round_shares() {
     swarm.was(round, 1);
     for mind in &swarm.minds {
         let learning = mind.learning.as_ref().unwrap();
-        let own = learning.set().common().filter(|sample| sample.part == Part::Shared);
+        let own = learning.set().common().filter(|sample| sample.part == SetPart::Shared);
         let message = Message::Samples(learning.told(own));
         let stamp = Stamp { boot: 1, sequence: 100 };
         let length = Envelope { author: mind.me(), stamp, message }.encode().len();
         assert!((80..=128).contains(&length), "{length} bytes");
     }
+}
+
+/// Shares what was seen last, and nothing of class 3.
+#[derive(Debug)]
+struct Newest;
+
+impl Selection for Newest {
+    fn select(
+        &mut self,
+        samples: &HeldSamples,
+        _: Option<&dyn Classify>,
+        _: &mut dyn rand::Rng,
+    ) -> Option<u64> {
+        let classes = samples.classes().filter(|class| *class != ClassId(3));
+        classes.filter_map(|class| samples.part_keys(SetPart::Personal, class).last().copied()).max()
+    }
+}
+
+/// Keeps what came first, and the newest.
+#[derive(Debug)]
+struct FirstImpression;
+
+impl Forgetting for FirstImpression {
+    fn victim(&mut self, samples: &HeldSamples, _: &mut dyn rand::Rng) -> Option<u64> {
+        samples.iter().rev().nth(1).map(|sample| sample.key)
+    }
+}
+
+#[test]
+fn rules_of_ones_own_choose_what_is_shared_and_what_goes() {
+    let rules = OwnRules::default().selection(|| Box::new(Newest)).forgetting(|| Box::new(FirstImpression));
+    let config = LearningConfig { capacity: 4, ..config(3, 0.5) };
+    let mut swarm = Swarm::with_rules(2, config, rules, 17);
+    for class in [3, 1, 2] {
+        let round = swarm.show(class);
+        swarm.was(round, class);
+    }
+    assert!(!swarm.said.is_empty() && swarm.said.iter().all(|sample| sample.class != ClassId(3)));
+    for mind in &swarm.minds {
+        let set = mind.training_set().unwrap();
+        assert_eq!((set.len(), set.class_count(ClassId(3))), (4, 3), "what came first is kept");
+    }
+    swarm.check();
 }

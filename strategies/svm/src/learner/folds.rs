@@ -1,13 +1,13 @@
 //! Which samples of a class are held out together.
 
-use super::samples::{Key, Sample};
+use super::samples::{KernelRow, Key};
 
 /// The fold of each sample of a class, `0..folds`.
 ///
 /// It depends on the sample's key alone, so that it stays when others come and go and does not depend on their
 /// order. Chance would deal a class of few samples unevenly: those are dealt in turn, so that one with fewer than
 /// `folds` is left out one by one.
-pub(super) fn folds(samples: &[Sample], folds: usize) -> Vec<usize> {
+pub(super) fn folds(samples: &[KernelRow], folds: usize) -> Vec<usize> {
     let few = 4 * folds;
     let hashes: Vec<u64> = samples.iter().map(|sample| hash(sample.key)).collect();
     if samples.len() >= few {
@@ -34,8 +34,9 @@ fn hash(key: Key) -> u64 {
 mod tests {
     use super::*;
 
-    fn samples(keys: impl Iterator<Item = u64>) -> Vec<Sample> {
-        keys.map(|key| Sample { key: Key::Inserted(key), vector: Vec::new(), kernel: Vec::new() }).collect()
+    fn samples(keys: impl Iterator<Item = u64>) -> Vec<KernelRow> {
+        keys.map(|key| KernelRow { key: Key::Inserted(key), vector: Vec::new(), kernel: Vec::new() })
+            .collect()
     }
 
     #[test]

@@ -17,7 +17,7 @@ use gestalt_rounds::{Classify, Vocabulary};
 use folds::folds;
 pub use options::{LearnError, LearnerOptions};
 use pair::Pair;
-use samples::{Key, Place, Samples};
+use samples::{KernelMatrix, Key, Place};
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
@@ -37,7 +37,7 @@ pub struct Learner {
     vocabulary: Vocabulary,
     options: LearnerOptions,
     gamma: f32,
-    samples: Samples,
+    samples: KernelMatrix,
     supports: u32,
     /// All pairs of the vocabulary.
     pairs: Vec<Pair>,
@@ -66,7 +66,7 @@ impl Learner {
         let classes = vocabulary.classes();
         Ok(Self {
             gamma,
-            samples: Samples::new(classes, gamma),
+            samples: KernelMatrix::new(classes, gamma),
             supports: 0,
             pairs: pairs(classes).map(|(i, j)| Pair::new([i, j])).collect(),
             touched: vec![false; classes],

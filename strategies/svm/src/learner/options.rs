@@ -60,6 +60,7 @@ impl LearnerOptions {
 
 /// What cannot be learned from. The learner is unchanged.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum LearnError {
     /// An option out of its range.
     #[error("learner option out of range: {0}")]

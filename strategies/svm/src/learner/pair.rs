@@ -1,6 +1,6 @@
 //! What a learner knows of one pair of classes.
 
-use super::samples::{Place, Samples};
+use super::samples::{KernelMatrix, Place};
 use super::solution::Solution;
 use crate::sigmoid::Sigmoid;
 
@@ -21,21 +21,21 @@ impl Pair {
     }
 
     /// Takes in the sample that now stands at the end of its class.
-    pub fn insert(&mut self, samples: &Samples, place: Place) {
+    pub fn insert(&mut self, samples: &KernelMatrix, place: Place) {
         let Some(side) = self.side(place) else { return };
         self.solution.insert(side, self.row(samples, place));
         self.changes += 1;
     }
 
     /// Takes out a sample that still stands in its place.
-    pub fn remove(&mut self, samples: &Samples, place: Place) {
+    pub fn remove(&mut self, samples: &KernelMatrix, place: Place) {
         let Some(side) = self.side(place) else { return };
         self.solution.remove(side, place.position, self.row(samples, place));
         self.changes += 1;
     }
 
     /// Brings the machine up to date.
-    pub fn solve(&mut self, samples: &Samples, cost: f64) {
+    pub fn solve(&mut self, samples: &KernelMatrix, cost: f64) {
         if self.is_empty(samples) {
             self.solution.clear();
             return;
@@ -45,7 +45,7 @@ impl Pair {
     }
 
     /// Fits the sigmoid to what machines say of samples that they have not seen. `folds` by class, of `count` folds.
-    pub fn calibrate(&mut self, samples: &Samples, cost: f64, folds: &[Vec<usize>], count: usize) {
+    pub fn calibrate(&mut self, samples: &KernelMatrix, cost: f64, folds: &[Vec<usize>], count: usize) {
         let sides = self.held_out(samples, cost, folds, count);
         let values = sides.iter().zip([true, false]);
         let values = values.flat_map(|(values, first)| values.iter().flatten().map(move |f| (*f, first)));
@@ -57,7 +57,7 @@ impl Pair {
     /// without samples.
     fn held_out(
         &self,
-        samples: &Samples,
+        samples: &KernelMatrix,
         cost: f64,
         folds: &[Vec<usize>],
         count: usize,
@@ -84,13 +84,13 @@ impl Pair {
     }
 
     /// The changes since the calibration as a part of the samples.
-    pub fn staleness(&self, samples: &Samples) -> f64 {
+    pub fn staleness(&self, samples: &KernelMatrix) -> f64 {
         let count: usize = self.classes.iter().map(|class| samples.of(*class).len()).sum();
         self.changes as f64 / count as f64
     }
 
     /// Whether one of the classes has no samples.
-    pub fn is_empty(&self, samples: &Samples) -> bool {
+    pub fn is_empty(&self, samples: &KernelMatrix) -> bool {
         self.classes.iter().any(|class| samples.of(*class).is_empty())
     }
 
@@ -98,13 +98,13 @@ impl Pair {
         self.classes.iter().position(|class| *class == place.class)
     }
 
-    fn row<'a>(&self, samples: &'a Samples, place: Place) -> [&'a [f32]; 2] {
+    fn row<'a>(&self, samples: &'a KernelMatrix, place: Place) -> [&'a [f32]; 2] {
         self.classes.map(|class| samples.at(place).kernel[class].as_slice())
     }
 }
 
 /// The kernel of the samples of a pair with each other.
-fn rows<'a>(samples: &'a Samples, classes: [usize; 2]) -> impl Fn(usize, usize) -> [&'a [f32]; 2] {
+fn rows<'a>(samples: &'a KernelMatrix, classes: [usize; 2]) -> impl Fn(usize, usize) -> [&'a [f32]; 2] {
     let of_side = classes.map(|class| samples.of(class));
     move |side, position| classes.map(|class| of_side[side][position].kernel[class].as_slice())
 }
@@ -116,7 +116,7 @@ mod tests {
     use rand_chacha::rand_core::SeedableRng;
 
     use super::super::folds::folds;
-    use super::super::samples::{Key, Sample};
+    use super::super::samples::{KernelRow, Key};
     use super::*;
 
     const COST: f64 = 10.0;
@@ -127,8 +127,8 @@ mod tests {
     }
 
     /// Classes in turn, a little apart; those of `keep`.
-    fn trained(vectors: &[Vec<f32>], keep: impl Fn(u64) -> bool) -> (Samples, Pair) {
-        let (mut samples, mut pair) = (Samples::new(2, 0.5), Pair::new([0, 1]));
+    fn trained(vectors: &[Vec<f32>], keep: impl Fn(u64) -> bool) -> (KernelMatrix, Pair) {
+        let (mut samples, mut pair) = (KernelMatrix::new(2, 0.5), Pair::new([0, 1]));
         for (key, vector) in (0..).zip(vectors).filter(|(key, _)| keep(*key)) {
             let class = key as usize % 2;
             let mut vector = vector.clone();
@@ -154,7 +154,7 @@ mod tests {
             let (others, alone) = trained(&vectors, |key| fold_of(key) != fold);
             for (key, _) in (0_u64..).zip(&vectors).filter(|(key, _)| fold_of(*key) == fold) {
                 let place = samples.place(Key::Inserted(key)).unwrap();
-                let kernel = |other: &Sample| {
+                let kernel = |other: &KernelRow| {
                     let other = samples.place(other.key).unwrap();
                     f64::from(samples.at(place).kernel[other.class][other.position])
                 };

@@ -15,7 +15,7 @@ pub(super) enum Key {
 
 /// A sample, and its kernel with all samples.
 #[derive(Debug)]
-pub(super) struct Sample {
+pub(super) struct KernelRow {
     pub key: Key,
     pub vector: Vec<f32>,
     /// For each class, the kernel with its samples, in their order: what a pair of classes needs of the matrix lies
@@ -33,23 +33,23 @@ pub(super) struct Place {
 
 /// The samples by class. The kernel matrix costs n² · 4 bytes for n samples, and up to an eighth more to grow into.
 #[derive(Debug)]
-pub(super) struct Samples {
+pub(super) struct KernelMatrix {
     gamma: f32,
-    classes: Vec<Vec<Sample>>,
+    classes: Vec<Vec<KernelRow>>,
     places: BTreeMap<Key, Place>,
 }
 
-impl Samples {
+impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
         Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places: BTreeMap::new() }
     }
 
     /// The samples of a class, in its order.
-    pub fn of(&self, class: usize) -> &[Sample] {
+    pub fn of(&self, class: usize) -> &[KernelRow] {
         &self.classes[class]
     }
 
-    pub fn at(&self, place: Place) -> &Sample {
+    pub fn at(&self, place: Place) -> &KernelRow {
         &self.classes[place.class][place.position]
     }
 
@@ -76,7 +76,7 @@ impl Samples {
             kernel.push(row);
         }
         kernel[class].push(1.0);
-        self.append(class, Sample { key, vector: vector.to_vec(), kernel })
+        self.append(class, KernelRow { key, vector: vector.to_vec(), kernel })
     }
 
     /// Takes a sample out.
@@ -101,7 +101,7 @@ impl Samples {
         self.append(class, sample)
     }
 
-    fn append(&mut self, class: usize, sample: Sample) -> Place {
+    fn append(&mut self, class: usize, sample: KernelRow) -> Place {
         let place = Place { class, position: self.classes[class].len() };
         self.places.insert(sample.key, place);
         self.classes[class].push(sample);
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_matrix_stays_true_and_small_whatever_comes_and_goes() {
         let mut rng = generator(1);
-        let mut samples = Samples::new(3, 0.3);
+        let mut samples = KernelMatrix::new(3, 0.3);
         let mut peak = 0;
         for step in 0..600 {
             let keys: Vec<Key> = samples.places().keys().copied().collect();

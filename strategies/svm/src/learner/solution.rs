@@ -316,13 +316,13 @@ fn movable(side: usize, weight: f64, cost: f64) -> (bool, bool) {
 mod tests {
     use rand::RngExt;
 
-    use super::super::samples::{Key, Samples};
+    use super::super::samples::{KernelMatrix, Key};
     use super::super::tests::{generator, vector};
     use super::*;
 
     /// How far a solution is from the optimum: the gap between residuals that could be brought together, in f64 from
     /// the vectors; and whether all weights are allowed.
-    fn violation(solution: &Solution, samples: &Samples, gamma: f64, cost: f64) -> f64 {
+    fn violation(solution: &Solution, samples: &KernelMatrix, gamma: f64, cost: f64) -> f64 {
         let all: Vec<(usize, &[f32], f64)> = (0..2)
             .flat_map(|side| {
                 let weights = solution.weights(side).iter();
@@ -355,7 +355,7 @@ mod tests {
         let gamma = 0.4;
         for (seed, cost) in [(1, 0.1), (2, 10.0), (3, 10.0), (4, 1e4)] {
             let mut rng = generator(seed);
-            let mut samples = Samples::new(2, gamma);
+            let mut samples = KernelMatrix::new(2, gamma);
             let mut solution = Solution::default();
             let mut next = 0;
             for round in 0..30 {

@@ -6,11 +6,12 @@ use linfa_svm::SvmError;
 use thiserror::Error;
 
 use super::options::TrainOptions;
-use crate::labelled::Sample;
+use crate::labelled::LabelledFeatures;
 use crate::reduction::Components;
 
 /// Samples or options that nothing can be learned from.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum TrainError {
     /// An option out of its range.
     #[error("training option out of range: {0}")]
@@ -90,7 +91,7 @@ pub(super) fn check_options(feature_set: &str, options: &TrainOptions) -> Result
     Ok(())
 }
 
-pub(super) fn check_samples(vocabulary: &Vocabulary, samples: &[Sample]) -> Result<(), TrainError> {
+pub(super) fn check_samples(vocabulary: &Vocabulary, samples: &[LabelledFeatures]) -> Result<(), TrainError> {
     let mut counts = vec![0; vocabulary.classes()];
     let expected = samples.first().map_or(0, |first| first.features.len());
     for (index, sample) in samples.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rand::Rng;
 use rand::seq::SliceRandom;
 
-use crate::labelled::Sample;
+use crate::labelled::LabelledFeatures;
 
 /// What stays together when samples are split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub enum Folding {
 /// By group where every sample has one and every class comes to lie in at least two folds, so that no fold's
 /// complement lacks a class; else by sample.
 pub(super) fn split(
-    samples: &[Sample],
+    samples: &[LabelledFeatures],
     classes: usize,
     folds: usize,
     rng: &mut impl Rng,
@@ -38,7 +38,7 @@ pub(super) fn split(
     (by_sample(samples, classes, folds, rng), Folding::BySample)
 }
 
-fn by_group(samples: &[Sample], folds: usize, rng: &mut impl Rng) -> Option<Vec<usize>> {
+fn by_group(samples: &[LabelledFeatures], folds: usize, rng: &mut impl Rng) -> Option<Vec<usize>> {
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (index, sample) in samples.iter().enumerate() {
         members.entry(sample.group?).or_default().push(index);
@@ -57,7 +57,7 @@ fn by_group(samples: &[Sample], folds: usize, rng: &mut impl Rng) -> Option<Vec<
     Some(assignment)
 }
 
-fn by_sample(samples: &[Sample], classes: usize, folds: usize, rng: &mut impl Rng) -> Vec<usize> {
+fn by_sample(samples: &[LabelledFeatures], classes: usize, folds: usize, rng: &mut impl Rng) -> Vec<usize> {
     let mut assignment = vec![0; samples.len()];
     let mut next = 0;
     for class in 0..classes {
@@ -80,9 +80,12 @@ mod tests {
 
     use super::*;
 
-    fn samples(groups: impl Fn(usize) -> Option<u32>) -> Vec<Sample> {
-        let sample =
-            |i: usize| Sample { features: vec![0.0], class: ClassId((i % 3) as u8), group: groups(i) };
+    fn samples(groups: impl Fn(usize) -> Option<u32>) -> Vec<LabelledFeatures> {
+        let sample = |i: usize| LabelledFeatures {
+            features: vec![0.0],
+            class: ClassId((i % 3) as u8),
+            group: groups(i),
+        };
         (0..60).map(sample).collect()
     }
 

@@ -11,4 +11,4 @@ mod train;
 pub use error::{MIN_SAMPLES, TrainError};
 pub use folds::Folding;
 pub use options::TrainOptions;
-pub use train::{Progress, Trained, train};
+pub use train::{TrainProgress, Trained, train};

@@ -8,12 +8,12 @@ use super::folds::{Folding, split};
 use super::options::TrainOptions;
 use crate::calibration::Calibration;
 use crate::feature_space::FeatureSpace;
-use crate::labelled::Sample;
+use crate::labelled::LabelledFeatures;
 use crate::machine::Machine;
 
 /// The samples, split and seen in the space of each fold.
 pub(super) struct Search<'a> {
-    samples: &'a [Sample],
+    samples: &'a [LabelledFeatures],
     classes: usize,
     folds: Vec<Fold>,
     pub folding: Folding,
@@ -29,7 +29,7 @@ pub(super) struct Choice {
 impl<'a> Search<'a> {
     pub fn new(
         feature_set: &str,
-        samples: &'a [Sample],
+        samples: &'a [LabelledFeatures],
         classes: usize,
         options: &TrainOptions,
         rng: &mut impl Rng,
@@ -98,7 +98,7 @@ pub(super) struct Fold {
 impl Fold {
     pub fn new(
         feature_set: &str,
-        samples: &[Sample],
+        samples: &[LabelledFeatures],
         classes: usize,
         options: &TrainOptions,
         rng: &mut impl Rng,
@@ -140,7 +140,7 @@ pub(super) struct HeldOut {
 }
 
 impl HeldOut {
-    fn new(decisions: &[Vec<f64>], samples: &[Sample], classes: usize) -> Self {
+    fn new(decisions: &[Vec<f64>], samples: &[LabelledFeatures], classes: usize) -> Self {
         let truths: Vec<usize> = samples.iter().map(|sample| sample.class.index()).collect();
         let calibration = Calibration::fit(decisions, &truths, classes);
         let (mut right, mut loss) = (0, 0.0);

@@ -10,11 +10,11 @@ use super::folds::Folding;
 use super::options::TrainOptions;
 use super::search::{Choice, Fold, HeldOut, Search};
 use crate::classifier::Classifier;
-use crate::labelled::Sample;
+use crate::labelled::LabelledFeatures;
 
 /// How far training has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
+pub struct TrainProgress {
     /// Machines fitted so far, one per fold and pair of parameters.
     pub done: usize,
     /// Machines to fit.
@@ -44,17 +44,18 @@ pub struct Trained {
 /// values of samples held out there: scaling, principal components and machines of a fold have not seen them. The
 /// scaling, components and machines of the result are then fitted on all samples.
 ///
-/// The same samples, options and generator give the same classifier, byte for byte.
+/// The same samples, options and generator give the same classifier, byte for byte, on one machine. Another may differ in
+/// the last bits: products of matrices and exponentials are as its processor makes them fastest.
 ///
 /// # Errors
 /// See [`TrainError`].
 pub fn train(
     feature_set: &str,
     vocabulary: &Vocabulary,
-    samples: &[Sample],
+    samples: &[LabelledFeatures],
     options: &TrainOptions,
     rng: &mut impl Rng,
-    mut progress: impl FnMut(Progress),
+    mut progress: impl FnMut(TrainProgress),
 ) -> Result<Trained, TrainError> {
     check_options(feature_set, options)?;
     check_samples(vocabulary, samples)?;
@@ -63,13 +64,13 @@ pub fn train(
     let mut done = 0;
     let best = search.run(options, || {
         done += 1;
-        progress(Progress { done, total });
+        progress(TrainProgress { done, total });
     })?;
     let Choice { cost, gamma, held_out } = best;
 
     let all = Fold::new(feature_set, samples, vocabulary.classes(), options, rng, |_| true);
     let machine = all.fit(cost, gamma)?;
-    progress(Progress { done: total, total });
+    progress(TrainProgress { done: total, total });
     let learned = all.counts();
     let classifier =
         Classifier::new(vocabulary.clone(), Arc::new(all.space), learned, machine, held_out.calibration);

@@ -7,15 +7,15 @@ use std::path::Path;
 use std::process::Command;
 
 use gestalt_rounds::Classify;
-use gestalt_svm::{Classifier, Evaluation, Sample};
+use gestalt_svm::{Classifier, Evaluation, LabelledFeatures};
 
 /// How LIBSVM judges `unseen` after learning `learned`, with this C and γ (in our unit); `None` where it is not
 /// installed.
 pub fn libsvm(
     classifier: &Classifier,
     (cost, gamma): (f64, f64),
-    learned: &[Sample],
-    unseen: &[Sample],
+    learned: &[LabelledFeatures],
+    unseen: &[LabelledFeatures],
     name: &str,
 ) -> Option<Evaluation> {
     if Command::new("svm-train").output().is_err() {
@@ -26,7 +26,7 @@ pub fn libsvm(
     fs::create_dir_all(&folder).unwrap();
     write(&folder.join("learned"), classifier, learned);
     write(&folder.join("unseen"), classifier, unseen);
-    let squares = |sample: &Sample| -> f64 {
+    let squares = |sample: &LabelledFeatures| -> f64 {
         classifier.space().project(&sample.features).unwrap().iter().map(|x| f64::from(x * x)).sum()
     };
     let gamma = gamma * learned.len() as f64 / learned.iter().map(squares).sum::<f64>();
@@ -52,7 +52,7 @@ pub fn print(who: &str, evaluation: &Evaluation) {
     );
 }
 
-fn write(path: &Path, classifier: &Classifier, samples: &[Sample]) {
+fn write(path: &Path, classifier: &Classifier, samples: &[LabelledFeatures]) {
     let mut text = String::new();
     for sample in samples {
         write!(text, "{}", sample.class).unwrap();
@@ -65,7 +65,7 @@ fn write(path: &Path, classifier: &Classifier, samples: &[Sample]) {
 }
 
 /// The first line names the classes by column; then, per sample, the answer and a probability per column.
-fn read(path: &Path, samples: &[Sample], classes: usize) -> Evaluation {
+fn read(path: &Path, samples: &[LabelledFeatures], classes: usize) -> Evaluation {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines().map(|line| line.split_whitespace().skip(1));
     let columns: Vec<usize> = lines.next().unwrap().map(|label| label.parse().unwrap()).collect();

@@ -10,7 +10,7 @@ const MAX_ROUNDS: usize = 32;
 
 /// One round.
 #[derive(Clone, Debug)]
-struct Life {
+struct RecentRound {
     counter: u32,
     /// All openers it was known under: robots that open at once merge their rounds on the smallest.
     openers: BTreeSet<RobotId>,
@@ -23,15 +23,15 @@ struct Life {
 
 /// The latest rounds, oldest first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Lives(VecDeque<Life>);
+pub(super) struct RecentRounds(VecDeque<RecentRound>);
 
-impl Lives {
+impl RecentRounds {
     /// Notes a round, or another name of one; says whether it was news.
     pub fn enter(&mut self, round: RoundId) -> bool {
         match self.0.iter_mut().find(|life| life.counter == round.counter) {
             Some(life) => life.openers.insert(round.opener),
             None => {
-                self.0.push_back(Life {
+                self.0.push_back(RecentRound {
                     counter: round.counter,
                     openers: [round.opener].into(),
                     last_look: None,
@@ -95,11 +95,11 @@ impl Lives {
         Some(RoundId { counter: life.counter, opener: *life.openers.first()? })
     }
 
-    fn find(&self, round: RoundId) -> Option<&Life> {
+    fn find(&self, round: RoundId) -> Option<&RecentRound> {
         self.0.iter().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
     }
 
-    fn find_mut(&mut self, round: RoundId) -> Option<&mut Life> {
+    fn find_mut(&mut self, round: RoundId) -> Option<&mut RecentRound> {
         self.0.iter_mut().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
     }
 }

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, RoundId, SampleId};
 
-use crate::sample::Part;
+use crate::sample::SetPart;
 
 /// A sample whose class is open.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Aside {
+pub(super) struct UnresolvedSample {
     /// The part of the training set it came from, or would go to.
-    pub part: Part,
+    pub part: SetPart,
     /// Its id, once shared, and the class it was shared under.
     pub shared: Option<(SampleId, ClassId)>,
     pub round: RoundId,
@@ -31,21 +31,21 @@ pub(crate) fn training_key(number: u64) -> u64 {
 
 /// The samples kept aside, oldest first, never more than so many.
 #[derive(Clone, Debug)]
-pub(super) struct Shelf {
-    samples: BTreeMap<u64, Aside>,
+pub(super) struct Unresolved {
+    samples: BTreeMap<u64, UnresolvedSample>,
     next: u64,
     capacity: usize,
 }
 
-impl Shelf {
-    pub fn new(samples: Vec<(u64, Aside)>, next: u64, capacity: usize) -> Self {
+impl Unresolved {
+    pub fn new(samples: Vec<(u64, UnresolvedSample)>, next: u64, capacity: usize) -> Self {
         let samples: BTreeMap<_, _> = samples.into_iter().collect();
         let next = samples.keys().next_back().map_or(next, |last| next.max(last + 1));
         Self { samples, next, capacity }
     }
 
     /// Puts one aside; those whose place was taken, which may be itself, come back.
-    pub fn put(&mut self, aside: Aside) -> (u64, Vec<(u64, Aside)>) {
+    pub fn put(&mut self, aside: UnresolvedSample) -> (u64, Vec<(u64, UnresolvedSample)>) {
         let number = self.next;
         self.next += 1;
         self.samples.insert(number, aside);
@@ -57,17 +57,17 @@ impl Shelf {
     }
 
     /// Takes out those for which `pick` says so, oldest first.
-    pub fn take(&mut self, pick: impl Fn(&Aside) -> bool) -> Vec<(u64, Aside)> {
+    pub fn take(&mut self, pick: impl Fn(&UnresolvedSample) -> bool) -> Vec<(u64, UnresolvedSample)> {
         let (taken, left) = std::mem::take(&mut self.samples).into_iter().partition(|(_, aside)| pick(aside));
         self.samples = left;
         BTreeMap::into_iter(taken).collect()
     }
 
-    pub fn get(&self, number: u64) -> Option<&Aside> {
+    pub fn get(&self, number: u64) -> Option<&UnresolvedSample> {
         self.samples.get(&number)
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = (u64, &Aside)> {
+    pub fn iter(&self) -> impl Iterator<Item = (u64, &UnresolvedSample)> {
         self.samples.iter().map(|(number, aside)| (*number, aside))
     }
 
