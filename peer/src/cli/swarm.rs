@@ -21,7 +21,7 @@ use crate::config::{
 use crate::opinion::likeliest;
 use crate::picture::{self, Panel};
 use crate::swarm::{Members, Roster, Score, Tally, curve};
-use gestalt_lab::topology::Topology;
+use gestalt_lab::shape::NetworkShape;
 use gestalt_link::{Announcement, Client, LinkConfig, News};
 use gestalt_vision::human::Human;
 use gestalt_vision::model::RobotModel;
@@ -36,7 +36,7 @@ pub struct Args {
 
     /// Who is linked to whom: line, ring, grid, star, random or full
     #[arg(long, default_value = "random")]
-    topology: Topology,
+    topology: NetworkShape,
 
     /// How many gestures to show
     #[arg(long, default_value_t = 12)]
