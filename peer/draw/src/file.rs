@@ -1,6 +1,7 @@
 //! A drawing's file: SVG or PNG, by its name.
 
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use thiserror::Error;
 
@@ -14,19 +15,38 @@ pub enum DrawError {
     #[error("the drawing {}: give it a name that ends in .svg or .png", .0.display())]
     Name(PathBuf),
     /// The folder it would go into does not exist.
-    #[error("the drawing {}: there is no folder {}", .0.display(), .0.parent().unwrap_or(.0).display())]
+    #[error("cannot write {}: its folder does not exist; make it with mkdir -p", .0.display())]
     NoFolder(PathBuf),
+    /// The file or its folder may not be written.
+    #[error("no permission to write {}: choose another folder, or grant it with chmod", .0.display())]
+    Permission(PathBuf),
+    /// The disk has no room left.
+    #[error("cannot write {}: the disk is full; free some space or choose another folder", .0.display())]
+    DiskFull(PathBuf),
     /// The drawing is no SVG that can be rendered.
     #[error("cannot draw: {0}")]
     Svg(String),
-    /// The file cannot be written.
-    #[error("cannot write the drawing {}: {cause}", path.display())]
+    /// Anything else the operating system objects to.
+    #[error("cannot write {}: {cause}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
         /// Why.
-        cause: std::io::Error,
+        cause: io::Error,
     },
+}
+
+impl DrawError {
+    fn io(path: &Path, cause: io::Error) -> Self {
+        match cause.kind() {
+            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+                Self::Permission(path.into())
+            }
+            io::ErrorKind::NotFound => Self::NoFolder(path.into()),
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull(path.into()),
+            _ => Self::Write { path: path.into(), cause },
+        }
+    }
 }
 
 /// What a drawing is written as.
@@ -52,16 +72,16 @@ impl Kind {
     }
 }
 
-/// Whether a drawing can be written there, asked before the work that is to be drawn is done.
+/// Whether a drawing can be written there, asked before the work that is to be drawn is done. Leaves everything as it was.
 ///
 /// # Errors
-/// [`DrawError::Name`], [`DrawError::NoFolder`].
+/// See [`DrawError`].
 pub fn check(path: &Path) -> Result<(), DrawError> {
     Kind::of(path)?;
-    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        Some(folder) if !folder.is_dir() => Err(DrawError::NoFolder(path.to_owned())),
-        _ => Ok(()),
-    }
+    let failed = |cause| DrawError::io(path, cause);
+    let was_there = path.exists();
+    fs::OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
+    if was_there { Ok(()) } else { fs::remove_file(path).map_err(failed) }
 }
 
 /// Writes an SVG drawing to a file, as SVG or PNG.
@@ -69,9 +89,48 @@ pub fn check(path: &Path) -> Result<(), DrawError> {
 /// # Errors
 /// See [`DrawError`].
 pub fn write(svg: &str, path: &Path) -> Result<(), DrawError> {
-    let bytes = match Kind::of(path)? {
-        Kind::Svg => svg.as_bytes().to_vec(),
-        Kind::Png => png(svg)?,
-    };
-    std::fs::write(path, bytes).map_err(|cause| DrawError::Write { path: path.to_owned(), cause })
+    match Kind::of(path)? {
+        Kind::Svg => save(svg.as_bytes(), path),
+        Kind::Png => save(&png(svg)?, path),
+    }
+}
+
+/// Writes the bytes of a picture that is drawn already.
+///
+/// # Errors
+/// A [`DrawError`] that names the path and what to do about it.
+pub fn save(bytes: &[u8], path: &Path) -> Result<(), DrawError> {
+    fs::write(path, bytes).map_err(|cause| DrawError::io(path, cause))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_cannot_be_written_is_named_with_what_to_do() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("no/round.png");
+        for refused in [save(b"x", &missing), check(&missing)] {
+            let refused = refused.unwrap_err().to_string();
+            assert!(refused.contains("no/round.png") && refused.contains("mkdir"), "{refused}");
+        }
+        assert!(matches!(save(b"x", folder.path()), Err(DrawError::Write { .. })));
+        if Path::new("/dev/full").exists() {
+            let full = save(b"x", Path::new("/dev/full")).unwrap_err();
+            assert!(matches!(full, DrawError::DiskFull(_)), "{full}");
+        }
+    }
+
+    #[test]
+    fn asking_leaves_everything_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("round.svg");
+        check(&path).unwrap();
+        assert!(!path.exists());
+        save(b"mine", &path).unwrap();
+        check(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"mine");
+        assert!(matches!(check(&folder.path().join("round.gif")), Err(DrawError::Name(_))));
+    }
 }

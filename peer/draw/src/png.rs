@@ -1,16 +1,10 @@
 //! SVG as PNG.
 
-use std::sync::Arc;
-
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::fontdb::Database;
-use resvg::usvg::{FontResolver, Options, Tree};
+use resvg::usvg::{Options, Tree};
 
 use crate::DrawError;
-
-/// DejaVu Sans: Latin, Greek, Cyrillic, Armenian, Georgian, Hebrew, Arabic, Lao and the mathematical signs.
-const FONT: &[u8] = include_bytes!("../fonts/DejaVuSans.ttf");
-const FAMILY: &str = "DejaVu Sans";
+use crate::font;
 
 /// No picture is wider or higher, in pixels.
 const MAX_SIDE: u32 = 16_384;
@@ -18,30 +12,15 @@ const MAX_SIDE: u32 = 16_384;
 /// Renders an SVG drawing at its own size, on the background it brings, as the bytes of a PNG file.
 ///
 /// Text is set in the embedded font, whatever family it asks for; a sign that it lacks, in the first of the system's
-/// fonts that has it.
+/// fonts that has it. One that no font has becomes a box: in a drawing that is left as SVG it is shown by whoever has one.
 ///
 /// # Errors
 /// [`DrawError::Svg`] for text that is no SVG, or larger than 16,384 pixels.
 pub fn png(svg: &str) -> Result<Vec<u8>, DrawError> {
-    let mut fonts = Database::new();
-    fonts.load_font_data(FONT.to_vec());
-    fonts.set_sans_serif_family(FAMILY);
-    fonts.set_serif_family(FAMILY);
-    fonts.set_monospace_family(FAMILY);
-    let among_known = FontResolver::default_fallback_selector();
     let options = Options {
-        fontdb: Arc::new(fonts),
-        font_family: FAMILY.to_owned(),
-        font_resolver: FontResolver {
-            // The system's fonts are many files, seldom needed.
-            select_fallback: Box::new(move |sign, tried, fonts| {
-                if fonts.len() == 1 {
-                    Arc::make_mut(fonts).load_system_fonts();
-                }
-                among_known(sign, tried, fonts)
-            }),
-            ..FontResolver::default()
-        },
+        fontdb: font::embedded(),
+        font_family: font::FAMILY.to_owned(),
+        font_resolver: font::resolver(),
         ..Options::default()
     };
     let tree = Tree::from_str(svg, &options).map_err(|error| DrawError::Svg(error.to_string()))?;

@@ -9,4 +9,4 @@ pub mod emulation;
 pub mod experiment;
 #[cfg(feature = "charts")]
 pub mod explain;
-pub mod topology;
+pub mod shape;

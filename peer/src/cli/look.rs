@@ -15,7 +15,7 @@ use super::progress::bar;
 use super::show::line;
 use crate::config::{CameraSection, Config, ModelSection, SourceSection};
 use crate::opinion::likeliest;
-use crate::picture::{stages, writable, write_png};
+use crate::picture::stages;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::perception::{FeatureSet, GROUPS, HandConfig, NoObservation, Perception};
@@ -30,8 +30,8 @@ pub struct Args {
     /// An image, a folder of images, a video, or `rendered:3` (a drawn hand of 3 fingers; `rendered`: an empty room)
     #[arg(long, value_name = "SRC")]
     source: LookAt,
-    /// The picture
-    #[arg(long, value_name = "FILE.png")]
+    /// The picture, as SVG or PNG by its name
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
     out: PathBuf,
     /// The model file, as `gestalt train` wrote it; without one, the embedded model, which takes some seconds
     #[arg(long, value_name = "FILE")]
@@ -87,7 +87,7 @@ fn preset(name: &str) -> Result<CameraModel, String> {
 /// # Errors
 /// When the source, the background, the model or the configuration cannot be used, or the picture not be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    writable(&args.out)?;
+    gestalt_draw::check(&args.out)?;
     let config = args.config.as_deref().map(Config::read).transpose()?;
     let section = config.as_ref().map(|config| &config.camera);
     let camera = args.camera.clone().or_else(|| section.map(|section| section.model.properties()));
@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         seen,
         model,
     };
-    write_png(&args.out, &view.draw()?)?;
+    gestalt_draw::write(&view.draw()?, &args.out)?;
     view.say(args)
 }
 
@@ -195,7 +195,7 @@ impl View {
         Ok(labels.zip(probabilities).collect())
     }
 
-    fn draw(&self) -> Result<Mat, Failure> {
+    fn draw(&self) -> Result<String, Failure> {
         let perception = &self.perception;
         let balanced = perception.balance(&self.frame)?;
         let [blue, green, red] = perception.gains();

@@ -21,7 +21,7 @@ use crate::config::{
 use crate::opinion::likeliest;
 use crate::picture::{self, Panel};
 use crate::swarm::{Members, Roster, Score, Tally, curve};
-use gestalt_lab::topology::Topology;
+use gestalt_lab::shape::NetworkShape;
 use gestalt_link::{Announcement, Client, LinkConfig, News};
 use gestalt_vision::human::Human;
 use gestalt_vision::model::RobotModel;
@@ -36,7 +36,7 @@ pub struct Args {
 
     /// Who is linked to whom: line, ring, grid, star, random or full
     #[arg(long, default_value = "random")]
-    topology: Topology,
+    topology: NetworkShape,
 
     /// How many gestures to show
     #[arg(long, default_value_t = 12)]
@@ -118,7 +118,7 @@ fn learn_from(text: &str) -> Result<LearnFrom, String> {
 pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(picture) = &args.picture {
         // Found out now, not after the last round.
-        picture::writable(picture)?;
+        gestalt_draw::check(picture)?;
     }
     if let Some(curve) = &args.curve {
         gestalt_draw::check(curve)?;
@@ -407,16 +407,20 @@ fn draw(
         .filter(|(_, _, seen)| seen.round.counter == counter)
         .map(|(config, body, seen)| {
             let classifier = body.robot().classifier();
+            let label = |class: ClassId| {
+                let label = classifier.as_ref().and_then(|known| known.vocabulary().label(class));
+                label.map_or_else(|| class.to_string(), str::to_owned)
+            };
             let probabilities =
-                classifier.map(|classifier| seen.probabilities(&*classifier)).unwrap_or_default();
+                classifier.as_ref().map(|classifier| seen.probabilities(&**classifier)).unwrap_or_default();
             let opinion = likeliest(&probabilities);
             let by_class = (0u8..).zip(probabilities);
             Panel {
                 title: config.name(),
                 image: &seen.image,
-                opinion: opinion.map(|(class, probability)| (class.to_string(), probability)),
+                opinion: opinion.map(|(class, probability)| (label(class), probability)),
                 correct: opinion.map(|(class, _)| Some(class) == decision.class),
-                probabilities: by_class.map(|(class, p)| (class.to_string(), p)).collect(),
+                probabilities: by_class.map(|(class, p)| (label(ClassId(class)), p)).collect(),
             }
         })
         .collect();
@@ -427,7 +431,7 @@ fn draw(
         decision.certificate.votes.len(),
         decision.certificate.elapsed_ms
     );
-    Ok(picture::write_png(path, &picture::round(&panels, &headline)?)?)
+    Ok(gestalt_draw::write(&picture::round(&panels, &headline)?, path)?)
 }
 
 fn say_score(args: &Args, configs: &[Config], score: &Score) -> Result<(), Failure> {

@@ -1,11 +1,13 @@
 //! One frame on its way through perception: raw, white-balanced, mask, hand, features, opinion.
 
-use opencv::core::{CV_8UC3, Mat, Point, Rect, Size};
-use opencv::imgproc::{self, COLOR_GRAY2BGR, INTER_AREA, INTER_LINEAR, LINE_AA};
+use gestalt_draw::{Letters, Place, Sheet, Tone};
+use opencv::core::{CV_8UC3, Mat, Rect, Scalar};
+use opencv::imgproc::{self, INTER_AREA, INTER_LINEAR};
 use opencv::prelude::*;
 
 use super::PictureError;
-use super::canvas::{AGREES, BACKGROUND, CARD, DIFFERS, MUTED, TEXT, TRACK, colour, fill, fit, write};
+use super::frame::embed;
+use super::tone::{AGREES, BACKGROUND, CARD, DIFFERS, MUTED, TEXT, TRACK};
 
 /// Groups of features: each a name and its values.
 pub type Groups = Vec<(String, Vec<f32>)>;
@@ -39,90 +41,93 @@ pub struct Stages<'a> {
     pub opinion: Result<Vec<(String, f64)>, String>,
 }
 
-const MARGIN: i32 = 24;
-const CARD_WIDTH: i32 = 400;
-const HEAD: i32 = 84;
-const CAPTION: i32 = 66;
-const VIEW: i32 = 300;
-const LOWER: i32 = 400;
-const COLUMNS: i32 = 4;
-const INSET: i32 = 16;
+const MARGIN: f64 = 24.0;
+const CARD_WIDTH: f64 = 400.0;
+const HEAD: f64 = 84.0;
+const CAPTION: f64 = 66.0;
+const VIEW: f64 = 300.0;
+const LOWER: f64 = 400.0;
+const INSET: f64 = 16.0;
+/// Left of the features stands what their bars are worth.
+const AXIS: f64 = 60.0;
+/// The labels stand left of the bars of the opinion, the percentages right of them.
+const LABELS: f64 = 130.0;
+const PERCENT: f64 = 76.0;
 /// Two tones by turns, so that neighbouring groups are told apart (Okabe and Ito, 2008).
-const GROUP_TONES: [u32; 2] = [0x56_b4_e9, 0xe6_9f_00];
+const GROUP_TONES: [Tone; 2] = [0x56_b4_e9, 0xe6_9f_00];
 
-/// Draws the six stages.
+/// Draws the six stages as SVG.
 ///
 /// # Errors
 /// [`PictureError::OpenCv`] when an image is empty or of another type.
-pub fn draw(stages: &Stages<'_>) -> Result<Mat, PictureError> {
-    let width = MARGIN + COLUMNS * (CARD_WIDTH + MARGIN);
+pub fn draw(stages: &Stages<'_>) -> Result<String, PictureError> {
+    let width = MARGIN + 4.0 * (CARD_WIDTH + MARGIN);
     let upper_height = CAPTION + VIEW;
-    let size = Size::new(width, HEAD + upper_height + MARGIN + CAPTION + LOWER + MARGIN);
-    let mut picture = Mat::new_size_with_default(size, CV_8UC3, colour(BACKGROUND))?;
-    for (i, line) in stages.headline.lines().take(2).enumerate() {
-        let (y, scale, tone) = if i == 0 { (38, 1.0, TEXT) } else { (68, 0.6, MUTED) };
-        write(&mut picture, line, Point::new(MARGIN, y), scale, tone, width - 2 * MARGIN)?;
+    let mut sheet = Sheet::new(width, HEAD + upper_height + MARGIN + CAPTION + LOWER + MARGIN, BACKGROUND);
+    let headline = [(38.0, Letters::new(28.0, TEXT)), (68.0, Letters::new(17.0, MUTED))];
+    for (line, (y, letters)) in stages.headline.lines().zip(headline) {
+        sheet.write(line, (MARGIN, y), letters, width - 2.0 * MARGIN);
     }
 
     let found = stages.hand.is_ok();
-    let frame = stages.frame;
-    let raw = framed(frame, stages.region, found)?;
-    let balanced = framed(stages.balanced, stages.region, found)?;
-    let mut mask = Mat::default();
-    imgproc::cvt_color_def(stages.mask, &mut mask, COLOR_GRAY2BGR)?;
+    let hand = if found { Some(hand(stages)?) } else { None };
     let (part, verdict) = match &stages.hand {
         Ok(words) => ("the hand's pixels", words.as_str()),
         Err(cause) => ("pixels that may be a hand's", cause.as_str()),
     };
-    let seen = format!("{} x {} pixels", frame.cols(), frame.rows());
-    for (column, (title, words, image)) in [
-        ("1  raw", seen.as_str(), Some(raw)),
-        ("2  white-balanced", stages.balance.as_str(), Some(balanced)),
-        ("3  mask", part, Some(mask)),
-        ("4  hand", verdict, if found { Some(hand(stages)?) } else { None }),
+    let frame = stages.frame;
+    let seen = format!("{} × {} pixels", frame.cols(), frame.rows());
+    let region = found.then_some(stages.region);
+    for (column, (title, words, image, marked)) in [
+        ("1  raw", seen.as_str(), Some(frame), region),
+        ("2  white-balanced", stages.balance.as_str(), Some(stages.balanced), region),
+        ("3  mask", part, Some(stages.mask), None),
+        ("4  hand", verdict, hand.as_ref(), None),
     ]
     .into_iter()
     .enumerate()
     {
-        let x = MARGIN + column as i32 * (CARD_WIDTH + MARGIN);
-        let place = Rect::new(x, HEAD, CARD_WIDTH, upper_height);
-        card(&mut picture, place, title, words, column < 3 || found)?;
-        let view = Rect::new(place.x, place.y + CAPTION, place.width, VIEW);
-        fill(&mut picture, view, BACKGROUND)?;
+        let place =
+            Place::new(MARGIN + column as f64 * (CARD_WIDTH + MARGIN), HEAD, CARD_WIDTH, upper_height);
+        card(&mut sheet, place, title, words, column < 3 || found);
+        let view = Place::new(place.x, place.y + CAPTION, place.width, VIEW);
+        sheet.fill(view, BACKGROUND);
         match image {
-            Some(image) => fit(&mut picture, &image, view)?,
+            Some(image) => {
+                let shown = embed(&mut sheet, image, view)?;
+                if let Some(region) = marked {
+                    mark(&mut sheet, image, region, shown);
+                }
+            }
             None => {
-                let middle = Point::new(view.x + 130, view.y + VIEW / 2);
-                write(&mut picture, "no hand", middle, 1.0, MUTED, view.width)?;
+                let middle = (view.x + 130.0, view.y + VIEW / 2.0);
+                sheet.write("no hand", middle, Letters::new(28.0, MUTED), view.width);
             }
         }
     }
 
     let y = HEAD + upper_height + MARGIN;
-    let features = Rect::new(MARGIN, y, 3 * CARD_WIDTH + 2 * MARGIN, CAPTION + LOWER);
-    let opinion = Rect::new(MARGIN + 3 * (CARD_WIDTH + MARGIN), y, CARD_WIDTH, CAPTION + LOWER);
-    draw_features(&mut picture, stages, features)?;
-    draw_opinion(&mut picture, stages, opinion)?;
-    Ok(picture)
+    let features = Place::new(MARGIN, y, 3.0 * CARD_WIDTH + 2.0 * MARGIN, CAPTION + LOWER);
+    let opinion = Place::new(MARGIN + 3.0 * (CARD_WIDTH + MARGIN), y, CARD_WIDTH, CAPTION + LOWER);
+    draw_features(&mut sheet, stages, features);
+    draw_opinion(&mut sheet, stages, opinion);
+    Ok(sheet.svg())
 }
 
-fn card(picture: &mut Mat, place: Rect, title: &str, words: &str, good: bool) -> opencv::Result<()> {
-    fill(picture, place, CARD)?;
-    let width = place.width - 2 * INSET;
-    write(picture, title, Point::new(place.x + INSET, place.y + 28), 0.75, TEXT, width)?;
+fn card(sheet: &mut Sheet, place: Place, title: &str, words: &str, good: bool) {
+    sheet.fill(place, CARD);
+    let width = place.width - 2.0 * INSET;
+    sheet.write(title, (place.x + INSET, place.y + 28.0), Letters::new(20.0, TEXT), width);
     let tone = if good { MUTED } else { DIFFERS };
-    write(picture, words, Point::new(place.x + INSET, place.y + 53), 0.5, tone, width)
+    sheet.write(words, (place.x + INSET, place.y + 53.0), Letters::new(14.0, tone), width);
 }
 
-/// The image with the region marked in it.
-fn framed(image: &Mat, region: Rect, found: bool) -> opencv::Result<Mat> {
-    let mut framed = image.clone();
-    if found {
-        // As thick on the picture whatever the frame's size.
-        let pen = (framed.cols() / 160).max(1);
-        imgproc::rectangle(&mut framed, region, colour(AGREES), pen, LINE_AA, 0)?;
-    }
-    Ok(framed)
+/// Marks a region of an image that is shown in a place.
+fn mark(sheet: &mut Sheet, image: &Mat, region: Rect, shown: Place) {
+    let scale = shown.width / f64::from(image.cols().max(1));
+    let [x, y, width, height] =
+        [region.x, region.y, region.width, region.height].map(|pixels| f64::from(pixels) * scale);
+    sheet.outline(Place::new(shown.x + x, shown.y + y, width, height), AGREES, 2.5);
 }
 
 /// The balanced pixels of the hand, and nothing else.
@@ -130,8 +135,9 @@ fn hand(stages: &Stages<'_>) -> opencv::Result<Mat> {
     let size = stages.mask.size()?;
     let part = Mat::roi(stages.balanced, stages.region)?;
     let how = if size.width < part.cols() { INTER_AREA } else { INTER_LINEAR };
-    let (mut scaled, mut hand) =
-        (Mat::default(), Mat::new_size_with_default(size, CV_8UC3, colour(BACKGROUND))?);
+    let [_, red, green, blue] = BACKGROUND.to_be_bytes();
+    let background = Scalar::new(blue.into(), green.into(), red.into(), 0.0);
+    let (mut scaled, mut hand) = (Mat::default(), Mat::new_size_with_default(size, CV_8UC3, background)?);
     imgproc::resize(&part, &mut scaled, size, 0.0, 0.0, how)?;
     scaled.copy_to_masked(&mut hand, stages.mask)?;
     let bounds = imgproc::bounding_rect(stages.mask)?;
@@ -139,93 +145,94 @@ fn hand(stages: &Stages<'_>) -> opencv::Result<Mat> {
 }
 
 /// One bar a feature, rising or hanging from the line of 0, under the name of its group.
-fn draw_features(picture: &mut Mat, stages: &Stages<'_>, place: Rect) -> opencv::Result<()> {
+fn draw_features(sheet: &mut Sheet, stages: &Stages<'_>, place: Place) {
     let count: usize = stages.features.iter().map(|(_, values)| values.len()).sum();
     let (unit, full) = &stages.scale;
     let words =
         if count == 0 { "no hand, no features".to_owned() } else { format!("{count} values; {unit}") };
-    card(picture, place, "5  features", &words, count > 0)?;
-    let plot = Rect::new(place.x + 60, place.y + CAPTION + 34, place.width - 60 - INSET, LOWER - 34 - INSET);
+    card(sheet, place, "5  features", &words, count > 0);
     if count == 0 {
-        return Ok(());
+        return;
     }
+    let (left, top) = (place.x + AXIS, place.y + CAPTION + 34.0);
+    let plot = Place::new(left, top, place.width - AXIS - INSET, LOWER - 34.0 - INSET);
     let hangs = stages.features.iter().flat_map(|(_, values)| values).any(|&value| value < 0.0);
-    let zero = if hangs { plot.y + plot.height / 2 } else { plot.y + plot.height };
-    let reach = f64::from(zero - plot.y);
+    let reach = if hangs { plot.height / 2.0 } else { plot.height };
+    let zero = plot.y + reach;
     let marks: &[f32] = if hangs { &[1.0, 0.0, -1.0] } else { &[1.0, 0.5, 0.0] };
     for mark in marks {
-        let y = zero - (f64::from(*mark) * reach) as i32;
-        fill(picture, Rect::new(plot.x, y, plot.width, 1), TRACK)?;
-        let label = format!("{:.1}", mark * full);
-        write(picture, &label, Point::new(place.x + 10, y + 5), 0.42, MUTED, 46)?;
+        let y = zero - f64::from(*mark) * reach;
+        sheet.fill(Place::new(plot.x, y, plot.width, 1.0), TRACK);
+        let worth = format!("{:.1}", mark * full);
+        sheet.write(&worth, (place.x + 10.0, y + 5.0), Letters::new(13.0, MUTED), AXIS - 14.0);
     }
     // A gap between groups.
     let gaps = stages.features.len() as f64 - 1.0;
-    let gap = 18.0_f64.min(f64::from(plot.width) / 40.0);
-    let pitch = (f64::from(plot.width) - gaps * gap) / count as f64;
-    let mut x = f64::from(plot.x);
-    for (group, (name, values)) in stages.features.iter().enumerate() {
-        let tone = GROUP_TONES[group % 2];
-        let span = (pitch * values.len() as f64) as i32;
-        let label = Point::new(x as i32, place.y + CAPTION + 18);
-        write(picture, name, label, 0.5, tone, span.max(40) + gap as i32)?;
-        fill(picture, Rect::new(x as i32, place.y + CAPTION + 24, span, 2), tone)?;
+    let gap = 18.0_f64.min(plot.width / 40.0);
+    let pitch = (plot.width - gaps * gap) / count as f64;
+    let mut x = plot.x;
+    for (n, (name, values)) in stages.features.iter().enumerate() {
+        let tone = GROUP_TONES[n % 2];
+        let span = pitch * values.len() as f64;
+        let name_at = (x, place.y + CAPTION + 18.0);
+        sheet.write(name, name_at, Letters::new(14.0, tone), span.max(40.0) + gap - 4.0);
+        sheet.fill(Place::new(x, place.y + CAPTION + 24.0, span, 2.0), tone);
         for value in values {
-            let height = (f64::from((value / full).clamp(-1.0, 1.0)) * reach).round() as i32;
-            let top = if height > 0 { zero - height } else { zero };
-            let width = ((pitch * 0.8) as i32).max(1);
-            fill(picture, Rect::new(x as i32, top, width, height.abs().max(1)), tone)?;
+            let height = f64::from((value / full).clamp(-1.0, 1.0)) * reach;
+            let top = if height > 0.0 { zero - height } else { zero };
+            sheet.fill(Place::new(x, top, (pitch * 0.8).max(1.0), height.abs().max(1.0)), tone);
             x += pitch;
         }
         x += gap;
     }
-    Ok(())
 }
 
 /// One lying bar a gesture, with its probability in figures.
-fn draw_opinion(picture: &mut Mat, stages: &Stages<'_>, place: Rect) -> opencv::Result<()> {
+fn draw_opinion(sheet: &mut Sheet, stages: &Stages<'_>, place: Place) {
     let probabilities = match &stages.opinion {
         Ok(probabilities) => probabilities,
-        Err(cause) => return card(picture, place, "6  opinion", cause, false),
+        Err(cause) => return card(sheet, place, "6  opinion", cause, false),
     };
     let best = probabilities.iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
     let words = best.map_or(String::new(), |(label, p)| format!("{label}, with probability {p:.2}"));
-    card(picture, place, "6  opinion", &words, true)?;
-    let pitch = ((LOWER - INSET) / (probabilities.len() as i32).max(1)).min(56);
-    let letters = if pitch < 24 { 0.4 } else { 0.7 };
-    for (i, (label, probability)) in probabilities.iter().enumerate() {
-        let y = place.y + CAPTION + i as i32 * pitch + 6;
-        if y + pitch > place.y + place.height {
-            break;
-        }
+    card(sheet, place, "6  opinion", &words, true);
+    let pitch = ((LOWER - INSET) / probabilities.len().max(1) as f64).min(56.0);
+    let size = (pitch * 0.36).clamp(6.0, 18.0);
+    // As much room as the labels need, and no more than there is.
+    let widest =
+        probabilities.iter().map(|(label, _)| gestalt_draw::text_width(label, size)).fold(40.0, f64::max);
+    let labels = widest.min(LABELS);
+    for (n, (label, probability)) in probabilities.iter().enumerate() {
+        let y = place.y + CAPTION + n as f64 * pitch + 6.0;
         let chosen = best.is_some_and(|(best, _)| best == label);
-        let tone = if chosen { AGREES } else { MUTED };
-        let base = y + pitch / 2 + (10.0 * letters) as i32;
-        write(
-            picture,
-            label,
-            Point::new(place.x + INSET, base),
-            letters,
-            if chosen { TEXT } else { MUTED },
-            78,
-        )?;
-        let track = Rect::new(place.x + 100, y + 2, place.width - 100 - 84, (pitch - 10).max(2));
-        fill(picture, track, TRACK)?;
-        let filled = (f64::from(track.width) * probability.clamp(0.0, 1.0)).round() as i32;
-        fill(picture, Rect::new(track.x, track.y, filled, track.height), tone)?;
+        let height = (pitch - 10.0).max(2.0);
+        let base = y + 2.0 + height / 2.0 + 0.36 * size;
+        let letters = Letters::new(size, if chosen { TEXT } else { MUTED });
+        sheet.write(label, (place.x + INSET, base), letters, labels);
+        let left = INSET + labels + 14.0;
+        let track = Place::new(place.x + left, y + 2.0, place.width - left - 8.0 - PERCENT, height);
+        sheet.fill(track, TRACK);
+        // What is not a number fills nothing.
+        let filled = track.width * probability.clamp(0.0, 1.0).max(0.0);
+        sheet.fill(Place { width: filled, ..track }, if chosen { AGREES } else { MUTED });
         let percent = format!("{:.1} %", 100.0 * probability);
-        write(picture, &percent, Point::new(track.x + track.width + 8, base), 0.5, MUTED, 76)?;
+        let beside = (track.x + track.width + 8.0, base);
+        sheet.write(&percent, beside, Letters::new(size.min(14.0), MUTED), PERCENT);
     }
-    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use opencv::core::{self, Scalar};
+    use opencv::{core, imgcodecs};
 
     use super::*;
 
-    fn pixels(picture: &Mat, rgb: u32) -> usize {
+    fn drawn(stages: &Stages<'_>) -> Mat {
+        let png = gestalt_draw::png(&draw(stages).unwrap()).unwrap();
+        imgcodecs::imdecode(&core::Vector::<u8>::from_slice(&png), imgcodecs::IMREAD_COLOR).unwrap()
+    }
+
+    fn pixels(picture: &Mat, rgb: Tone) -> usize {
         let [_, red, green, blue] = rgb.to_be_bytes();
         let wanted = core::Vec3b::from([blue, green, red]);
         picture.data_typed::<core::Vec3b>().unwrap().iter().filter(|pixel| **pixel == wanted).count()
@@ -252,7 +259,7 @@ mod tests {
             scale: ("standard deviations".into(), 3.0),
             opinion: Ok(vec![("two".into(), 0.25), ("three".into(), 0.75)]),
         };
-        let picture = draw(&stages).unwrap();
+        let picture = drawn(&stages);
         let shade = |level: u32| level << 16 | level << 8 | level;
         assert!(pixels(&picture, shade(71)) > 80_000, "raw");
         // The balanced frame, and the hand.
@@ -261,12 +268,12 @@ mod tests {
         assert!(GROUP_TONES.iter().all(|&tone| pixels(&picture, tone) > 40_000), "features");
         let most = pixels(&picture, AGREES);
         stages.opinion = Ok(vec![("two".into(), 0.6), ("three".into(), 0.4)]);
-        assert!(pixels(&draw(&stages).unwrap(), AGREES) < most, "the bar is as long as the probability");
+        assert!(pixels(&drawn(&stages), AGREES) < most, "the bar is as long as the probability");
 
         stages.hand = Err("nothing stands out".into());
         stages.features.clear();
         stages.opinion = Err("no hand".into());
-        assert_eq!(pixels(&draw(&stages).unwrap(), AGREES), 0);
+        assert_eq!(pixels(&drawn(&stages), AGREES), 0);
     }
 
     fn fill_mask(mask: &mut Mat) {

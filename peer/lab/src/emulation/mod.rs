@@ -4,28 +4,33 @@
 //! every machine, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
 //! shortest ways of what the robots believe to be connected, and are lost hop by hop.
 
-mod learning;
 mod network;
 mod observer;
+mod pupil;
 mod record;
 mod report;
 mod route;
+mod rules;
 mod scenario;
+mod school;
 mod statistics;
 mod swarm;
+mod teaching;
 mod trace;
 
 use std::io;
 use std::sync::Arc;
 
-pub use learning::{Feedback, School, Teaching};
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
 #[cfg(feature = "experiments")]
 pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
+pub use rules::Rules;
 pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Order, Scenario, ScenarioError, View};
+pub use school::School;
 pub use statistics::{Mean, Proportion};
+pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
 use gestalt_strategies::{Classifier, TrainingSet, Vocabulary};
@@ -50,13 +55,27 @@ pub fn run_traced<'a>(
     seed: u64,
     trace: Trace<'a>,
 ) -> Result<(Report, io::Result<()>), ScenarioError> {
+    run_by(scenario, seed, Rules::default(), trace)
+}
+
+/// Runs a scenario in which all robots share, forget or fuse by rules of your own, with the statistical views it
+/// describes.
+///
+/// # Errors
+/// A [`ScenarioError`] for a scenario that cannot be run.
+pub fn run_by<'a>(
+    scenario: &'a Scenario,
+    seed: u64,
+    rules: Rules,
+    trace: Trace<'a>,
+) -> Result<(Report, io::Result<()>), ScenarioError> {
     scenario.validate()?;
     let mut observers = statistical_observers(scenario)?;
     let school = school_of_scores(scenario, &mut observers)?;
-    Ok(Emulation::new(scenario, seed, observers, school, trace)?.finish())
+    Ok(Emulation::by(scenario, seed, observers, school, rules, trace)?.finish())
 }
 
-/// Runs a scenario with eyes of one's own, one per robot, in place of the views it describes.
+/// Runs a scenario with eyes of your own, one per robot, in place of the views it describes.
 ///
 /// # Errors
 /// A [`ScenarioError`] for a scenario that cannot be run, or another number of eyes than of robots.
@@ -90,6 +109,21 @@ impl<'a> Emulation<'a> {
         school: Option<Arc<School>>,
         trace: Trace<'a>,
     ) -> Result<Self, ScenarioError> {
+        Self::by(scenario, seed, observers, school, Rules::default(), trace)
+    }
+
+    /// The same with robots that share, forget or fuse by rules of your own.
+    ///
+    /// # Errors
+    /// As [`Emulation::new`].
+    pub fn by(
+        scenario: &'a Scenario,
+        seed: u64,
+        observers: Vec<Box<dyn Observer>>,
+        school: Option<Arc<School>>,
+        rules: Rules,
+        trace: Trace<'a>,
+    ) -> Result<Self, ScenarioError> {
         scenario.validate()?;
         if observers.len() != scenario.swarm_size() {
             let mend =
@@ -100,7 +134,12 @@ impl<'a> Emulation<'a> {
             let mend = "robots learn with a school, and only then: give both or none".to_owned();
             return Err(ScenarioError::Value { key: "learning", mend });
         }
-        Ok(Self { swarm: Swarm::new(scenario, seed, observers, school, trace), scenario, seed, shown: 0 })
+        Ok(Self {
+            swarm: Swarm::new(scenario, seed, observers, (school, rules), trace),
+            scenario,
+            seed,
+            shown: 0,
+        })
     }
 
     /// Shows the next gesture and runs until the one after it is due; false when there is none left.

@@ -244,9 +244,9 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
-    use crate::topology::Topology;
+    use crate::shape::NetworkShape;
 
-    fn network(topology: Topology, size: usize, loss: f64) -> Network {
+    fn network(topology: NetworkShape, size: usize, loss: f64) -> Network {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let links = topology.links(size, &mut rng);
         Network::new(size, links, LinkModel { loss, ..LinkModel::default() }, rng)
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_broadcast_reaches_all_and_each_hop_is_paid_by_who_makes_it() {
-        let mut line = network(Topology::Line, 4, 0.0);
+        let mut line = network(NetworkShape::Line, 4, 0.0);
         assert_eq!(reached(&mut line, 1), [0, 2, 3]);
         let spent: Vec<_> = line.traffic.iter().map(|t| (t.votes, t.relayed)).collect();
         assert_eq!(spent, [(0, 0), (20, 0), (0, 10), (0, 0)]);
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn samples_have_an_account_of_their_own() {
-        let mut line = network(Topology::Line, 3, 0.0);
+        let mut line = network(NetworkShape::Line, 3, 0.0);
         line.broadcast(1, 10, Kind::Samples);
         line.broadcast(0, 1, Kind::Samples);
         line.tell(1, 2, 100, true);
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn what_a_silent_cut_swallows_is_lost_until_it_is_noticed() {
-        let mut ring = network(Topology::Ring, 4, 0.0);
+        let mut ring = network(NetworkShape::Ring, 4, 0.0);
         ring.set_link((0, 1), false);
         assert_eq!(reached(&mut ring, 0), [3], "1 and, on the way of routing, 2 lie behind the cut");
         ring.notice(Change::Link((0, 1), false));
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_frozen_relay_hears_and_passes_nothing_on() {
-        let mut line = network(Topology::Line, 4, 0.0);
+        let mut line = network(NetworkShape::Line, 4, 0.0);
         line.set_presence(1, Presence::Frozen);
         assert_eq!(reached(&mut line, 0), [1]);
         line.set_presence(1, Presence::Down);
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn loss_falls_on_each_hop() {
-        let mut line = network(Topology::Line, 3, 0.3);
+        let mut line = network(NetworkShape::Line, 3, 0.3);
         let mut counts = [0.0_f64; 3];
         for _ in 0..4000 {
             reached(&mut line, 0).into_iter().for_each(|to| counts[to] += 1.0 / 4000.0);
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn only_a_direct_neighbour_can_be_told() {
-        let mut line = network(Topology::Line, 3, 0.0);
+        let mut line = network(NetworkShape::Line, 3, 0.0);
         assert!(line.tell(0, 1, 10, false).is_some());
         assert_eq!(line.tell(0, 2, 10, false), None);
     }

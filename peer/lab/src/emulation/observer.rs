@@ -116,7 +116,8 @@ impl Classify for ScoreClassifier {
     }
 }
 
-/// A standard normal number (Box & Muller 1958).
+/// A standard normal number (Box & Muller 1958). Always two draws, so that how many frames a robot takes is all that
+/// its stream depends on; and written out, so that a seed goes on meaning the same traces.
 fn gaussian(rng: &mut dyn rand::Rng) -> f64 {
     let (u, v): (f64, f64) = (rng.random(), rng.random());
     (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()

@@ -23,6 +23,8 @@ pub struct Report {
     pub right: Proportion,
     /// Rounds in which it decided for another.
     pub wrong: Proportion,
+    /// Rounds in which it did not decide.
+    pub undecided: Proportion,
     /// Rounds in which the likeliest class was the one shown, sure enough for a decision or not.
     pub likeliest_right: Proportion,
     /// Single frames in which the robot that saw it found the gesture shown likeliest.
@@ -109,6 +111,7 @@ impl Report {
             showings: record.showings.len() as u64,
             right: Proportion::new(count(&|s| decided(s) == Some(s.shown)), rounds),
             wrong: Proportion::new(count(&|s| decided(s).is_some_and(|class| class != s.shown)), rounds),
+            undecided: Proportion::new(count(&|s| decided(s).is_none()), rounds),
             likeliest_right: Proportion::new(
                 count(&|s| {
                     decision(s)
@@ -165,6 +168,8 @@ pub struct Summary {
     /// As in [`Report`], over the rounds of all seeds.
     pub wrong: Proportion,
     /// As in [`Report`], over the rounds of all seeds.
+    pub undecided: Proportion,
+    /// As in [`Report`], over the rounds of all seeds.
     pub likeliest_right: Proportion,
     /// As in [`Report`], over the frames of all seeds.
     pub frames_right: Proportion,
@@ -176,9 +181,9 @@ pub struct Summary {
     pub conflicts: u64,
     /// Seeds at whose end all robots agree.
     pub agreed_at_the_end: Proportion,
-    /// The means of the seeds.
+    /// The means of those seeds that decided anything.
     pub decided_ms: Mean,
-    /// The means of the seeds.
+    /// The means of those seeds in which a robot held anything.
     pub settled_ms: Mean,
     /// The means of the seeds.
     pub announcements: Mean,
@@ -195,6 +200,7 @@ impl Summary {
             Proportion::new(hits, trials)
         };
         let mean = |of: &dyn Fn(&Report) -> f64| Mean::of(&reports.iter().map(of).collect::<Vec<_>>());
+        let means = |of: &dyn Fn(&Report) -> Mean| Mean::of_means(reports.iter().map(of));
         let agreed = reports.iter().filter(|report| report.agreed_at_the_end).count();
         Self {
             rule,
@@ -203,15 +209,16 @@ impl Summary {
             robots: reports.first().map_or(0, |report| report.robots),
             right: pool(&|report| report.right),
             wrong: pool(&|report| report.wrong),
+            undecided: pool(&|report| report.undecided),
             likeliest_right: pool(&|report| report.likeliest_right),
             frames_right: pool(&|report| report.frames_right),
             votes_right: pool(&|report| report.votes_right),
             unanimous: pool(&|report| report.unanimous),
             conflicts: reports.iter().map(|report| report.conflicts).sum(),
             agreed_at_the_end: Proportion::new(agreed as u64, reports.len() as u64),
-            decided_ms: mean(&|report| report.decided_ms.mean),
-            settled_ms: mean(&|report| report.settled_ms.mean),
-            announcements: mean(&|report| report.announcements.mean),
+            decided_ms: means(&|report| report.decided_ms),
+            settled_ms: means(&|report| report.settled_ms),
+            announcements: means(&|report| report.announcements),
             vote_bytes_per_open_second: mean(&|report| report.vote_bytes_per_open_second),
         }
     }
@@ -227,11 +234,12 @@ impl fmt::Display for Table<'_> {
             |p: Proportion| format!("{:5.1} [{:.1}, {:.1}]", 100.0 * p.share, 100.0 * p.low, 100.0 * p.high);
         writeln!(
             f,
-            "{:<20} {:>5}  {:<20} {:<18} {:<20} {:<20} {:>14} {:>9}",
+            "{:<20} {:>5}  {:<20} {:<18} {:>9}  {:<20} {:<20} {:>14} {:>9}",
             "rule",
             "alpha",
             "right %",
             "wrong %",
+            "undecided",
             "likeliest right %",
             "unanimous %",
             "decided ms",
@@ -239,16 +247,20 @@ impl fmt::Display for Table<'_> {
         )?;
         for summary in self.0 {
             let rule = summary.rule;
+            let decided = match summary.decided_ms {
+                Mean { n: 0, .. } => "–".to_owned(),
+                Mean { mean, half_width, .. } => format!("{mean:.0} ± {half_width:<4.0}"),
+            };
             writeln!(
                 f,
-                "{rule:<20} {:>5}  {:<20} {:<18} {:<20} {:<20} {:>7.0} ± {:<4.0} {:>9.0}",
+                "{rule:<20} {:>5}  {:<20} {:<18} {:>9}  {:<20} {:<20} {:>14} {:>9.0}",
                 summary.alpha,
                 percent(summary.right),
                 percent(summary.wrong),
+                summary.undecided.hits,
                 percent(summary.likeliest_right),
                 percent(summary.unanimous),
-                summary.decided_ms.mean,
-                summary.decided_ms.half_width,
+                decided,
                 summary.vote_bytes_per_open_second.mean,
             )?;
         }

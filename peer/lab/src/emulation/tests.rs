@@ -8,14 +8,14 @@ use gestalt_protocol::{FusionRule, RobotId};
 use gestalt_strategies::{MindConfig, Part};
 
 use super::*;
-use crate::topology::Topology;
+use crate::shape::NetworkShape;
 
 fn shipped(name: &str) -> Scenario {
     Scenario::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/emulation").join(name)).unwrap()
 }
 
 /// Robots that see perfectly well, or not at all, on some topology.
-fn calm(seeing: usize, blind: usize, topology: Topology, rounds: u32) -> Scenario {
+fn calm(seeing: usize, blind: usize, topology: NetworkShape, rounds: u32) -> Scenario {
     let view = Some(View { fps: 2.0, signal: 1.5, persistence: 0.0 });
     Scenario {
         robots: vec![
@@ -45,7 +45,9 @@ fn the_same_seed_writes_the_same_trace_and_another_does_not() {
 
 #[test]
 fn a_calm_swarm_agrees_in_every_round_and_announces_each_decision_once() {
-    for topology in [Topology::Line, Topology::Ring, Topology::Grid, Topology::Star, Topology::Random] {
+    for topology in
+        [NetworkShape::Line, NetworkShape::Ring, NetworkShape::Grid, NetworkShape::Star, NetworkShape::Random]
+    {
         let report = run(&calm(6, 2, topology, 8), 7).unwrap();
         assert_eq!((report.unanimous.hits, report.unanimous.trials), (8, 8), "{topology:?}");
         assert_eq!((report.announcements.mean, report.announcements.half_width), (1.0, 0.0), "{topology:?}");
@@ -55,7 +57,7 @@ fn a_calm_swarm_agrees_in_every_round_and_announces_each_decision_once() {
 
 #[test]
 fn the_eighth_in_a_line_decides_what_only_the_first_sees() {
-    let report = run(&calm(1, 7, Topology::Line, 10), 3).unwrap();
+    let report = run(&calm(1, 7, NetworkShape::Line, 10), 3).unwrap();
     assert_eq!(report.unanimous.hits, 10);
     assert!(report.right.hits >= 8, "{:?}", report.right);
 }
@@ -117,7 +119,7 @@ fn within_three_seconds_of_calm_all_hold_the_last_decision() {
         interval: (churn.until + calm_for) / (rounds + 1),
         rounds,
         churn: Some(churn),
-        ..calm(9, 0, Topology::Grid, rounds)
+        ..calm(9, 0, NetworkShape::Grid, rounds)
     };
     for seed in 0..20 {
         let report = run(&scenario, seed).unwrap();
@@ -137,7 +139,7 @@ fn a_robot_that_missed_a_round_is_told_of_it_when_it_is_back() {
             fault(34, Event::Kill(RobotId(3))),
             fault(39, Event::Restart(RobotId(3))),
         ],
-        ..calm(2, 1, Topology::Line, 5)
+        ..calm(2, 1, NetworkShape::Line, 5)
     };
     let report = run(&scenario, 1).unwrap();
     assert_eq!(report.unanimous.hits, report.unanimous.trials, "{report:?}");
@@ -146,7 +148,7 @@ fn a_robot_that_missed_a_round_is_told_of_it_when_it_is_back() {
 
 #[test]
 fn votes_cost_at_most_a_kilobyte_a_second() {
-    let mut scenario = calm(10, 0, Topology::Random, 3);
+    let mut scenario = calm(10, 0, NetworkShape::Random, 3);
     // Nobody is ever sure, so every round lasts until its deadline.
     scenario.mind.alpha = 1e-12;
     scenario.robots[0].view = Some(View { fps: 30.0, signal: 0.1, persistence: 0.0 });
@@ -156,12 +158,12 @@ fn votes_cost_at_most_a_kilobyte_a_second() {
 
 #[test]
 fn another_number_of_eyes_than_robots_is_refused() {
-    let error = run_with(&calm(2, 0, Topology::Line, 1), 0, vec![Box::new(BlindObserver)], Trace::none());
+    let error = run_with(&calm(2, 0, NetworkShape::Line, 1), 0, vec![Box::new(BlindObserver)], Trace::none());
     assert!(matches!(error, Err(ScenarioError::Value { key: "robots", .. })));
 }
 
 /// Robots on a ring that are shown each gesture once, see five looks of it and learn from nothing.
-fn learning(robots: usize, fraction: f64, topology: Topology) -> Scenario {
+fn learning(robots: usize, fraction: f64, topology: NetworkShape) -> Scenario {
     let json = "{ keep: 5, share_bytes: null, precision: 'f32' }";
     let mut teaching = Teaching { robots: json5::from_str(json).unwrap(), ..Teaching::default() };
     teaching.robots.share_fraction = fraction;
@@ -194,14 +196,14 @@ fn held(scenario: &Scenario, seed: u64) -> (Vec<[usize; 3]>, usize) {
 
 #[test]
 fn ten_robots_on_a_ring_hold_what_the_source_says() {
-    let (parts, common) = held(&learning(10, 0.2, Topology::Ring), 1);
+    let (parts, common) = held(&learning(10, 0.2, NetworkShape::Ring), 1);
     assert_eq!(parts, vec![[24, 6, 54]; 10]);
     assert_eq!(common, 60);
 }
 
 #[test]
 fn with_three_messages_of_ten_lost_no_sample_is_missing_after_a_calm() {
-    let mut scenario = learning(10, 0.2, Topology::Ring);
+    let mut scenario = learning(10, 0.2, NetworkShape::Ring);
     scenario.link.loss = 0.3;
     // Repair speaks every four seconds through the same bad links, and one question and answer of three messages gets
     // through in one of three: nearly a minute follows the last word.
@@ -222,7 +224,7 @@ fn the_size_of_a_training_set_follows_the_formula() {
     for (robots, fraction) in
         [5_usize, 20].into_iter().flat_map(|n| [0.0, 0.1, 0.5, 1.0].map(|fraction| (n, fraction)))
     {
-        let (parts, common) = held(&learning(robots, fraction, Topology::Ring), 2);
+        let (parts, common) = held(&learning(robots, fraction, NetworkShape::Ring), 2);
         let shared = (30.0 * fraction) as usize;
         let expected = [30 - shared, shared, shared * (robots - 1)];
         assert_eq!(parts, vec![expected; robots], "{robots} robots, B = {fraction}");
@@ -232,7 +234,7 @@ fn the_size_of_a_training_set_follows_the_formula() {
 
 #[test]
 fn with_learning_too_a_seed_fixes_every_byte() {
-    let mut scenario = learning(5, 0.5, Topology::Random);
+    let mut scenario = learning(5, 0.5, NetworkShape::Random);
     scenario.link.loss = 0.2;
     scenario.learning.as_mut().unwrap().robots.capacity = 40;
     let first = traced(&scenario, 1);
@@ -244,7 +246,7 @@ fn with_learning_too_a_seed_fixes_every_byte() {
 #[test]
 fn robots_that_share_learn_faster_than_robots_that_do_not() {
     let frames_right = |fraction| {
-        let mut scenario = learning(8, fraction, Topology::Ring);
+        let mut scenario = learning(8, fraction, NetworkShape::Ring);
         scenario.rounds = 18;
         scenario.learning.as_mut().unwrap().robots.keep = 2;
         (0..3).map(|seed| run(&scenario, seed).unwrap().frames_right.share).sum::<f64>() / 3.0
@@ -256,7 +258,7 @@ fn robots_that_share_learn_faster_than_robots_that_do_not() {
 #[test]
 fn a_robot_that_was_away_has_all_its_samples_back_and_gets_what_it_missed() {
     let fault = |at: u64, event| Fault { at: Duration::from_secs(at), event };
-    let mut scenario = learning(4, 1.0, Topology::Ring);
+    let mut scenario = learning(4, 1.0, NetworkShape::Ring);
     scenario.faults = vec![fault(27, Event::Kill(RobotId(2))), fault(29, Event::Restart(RobotId(2)))];
     let (parts, common) = held(&scenario, 3);
     // Of three gestures it saw all five looks before, of one or two after; its own from then are still its own.
@@ -267,7 +269,7 @@ fn a_robot_that_was_away_has_all_its_samples_back_and_gets_what_it_missed() {
 
 #[test]
 fn bytes_of_samples_are_counted_apart() {
-    let scenario = learning(6, 0.2, Topology::Ring);
+    let scenario = learning(6, 0.2, NetworkShape::Ring);
     let mut emulation = emulation(&scenario, 1);
     while emulation.show_next() {}
     let bytes: Traffic = (0..6).map(|i| emulation.traffic(i)).sum();
@@ -275,13 +277,13 @@ fn bytes_of_samples_are_counted_apart() {
     assert!((36 * 24..36 * 64).contains(&bytes.published_samples), "{bytes:?}");
     // On a ring each goes over five links.
     assert_eq!(bytes.samples + bytes.relayed_samples, 5 * bytes.published_samples);
-    let alone = run(&learning(6, 0.0, Topology::Ring), 1).unwrap().bytes_per_robot;
+    let alone = run(&learning(6, 0.0, NetworkShape::Ring), 1).unwrap().bytes_per_robot;
     assert_eq!((alone.published_samples, alone.samples_on_links), (0.0, 0.0));
 }
 
 #[test]
 fn told_only_right_or_wrong_robots_that_know_nothing_learn_nothing() {
-    let mut scenario = learning(3, 1.0, Topology::Ring);
+    let mut scenario = learning(3, 1.0, NetworkShape::Ring);
     scenario.learning.as_mut().unwrap().feedback = Feedback::Partial;
     let learned = run(&scenario, 1).unwrap().learned.unwrap();
     assert_eq!(learned.samples.mean, 0.0);

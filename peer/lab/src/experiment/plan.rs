@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::ExperimentError;
+use super::error::ExperimentError;
 use super::setting::{Drift, Setting};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Placement;
@@ -161,11 +161,10 @@ impl Experiment {
         if names.len() < cells.len() {
             return wrong("two values of the same name: name them apart");
         }
-        if names
-            .iter()
-            .any(|(line, value)| [line, value].iter().any(|name| name.contains([',', '"', '|', '\n'])))
-        {
-            return wrong("a name with a comma, a quote, a bar or a line break: write it without");
+        if names.iter().any(|(line, value)| {
+            [line, value].iter().any(|name| name.contains(|sign: char| sign == '|' || sign.is_control()))
+        }) {
+            return wrong("a name with a bar or a line break: write it without");
         }
         let drifts = cells.iter().map(|cell| cell.setting.drift).filter(|drift| *drift != Drift::None);
         if drifts.collect::<Vec<_>>().windows(2).any(|pair| pair[0] != pair[1]) {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -10,10 +9,12 @@ use gestalt_protocol::ClassId;
 use gestalt_strategies::{Observation, Vocabulary};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::ExperimentError;
+use super::error::ExperimentError;
 use super::plan::{Experiment, Hands};
+use super::replace::replace;
 use super::setting::Drift;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::dataset::Dataset;
@@ -72,7 +73,7 @@ enum Shown {
 
 impl Pool {
     /// Looks at rendered hands, or at the pictures of a dataset, from all places, on all cores; or reads what an earlier
-    /// call kept in `folder`. `step(done, total)` is called now and then.
+    /// call with the same `eyes` (see [`Program`](super::Program)) kept in `folder`. `step(done, total)` is called now and then.
     ///
     /// # Errors
     /// A dataset that cannot be read, or fewer gestures in it than two.
@@ -80,6 +81,7 @@ impl Pool {
         experiment: &Experiment,
         dataset: Option<&Path>,
         folder: &Path,
+        eyes: u32,
         step: impl Fn(usize, usize) + Sync,
     ) -> Result<Self, ExperimentError> {
         let drift = experiment.drift();
@@ -88,7 +90,7 @@ impl Pool {
             None => rendered(hands, drift),
             Some(folder) => pictured(hands, drift, folder)?,
         };
-        let made_of = serde_json::to_string(&(FEATURES.name(), hands, drift, &gestures, &takes))
+        let made_of = serde_json::to_string(&(FEATURES.name(), eyes, hands, drift, &gestures, &takes))
             .expect("names and numbers can be written as JSON");
         let made_of = crc32fast::hash(made_of.as_bytes());
         let kept = folder.join(format!("observations-{made_of:08x}.bin"));
@@ -112,7 +114,7 @@ impl Pool {
     fn write(&self, path: &Path) -> std::io::Result<()> {
         let bytes = postcard::to_stdvec(self).map_err(std::io::Error::other)?;
         let sum = crc32fast::hash(&bytes).to_le_bytes();
-        std::fs::write(path, [&sum[..], &bytes].concat())
+        replace(path, &[&sum[..], &bytes].concat())
     }
 
     /// The gestures.
@@ -211,31 +213,23 @@ fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, 
     Ok((dataset.vocabulary.labels().to_vec(), takes))
 }
 
-/// Looks at each moment from each place.
+/// Looks at each moment from each place. Each moment is looked at with fresh eyes: what is seen depends neither on the
+/// number of threads nor on their order.
 fn look_at(
     takes: &[Take],
     hands: &Hands,
     step: impl Fn(usize, usize) + Sync,
 ) -> Result<Views, ExperimentError> {
     let cameras = cameras(hands)?;
-    let seen = Mutex::new(vec![Vec::new(); takes.len()]);
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let work = || -> Result<(), ExperimentError> {
+    let done = AtomicUsize::new(0);
+    let look = |(n, take): (usize, &Take)| -> Result<Views, ExperimentError> {
         let mut perception = Perception::new(FEATURES, HandConfig::default())?;
-        loop {
-            let n = next.fetch_add(1, Ordering::Relaxed);
-            let Some(take) = takes.get(n) else { return Ok(()) };
-            let views = look_from_all(n, take, &cameras, hands, &mut perception)?;
-            seen.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[n] = views;
-            step(done.fetch_add(1, Ordering::Relaxed) + 1, takes.len());
-        }
+        let views = look_from_all(n, take, &cameras, hands, &mut perception)?;
+        step(done.fetch_add(1, Ordering::Relaxed) + 1, takes.len());
+        Ok(views)
     };
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..super::runner::workers()).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().try_for_each(|worker| worker.join().expect("looking does not panic"))
-    })?;
-    let seen = seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    Ok(seen.into_iter().flatten().collect())
+    let seen: Vec<Views> = takes.par_iter().enumerate().map(look).collect::<Result<_, _>>()?;
+    Ok(seen.concat())
 }
 
 /// The camera at each place, before and after the drift of light.

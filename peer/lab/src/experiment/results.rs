@@ -1,70 +1,61 @@
-//! What was measured, in a file that survives an interruption.
+//! What was measured, run by run, in a file that survives an interruption.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::ExperimentError;
-use super::trial::Standing;
+use serde::{Deserialize, Serialize};
+
+use super::error::ExperimentError;
+use super::ledger::Ledger;
+use super::standing::Standing;
 
 /// Names a run: line, value, seed.
 pub type Run = (String, String, u64);
 
-const HEAD: &str = "line,value,seed,round,single,swarm,majority,published_bytes,link_bytes,samples";
+/// A round of a run, as a row of `results.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Row {
+    line: String,
+    value: String,
+    seed: u64,
+    round: u32,
+    single: f64,
+    swarm: f64,
+    majority: f64,
+    published_bytes: f64,
+    link_bytes: f64,
+    samples: f64,
+}
 
 /// `results.csv`: all rounds of each run that ended.
 #[derive(Debug)]
 pub struct Results {
-    path: PathBuf,
-    file: File,
+    ledger: Ledger,
     /// The standings of each run, from before the first round on.
     pub runs: BTreeMap<Run, Vec<Standing>>,
 }
 
 impl Results {
-    /// Opens or begins the results in `folder`. What an interruption left half-written is dropped.
+    /// Opens or begins the results in `folder`. Of what is there, those runs are kept that have as many rounds as
+    /// `rounds` says.
     ///
     /// # Errors
-    /// [`ExperimentError::Read`], [`ExperimentError::Write`], or [`ExperimentError::Other`] for a file of another layout.
-    pub fn open(folder: &Path) -> Result<Self, ExperimentError> {
-        let path = folder.join("results.csv");
-        let failed = |source| ExperimentError::Write { path: path.clone(), source };
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
-            Err(source) => return Err(ExperimentError::Read { path, source }),
-        };
+    /// [`ExperimentError::Read`], [`ExperimentError::Write`], or [`ExperimentError::Table`] for a file of another layout.
+    pub fn open(folder: &Path, rounds: impl Fn(&Run) -> Option<u32>) -> Result<Self, ExperimentError> {
         let mut runs: BTreeMap<Run, Vec<Standing>> = BTreeMap::new();
-        let mut lines = text.lines();
-        if lines.next().is_some_and(|head| head != HEAD) {
-            return Err(ExperimentError::Other(folder.to_owned()));
-        }
-        // A line without its end may be cut in the midst of a number.
-        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-        for (run, standing) in whole.lines().skip(1).filter_map(parse) {
-            runs.entry(run).or_default().push(standing);
-        }
-        let file = OpenOptions::new().create(true).append(true).open(&path).map_err(failed)?;
-        Ok(Self { path, file, runs })
-    }
-
-    /// Keeps only these runs, if they have as many rounds as they should: the file is written anew.
-    ///
-    /// # Errors
-    /// [`ExperimentError::Write`].
-    pub fn keep_whole(&mut self, rounds: impl Fn(&Run) -> Option<u32>) -> Result<(), ExperimentError> {
-        self.runs.retain(|run, standings| {
-            let numbered = standings.iter().map(|standing| standing.round);
-            rounds(run).is_some_and(|rounds| numbered.eq(0..=rounds))
-        });
-        let mut text = format!("{HEAD}\n");
-        self.runs.iter().for_each(|(run, standings)| text.push_str(&lines(run, standings)));
-        let failed = |source| ExperimentError::Write { path: self.path.clone(), source };
-        let new = self.path.with_extension("new");
-        std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, &self.path)).map_err(failed)?;
-        self.file = OpenOptions::new().append(true).open(&self.path).map_err(failed)?;
-        Ok(())
+        let keep = |all: Vec<Row>| {
+            for row in all {
+                let (run, standing) = taken_apart(row);
+                runs.entry(run).or_default().push(standing);
+            }
+            runs.retain(|run, standings| {
+                let numbered = standings.iter().map(|standing| standing.round);
+                rounds(run).is_some_and(|rounds| numbered.eq(0..=rounds))
+            });
+            rows(&runs)
+        };
+        let (ledger, _) = Ledger::open(folder, keep)?;
+        Ok(Self { ledger, runs })
     }
 
     /// Writes down a run that has ended.
@@ -72,31 +63,57 @@ impl Results {
     /// # Errors
     /// [`ExperimentError::Write`].
     pub fn add(&mut self, run: Run, standings: Vec<Standing>) -> Result<(), ExperimentError> {
-        let failed = |source| ExperimentError::Write { path: self.path.clone(), source };
-        self.file.write_all(lines(&run, &standings).as_bytes()).map_err(failed)?;
+        let rows: Vec<Row> = standings.iter().map(|standing| row(&run, standing)).collect();
+        self.ledger.add(&rows)?;
         self.runs.insert(run, standings);
         Ok(())
     }
+
+    /// Puts the runs into order, whichever ended first, and gives them back.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Write`].
+    pub fn finish(self) -> Result<BTreeMap<Run, Vec<Standing>>, ExperimentError> {
+        self.ledger.finish(&rows(&self.runs))?;
+        Ok(self.runs)
+    }
 }
 
-fn lines((line, value, seed): &Run, standings: &[Standing]) -> String {
-    let line = |s: &Standing| {
-        let Standing { round, single, swarm, majority, published, on_links, samples } = s;
-        format!(
-            "{line},{value},{seed},{round},{single:.6},{swarm:.6},{majority:.6},{published:.1},{on_links:.1},{samples:.2}\n"
-        )
+fn rows(runs: &BTreeMap<Run, Vec<Standing>>) -> Vec<Row> {
+    let of_run = |(run, standings): (&Run, &Vec<Standing>)| -> Vec<Row> {
+        standings.iter().map(|standing| row(run, standing)).collect()
     };
-    standings.iter().map(line).collect()
+    runs.iter().flat_map(of_run).collect()
 }
 
-fn parse(line: &str) -> Option<(Run, Standing)> {
-    let fields: Vec<&str> = line.split(',').collect();
-    let [line, value, seed, round, numbers @ ..] = fields.as_slice() else { return None };
-    let numbers: Option<Vec<f64>> = numbers.iter().map(|number| number.parse().ok()).collect();
-    let [single, swarm, majority, published, on_links, samples] = numbers?.try_into().ok()?;
-    let run = ((*line).to_owned(), (*value).to_owned(), seed.parse().ok()?);
-    let round = round.parse().ok()?;
-    Some((run, Standing { round, single, swarm, majority, published, on_links, samples }))
+fn row((line, value, seed): &Run, standing: &Standing) -> Row {
+    let Standing { round, single, swarm, majority, published, on_links, samples } = *standing;
+    Row {
+        line: line.clone(),
+        value: value.clone(),
+        seed: *seed,
+        round,
+        single,
+        swarm,
+        majority,
+        published_bytes: published,
+        link_bytes: on_links,
+        samples,
+    }
+}
+
+fn taken_apart(row: Row) -> (Run, Standing) {
+    let Row { line, value, seed, round, single, swarm, majority, published_bytes, link_bytes, samples } = row;
+    let standing = Standing {
+        round,
+        single,
+        swarm,
+        majority,
+        published: published_bytes,
+        on_links: link_bytes,
+        samples,
+    };
+    ((line, value, seed), standing)
 }
 
 #[cfg(test)]
@@ -106,7 +123,7 @@ mod tests {
     fn standings(rounds: u32) -> Vec<Standing> {
         let standing = |round| Standing {
             round,
-            single: 0.25,
+            single: 1.0 / 3.0,
             swarm: 0.5,
             majority: 0.75,
             published: 10.5,
@@ -117,44 +134,38 @@ mod tests {
     }
 
     fn run(seed: u64) -> Run {
-        ("a".to_owned(), "0.5".to_owned(), seed)
+        ("a, \"b\"".to_owned(), "0.5".to_owned(), seed)
     }
 
     #[test]
-    fn what_was_written_is_read_again_and_what_was_cut_short_is_not() {
+    fn runs_are_read_as_they_were_and_what_was_cut_short_is_run_again() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("results.csv");
-        let mut results = Results::open(folder.path()).unwrap();
-        results.keep_whole(|_| Some(2)).unwrap();
+        let mut results = Results::open(folder.path(), |_| Some(2)).unwrap();
         results.add(run(0), standings(2)).unwrap();
         results.add(run(1), standings(2)).unwrap();
         let whole = std::fs::read_to_string(&path).unwrap();
-        // In the midst of the second run: 0.25 is cut to 0.2 of another round.
-        for cut in [10, 80, 100] {
+        // In the midst of the second run.
+        for cut in [1, 10, 80, 100] {
             std::fs::write(&path, &whole[..whole.len() - cut]).unwrap();
-            let mut again = Results::open(folder.path()).unwrap();
-            again.keep_whole(|_| Some(2)).unwrap();
+            let mut again = Results::open(folder.path(), |_| Some(2)).unwrap();
             assert_eq!(again.runs, [(run(0), standings(2))].into(), "{cut}");
             again.add(run(1), standings(2)).unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), whole);
         }
+        let other_rounds = Results::open(folder.path(), |_| Some(3)).unwrap();
+        assert!(other_rounds.runs.is_empty());
     }
 
     #[test]
-    fn runs_of_other_settings_are_dropped() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut results = Results::open(folder.path()).unwrap();
-        results.keep_whole(|_| None).unwrap();
-        results.add(run(0), standings(2)).unwrap();
-        let mut again = Results::open(folder.path()).unwrap();
-        again.keep_whole(|_| Some(3)).unwrap();
-        assert!(again.runs.is_empty(), "another number of rounds");
-    }
-
-    #[test]
-    fn a_file_that_is_none_is_left_alone() {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("results.csv"), "my,own,table\n1,2,3\n").unwrap();
-        assert!(matches!(Results::open(folder.path()), Err(ExperimentError::Other(_))));
+    fn the_file_does_not_tell_which_run_ended_first() {
+        let written = |order: [u64; 3]| {
+            let folder = tempfile::tempdir().unwrap();
+            let mut results = Results::open(folder.path(), |_| Some(2)).unwrap();
+            order.into_iter().for_each(|seed| results.add(run(seed), standings(2)).unwrap());
+            results.finish().unwrap();
+            std::fs::read(folder.path().join("results.csv")).unwrap()
+        };
+        assert_eq!(written([0, 1, 2]), written([2, 0, 1]));
     }
 }

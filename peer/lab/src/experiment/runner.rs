@@ -1,49 +1,37 @@
 //! Many runs on all cores: each is written down as it ends, and none is run twice.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, mpsc};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use super::plan::Experiment;
+use rayon::prelude::*;
+
+use super::error::ExperimentError;
+use super::figures::figures;
+use super::fingerprint::this_program;
+use super::folder;
+use super::materials::Materials;
+use super::plan::{Cell, Experiment};
 use super::pool::Pool;
+use super::progress::Progress;
+use super::replace::replace;
 use super::results::{Results, Run};
 use super::school::Schools;
-use super::trial::Standing;
-use super::{ExperimentError, chart, table, trial};
-use crate::emulation::School;
-
-/// How many threads work.
-pub(super) fn workers() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// Where real hands come from.
-#[derive(Clone, Debug, Default)]
-pub struct Materials {
-    /// Pictures that robots see; rendered hands when there are none.
-    pub dataset: Option<PathBuf>,
-    /// Pictures that a model is trained on to start from; rendered hands, seen from the front, when there are none.
-    pub start: Option<PathBuf>,
-}
-
-/// How far an experiment has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress {
-    /// So many hands were looked at, of so many.
-    Looked(usize, usize),
-    /// So many runs have ended, of so many.
-    Ran(usize, usize),
-}
+use super::summary::Summary;
+use super::{chart, trial};
+use crate::emulation::{Rules, School};
 
 /// Conducts an experiment, or what is left of it, and writes into `folder`:
 ///
-/// - `experiment.json5` and `run.json`: the experiment as given, seeds and datasets;
+/// - `experiment.json5` and `run.json`: the experiment as given, seeds, datasets and program;
 /// - `observations-….bin`: what robots see, kept for the next call;
 /// - `results.csv`: every round of every run;
 /// - `results.md`: means with 95 % intervals;
 /// - plots, as `.svg` and `.png`.
 ///
-/// Gives the text of the table. The same call after an interruption continues.
+/// Gives the text of the table. The same call after an interruption continues; neither the number of threads nor their
+/// order changes a figure.
 ///
 /// # Errors
 /// See [`ExperimentError`]; the results so far are kept.
@@ -54,95 +42,113 @@ pub fn conduct(
     seeds: Option<u32>,
     progress: impl Fn(Progress) + Sync,
 ) -> Result<String, ExperimentError> {
+    conduct_by((text, origin), (materials, &BTreeMap::new()), folder, seeds, progress)
+}
+
+/// The same with rules of your own: a setting whose `own_rules` names them shares, forgets and fuses by them. Rules that
+/// have changed want another name or another folder: nobody can tell from the results.
+///
+/// # Errors
+/// As [`conduct`]; [`ExperimentError::Setting`] for a name that there are no rules of.
+pub fn conduct_by(
+    (text, origin): (&str, &Path),
+    (materials, rules): (&Materials, &BTreeMap<String, Rules>),
+    folder: &Path,
+    seeds: Option<u32>,
+    progress: impl Fn(Progress) + Sync,
+) -> Result<String, ExperimentError> {
     let experiment = Experiment::parse(text, origin)?;
+    let cells = experiment.cells()?;
+    let rules = cells.iter().map(|cell| rules_of(cell, rules)).collect::<Result<Vec<_>, _>>()?;
     let seeds = seeds.unwrap_or(experiment.seeds);
-    std::fs::create_dir_all(folder)
-        .map_err(|source| ExperimentError::Write { path: folder.to_owned(), source })?;
-    write_down(text, materials, folder, seeds)?;
-    let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, |done, total| {
-        progress(Progress::Looked(done, total));
-    })?;
+    let program = this_program()?;
+    folder::claim(folder, text, materials, seeds, &program)?;
+    let looked = |done, total| progress(Progress::Looked(done, total));
+    let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);
     let mut schools = Schools::new(pool.vocabulary()?, materials.start.as_deref())?;
-    let cells = experiment.cells()?;
-    let cells: Vec<(_, Arc<School>)> = cells
-        .into_iter()
-        .map(|cell| schools.of(&cell.setting).map(|school| (cell, school)))
-        .collect::<Result<_, _>>()?;
+    let taught: Vec<Taught<'_>> = cells
+        .iter()
+        .zip(rules)
+        .map(|(cell, rules)| Ok(Taught { cell, school: schools.of(&cell.setting)?, rules }))
+        .collect::<Result<_, ExperimentError>>()?;
 
-    let mut results = Results::open(folder)?;
-    results.keep_whole(|(line, value, _)| {
-        let cell = cells.iter().find(|(cell, _)| cell.line == *line && cell.value == *value);
-        cell.map(|(cell, _)| cell.setting.rounds)
+    let results = Results::open(folder, |(line, value, _)| {
+        let cell = cells.iter().find(|cell| cell.line == *line && cell.value == *value);
+        cell.map(|cell| cell.setting.rounds)
     })?;
-    let all = (0..u64::from(seeds)).flat_map(|seed| (0..cells.len()).map(move |cell| (cell, seed)));
-    let named = |(cell, seed): (usize, u64)| -> Run {
-        (cells[cell].0.line.clone(), cells[cell].0.value.clone(), seed)
-    };
-    let left: Vec<(usize, u64)> = all.filter(|run| !results.runs.contains_key(&named(*run))).collect();
-    let total = seeds as usize * cells.len();
-    let mut done = total - left.len();
-    progress(Progress::Ran(done, total));
+    let runs = run_what_is_left(&taught, &pool, results, seeds, &progress)?.finish()?;
 
-    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let (ended, ends) = mpsc::channel::<((usize, u64), Result<Vec<Standing>, ExperimentError>)>();
-    std::thread::scope(|scope| -> Result<(), ExperimentError> {
-        for _ in 0..workers().min(left.len()) {
-            let (ended, cells, left, pool) = (ended.clone(), &cells, &left, &pool);
-            let (next, stop) = (&next, &stop);
-            scope.spawn(move || {
-                while let Some(&(cell, seed)) = left.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let (what, school) = &cells[cell];
-                    let standings = trial::run(&what.setting, school, pool, seed);
-                    if stop.load(Ordering::Relaxed) || ended.send(((cell, seed), standings)).is_err() {
-                        return;
-                    }
-                }
-            });
-        }
-        drop(ended);
-        for (run, standings) in ends {
-            let kept = standings.and_then(|standings| results.add(named(run), standings));
-            if kept.is_err() {
-                stop.store(true, Ordering::Relaxed);
-                return kept;
-            }
-            done += 1;
-            progress(Progress::Ran(done, total));
-        }
-        Ok(())
-    })?;
-
-    let cells: Vec<_> = cells.into_iter().map(|(cell, _)| cell).collect();
-    let summary = table::Summary::of(&experiment, &cells, &results.runs, seeds);
+    let summary = Summary::of(&experiment, &cells, &runs, seeds);
     let table = summary.markdown(&pool, materials);
     let path = folder.join("results.md");
-    std::fs::write(&path, &table).map_err(|source| ExperimentError::Write { path, source })?;
-    chart::draw_all(&summary, folder)?;
+    replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+    chart::draw_into(folder, &figures(&summary))?;
     Ok(table)
 }
 
-/// Writes what is run beside its results; refuses to mix it with something else.
-fn write_down(text: &str, materials: &Materials, folder: &Path, seeds: u32) -> Result<(), ExperimentError> {
-    let path = |name: &str| folder.join(name);
-    let place = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
-    let datasets =
-        serde_json::json!({ "dataset": place(&materials.dataset), "start": place(&materials.start) });
-    let before = std::fs::read_to_string(path("run.json")).ok();
-    if let Some(before) = before.and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok()) {
-        let same = std::fs::read_to_string(path("experiment.json5")).is_ok_and(|before| before == text);
-        if !same || before["datasets"] != datasets {
-            return Err(ExperimentError::Other(folder.to_owned()));
+/// A cell and all that its runs share.
+struct Taught<'a> {
+    cell: &'a Cell,
+    school: Arc<School>,
+    rules: Rules,
+}
+
+/// The rules that a cell names; none of your own where it names none.
+fn rules_of(cell: &Cell, rules: &BTreeMap<String, Rules>) -> Result<Rules, ExperimentError> {
+    let Some(name) = &cell.setting.own_rules else { return Ok(Rules::default()) };
+    rules.get(name).cloned().ok_or_else(|| {
+        let named: Vec<&str> = rules.keys().map(String::as_str).collect();
+        ExperimentError::Setting(format!(
+            "own_rules: there are none of the name '{name}' (known: {}); a program of your own hands them to \
+             experiment::conduct_by",
+            if named.is_empty() { "none".to_owned() } else { named.join(", ") }
+        ))
+    })
+}
+
+/// Runs each cell with each seed that there are no results of yet. The first error stops all.
+fn run_what_is_left(
+    cells: &[Taught<'_>],
+    pool: &Arc<Pool>,
+    results: Results,
+    seeds: u32,
+    progress: &(impl Fn(Progress) + Sync),
+) -> Result<Results, ExperimentError> {
+    let named = |cell: &Cell, seed| -> Run { (cell.line.clone(), cell.value.clone(), seed) };
+    let all = (0..u64::from(seeds)).flat_map(|seed| cells.iter().map(move |cell| (cell, seed)));
+    let left: Vec<_> =
+        all.filter(|(taught, seed)| !results.runs.contains_key(&named(taught.cell, *seed))).collect();
+    let total = seeds as usize * cells.len();
+    let ran = total - left.len();
+    progress(Progress::Ran(ran, total));
+
+    let stop = AtomicBool::new(false);
+    let results = Mutex::new((results, ran));
+    let run = |(taught, seed): &(&Taught<'_>, u64)| -> Result<(), ExperimentError> {
+        let Taught { cell, school, rules } = taught;
+        let standings = trial::run(&cell.setting, school, pool, *seed, (rules, &stop))?;
+        let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+        let (results, ran) = &mut *results;
+        results.add(named(cell, *seed), standings)?;
+        *ran += 1;
+        progress(Progress::Ran(*ran, total));
+        Ok(())
+    };
+    let failed = Mutex::new(None);
+    // One run at a time to a thread, in their order: where it is stopped, the first are there.
+    left.par_iter().with_max_len(1).for_each(|todo| {
+        if stop.load(Ordering::Relaxed) {
+            return;
         }
-    }
-    let run = serde_json::json!({
-        "seeds": (0..seeds).collect::<Vec<_>>(),
-        "datasets": datasets,
-        "version": env!("CARGO_PKG_VERSION"),
+        if let Err(error) = run(todo) {
+            // What others say after it is only that they were stopped.
+            failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+            stop.store(true, Ordering::Relaxed);
+        }
     });
-    for (name, text) in [("experiment.json5", text.to_owned()), ("run.json", format!("{run:#}\n"))] {
-        let path = path(name);
-        std::fs::write(&path, text).map_err(|source| ExperimentError::Write { path, source })?;
+    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(error) => Err(error),
+        None => Ok(results.into_inner().unwrap_or_else(PoisonError::into_inner).0),
     }
-    Ok(())
 }

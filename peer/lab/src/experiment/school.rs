@@ -11,7 +11,7 @@ use gestalt_strategies::{
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::ExperimentError;
+use super::error::ExperimentError;
 use super::pool::FEATURES;
 use super::setting::{Method, Setting, Start};
 use crate::emulation::School;

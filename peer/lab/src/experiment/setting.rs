@@ -6,9 +6,9 @@ use gestalt_protocol::MAX_CLASSES;
 use gestalt_strategies::{LearningConfig, MindConfig, Ranking};
 use serde::{Deserialize, Serialize};
 
-use super::ExperimentError;
+use super::error::ExperimentError;
 use crate::emulation::{Feedback, Group, Order, Scenario, Teaching};
-use crate::topology::Topology;
+use crate::shape::NetworkShape;
 
 /// A swarm that learns, and everything that an experiment may vary. What is left out is the default.
 ///
@@ -24,6 +24,7 @@ use crate::topology::Topology;
 /// | `drift` | none | what changes half-way |
 /// | `feedback` | full | what the instructor says |
 /// | `learning` | | how robots keep, share, forget and train |
+/// | `own_rules` | none | the name of rules of your own, as handed to [`conduct_by`](super::conduct_by) |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Setting {
@@ -32,7 +33,7 @@ pub struct Setting {
     /// How many gestures are shown.
     pub rounds: u32,
     /// Who is linked to whom.
-    pub topology: Topology,
+    pub topology: NetworkShape,
     /// What robots know before.
     pub start: Start,
     /// From many features to few.
@@ -47,6 +48,8 @@ pub struct Setting {
     pub feedback: Feedback,
     /// How robots keep, share, forget and train.
     pub learning: LearningConfig,
+    /// The name of rules of your own, in place of those that `learning` names and of the logarithmic pool.
+    pub own_rules: Option<String>,
 }
 
 /// What robots know before the first round.
@@ -114,7 +117,7 @@ impl Default for Setting {
         Self {
             robots: 10,
             rounds: 12,
-            topology: Topology::Ring,
+            topology: NetworkShape::Ring,
             start: Start::default(),
             reduction: Method::default(),
             components: 24,
@@ -122,6 +125,7 @@ impl Default for Setting {
             drift: Drift::default(),
             feedback: Feedback::default(),
             learning: LearningConfig::default(),
+            own_rules: None,
         }
     }
 }

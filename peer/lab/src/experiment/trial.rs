@@ -2,19 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, FusionRule};
-use gestalt_strategies::{Classifier, Classify, Evidence, Look, fusion};
+use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, Look};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::ExperimentError;
+use super::error::ExperimentError;
 use super::eyes::{PoolEyes, Split};
 use super::pool::{Moment, Pool};
 use super::setting::{Drift, Setting};
-use crate::emulation::{Emulation, Observer, School, Trace, likeliest};
+use super::standing::Standing;
+use crate::emulation::{Emulation, Observer, Rules, School, Trace, likeliest};
 
 /// The most held-out moments that are judged after each round.
 const JUDGED: usize = 60;
@@ -22,34 +24,18 @@ const JUDGED: usize = 60;
 /// A robot's evidence is bounded to this, as in a vote.
 const CLIP: f64 = 6.0;
 
-/// How a swarm stands after a round.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standing {
-    /// How many rounds there were.
-    pub round: u32,
-    /// The share of held-out views that the robot which sees them judges rightly, over all robots.
-    pub single: f64,
-    /// The share of held-out moments that all robots' views together, in a logarithmic pool, are right about.
-    pub swarm: f64,
-    /// The same by majority.
-    pub majority: f64,
-    /// Bytes of samples that a robot published so far, on average.
-    pub published: f64,
-    /// Bytes of samples that a robot put on its links so far, on average: its own, those it relays, repair.
-    pub on_links: f64,
-    /// Samples that a robot holds, on average.
-    pub samples: f64,
-}
-
 /// Runs a setting with a seed. Two settings with the same seed and number of robots are shown the same.
 ///
+/// Robots share, forget and fuse by `rules` where there are any. Between two rounds it looks whether to `stop`.
+///
 /// # Errors
-/// A setting that cannot be emulated.
+/// A setting that cannot be emulated; [`ExperimentError::Stopped`].
 pub fn run(
     setting: &Setting,
     school: &Arc<School>,
     pool: &Arc<Pool>,
     seed: u64,
+    (rules, stop): (&Rules, &AtomicBool),
 ) -> Result<Vec<Standing>, ExperimentError> {
     let scenario = setting.scenario(pool.gestures.len())?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -69,10 +55,14 @@ pub fn run(
         })
     };
     let observers = places.iter().map(eyes).collect();
-    let mut emulation = Emulation::new(&scenario, seed, observers, Some(school.clone()), Trace::none())?;
-    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], &places));
+    let mut emulation =
+        Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
+    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], &places, rules));
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
+        if stop.load(Ordering::Relaxed) {
+            return Err(ExperimentError::Stopped);
+        }
         let round = standings.len() as u32;
         let after = usize::from(drift_after.is_some_and(|last| round > last));
         standings.push(exams[after].sit(&mut emulation, round));
@@ -142,10 +132,12 @@ struct Exam {
     /// What is right, and the coordinates from each place.
     questions: Vec<(ClassId, BTreeMap<usize, Vec<f32>>)>,
     places: Vec<usize>,
+    /// By which a swarm judges.
+    fusion: Arc<dyn Fuse>,
 }
 
 impl Exam {
-    fn new(pool: &Pool, school: &School, moments: &[usize], places: &[usize]) -> Self {
+    fn new(pool: &Pool, school: &School, moments: &[usize], places: &[usize], rules: &Rules) -> Self {
         let question = |moment: &usize| {
             let seen = places.iter().filter_map(|place| {
                 let (features, _) = pool.features(*moment, *place)?;
@@ -154,7 +146,14 @@ impl Exam {
             (pool.moments[*moment].class, seen.collect())
         };
         let questions = moments.iter().map(question).collect();
-        Self { classes: pool.gestures.len(), robots: places.len(), questions, places: places.to_vec() }
+        let fusion = rules.fusion.clone().unwrap_or(Arc::new(FusionRule::LogPool));
+        Self {
+            classes: pool.gestures.len(),
+            robots: places.len(),
+            questions,
+            places: places.to_vec(),
+            fusion,
+        }
     }
 
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
@@ -177,13 +176,13 @@ impl Exam {
                     }
                 }
             }
-            let pooled = |rule| {
-                let rows = evidence.iter().map(Vec::as_slice);
-                fusion::fuse(rule, CLIP, self.classes, rows)
+            let votes: Vec<&[f32]> = evidence.iter().map(Vec::as_slice).collect();
+            let pooled = |rule: &dyn Fuse| {
+                rule.fuse(CLIP, self.classes, &votes)
                     .map_or(chance, |fused| f64::from(u8::from(fused.top == *class)))
             };
-            swarm += pooled(FusionRule::LogPool);
-            majority += pooled(FusionRule::Majority);
+            swarm += pooled(&*self.fusion);
+            majority += pooled(&FusionRule::Majority);
         }
         let questions = self.questions.len().max(1) as f64;
         let robots = self.robots as f64;

@@ -9,27 +9,44 @@
 //! Within a seed all swarms are shown the same gestures by the same people, and the n-th robot of every kind stands at the
 //! same place: what differs between two swarms is what they are made of.
 
+mod outcome;
 mod plan;
 mod results;
+mod summary;
 mod takes;
 mod training;
 mod trial;
 
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
 
 pub use plan::{Kind, Recognition, SwarmPlan, Where};
 
-use super::runner::{Progress, workers};
-use super::{ExperimentError, chart};
-use results::Summary;
+use super::error::ExperimentError;
+use super::fingerprint::this_program;
+use super::materials::Materials;
+use super::progress::Progress;
+use super::replace::replace;
+use super::{chart, folder};
+use results::Results;
+use summary::Summary;
 use training::Classifiers;
 
-/// Conducts the experiment and writes `experiment.json5`, `results.csv` (every swarm of every seed), `results.md` (means
-/// with 95 % intervals) and plots into `folder`. Gives the text of the table.
+/// Conducts the experiment, or what is left of it, and writes into `folder`:
+///
+/// - `experiment.json5` and `run.json`: the experiment as given, seeds and program;
+/// - `results.csv`: every swarm of every seed;
+/// - `results.md`: means with 95 % intervals;
+/// - plots, as `.svg` and `.png`.
+///
+/// Gives the text of the table. The same call after an interruption continues; neither the number of threads nor their
+/// order changes a figure.
 ///
 /// # Errors
-/// See [`ExperimentError`].
+/// See [`ExperimentError`]; the results so far are kept.
 pub fn conduct(
     (text, origin): (&str, &Path),
     folder: &Path,
@@ -38,39 +55,57 @@ pub fn conduct(
 ) -> Result<String, ExperimentError> {
     let plan = Recognition::parse(text, origin)?;
     let seeds = seeds.unwrap_or(plan.seeds);
-    let write = |name: &str, text: &str| {
-        let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|source| ExperimentError::Write { path, source })
-    };
-    std::fs::create_dir_all(folder)
-        .map_err(|source| ExperimentError::Write { path: folder.to_owned(), source })?;
-    write("experiment.json5", text)?;
-    let classifiers = Classifiers::train(&plan, |done, total| progress(Progress::Looked(done, total)))?;
+    folder::claim(folder, text, &Materials::default(), seeds, &this_program()?)?;
+    let results = Results::open(folder, &plan)?;
+    let runs = run_what_is_left(&plan, results, seeds, &progress)?.finish()?;
 
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let work = || -> Result<Vec<_>, ExperimentError> {
-        let mut runs = Vec::new();
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= seeds as usize {
-                return Ok(runs);
-            }
-            runs.push((seed, trial::run(&plan, &classifiers, seed as u64)?));
-            progress(Progress::Ran(done.fetch_add(1, Ordering::Relaxed) + 1, seeds as usize));
-        }
-    };
-    let mut runs = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..workers()).map(|_| scope.spawn(work)).collect();
-        let joined = workers.into_iter().map(|worker| worker.join().expect("a trial does not panic"));
-        joined.collect::<Result<Vec<_>, _>>()
-    })?
-    .concat();
-    runs.sort_by_key(|(seed, _)| *seed);
-
-    let summary = Summary::of(&plan, &runs);
-    write("results.csv", &results::csv(&plan, &runs))?;
+    let counted: Vec<_> = runs.into_iter().filter(|(seed, _)| *seed < u64::from(seeds)).collect();
+    let summary = Summary::of(&plan, &counted);
     let table = summary.markdown();
-    write("results.md", &table)?;
+    let path = folder.join("results.md");
+    replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &summary.figures())?;
     Ok(table)
+}
+
+/// Runs each seed that there are no results of yet. The first error stops all.
+fn run_what_is_left(
+    plan: &Recognition,
+    results: Results,
+    seeds: u32,
+    progress: &(impl Fn(Progress) + Sync),
+) -> Result<Results, ExperimentError> {
+    let left: Vec<u64> = (0..u64::from(seeds)).filter(|seed| !results.runs.contains_key(seed)).collect();
+    let ran = seeds as usize - left.len();
+    progress(Progress::Ran(ran, seeds as usize));
+    if left.is_empty() {
+        return Ok(results);
+    }
+    let classifiers = Classifiers::train(plan, |done, total| progress(Progress::Looked(done, total)))?;
+
+    let stop = AtomicBool::new(false);
+    let (results, failed) = (Mutex::new((results, ran)), Mutex::new(None));
+    let run = |seed: u64| -> Result<(), ExperimentError> {
+        let outcomes = trial::run(plan, &classifiers, seed, &stop)?;
+        let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
+        let (results, ran) = &mut *results;
+        results.add(plan, seed, outcomes)?;
+        *ran += 1;
+        progress(Progress::Ran(*ran, seeds as usize));
+        Ok(())
+    };
+    left.par_iter().with_max_len(1).for_each(|seed| {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        if let Err(error) = run(*seed) {
+            // What others say after it is only that they were stopped.
+            failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+            stop.store(true, Ordering::Relaxed);
+        }
+    });
+    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(error) => Err(error),
+        None => Ok(results.into_inner().unwrap_or_else(PoisonError::into_inner).0),
+    }
 }

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::experiment::ExperimentError;
+use crate::experiment::error::ExperimentError;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::perception::LayerConfig;
 use gestalt_vision::pose::Pose;
@@ -221,10 +221,8 @@ impl Recognition {
             if !(1..=100).contains(&swarm.size()) {
                 return wrong(format!("{}: choose 1 to 100 robots", swarm.line));
             }
-            if swarm.line.contains([',', '"', '|', '\n']) {
-                return wrong(
-                    "a line with a comma, a quote, a bar or a line break: write it without".to_owned(),
-                );
+            if swarm.line.contains(|sign: char| sign == '|' || sign.is_control()) {
+                return wrong("a line with a bar or a line break: write it without".to_owned());
             }
             for kind in &swarm.robots {
                 kind.model()?;

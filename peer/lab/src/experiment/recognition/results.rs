@@ -1,138 +1,133 @@
-//! Means over seeds with their intervals: a table, a file and figures.
+//! What was measured, seed by seed, in a file that survives an interruption.
 
-use std::fmt::Write;
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use super::plan::{Recognition, SwarmPlan};
-use super::trial::Outcome;
-use crate::emulation::Mean;
-use crate::experiment::chart::{Figure, Line, Panel};
+use serde::{Deserialize, Serialize};
 
-/// A run: its seed, and the outcome of each swarm.
-pub type Run = (usize, Vec<Outcome>);
+use super::outcome::Outcome;
+use super::plan::Recognition;
+use crate::experiment::error::ExperimentError;
+use crate::experiment::ledger::Ledger;
 
-/// All that the experiment shows.
-pub struct Summary {
-    title: String,
-    shown: String,
-    rows: Vec<Row>,
-}
-
+/// A swarm of a seed, as a row of `results.csv`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Row {
+    /// The swarm's place in the plan, from 1.
+    swarm: usize,
     line: String,
     robots: usize,
     made_of: String,
-    right: Mean,
-    wrong: Mean,
-    frames_right: Mean,
-    decided_s: Mean,
-    /// The difference to the first swarm, seed by seed.
-    gain: Mean,
+    seed: u64,
+    right: f64,
+    wrong: f64,
+    undecided: f64,
+    frames_right: f64,
+    decided_s: Option<f64>,
 }
 
-/// Every swarm of every seed, a line each.
-pub fn csv(plan: &Recognition, runs: &[Run]) -> String {
-    let mut text = "line,robots,made_of,seed,right,wrong,frames_right,decided_s\n".to_owned();
-    for (swarm, n) in plan.swarms.iter().zip(0..) {
-        for (seed, outcomes) in runs {
-            let Outcome { right, wrong, frames_right, decided_s } = outcomes[n];
-            let (line, size, made_of) = (&swarm.line, swarm.size(), swarm.describe());
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                text,
-                "{line},{size},{made_of},{seed},{right:.6},{wrong:.6},{frames_right:.6},{decided_s:.6}"
-            );
-        }
-    }
-    text
+/// `results.csv`: the outcomes of all swarms of each seed that ended.
+#[derive(Debug)]
+pub struct Results {
+    ledger: Ledger,
+    /// The outcomes of each seed, in the order of the plan.
+    pub runs: BTreeMap<u64, Vec<Outcome>>,
+    rows: BTreeMap<u64, Vec<Row>>,
 }
 
-impl Summary {
-    pub fn of(plan: &Recognition, runs: &[Run]) -> Self {
-        let row = |(n, swarm): (usize, &SwarmPlan)| {
-            let over = |measure: fn(&Outcome) -> f64| {
-                Mean::of(&runs.iter().map(|(_, outcomes)| measure(&outcomes[n])).collect::<Vec<_>>())
-            };
-            let gains: Vec<f64> =
-                runs.iter().map(|(_, outcomes)| outcomes[n].right - outcomes[0].right).collect();
-            Row {
-                line: swarm.line.clone(),
-                robots: swarm.size(),
-                made_of: swarm.describe(),
-                right: over(|o| o.right),
-                wrong: over(|o| o.wrong),
-                frames_right: over(|o| o.frames_right),
-                decided_s: over(|o| o.decided_s),
-                gain: Mean::of(&gains),
-            }
+impl Results {
+    /// Opens or begins the results in `folder`. Of what is there, those seeds are kept that have all swarms of the plan.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Read`], [`ExperimentError::Write`], or [`ExperimentError::Table`] for a file of another layout.
+    pub fn open(folder: &Path, plan: &Recognition) -> Result<Self, ExperimentError> {
+        let mut rows: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+        let keep = |all: Vec<Row>| {
+            all.into_iter().for_each(|row| rows.entry(row.seed).or_default().push(row));
+            rows.retain(|_, rows| rows.iter().map(|row| row.swarm).eq(1..=plan.swarms.len()));
+            rows.values().flatten().cloned().collect()
         };
-        let shown = format!("{} seeds of {} gestures", runs.len(), plan.showings);
-        Self { title: plan.title.clone(), shown, rows: plan.swarms.iter().enumerate().map(row).collect() }
+        let (ledger, _) = Ledger::open(folder, keep)?;
+        let runs = rows.iter().map(|(seed, rows)| (*seed, rows.iter().map(outcome).collect())).collect();
+        Ok(Self { ledger, runs, rows })
     }
 
-    /// The table, with a word on how to read it.
-    pub fn markdown(&self) -> String {
-        let percent = |mean: Mean| format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
-        let mut text = format!(
-            "# {}\n\n{}, drawn hands of people the classifier was not trained on. Means with 95 % intervals (Student's t), \
-             in percent; `to the first`: the difference in `right` to the first row, seed by seed.\n\n\
-             | swarm | made of | right | wrong | undecided | to the first | one frame right | decided after, s |\n|{}\n",
-            self.title,
-            self.shown,
-            "---|".repeat(8)
-        );
-        for row in &self.rows {
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} | {:.1} | {:+.1} ± {:.1} | {} | {:.2} ± {:.2} |",
-                row.line,
-                row.made_of,
-                percent(row.right),
-                percent(row.wrong),
-                100.0 * (1.0 - row.right.mean - row.wrong.mean),
-                100.0 * row.gain.mean,
-                100.0 * row.gain.half_width,
-                percent(row.frames_right),
-                row.decided_s.mean,
-                row.decided_s.half_width,
-            );
-        }
-        text
+    /// Writes down a seed that has ended.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Write`].
+    pub fn add(
+        &mut self,
+        plan: &Recognition,
+        seed: u64,
+        outcomes: Vec<Outcome>,
+    ) -> Result<(), ExperimentError> {
+        let rows: Vec<Row> = (1..)
+            .zip(plan.swarms.iter().zip(&outcomes))
+            .map(|(swarm, (of, outcome))| Row {
+                swarm,
+                line: of.line.clone(),
+                robots: of.size(),
+                made_of: of.describe(),
+                seed,
+                right: outcome.right,
+                wrong: outcome.wrong,
+                undecided: outcome.undecided,
+                frames_right: outcome.frames_right,
+                decided_s: outcome.decided_s,
+            })
+            .collect();
+        self.ledger.add(&rows)?;
+        self.rows.insert(seed, rows);
+        self.runs.insert(seed, outcomes);
+        Ok(())
     }
 
-    /// Decisions over the number of robots, a line each.
-    pub fn figures(&self) -> Vec<(&'static str, Figure)> {
-        let mut names: Vec<&String> = Vec::new();
-        self.rows.iter().for_each(|row| {
-            if !names.contains(&&row.line) {
-                names.push(&row.line);
-            }
-        });
-        let lines = |measure: fn(&Row) -> Mean| -> Vec<Line> {
-            let points = |name: &String| {
-                let mut points: Vec<(f64, Mean)> = self
-                    .rows
-                    .iter()
-                    .filter(|row| row.line == *name)
-                    .map(|row| (row.robots as f64, measure(row)))
-                    .collect();
-                points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                points
-            };
-            names.iter().map(|name| Line { name: (*name).clone(), points: points(name) }).collect()
+    /// Puts the seeds into order, whichever ended first, and gives them back.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Write`].
+    pub fn finish(self) -> Result<BTreeMap<u64, Vec<Outcome>>, ExperimentError> {
+        let rows: Vec<Row> = self.rows.into_values().flatten().collect();
+        self.ledger.finish(&rows)?;
+        Ok(self.runs)
+    }
+}
+
+fn outcome(row: &Row) -> Outcome {
+    let Row { right, wrong, undecided, frames_right, decided_s, .. } = *row;
+    Outcome { right, wrong, undecided, frames_right, decided_s }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_read_as_they_were_and_half_a_seed_is_run_again() {
+        let text = "{ title: 't', swarms: [
+            { line: 'Foot-bots, \"old\"', robots: [{ camera: 'footbot', count: 10 }] },
+            { line: 'mixed', robots: [{ camera: 'footbot', count: 4 }, { camera: 'parrot', count: 2 }] } ] }";
+        let plan = Recognition::parse(text, Path::new("test")).unwrap();
+        let outcome = |right, decided_s| Outcome {
+            right,
+            wrong: 0.25,
+            undecided: 0.75 - right,
+            frames_right: 1.0 / 3.0,
+            decided_s,
         };
-        let mut marks: Vec<f64> = self.rows.iter().map(|row| row.robots as f64).collect();
-        marks.sort_by(f64::total_cmp);
-        marks.dedup();
-        let figure = Figure {
-            title: self.title.clone(),
-            x: "robots".to_owned(),
-            marks: Some(marks),
-            logarithmic: false,
-            panels: vec![
-                Panel { y: "decided rightly, %", lines: lines(|row| row.right) },
-                Panel { y: "decided wrongly, %", lines: lines(|row| row.wrong) },
-            ],
-        };
-        vec![("robots", figure)]
+        let outcomes = vec![outcome(0.0, None), outcome(0.5, Some(0.7))];
+        let folder = tempfile::tempdir().unwrap();
+        let mut results = Results::open(folder.path(), &plan).unwrap();
+        results.add(&plan, 1, outcomes.clone()).unwrap();
+        results.add(&plan, 0, outcomes.clone()).unwrap();
+        let all = [(0, outcomes.clone()), (1, outcomes.clone())].into();
+        assert_eq!(Results::open(folder.path(), &plan).unwrap().runs, all);
+
+        let path = folder.path().join("results.csv");
+        let whole = std::fs::read_to_string(&path).unwrap();
+        let without_last_row = &whole[..whole.trim_end().rfind('\n').unwrap() + 1];
+        std::fs::write(&path, without_last_row).unwrap();
+        assert_eq!(Results::open(folder.path(), &plan).unwrap().runs.len(), 1);
     }
 }

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::plan::{Kind, Recognition};
 use super::training::FEATURES;
-use crate::experiment::ExperimentError;
+use crate::experiment::error::ExperimentError;
 use gestalt_vision::perception::{HandConfig, LayerConfig, Perception};
 use gestalt_vision::source::{RenderedSource, Scene, Source, through_jpeg};
 

@@ -6,7 +6,7 @@ use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classifier, Sample};
 
 use super::plan::{Recognition, SwarmPlan, camera};
-use crate::experiment::ExperimentError;
+use crate::experiment::error::ExperimentError;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::model::learn_fingers;
 use gestalt_vision::perception::{FeatureSet, HandConfig, LayerConfig, Perception};

@@ -3,40 +3,34 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classifier, Classify, Observation};
 
+use super::outcome::Outcome;
 use super::plan::{Kind, Recognition, SwarmPlan};
 use super::takes::{Take, Takes};
 use super::training::{Classifiers, GESTURES};
-use crate::emulation::{self, Group, LinkModel, Observer, Order, Scenario, Trace};
-use crate::experiment::ExperimentError;
-use crate::topology::Topology;
+use crate::emulation::{Emulation, Group, LinkModel, Observer, Order, Scenario, Trace};
+use crate::experiment::error::ExperimentError;
+use crate::shape::NetworkShape;
 use gestalt_vision::perception::LayerConfig;
 
-/// What a swarm made of the gestures of a seed; shares are of the gestures shown, `0.0..=1.0`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
-    /// It decided for the gesture shown.
-    pub right: f64,
-    /// It decided for another.
-    pub wrong: f64,
-    /// Single frames with a hand in which the robot that saw it found the gesture shown likeliest, of such frames.
-    pub frames_right: f64,
-    /// Seconds from the showing until the first robot held a class, over the decided ones.
-    pub decided_s: f64,
-}
-
-/// Shows all swarms of a plan the gestures of a seed; outcomes in the order of the plan.
+/// Shows all swarms of a plan the gestures of a seed; outcomes in the order of the plan. Between two gestures it looks
+/// whether to `stop`.
+///
+/// # Errors
+/// A swarm that cannot be emulated, hands that cannot be drawn or seen; [`ExperimentError::Stopped`].
 pub fn run(
     plan: &Recognition,
     classifiers: &Classifiers,
     seed: u64,
+    stop: &AtomicBool,
 ) -> Result<Vec<Outcome>, ExperimentError> {
     let seen = Rc::new(RefCell::new(Takes::new(plan.clone(), seed)));
-    plan.swarms.iter().map(|swarm| show(plan, swarm, classifiers.of(swarm), &seen, seed)).collect()
+    plan.swarms.iter().map(|swarm| show(plan, swarm, classifiers.of(swarm), &seen, (seed, stop))).collect()
 }
 
 fn show(
@@ -44,11 +38,11 @@ fn show(
     swarm: &SwarmPlan,
     classifier: &Arc<Classifier>,
     seen: &Rc<RefCell<Takes>>,
-    seed: u64,
+    (seed, stop): (u64, &AtomicBool),
 ) -> Result<Outcome, ExperimentError> {
     let scenario = Scenario {
         robots: vec![Group { name: "robot".to_owned(), count: swarm.size(), view: None }],
-        topology: Topology::Ring,
+        topology: NetworkShape::Ring,
         link: LinkModel::default(),
         classes: GESTURES,
         rounds: plan.showings,
@@ -79,15 +73,22 @@ fn show(
             }));
         }
     }
-    let (report, _) = emulation::run_with(&scenario, seed, observers, Trace::none())?;
-    if let Some(failure) = failure.take() {
-        return Err(failure);
+    let mut emulation = Emulation::new(&scenario, seed, observers, None, Trace::none())?;
+    while emulation.show_next() {
+        if let Some(failure) = failure.take() {
+            return Err(failure);
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(ExperimentError::Stopped);
+        }
     }
+    let (report, _) = emulation.finish();
     Ok(Outcome {
         right: report.right.share,
         wrong: report.wrong.share,
         frames_right: report.frames_right.share,
-        decided_s: report.decided_ms.mean / 1000.0,
+        undecided: report.undecided.share,
+        decided_s: (report.decided_ms.n > 0).then_some(report.decided_ms.mean / 1000.0),
     })
 }
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use super::materials::Materials;
 use super::plan::{Cell, Experiment};
 use super::pool::Pool;
 use super::results::Run;
-use super::runner::Materials;
-use super::trial::Standing;
+use super::standing::Standing;
 use crate::emulation::Mean;
 
 /// Accuracies that a single robot is to reach.

@@ -9,12 +9,12 @@ use thiserror::Error;
 /// A text that names no topology.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("'{0}' is no topology: take line, ring, grid, star, random or full")]
-pub struct TopologyError(String);
+pub struct ShapeError(String);
 
 /// The shape of a network of links.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Topology {
+pub enum NetworkShape {
     /// Each to the next.
     Line,
     /// A line, closed.
@@ -30,9 +30,9 @@ pub enum Topology {
     Full,
 }
 
-impl Topology {
+impl NetworkShape {
     /// The links between `n` robots as pairs of positions `(a, b)` with `a < b`, each once, in ascending order.
-    /// The graph is connected. Only [`Topology::Random`] draws from `chance`.
+    /// The graph is connected. Only [`NetworkShape::Random`] draws from `chance`.
     pub fn links(self, n: usize, chance: &mut impl Rng) -> Vec<(usize, usize)> {
         let mut links: Vec<(usize, usize)> = match self {
             Self::Line => (1..n).map(|b| (b - 1, b)).collect(),
@@ -67,10 +67,10 @@ fn random(n: usize, chance: &mut impl Rng) -> Vec<(usize, usize)> {
     links
 }
 
-impl FromStr for Topology {
-    type Err = TopologyError;
+impl FromStr for NetworkShape {
+    type Err = ShapeError;
 
-    fn from_str(text: &str) -> Result<Self, TopologyError> {
+    fn from_str(text: &str) -> Result<Self, ShapeError> {
         Ok(match text {
             "line" => Self::Line,
             "ring" => Self::Ring,
@@ -78,7 +78,7 @@ impl FromStr for Topology {
             "star" => Self::Star,
             "random" => Self::Random,
             "full" => Self::Full,
-            other => return Err(TopologyError(other.to_owned())),
+            other => return Err(ShapeError(other.to_owned())),
         })
     }
 }
@@ -90,10 +90,16 @@ mod tests {
 
     use super::*;
 
-    const ALL: [Topology; 6] =
-        [Topology::Line, Topology::Ring, Topology::Grid, Topology::Star, Topology::Random, Topology::Full];
+    const ALL: [NetworkShape; 6] = [
+        NetworkShape::Line,
+        NetworkShape::Ring,
+        NetworkShape::Grid,
+        NetworkShape::Star,
+        NetworkShape::Random,
+        NetworkShape::Full,
+    ];
 
-    fn links(topology: Topology, n: usize) -> Vec<(usize, usize)> {
+    fn links(topology: NetworkShape, n: usize) -> Vec<(usize, usize)> {
         topology.links(n, &mut ChaCha8Rng::seed_from_u64(1))
     }
 
@@ -118,13 +124,13 @@ mod tests {
 
     #[test]
     fn a_grid_of_nine_has_twelve_links() {
-        assert_eq!(links(Topology::Grid, 9).len(), 12);
+        assert_eq!(links(NetworkShape::Grid, 9).len(), 12);
     }
 
     #[test]
     fn a_random_topology_is_sparse() {
         for n in 3..60 {
-            assert!(links(Topology::Random, n).len() <= n - 1 + n / 2);
+            assert!(links(NetworkShape::Random, n).len() <= n - 1 + n / 2);
         }
     }
 }

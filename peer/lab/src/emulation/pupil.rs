@@ -1,0 +1,89 @@
+//! A robot that learns: its memory and its machine.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use gestalt_protocol::RobotId;
+use gestalt_strategies::{
+    Change, Classifier, Learner, LearningConfig, LearningSetup, Memory, Mind, MindConfig, OwnRules,
+    TrainingChange,
+};
+use rand_chacha::ChaCha8Rng;
+
+use super::school::School;
+
+/// One robot that learns: its disk outlives it.
+#[derive(Debug, Default)]
+pub(super) struct Pupil {
+    disk: BTreeMap<Vec<u8>, Vec<u8>>,
+    /// The revision on the disk.
+    pub remembered: u64,
+    learner: Option<Learner>,
+    /// What the classifier has not followed yet.
+    due: Vec<TrainingChange>,
+    classifier: Option<Arc<Classifier>>,
+}
+
+impl Pupil {
+    /// The mind of this robot, with what its disk holds.
+    pub fn start(
+        &mut self,
+        (me, boot): (RobotId, u32),
+        mind: MindConfig,
+        school: &School,
+        (config, rules): (&LearningConfig, &OwnRules),
+        rng: ChaCha8Rng,
+    ) -> Mind {
+        let records = self.disk.iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
+        let memory = Memory::read(records).expect("it holds what this robot's minds wrote");
+        self.stop();
+        self.classifier = school.start().cloned();
+        self.learner = Some(school.learner().expect("the school was tried when it was made"));
+        let setup = LearningSetup {
+            config: config.clone(),
+            space: school.space().clone(),
+            vocabulary: school.vocabulary().clone(),
+            rng: Box::new(rng),
+            memory: Some(memory),
+            rules: rules.clone(),
+        };
+        Mind::new(me, boot, mind)
+            .expect("the scenario was validated")
+            .learning(setup)
+            .expect("the scenario was validated, and the memory is this robot's own")
+    }
+
+    /// Loses what is on no disk.
+    pub fn stop(&mut self) {
+        (self.remembered, self.learner, self.classifier) = (0, None, None);
+        self.due.clear();
+    }
+
+    pub fn remember(&mut self, revision: u64, changes: Vec<Change>) {
+        for Change { key, value } in changes {
+            match value {
+                Some(value) => self.disk.insert(key, value),
+                None => self.disk.remove(&key),
+            };
+        }
+        self.remembered = revision;
+    }
+
+    pub fn train_later(&mut self, changes: Vec<TrainingChange>) {
+        self.due.extend(changes);
+    }
+
+    /// The classifier, brought up to date, and whether that changed it.
+    pub fn learn(&mut self) -> Option<Arc<Classifier>> {
+        let learner = self.learner.as_mut().filter(|_| !self.due.is_empty())?;
+        for change in self.due.drain(..) {
+            change.apply_to(learner).expect("a mind trains on vectors of the school's space and classes");
+        }
+        self.classifier = Some(learner.learn().expect("a learner learns from any samples it took"));
+        self.classifier.clone()
+    }
+
+    pub fn classifier(&self) -> Option<&Arc<Classifier>> {
+        self.classifier.as_ref()
+    }
+}

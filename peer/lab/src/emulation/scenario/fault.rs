@@ -1,0 +1,60 @@
+//! What goes wrong in a scenario.
+
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+use serde::{Deserialize, Serialize};
+
+/// One thing that happens to the swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fault {
+    /// When.
+    #[serde(with = "humantime_serde")]
+    pub at: Duration,
+    /// What.
+    pub event: Event,
+}
+
+/// What can happen to a swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    /// The link between two robots falls silent.
+    Cut(RobotId, RobotId),
+    /// That link works again.
+    Heal(RobotId, RobotId),
+    /// A robot is gone, with all it knew.
+    Kill(RobotId),
+    /// It starts again, knowing nothing.
+    Restart(RobotId),
+    /// A robot stops in the midst of things; what is sent to it waits.
+    Freeze(RobotId),
+    /// It goes on.
+    Thaw(RobotId),
+}
+
+/// Links that fail and heal at random; at the end all are healed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Churn {
+    /// From when.
+    #[serde(with = "humantime_serde")]
+    pub from: Duration,
+    /// Until when.
+    #[serde(with = "humantime_serde")]
+    pub until: Duration,
+    /// The time between two changes: each cuts a link or heals one, whichever link the chance falls on.
+    #[serde(with = "humantime_serde")]
+    pub period: Duration,
+}
+
+impl Event {
+    /// The robots it names.
+    pub(super) fn robots(self) -> Vec<RobotId> {
+        match self {
+            Self::Cut(a, b) | Self::Heal(a, b) => vec![a, b],
+            Self::Kill(robot) | Self::Restart(robot) | Self::Freeze(robot) | Self::Thaw(robot) => vec![robot],
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Whether a scenario can be run.
+
+use gestalt_protocol::{MAX_CLASSES, RobotId};
+
+use super::Scenario;
+use super::error::ScenarioError;
+use super::fault::Event;
+
+impl Scenario {
+    /// Whether the scenario can be run.
+    ///
+    /// # Errors
+    /// The first [`ScenarioError`] found.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        let wrong = |key, mend: String| Err(ScenarioError::Value { key, mend });
+        let size = self.swarm_size();
+        if !(1..=1000).contains(&size) {
+            return wrong("robots", format!("{size} robots in all: choose 1 to 1000"));
+        }
+        if !(2..=MAX_CLASSES).contains(&self.classes) {
+            return wrong("classes", format!("is {}: choose 2 to {MAX_CLASSES}", self.classes));
+        }
+        if !(1..=100_000).contains(&self.rounds) {
+            return wrong("rounds", format!("is {}: choose 1 to 100000", self.rounds));
+        }
+        if self.seeds == 0 {
+            return wrong("seeds", "is 0: choose at least 1".to_owned());
+        }
+        if !(0.0..1.0).contains(&self.link.loss) {
+            return wrong("link.loss", format!("is {}: choose from 0 to below 1", self.link.loss));
+        }
+        for view in self.robots.iter().filter_map(|group| group.view) {
+            if !(view.fps > 0.0 && view.fps <= 1000.0) {
+                return wrong("robots.view.fps", format!("is {}: choose above 0, at most 1000", view.fps));
+            }
+            if !(view.signal >= 0.0 && view.signal <= 100.0) {
+                return wrong("robots.view.signal", format!("is {}: choose 0 to 100", view.signal));
+            }
+            if !(0.0..=1.0).contains(&view.persistence) {
+                return wrong("robots.view.persistence", format!("is {}: choose 0 to 1", view.persistence));
+            }
+        }
+        self.mind.validate()?;
+        if let Some(teaching) = &self.learning {
+            teaching.robots.validate()?;
+            if teaching.after >= self.interval {
+                return wrong("learning.after", "speak before the next gesture is shown".to_owned());
+            }
+        }
+        for contender in &self.compare {
+            self.contending(*contender).mind.validate()?;
+        }
+        if self.interval <= self.mind.refractory {
+            return wrong(
+                "interval",
+                "no longer than mind.refractory: no second round would open".to_owned(),
+            );
+        }
+        if let Some(churn) = self.churn
+            && (churn.period.is_zero() || churn.until <= churn.from)
+        {
+            return wrong("churn", "choose a period above 0 and an end after the beginning".to_owned());
+        }
+        let known = |robot: RobotId| (1..=size).contains(&(robot.0 as usize));
+        for fault in &self.faults {
+            let robots = fault.event.robots();
+            if let Some(robot) = robots.into_iter().find(|robot| !known(*robot)) {
+                return wrong("faults", format!("there is no robot {robot}: choose 1 to {size}"));
+            }
+            if matches!(fault.event, Event::Cut(a, b) | Event::Heal(a, b) if a == b) {
+                return wrong("faults", "a link has two ends: name two robots".to_owned());
+            }
+        }
+        Ok(())
+    }
+}

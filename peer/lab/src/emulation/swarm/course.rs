@@ -1,0 +1,127 @@
+//! The course of events: what is shown, what is seen of it, and what the instructor says.
+
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId};
+use gestalt_strategies::{Classify, Input, Instructed, Mind};
+use rand::RngExt;
+use rand::seq::SliceRandom;
+
+use super::Swarm;
+use super::parcel::{Parcel, json_bytes};
+use super::queue::Due;
+use super::robot::Robot;
+use super::seed::{frames, stream};
+use crate::emulation::network::{Kind, Presence};
+use crate::emulation::scenario::Order;
+use crate::emulation::teaching::Feedback;
+use crate::emulation::trace::Happening;
+
+/// Who teaches.
+const INSTRUCTOR: &str = "script";
+
+impl Swarm<'_> {
+    /// Another gesture is shown to all; one of the robots that can notices it first.
+    pub(super) fn show(&mut self, n: u32) {
+        self.end_showing();
+        self.shown = self.draw_gesture();
+        let luck = self.course.random::<u64>();
+        for (i, robot) in self.robots.iter_mut().enumerate() {
+            robot.rng = stream(self.seed, frames(n, i));
+            robot.observer.show(self.shown, &mut robot.rng);
+        }
+        let up: Vec<usize> = self.network.up().collect();
+        if up.is_empty() {
+            return;
+        }
+        let opener = up[(luck % up.len() as u64) as usize];
+        let happening = Happening::Shown { class: self.shown, opener: self.robots[opener].id };
+        self.note(&happening);
+        let before = self.robots[opener].mind.as_ref().and_then(Mind::round);
+        self.tell_mind(opener, Input::Open);
+        let after = self.robots[opener].mind.as_ref().and_then(Mind::round);
+        // A robot that is still busy with the round before does not open another.
+        let opened = after.filter(|round| Some(*round) != before);
+        self.record.show(self.now, self.shown, opened.map(|round| round.counter));
+        if let Some(teaching) = self.scenario.learning.as_ref().filter(|_| opened.is_some()) {
+            self.at(self.now + teaching.after, Due::Teach(n, opener));
+        }
+    }
+
+    fn draw_gesture(&mut self) -> ClassId {
+        let classes = self.scenario.classes;
+        match self.scenario.order {
+            Order::Random => ClassId(self.course.random_range(0..classes as u64) as u8),
+            Order::InTurn => {
+                if self.turn.is_empty() {
+                    self.turn = (0..classes).map(|class| ClassId(class as u8)).collect();
+                    self.turn.shuffle(&mut self.course);
+                }
+                self.turn.pop().unwrap_or(ClassId(0))
+            }
+        }
+    }
+
+    pub(super) fn frame(&mut self, i: usize, looks: u32) {
+        let looks_still = |robot: &Robot| robot.looking && robot.looks == looks;
+        if !looks_still(&self.robots[i]) {
+            return;
+        }
+        // A robot that learns does so before it looks again, not sooner: nobody asks before.
+        self.train(i);
+        let robot = &mut self.robots[i];
+        let next = self.now + Duration::from_secs_f64(robot.observer.period());
+        if self.network.presence(i) == Presence::Up
+            && let Some(observation) = robot.observer.frame(&mut robot.rng)
+        {
+            let classifier: Option<Arc<dyn Classify>> = match &robot.pupil {
+                Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
+                None => robot.observer.classifier(),
+            };
+            if let Some(p) = classifier.and_then(|c| c.probabilities(&observation.features).ok()) {
+                self.record.frame(&p, self.shown);
+            }
+            self.tell_mind(i, Input::Observed(observation));
+        }
+        self.at(next, Due::Frame(i, looks));
+    }
+
+    /// The instructor, who stands at that robot, says what it was that was shown.
+    pub(super) fn teach(&mut self, n: u32, i: usize) {
+        let Some(teaching) = &self.scenario.learning else { return };
+        let mind = self.robots[i].mind.as_ref().filter(|_| self.network.presence(i) == Presence::Up);
+        let Some((mind, round)) = mind.and_then(|mind| Some((mind, mind.round()?))) else { return };
+        let instruction = match (teaching.feedback, mind.held().and_then(|held| held.class)) {
+            (Feedback::Full, _) => Instruction::Was { round, class: Gesture::Class(self.shown) },
+            (Feedback::Partial, Some(decided)) if decided == self.shown => Instruction::Right { round },
+            (Feedback::Partial, Some(_)) => Instruction::Wrong { round },
+            (Feedback::Partial, None) | (Feedback::None, _) => return,
+        };
+        let robot = self.robots[i].id;
+        self.note(&Happening::Instruct { robot, instruction: &instruction });
+        let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
+        let bytes = json_bytes(&instruction);
+        let instructed = Rc::new(Instructed { by, at: u64::from(n), instruction });
+        self.broadcast(i, bytes, Kind::Words, &Parcel::Instructed(instructed.clone()));
+        self.arrive(i, Parcel::Instructed(instructed));
+    }
+
+    /// Makes a robot's classifier follow its samples.
+    pub(super) fn train(&mut self, i: usize) {
+        let up = self.network.presence(i) == Presence::Up;
+        let Some(pupil) = self.robots[i].pupil.as_mut().filter(|_| up) else { return };
+        if let Some(classifier) = pupil.learn() {
+            let samples =
+                self.robots[i].mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
+            self.note(&Happening::Learn { robot: self.robots[i].id, samples });
+            self.tell_mind(i, Input::Learned(classifier));
+        }
+    }
+
+    pub(super) fn end_showing(&mut self) {
+        let up: Vec<usize> = self.network.up().collect();
+        self.record.end_showing(self.now, &up);
+    }
+}

@@ -1,0 +1,176 @@
+//! Many minds in one thread: a queue of events, the robots, and what they want done.
+//!
+//! | file | question |
+//! |---|---|
+//! | `queue` | what is to happen next? |
+//! | `course` | what is shown, seen and taught? |
+//! | `faults` | what goes wrong? |
+//! | `lives` | who starts, goes on, and knows of whom? |
+//! | `carry` | what does a mind want done, and what becomes of it? |
+
+mod carry;
+mod course;
+mod faults;
+mod lives;
+mod parcel;
+mod queue;
+mod robot;
+mod seed;
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, RobotId};
+use gestalt_strategies::{Classifier, Input, Mind};
+use rand_chacha::ChaCha8Rng;
+
+use super::network::{Network, Traffic};
+use super::observer::Observer;
+use super::record::Record;
+use super::report::Learned;
+use super::rules::Rules;
+use super::scenario::Scenario;
+use super::school::School;
+use super::statistics::Mean;
+use super::trace::{Happening, Trace};
+use queue::{Due, Queue};
+use robot::Robot;
+use seed::{COURSE, NETWORK, stream};
+
+/// A run of a scenario.
+pub(super) struct Swarm<'a> {
+    scenario: &'a Scenario,
+    school: Option<Arc<School>>,
+    rules: Rules,
+    seed: u64,
+    now: Duration,
+    queue: Queue,
+    network: Network,
+    robots: Vec<Robot>,
+    course: ChaCha8Rng,
+    shown: ClassId,
+    /// The gestures still to be shown before all have been.
+    turn: Vec<ClassId>,
+    record: Record,
+    trace: Trace<'a>,
+}
+
+impl<'a> Swarm<'a> {
+    pub fn new(
+        scenario: &'a Scenario,
+        seed: u64,
+        observers: Vec<Box<dyn Observer>>,
+        (school, rules): (Option<Arc<School>>, Rules),
+        trace: Trace<'a>,
+    ) -> Self {
+        let mut rng = stream(seed, NETWORK);
+        let links = scenario.topology.links(observers.len(), &mut rng);
+        let network = Network::new(observers.len(), links, scenario.link, rng);
+        let learns = school.is_some();
+        let robots: Vec<_> = (1..)
+            .zip(observers)
+            .map(|(id, observer)| Robot::new(RobotId(id), observer, seed, learns))
+            .collect();
+        let record = Record::new(robots.len());
+        let mut swarm = Self {
+            scenario,
+            school,
+            rules,
+            seed,
+            now: Duration::ZERO,
+            queue: Queue::default(),
+            network,
+            robots,
+            course: stream(seed, COURSE),
+            shown: ClassId(0),
+            turn: Vec::new(),
+            record,
+            trace,
+        };
+        (0..swarm.robots.len()).for_each(|robot| swarm.start(robot));
+        swarm.tell_who_is_there();
+        (0..scenario.rounds).for_each(|n| swarm.at(scenario.showing_at(n), Due::Show(n)));
+        scenario.faults.iter().for_each(|fault| swarm.at(fault.at, Due::Fault(fault.event)));
+        if let Some(churn) = scenario.churn {
+            swarm.at(churn.from, Due::Churn);
+        }
+        swarm
+    }
+
+    /// Lets everything happen that is due before that time.
+    pub fn pass(&mut self, until: Duration) {
+        while let Some((at, due)) = self.queue.next_before(until) {
+            self.now = at;
+            self.happen(due);
+        }
+    }
+
+    /// Runs to the end of the scenario: an interval after the last showing.
+    pub fn run(mut self) -> (Record, Network, Option<Learned>, std::io::Result<()>) {
+        let end = self.scenario.showing_at(self.scenario.rounds);
+        self.pass(end + Duration::from_nanos(1));
+        self.now = end;
+        self.end_showing();
+        let learned = self.school.is_some().then(|| self.summed_up());
+        (self.record, self.network, learned, self.trace.finish())
+    }
+
+    pub fn mind(&self, i: usize) -> Option<&Mind> {
+        self.robots[i].mind.as_ref()
+    }
+
+    pub fn traffic(&self, i: usize) -> Traffic {
+        self.network.traffic[i]
+    }
+
+    /// What that robot judges by after learning from all it holds.
+    pub fn learned(&mut self, i: usize) -> Option<Arc<Classifier>> {
+        self.train(i);
+        self.robots[i].pupil.as_ref()?.classifier().cloned()
+    }
+
+    fn summed_up(&self) -> Learned {
+        let statuses = || self.network.up().filter_map(|i| self.robots[i].mind.as_ref()?.learned());
+        let numbers = |parts: &[&[usize]]| parts.iter().flat_map(|part| part.iter()).sum::<usize>() as f64;
+        let held: Vec<f64> = statuses().map(|s| numbers(&[&s.personal, &s.shared, &s.external])).collect();
+        let common: Vec<f64> = statuses().map(|s| numbers(&[&s.shared, &s.external])).collect();
+        let alike = statuses().map(|status| status.common).collect::<BTreeSet<_>>().len() <= 1;
+        Learned { samples: Mean::of(&held), common: Mean::of(&common), alike }
+    }
+
+    fn happen(&mut self, due: Due) {
+        match due {
+            Due::Show(n) => self.show(n),
+            Due::Fault(event) => self.fault(event),
+            Due::Churn => self.churn(),
+            Due::Notice(change) => {
+                self.network.notice(change);
+                self.tell_who_is_there();
+            }
+            Due::Wake(robot) => {
+                if self.robots[robot].wake == Some(self.now) {
+                    self.robots[robot].wake = None;
+                    self.tell_mind(robot, Input::Tick);
+                }
+            }
+            Due::Frame(robot, looks) => self.frame(robot, looks),
+            Due::Arrive(robot, parcel) => self.arrive(robot, parcel),
+            Due::Spread(arrivals, parcel) => self.spread(arrivals, parcel),
+            Due::Teach(n, robot) => self.teach(n, robot),
+            Due::Remembered(robot, boot, revision) => {
+                if self.robots[robot].boot == boot {
+                    self.tell_mind(robot, Input::Remembered(revision));
+                }
+            }
+        }
+    }
+
+    fn at(&mut self, at: Duration, due: Due) {
+        self.queue.at(at, due);
+    }
+
+    fn note(&mut self, happening: &Happening<'_>) {
+        self.trace.write(self.now, happening);
+    }
+}

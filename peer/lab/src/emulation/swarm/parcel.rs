@@ -1,0 +1,48 @@
+//! What travels between robots, and what it costs to write it.
+
+use std::rc::Rc;
+
+use gestalt_protocol::{Decision, Envelope, InstructorId, RobotId};
+use gestalt_strategies::{Input, Instructed};
+
+/// What travels.
+#[derive(Clone)]
+pub(super) enum Parcel {
+    Said(Rc<Envelope>),
+    Held(RobotId, Rc<Decision>),
+    Announced(Rc<Decision>),
+    Instructed(Rc<Instructed>),
+    Answered(InstructorId, u64, RobotId),
+}
+
+impl Parcel {
+    /// What a mind is told when it arrives.
+    pub fn opened(self) -> Input {
+        match self {
+            Self::Said(envelope) => Input::Received((*envelope).clone()),
+            Self::Held(robot, decision) => Input::Heard(robot, (*decision).clone()),
+            Self::Announced(decision) => Input::Announced((*decision).clone()),
+            Self::Instructed(instructed) => Input::Instructed((*instructed).clone()),
+            Self::Answered(by, at, robot) => Input::Answered(by, at, robot),
+        }
+    }
+}
+
+/// What a message becomes by being written and read, and how many bytes that takes.
+pub(super) fn over_the_wire(envelope: &Envelope) -> (Rc<Envelope>, usize) {
+    let bytes = envelope.encode();
+    let read = Envelope::decode(&bytes).expect("what a mind says can be read");
+    (Rc::new(read), bytes.len())
+}
+
+/// How many bytes something takes that travels as JSON.
+pub(super) fn json_bytes(value: &impl serde::Serialize) -> usize {
+    serde_json::to_vec(value).expect("what people say holds nothing that JSON cannot").len()
+}
+
+/// The same for a decision, which travels as JSON.
+pub(super) fn as_json(decision: &Decision) -> (Rc<Decision>, usize) {
+    let json = serde_json::to_vec(decision).expect("a decision holds nothing that JSON cannot");
+    let read = gestalt_protocol::decode_json(&json).expect("what was written can be read");
+    (Rc::new(read), json.len())
+}

@@ -1,0 +1,50 @@
+//! One robot: its mind, its eyes, and what waits for it.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+use gestalt_strategies::Mind;
+use rand_chacha::ChaCha8Rng;
+
+use super::parcel::Parcel;
+use super::seed::stream;
+use crate::emulation::observer::Observer;
+use crate::emulation::pupil::Pupil;
+
+pub(super) struct Robot {
+    pub id: RobotId,
+    pub boot: u32,
+    /// None while it is dead.
+    pub mind: Option<Mind>,
+    pub observer: Box<dyn Observer>,
+    pub rng: ChaCha8Rng,
+    pub wake: Option<Duration>,
+    /// Whether it looks, and for the how-manyth time.
+    pub looking: bool,
+    pub looks: u32,
+    pub waiting: VecDeque<Parcel>,
+    /// None of a robot that does not learn.
+    pub pupil: Option<Pupil>,
+    /// Whom it believes alive, and whom it believes itself linked to.
+    pub knows: (BTreeSet<usize>, Vec<usize>),
+}
+
+impl Robot {
+    /// A robot that was never started.
+    pub fn new(id: RobotId, observer: Box<dyn Observer>, seed: u64, learns: bool) -> Self {
+        Self {
+            id,
+            boot: 0,
+            mind: None,
+            observer,
+            rng: stream(seed, 0),
+            wake: None,
+            looking: false,
+            looks: 0,
+            waiting: VecDeque::new(),
+            pupil: learns.then(Pupil::default),
+            knows: Default::default(),
+        }
+    }
+}

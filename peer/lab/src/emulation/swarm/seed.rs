@@ -1,0 +1,28 @@
+//! The streams of a seed: what depends on chance in one place does not change the chances elsewhere.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// What the network does to messages.
+pub(super) const NETWORK: u64 = u64::MAX;
+/// The course of events.
+pub(super) const COURSE: u64 = u64::MAX - 1;
+/// The first of those by which robots share and forget, one for each life of each robot.
+const LEARNING: u64 = 1 << 63;
+
+/// The generator of one stream of a seed.
+pub(super) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream);
+    rng
+}
+
+/// What a robot sees of the `n`th showing: all fusion rules are shown the same frames.
+pub(super) fn frames(n: u32, robot: usize) -> u64 {
+    u64::from(n) << 32 | robot as u64
+}
+
+/// How a robot shares and forgets in one of its lives.
+pub(super) fn learning(robot: usize, boot: u32) -> u64 {
+    LEARNING | u64::from(boot) << 32 | robot as u64
+}

@@ -1,0 +1,104 @@
+//! The folder that results go into: one experiment's, measured by one program.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::ExperimentError;
+use super::materials::Materials;
+use super::program::Program;
+use super::replace::replace;
+
+/// What `run.json` says.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct RunFile {
+    seeds: u32,
+    datasets: Materials,
+    program: Program,
+}
+
+/// Makes the folder and writes down what is run in it: the experiment as given (`experiment.json5`), seeds, datasets and
+/// program (`run.json`).
+///
+/// # Errors
+/// [`ExperimentError::Other`] and [`ExperimentError::OtherProgram`] where something else was run in it;
+/// [`ExperimentError::Read`] and [`ExperimentError::Write`].
+pub fn claim(
+    folder: &Path,
+    text: &str,
+    materials: &Materials,
+    seeds: u32,
+    program: &Program,
+) -> Result<(), ExperimentError> {
+    fs::create_dir_all(folder)
+        .map_err(|source| ExperimentError::Write { path: folder.to_owned(), source })?;
+    let (experiment, run) = (folder.join("experiment.json5"), folder.join("run.json"));
+    let other = || ExperimentError::Other(folder.to_owned());
+    if let Some(before) = read(&run)? {
+        let before: RunFile = serde_json::from_str(&before).map_err(|_| other())?;
+        if read(&experiment)?.as_deref() != Some(text) || before.datasets != *materials {
+            return Err(other());
+        }
+        if before.program != *program {
+            let (before, now) = (Box::new(before.program), Box::new(program.clone()));
+            return Err(ExperimentError::OtherProgram { folder: folder.to_owned(), before, now });
+        }
+    } else if folder.join("results.csv").exists() {
+        // Nobody knows what these were measured with.
+        return Err(other());
+    }
+    let file = RunFile { seeds, datasets: materials.clone(), program: program.clone() };
+    let json = serde_json::to_string_pretty(&file).expect("names and numbers can be written as JSON");
+    // The run last: where it is, the rest is.
+    for (path, text) in [(experiment, text), (run, &format!("{json}\n"))] {
+        replace(&path, text.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Option<String>, ExperimentError> {
+    match fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(ExperimentError::Read { path: path.to_owned(), source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn program(eyes: u32) -> Program {
+        Program { version: "1".to_owned(), eyes, minds: 0 }
+    }
+
+    #[test]
+    fn a_folder_is_one_experiments_of_one_program() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        let none = Materials::default();
+        let claim = |text, materials: &Materials, program| super::claim(&path, text, materials, 2, &program);
+        claim("{}", &none, program(1)).unwrap();
+        claim("{}", &none, program(1)).unwrap();
+        assert!(matches!(claim("{ }", &none, program(1)), Err(ExperimentError::Other(_))));
+        let dataset = Materials { dataset: Some("hands".into()), start: None };
+        assert!(matches!(claim("{}", &dataset, program(1)), Err(ExperimentError::Other(_))));
+        let refused = claim("{}", &none, program(2)).unwrap_err();
+        assert!(matches!(refused, ExperimentError::OtherProgram { .. }));
+        assert!(
+            refused.to_string().contains("eyes 00000001") && refused.to_string().contains("eyes 00000002")
+        );
+        std::fs::write(path.join("run.json"), "{").unwrap();
+        assert!(matches!(claim("{}", &none, program(1)), Err(ExperimentError::Other(_))));
+    }
+
+    #[test]
+    fn results_that_nobody_knows_the_origin_of_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("results.csv"), "my,own,table\n").unwrap();
+        let claimed = claim(folder.path(), "{}", &Materials::default(), 2, &program(1));
+        assert!(matches!(claimed, Err(ExperimentError::Other(_))));
+    }
+}

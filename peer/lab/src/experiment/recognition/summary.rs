@@ -1,0 +1,128 @@
+//! Means over seeds with their intervals: a table and figures.
+
+use std::fmt::Write;
+
+use super::outcome::Outcome;
+use super::plan::{Recognition, SwarmPlan};
+use crate::emulation::Mean;
+use crate::experiment::chart::{Figure, Line, Panel};
+
+/// A seed, and the outcome of each swarm.
+pub type Run = (u64, Vec<Outcome>);
+
+/// All that the experiment shows.
+pub struct Summary {
+    title: String,
+    shown: String,
+    rows: Vec<Row>,
+}
+
+struct Row {
+    line: String,
+    robots: usize,
+    made_of: String,
+    right: Mean,
+    wrong: Mean,
+    frames_right: Mean,
+    undecided: Mean,
+    /// Over the seeds that decided anything.
+    decided_s: Mean,
+    /// The difference to the first swarm, seed by seed.
+    gain: Mean,
+}
+
+impl Summary {
+    pub fn of(plan: &Recognition, runs: &[Run]) -> Self {
+        let row = |(n, swarm): (usize, &SwarmPlan)| {
+            let over = |measure: fn(&Outcome) -> f64| {
+                Mean::of(&runs.iter().map(|(_, outcomes)| measure(&outcomes[n])).collect::<Vec<_>>())
+            };
+            let gains: Vec<f64> =
+                runs.iter().map(|(_, outcomes)| outcomes[n].right - outcomes[0].right).collect();
+            Row {
+                line: swarm.line.clone(),
+                robots: swarm.size(),
+                made_of: swarm.describe(),
+                right: over(|o| o.right),
+                wrong: over(|o| o.wrong),
+                frames_right: over(|o| o.frames_right),
+                undecided: over(|o| o.undecided),
+                decided_s: Mean::of(&runs.iter().filter_map(|(_, o)| o[n].decided_s).collect::<Vec<_>>()),
+                gain: Mean::of(&gains),
+            }
+        };
+        let shown = format!("{} seeds of {} gestures", runs.len(), plan.showings);
+        Self { title: plan.title.clone(), shown, rows: plan.swarms.iter().enumerate().map(row).collect() }
+    }
+
+    /// The table, with a word on how to read it.
+    pub fn markdown(&self) -> String {
+        let percent = |mean: Mean| format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
+        // Who never decides takes no time over it.
+        let seconds = |mean: Mean| match mean.n {
+            0 => "–".to_owned(),
+            _ => format!("{:.2} ± {:.2}", mean.mean, mean.half_width),
+        };
+        let mut text = format!(
+            "# {}\n\n{}, drawn hands of people the classifier was not trained on. Means with 95 % intervals (Student's t), \
+             in percent; `to the first`: the difference in `right` to the first row, seed by seed.\n\n\
+             | swarm | made of | right | wrong | undecided | to the first | one frame right | decided after, s |\n|{}\n",
+            self.title,
+            self.shown,
+            "---|".repeat(8)
+        );
+        for row in &self.rows {
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {:+.1} ± {:.1} | {} | {} |",
+                row.line,
+                row.made_of,
+                percent(row.right),
+                percent(row.wrong),
+                percent(row.undecided),
+                100.0 * row.gain.mean,
+                100.0 * row.gain.half_width,
+                percent(row.frames_right),
+                seconds(row.decided_s),
+            );
+        }
+        text
+    }
+
+    /// Decisions over the number of robots, a line each.
+    pub fn figures(&self) -> Vec<(&'static str, Figure)> {
+        let mut names: Vec<&String> = Vec::new();
+        self.rows.iter().for_each(|row| {
+            if !names.contains(&&row.line) {
+                names.push(&row.line);
+            }
+        });
+        let lines = |measure: fn(&Row) -> Mean| -> Vec<Line> {
+            let points = |name: &String| {
+                let mut points: Vec<(f64, Mean)> = self
+                    .rows
+                    .iter()
+                    .filter(|row| row.line == *name)
+                    .map(|row| (row.robots as f64, measure(row)))
+                    .collect();
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                points
+            };
+            names.iter().map(|name| Line { name: (*name).clone(), points: points(name) }).collect()
+        };
+        let mut marks: Vec<f64> = self.rows.iter().map(|row| row.robots as f64).collect();
+        marks.sort_by(f64::total_cmp);
+        marks.dedup();
+        let figure = Figure {
+            title: self.title.clone(),
+            x: "robots".to_owned(),
+            marks: Some(marks),
+            logarithmic: false,
+            panels: vec![
+                Panel { y: "decided rightly, %", lines: lines(|row| row.right) },
+                Panel { y: "decided wrongly, %", lines: lines(|row| row.wrong) },
+            ],
+        };
+        vec![("robots", figure)]
+    }
+}

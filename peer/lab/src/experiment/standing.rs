@@ -1,0 +1,21 @@
+//! What is measured after each round of a run.
+
+/// How a swarm stands after a round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing {
+    /// How many rounds there were.
+    pub round: u32,
+    /// The share of held-out views that the robot which sees them judges rightly, over all robots.
+    pub single: f64,
+    /// The share of held-out moments that all robots' views together, in a logarithmic pool or by a
+    /// rule of your own, are right about.
+    pub swarm: f64,
+    /// The same by majority.
+    pub majority: f64,
+    /// Bytes of samples that a robot published so far, on average.
+    pub published: f64,
+    /// Bytes of samples that a robot put on its links so far, on average: its own, those it relays, repair.
+    pub on_links: f64,
+    /// Samples that a robot holds, on average.
+    pub samples: f64,
+}
