@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use gestalt_protocol::{Digest, Learning, RobotId};
 use gestalt_strategies::{
     Change, Classifier, FeatureSpace, Input, Learner, LearningConfig, LearningSetup, Memory, Mind,
-    TrainingChange, Vocabulary,
+    MindConfig, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -84,6 +84,22 @@ impl Prepared {
     pub fn classifier(&self) -> Option<Arc<Classifier>> {
         let same = |known: &&Arc<Classifier>| known.space().id() == self.learning.space.id();
         self.remembered.as_ref().filter(same).or(self.learning.base.as_ref()).cloned()
+    }
+}
+
+impl RobotLearning {
+    /// Whether that robot could learn like this: opens its memory as a start would, which counts as one, and closes it.
+    ///
+    /// # Errors
+    /// See [`LinkError`]: a memory that cannot be opened, is another robot's, or does not fit the model.
+    pub fn check(&self, robot: RobotId, mind: &MindConfig) -> Result<(), LinkError> {
+        let mut prepared = Prepared::open(robot, 1, self.clone())?;
+        if let Some(failure) = &prepared.failure {
+            let key = "learning.memory".to_owned();
+            return Err(LinkError::Config { key, cause: failure.to_string() });
+        }
+        Mind::new(robot, prepared.boot, mind.clone())?.learning(prepared.setup(robot))?;
+        Ok(())
     }
 }
 
