@@ -198,8 +198,8 @@ mod tests {
             evaluation.record(sample.class, &classifier.probabilities(&sample.features).unwrap());
         }
         let accuracy = evaluation.accuracy().unwrap().value;
-        println!("accuracy on {} fresh frames: {accuracy:.3}", evaluation.count());
-        assert!(accuracy > 0.5, "accuracy {accuracy:.3}: the embedded model is stale");
+        // It was .937 when the model was made.
+        assert!(accuracy > 0.9, "accuracy {accuracy:.3}: the embedded model is stale");
     }
 
     #[test]
