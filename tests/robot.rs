@@ -126,7 +126,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
 async fn serve(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let config = center_config(orders);
     let model = ModelSection::File(orders["serve"]["model"].as_str().expect("\"model\": a file").into());
-    let model = gestalt_peer::model::load(&model, |_, _| {}).expect("a model").expect("a model");
+    let model = gestalt_peer::model::load(&model).expect("a model").expect("a model");
     let boot = boot_number(SystemTime::now());
     let center = Center::start(&config, model, boot).await.expect("the centre starts");
     let id = config.robot.id.0;

@@ -45,7 +45,7 @@ fn main() {
     let folder = tempfile::tempdir().expect("a folder for the pictures");
     let pictures = pictures(folder.path());
     let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let model = RobotModel::rendered(|_, _| {}).expect("a model");
+    let model = RobotModel::rendered().expect("a model");
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().expect("a runtime");
 
     let mut most = Bound::default();

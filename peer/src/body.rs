@@ -109,7 +109,7 @@ impl Body {
 }
 
 /// How a robot with that model learns; `None` for one that does not.
-fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearning> {
+pub(crate) fn learning(section: &LearningSection, model: &RobotModel) -> Option<RobotLearning> {
     section.enabled.then(|| RobotLearning {
         config: section.samples.clone(),
         space: model.classifier.space().clone(),

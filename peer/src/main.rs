@@ -11,9 +11,9 @@ fn main() -> ExitCode {
     match command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // One line with every cause, whatever line breaks the causes have.
+            // One line with every cause, whatever line breaks the causes have, and nothing that a terminal would obey.
             let line = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-            eprintln!("gestalt: {line}");
+            eprintln!("gestalt: {}", cli::clean(&line));
             ExitCode::FAILURE
         }
     }

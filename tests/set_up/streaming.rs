@@ -30,7 +30,7 @@ impl Hands {
         let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
         // The same for all scenarios of this process.
         static MODEL: OnceLock<RobotModel> = OnceLock::new();
-        let train = || RobotModel::rendered(|_, _| {}).ok();
+        let train = || RobotModel::rendered().ok();
         let model = MODEL.get_or_init(|| train().expect("it can be trained"));
         model.write(&hands.model()).expect("the model is written");
         std::fs::create_dir(hands.images()).expect("a folder for the pictures");

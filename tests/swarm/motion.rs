@@ -22,7 +22,7 @@ const SEED: u64 = 5;
 /// A model of drawn hands, learned once for all scenarios.
 pub fn model() -> RobotModel {
     static MODEL: OnceLock<RobotModel> = OnceLock::new();
-    let learn = || RobotModel::rendered(|_, _| ()).unwrap();
+    let learn = || RobotModel::rendered().unwrap();
     MODEL.get_or_init(learn).clone()
 }
 

@@ -7,7 +7,7 @@ use std::time::SystemTime;
 
 use gestalt_protocol::{Digest, Learning, RobotId};
 use gestalt_strategies::{
-    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, OwnRules,
+    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, MindConfig, OwnRules,
     RecordChange, RobotMemory, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
@@ -145,6 +145,22 @@ impl Prepared {
     /// The classifier to start with.
     pub fn classifier(&self) -> Option<Arc<Classifier>> {
         self.learning.first_classifier(self.remembered.clone())
+    }
+}
+
+impl RobotLearning {
+    /// Whether that robot could learn like this: opens its memory as a start would, which counts as one, and closes it.
+    ///
+    /// # Errors
+    /// See [`LinkError`]: a memory that cannot be opened, is another robot's, or does not fit the model.
+    pub fn check(&self, robot: RobotId, mind: &MindConfig) -> Result<(), LinkError> {
+        let mut prepared = Prepared::open(robot, 1, self.clone())?;
+        if let Some(failure) = &prepared.failure {
+            let key = "learning.memory".to_owned();
+            return Err(LinkError::Config { key, cause: failure.to_string() });
+        }
+        Mind::new(robot, prepared.boot, mind.clone())?.learning(prepared.setup(robot))?;
+        Ok(())
     }
 }
 

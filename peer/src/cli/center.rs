@@ -1,72 +1,81 @@
-//! `gestalt center`: one machine that looks through the cameras of many robots.
+//! `gestalt center`: one machine that processes the frames of many robots.
 
+use std::pin::pin;
 use std::time::SystemTime;
 
+use gestalt_strategies::Classify;
 use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::ConfigArgs;
-use super::peer::report;
-use super::progress::bar;
-use super::show::line;
+use super::peer::{lagged, report};
+use super::robot_args::{IdentityArgs, ModelArgs};
+use super::show::{Names, line};
 use super::{Failure, interrupted};
 use crate::center::Center;
 use crate::config::Fuse;
 use gestalt_link::boot_number;
 
-/// Runs a fusion centre until Ctrl-C: it serves every robot that streams to it.
+/// Run a fusion centre until Ctrl-C: it classifies the frames that robots stream, and votes for them
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt center -c configs/fusion-center.json5
+  gestalt center --id 100 --listen tcp/[::]:7447 --model hands.gestalt --fuse swarm")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// Who decides: the centre for all robots it serves, or each of them with a mind of its own
-    #[arg(long, value_name = "central|swarm", value_parser = fuse)]
+    #[command(flatten)]
+    identity: IdentityArgs,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// Who decides: `central`, one mind in the centre for all streaming robots; `swarm`, one mind per robot (center.fuse)
+    #[arg(long, value_parser = super::choice::fuse())]
     fuse: Option<Fuse>,
 
-    /// Say what happens as one JSON object a line
+    /// Print events as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
-}
-
-fn fuse(text: &str) -> Result<Fuse, String> {
-    serde_json::from_value(json!(text)).map_err(|error| error.to_string())
 }
 
 /// Runs the verb.
 ///
 /// # Errors
-/// Whatever keeps the centre from starting.
+/// Whatever keeps the centre from starting, and what ends it before its time.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let mut config = args.config.load()?;
+    let settings = [args.identity.settings(), args.model.settings()].concat();
+    let mut config = args.config.load_with(settings)?;
     config.center.fuse = args.fuse.unwrap_or(config.center.fuse);
-    let training = bar("learning", 0);
-    let model = crate::model::load(&config.model, |done, total| {
-        training.set_length(total as u64);
-        training.set_position(done as u64);
-    })?
-    .ok_or("a centre needs a classifier: set model to \"rendered\" or {file: \"FILE\"}")?;
-    training.finish_and_clear();
+    let model = crate::model::load(&config.model)?.ok_or(
+        "a fusion centre needs a classifier: set model (--model) to \"rendered\" or {file: \"FILE\"}",
+    )?;
+    let names = Names::new(model.classifier.vocabulary());
     super::runtime()?.block_on(async {
-        let center = Center::start(&config, model, boot_number(SystemTime::now())).await?;
+        let mut interrupted = pin!(interrupted());
+        let center = tokio::select! {
+            center = Center::start(&config, model, boot_number(SystemTime::now())) => center?,
+            () = &mut interrupted => return Ok(()),
+        };
         let mut events = center.robot().events();
         let locators = center.robot().locators();
         line(
             args.json,
             &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "fuse": config.center.fuse, "locators": locators}),
-            &format!("{} of swarm '{}' serves cameras on {}", config.name(), config.swarm.0, locators.join(" ")),
+            &format!("fusion centre {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
         )?;
-        loop {
+        let ended = loop {
             tokio::select! {
-                () = interrupted() => break,
+                () = &mut interrupted => break Ok(()),
                 event = events.recv() => match event {
-                    Ok(event) => report(args.json, &event)?,
-                    Err(RecvError::Lagged(missed)) => tracing::warn!("{missed} events passed unreported"),
-                    Err(RecvError::Closed) => break,
+                    Ok(event) => report(args.json, &event, &names)?,
+                    Err(RecvError::Lagged(missed)) => lagged(missed),
+                    Err(RecvError::Closed) => break Err("the fusion centre has ended".into()),
                 },
             }
-        }
+        };
         center.stop().await;
-        Ok(())
+        ended
     })
 }

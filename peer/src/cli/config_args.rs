@@ -10,33 +10,54 @@ use gestalt_link::LinkConfig;
 /// Which configuration, and what to change in it.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ConfigArgs {
-    /// A robot's configuration: commented JSON5, see configs/
+    /// Configuration file (JSON5; `gestalt config` prints a commented template, configs/ has examples)
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
 
-    /// Change one key: a path and a JSON5 value, `rounds/deadline:"8s"` or Zenoh's `transport/link/tx/lease:500`
+    /// Override one key: `rounds.deadline:8s`, or one of Zenoh's, `transport.link.tx.lease:500` (dots or slashes; repeatable)
     #[arg(long, value_name = "KEY:VALUE")]
     pub cfg: Vec<Override>,
 
-    /// Zenoh's mode: robots are routers, so that messages cross several hops
+    /// Zenoh session mode; robots default to router, so that messages are relayed over several hops
     #[arg(short, long, value_parser = ["router", "peer", "client"])]
     pub mode: Option<String>,
 
-    /// An endpoint to connect to, `tcp/192.168.1.5:7447`; repeatable
+    /// Endpoint to connect to, `tcp/192.168.1.5:7447`; repeatable
     #[arg(short = 'e', long, value_name = "ENDPOINT")]
     pub connect: Vec<String>,
 
-    /// An endpoint to listen on, `tcp/[::]:7447`; repeatable
+    /// Endpoint to listen on, `tcp/[::]:7447`; repeatable
     #[arg(short, long, value_name = "ENDPOINT")]
     pub listen: Vec<String>,
 
-    /// Find others by --connect and --listen alone
+    /// Disable multicast discovery: use --connect and --listen only
     #[arg(long)]
     pub no_multicast_scouting: bool,
 
-    /// The swarm's name
+    /// Name of the swarm
     #[arg(long, value_name = "NAME")]
     pub swarm: Option<String>,
+}
+
+/// What another flag sets.
+#[derive(Clone, Debug)]
+pub(super) struct Setting {
+    path: &'static [&'static str],
+    value: Value,
+    /// Gives way to what the file and the other flags say.
+    yields: bool,
+}
+
+impl Setting {
+    /// A key's value, whatever the file says.
+    pub(super) fn new(path: &'static [&'static str], value: Value) -> Self {
+        Self { path, value, yields: false }
+    }
+
+    /// A key's value where neither the file nor a flag says another.
+    pub(super) fn unless_said(path: &'static [&'static str], value: Value) -> Self {
+        Self { path, value, yields: true }
+    }
 }
 
 impl ConfigArgs {
@@ -45,7 +66,15 @@ impl ConfigArgs {
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
     pub fn load(&self) -> Result<Config, ConfigError> {
-        Config::from_document(self.document()?)
+        self.load_with(Vec::new())
+    }
+
+    /// The same, with what other flags set.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the file or a flag, by key.
+    pub(super) fn load_with(&self, settings: Vec<Setting>) -> Result<Config, ConfigError> {
+        Config::from_document(self.document(settings)?)
     }
 
     /// The swarm these flags name, and how a client reaches it: at the endpoints given, or else by scouting. The
@@ -62,9 +91,9 @@ impl ConfigArgs {
     ///
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
-    pub fn streaming(&self) -> Result<(Config, LinkConfig), ConfigError> {
-        let mut config: Config = self.document()?.meaning()?;
-        // What concerns a mind is that of whoever looks for it.
+    pub(super) fn streaming(&self, settings: Vec<Setting>) -> Result<(Config, LinkConfig), ConfigError> {
+        let mut config: Config = self.document(settings)?.meaning()?;
+        // Mind and model are those of whoever processes its frames.
         config.model = ModelSection::None;
         config.learning.enabled = false;
         let source = std::mem::take(&mut config.camera.source);
@@ -74,7 +103,7 @@ impl ConfigArgs {
         Ok((config, link))
     }
 
-    fn document(&self) -> Result<Document, ConfigError> {
+    fn document(&self, settings: Vec<Setting>) -> Result<Document, ConfigError> {
         let mut document = match &self.config {
             Some(path) => Document::read(path)?,
             None => Document::default(),
@@ -98,6 +127,15 @@ impl ConfigArgs {
         if let Some(swarm) = &self.swarm {
             set(&["swarm"], json!(swarm))?;
         }
+        let (weak, strong): (Vec<Setting>, Vec<Setting>) = settings.into_iter().partition(|it| it.yields);
+        for Setting { path, value, .. } in strong {
+            document.set(path, value)?;
+        }
+        for Setting { path, value, .. } in weak {
+            if !document.says(path) {
+                document.set(path, value)?;
+            }
+        }
         Ok(document)
     }
 }
@@ -113,4 +151,61 @@ fn client_of(config: &Config) -> (String, LinkConfig) {
         link.zenoh.remove("connect");
     }
     (config.swarm.0.clone(), link)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
+    use crate::config::{CameraChoice, SourceSection};
+
+    #[derive(Parser)]
+    struct Flags {
+        #[command(flatten)]
+        config: ConfigArgs,
+        #[command(flatten)]
+        identity: IdentityArgs,
+        #[command(flatten)]
+        camera: CameraArgs,
+        #[command(flatten)]
+        model: ModelArgs,
+    }
+
+    fn load(flags: &[&str]) -> Result<Config, Box<dyn std::error::Error>> {
+        let flags = Flags::try_parse_from(["gestalt"].iter().chain(flags))?;
+        let Flags { config, identity, camera, model } = flags;
+        let settings = [identity.settings(), camera.settings()?, model.settings()].concat();
+        Ok(config.load_with(settings)?)
+    }
+
+    #[test]
+    fn a_robot_is_described_by_flags_alone() {
+        let config = load(&["--id", "3", "--name", "window", "--source", "/dev/video0"]).unwrap();
+        assert_eq!((config.robot.id.0, config.name()), (3, "window".to_owned()));
+        assert!(matches!(config.camera.source, SourceSection::Device(_)));
+        assert!(matches!(config.camera.model, CameraChoice::Laptop));
+        assert_eq!(config.model, ModelSection::Rendered);
+    }
+
+    #[test]
+    fn flags_outdo_the_file_and_defaults_give_way_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("robot.json5");
+        std::fs::write(&file, "{robot: {id: 7}, model: {file: 'hands.gestalt'}, camera: {model: 'parrot'}}")
+            .unwrap();
+        let file = file.to_str().unwrap();
+        let config = load(&["-c", file, "--source", "/dev/video0", "--id", "8"]).unwrap();
+        assert_eq!(config.robot.id.0, 8);
+        assert_eq!(config.model, ModelSection::File("hands.gestalt".into()));
+        assert!(matches!(config.camera.model, CameraChoice::Parrot));
+        let config = load(&["-c", file, "--model", "none", "--camera", "footbot"]).unwrap();
+        assert_eq!(config.model, ModelSection::None);
+        assert!(matches!(config.camera.model, CameraChoice::Footbot));
+        let error = load(&["--source", "rendered:3"]).unwrap_err().to_string();
+        assert!(error.contains("fingers"), "{error}");
+        let error = load(&["--camera", "kite"]).unwrap_err().to_string();
+        assert!(error.contains("parrot"), "{error}");
+    }
 }

@@ -15,28 +15,31 @@ use gestalt_lab::experiment::recognition::{self, Recognition};
 #[cfg(feature = "opencv")]
 use gestalt_lab::experiment::{self, Experiment, Materials, Progress};
 
-/// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares; or an
-/// experiment: how well swarms learn, over settings and seeds, with tables and plots.
+/// Run a scenario in an emulated network, over several seeds, under each fusion rule that it compares; or an experiment:
+/// how well swarms learn or recognise, over settings and seeds, with tables and plots
 #[derive(Clone, Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt emulate configs/emulation/fusion.json5 --seeds 20
+  gestalt emulate configs/experiments/rounds.json5 --out out/rounds")]
 pub struct Args {
-    /// A scenario (see configs/emulation/) or an experiment (see configs/experiments/), commented JSON5
+    /// Scenario (configs/emulation/) or experiment (configs/experiments/), JSON5
     scenario: PathBuf,
-    /// Where an experiment's results go; a second call continues what is there
+    /// Output folder of an experiment; running it again resumes it
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Pictures that an experiment's robots see, one folder per gesture; rendered hands if not given
+    /// Images the robots of an experiment see, one folder per gesture [default: synthetic hands]
     #[arg(long, value_name = "DIR", requires = "out")]
     dataset: Option<PathBuf>,
-    /// Pictures to train the model on that an experiment's robots may start from; rendered hands if not given
+    /// Images to train the initial model on [default: synthetic hands]
     #[arg(long, value_name = "DIR", requires = "out")]
     start_dataset: Option<PathBuf>,
-    /// How many seeds, counted from 0; the file's own number if not given
+    /// Number of seeds, from 0 [default: as in the file]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
-    /// One JSON object per fusion rule on stdout, in place of the table
+    /// Print JSON Lines instead of the table, one object per fusion rule
     #[arg(long)]
     json: bool,
-    /// Write all that happens with seed 0 to this file, one JSON object a line
+    /// Write a trace of seed 0 to this file (JSON Lines)
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
 }
@@ -56,10 +59,10 @@ pub enum EmulateError {
         source: io::Error,
     },
     /// A scenario where an experiment is wanted.
-    #[error("{} is no experiment (it has neither an axis nor swarms): leave out --out, or see configs/experiments/", .0.display())]
+    #[error("{} is a scenario, not an experiment (it has neither `axis` nor `swarms`): leave out --out, or see configs/experiments/", .0.display())]
     NoExperiment(PathBuf),
     /// An experiment without a place for its results.
-    #[error("{} is an experiment: say with --out DIR where its results go", .0.display())]
+    #[error("{} is an experiment: give --out DIR for its results", .0.display())]
     NoOut(PathBuf),
     /// The trace cannot be written.
     #[error("cannot write the trace {path}: {source}")]
@@ -83,7 +86,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     #[cfg(not(feature = "opencv"))]
     if args.out.is_some() {
         return Err(
-            "this gestalt was built without OpenCV, and experiments look at hands: build it with".into()
+            "this gestalt was built without OpenCV, which experiments need to look at hands: build it with the feature 'opencv'"
+                .into()
         );
     }
     #[cfg(feature = "opencv")]
@@ -121,7 +125,7 @@ fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
     let path = &args.scenario;
     let text =
         std::fs::read_to_string(path).map_err(|source| EmulateError::Read { path: path.clone(), source })?;
-    let (looking, running) = (progress::bar("looking", 0), progress::bar("runs", 0));
+    let (looking, running) = (progress::bar("features", 0), progress::bar("runs", 0));
     let report = |progress| {
         let (bar, done, total) = match progress {
             Progress::Looked(done, total) => (&looking, done, total),

@@ -13,22 +13,25 @@ use gestalt_vision::dataset::{Dataset, LabelledImage};
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 
-/// Measures a model on a folder of photographs. Images and people that it was trained on are left out.
+/// Evaluate a model on labelled images. Images and subjects it was trained on are left out
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt evaluate --dataset hands --model hands.gestalt
+  gestalt evaluate --dataset others --model hands.gestalt --plot confusion.png")]
 pub struct Args {
-    /// The folder of photographs: one folder per gesture
+    /// Dataset folder, with one subfolder per gesture
     #[arg(long, value_name = "DIR")]
     dataset: PathBuf,
-    /// The model file, as `gestalt train` wrote it
+    /// Model file written by `gestalt train`
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Draw the confusion matrix into this SVG file
-    #[arg(long, value_name = "FILE.svg")]
+    /// Plot the confusion matrix (SVG or PNG, by the file extension)
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
     plot: Option<PathBuf>,
-    /// Measure also on what the model was trained on: says how well it remembers, not how well it judges
+    /// Include the training images too (training accuracy, not generalisation)
     #[arg(long)]
     include_training: bool,
-    /// Report as one JSON object on stdout
+    /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
 }
@@ -54,8 +57,8 @@ pub fn run(args: Args) -> Result<(), Failure> {
     let left_out = all - images.len();
     if images.is_empty() {
         return Err(format!(
-            "the model was trained on all people in {}: hold some out (gestalt train --test-share 0.3), or say \
-             --include-training to measure how well it remembers",
+            "the model was trained on all subjects in {}: hold some out (gestalt train --test-share 0.3), or use \
+             --include-training to measure its training accuracy",
             args.dataset.display()
         )
         .into());
@@ -77,12 +80,12 @@ pub fn run(args: Args) -> Result<(), Failure> {
         say(&format!("{report}\n"))
     } else {
         let mut text =
-            format!("{} images of {} people, {}\n", images.len(), people.len(), args.dataset.display());
+            format!("{} images of {} subjects, {}\n", images.len(), people.len(), args.dataset.display());
         if left_out > 0 {
-            text += &format!("  left out          {left_out} images of people the model was trained on\n");
+            text += &format!("  left out          {left_out} images of training subjects\n");
         }
         if args.include_training {
-            text += "  warning           may include what the model was trained on\n";
+            text += "  warning           training images may be included\n";
         }
         say(&(text + &report::text(&evaluation, &survey, vocabulary)))
     }

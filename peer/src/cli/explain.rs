@@ -5,14 +5,17 @@ use std::path::PathBuf;
 use super::{Failure, say};
 use gestalt_lab::explain::{self, Subject};
 
-/// Draw what each rule picks among the same points of the plane, as the rules themselves pick it
+/// Draw which samples each rule picks among the same points of the plane
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt explain selection --out selection.svg
+  gestalt explain forgetting --out forgetting.png")]
 pub struct Args {
-    /// Which rules
+    /// Rules to explain
     #[arg(value_enum)]
     subject: Rules,
-    /// The drawing
-    #[arg(long, value_name = "FILE.svg")]
+    /// Picture to write (SVG or PNG, by the file extension)
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
     out: PathBuf,
 }
 

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "opencv")]
 mod center;
+#[cfg(feature = "opencv")]
+mod choice;
 mod config;
 mod config_args;
 mod emulate;
@@ -10,14 +12,18 @@ mod evaluate;
 mod explain;
 #[cfg(feature = "opencv")]
 mod look;
-mod open;
+mod manual;
 #[cfg(feature = "opencv")]
 mod peer;
 mod progress;
 #[cfg(feature = "opencv")]
 mod report;
+#[cfg(feature = "opencv")]
+mod robot_args;
 mod robots;
 mod show;
+#[cfg(feature = "opencv")]
+mod source_arg;
 #[cfg(feature = "opencv")]
 mod stream;
 #[cfg(feature = "opencv")]
@@ -36,9 +42,14 @@ use tracing_subscriber::EnvFilter;
 
 use gestalt_link::{Announcement, Client, News};
 
+pub use show::clean;
+
 /// A swarm of robots that reads hand gestures together.
 #[derive(Debug, Parser)]
 #[command(name = "gestalt", version, propagate_version = true)]
+#[command(after_help = "Examples:
+  gestalt swarm --robots footbot:3,parrot:1 --rounds 3
+  gestalt peer -c configs/footbot.json5")]
 pub struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -46,45 +57,47 @@ pub struct Command {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    #[cfg(feature = "opencv")]
     /// Run one robot
-    Peer(peer::Args),
-    /// Stream a robot's camera to a fusion centre
     #[cfg(feature = "opencv")]
-    Stream(stream::Args),
-    /// Run a fusion centre, which looks through the cameras of robots that stream
+    Peer(Box<peer::Args>),
+    /// Stream a camera to a fusion centre
     #[cfg(feature = "opencv")]
-    Center(center::Args),
+    Stream(Box<stream::Args>),
+    /// Run a fusion centre: classify the frames that robots stream, and vote for them
     #[cfg(feature = "opencv")]
-    /// Run a whole swarm on this machine, show it gestures, and keep the score
+    Center(Box<center::Args>),
+    /// Run a whole swarm on this machine, show it gestures, and report its accuracy
+    #[cfg(feature = "opencv")]
     Swarm(swarm::Args),
-    /// Watch decisions and robots of a running swarm, live
+    /// Watch the decisions and robots of a running swarm, live
     Watch(watch::Args),
-    /// Tell a running swarm to look: open a round
-    Open(open::Args),
-    /// Teach a running swarm: open rounds, and say what the gesture was
+    /// Teach a running swarm: open rounds and give feedback on its decisions
     Teach(teach::Args),
-    /// Learn a classifier from a folder of pictures
+    /// Train a classifier on a folder of labelled images
     #[cfg(feature = "opencv")]
     Train(train::Args),
-    /// Measure a classifier on a folder of pictures
+    /// Evaluate a classifier on a folder of labelled images
     #[cfg(feature = "opencv")]
     Evaluate(evaluate::Args),
     /// Show what perception makes of one frame, stage by stage
     #[cfg(feature = "opencv")]
     Look(look::Args),
-    /// Run a scenario in the emulated network, over several seeds, under each fusion rule that it compares
+    /// Run a scenario or an experiment in an emulated network, over several seeds
     Emulate(emulate::Args),
-    /// Draw what each rule of selection or forgetting picks
+    /// Draw which samples each selection or forgetting rule picks
     Explain(explain::Args),
-    /// Check a robot's configuration
+    /// Print a commented configuration, or check one
     Config(config::Args),
+    /// Print shell completions
+    Completions(manual::CompletionsArgs),
+    /// Write man pages to a folder
+    Man(manual::ManArgs),
 }
 
 /// How long robots may take to answer a client's question.
 const ANSWER: Duration = Duration::from_secs(2);
 
-/// Why a verb failed, in one line: cause and mend.
+/// Why a verb failed, in one line: the cause, and how to fix it.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 impl Command {
@@ -103,7 +116,6 @@ impl Command {
             #[cfg(feature = "opencv")]
             Verb::Swarm(args) => swarm::run(&args),
             Verb::Watch(args) => watch::run(&args),
-            Verb::Open(args) => open::run(&args),
             Verb::Teach(args) => teach::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Train(args) => train::run(args),
@@ -114,6 +126,8 @@ impl Command {
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
             Verb::Config(args) => config::run(&args),
+            Verb::Completions(args) => manual::completions(&args),
+            Verb::Man(args) => manual::man(&args),
         }
     }
 }
@@ -121,8 +135,9 @@ impl Command {
 /// Sends log lines to stderr; `RUST_LOG` chooses which. When it is silent: our own warnings, and Zenoh's errors; what
 /// else concerns the user is said in Gestalt's own words.
 pub fn start_log() {
-    let filter =
-        EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("error,gestalt_peer=warn"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
+        EnvFilter::new("error,gestalt_peer=warn,gestalt_link=warn,gestalt_vision=warn,gestalt_lab=warn")
+    });
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
 }
 
@@ -132,27 +147,86 @@ fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 }
 
 /// Has a round opened in the name of an instructor, and waits for the decision of one after `before`; `None` when there
-/// is none within `patience`.
+/// is none within `timeout`.
 async fn open_round(
     client: &Client,
     news: &mut News,
     instructor: &InstructorId,
     before: Option<u32>,
-    patience: Duration,
+    timeout: Duration,
 ) -> Result<Option<Announcement>, Failure> {
     client.instruct(instructor, &Instruction::Open).await?;
-    match tokio::time::timeout(patience, news.decision_after(before)).await {
+    next_decision(news, before, timeout).await
+}
+
+/// Waits for the decision of a round after `before`; `None` when there is none within `timeout`.
+async fn next_decision(
+    news: &mut News,
+    before: Option<u32>,
+    timeout: Duration,
+) -> Result<Option<Announcement>, Failure> {
+    match tokio::time::timeout(timeout, news.decision_after(before)).await {
         Ok(Some(decided)) => Ok(Some(decided)),
-        Ok(None) => Err("the session has ended".into()),
+        Ok(None) => Err("the Zenoh session was closed".into()),
         Err(_) => Ok(None),
     }
 }
 
-/// Ctrl-C; where signals cannot be had, never.
+/// Waits for Ctrl-C or SIGTERM, as service managers and containers send it; where signals cannot be had, for ever. To be
+/// made once and kept: what comes while nobody listens is lost. A second one ends the program at once.
 async fn interrupted() {
-    if let Err(error) = tokio::signal::ctrl_c().await {
-        tracing::warn!("cannot listen for Ctrl-C: {error}");
-        std::future::pending::<()>().await;
+    match signals() {
+        Ok(mut signals) => {
+            signals.next().await;
+            tokio::spawn(async move {
+                signals.next().await;
+                std::process::exit(130);
+            });
+        }
+        Err(error) => {
+            tracing::warn!("cannot listen for Ctrl-C: {error}");
+            std::future::pending::<()>().await;
+        }
+    }
+}
+
+/// What asks the program to end.
+#[cfg(unix)]
+struct Signals {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
+}
+
+#[cfg(unix)]
+fn signals() -> io::Result<Signals> {
+    use tokio::signal::unix::{SignalKind, signal};
+    Ok(Signals { interrupt: signal(SignalKind::interrupt())?, terminate: signal(SignalKind::terminate())? })
+}
+
+#[cfg(unix)]
+impl Signals {
+    async fn next(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+    }
+}
+
+#[cfg(not(unix))]
+struct Signals;
+
+#[cfg(not(unix))]
+fn signals() -> io::Result<Signals> {
+    Ok(Signals)
+}
+
+#[cfg(not(unix))]
+impl Signals {
+    async fn next(&mut self) {
+        if tokio::signal::ctrl_c().await.is_err() {
+            std::future::pending::<()>().await;
+        }
     }
 }
 
@@ -170,7 +244,54 @@ fn say(report: &str) -> Result<(), Failure> {
 fn duration(text: &str) -> Result<Duration, String> {
     match text.parse::<humantime_serde::re::humantime::Duration>() {
         Ok(duration) if !duration.is_zero() => Ok(duration.into()),
-        Ok(_) => Err("must be longer than 0".to_owned()),
+        Ok(_) => Err("must be greater than 0".to_owned()),
         Err(error) => Err(format!("{error}; write a number with a unit, like 500ms or 2s")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    /// The words of a line as a shell takes them apart; enough for examples.
+    fn words(line: &str) -> Vec<String> {
+        let parts = line.split('\'').enumerate();
+        let quoted = parts.flat_map(|(i, part)| match i % 2 {
+            1 => vec![part.to_owned()],
+            _ => part.split_whitespace().map(str::to_owned).collect(),
+        });
+        quoted.collect()
+    }
+
+    #[test]
+    fn every_verb_ends_its_help_with_two_examples_that_can_be_run() {
+        let command = Command::command();
+        command.clone().debug_assert();
+        for verb in command.get_subcommands() {
+            let name = verb.get_name();
+            let help = verb.get_after_help().unwrap_or_else(|| panic!("{name} has no examples")).to_string();
+            let examples: Vec<&str> = help.lines().skip(1).map(str::trim).collect();
+            assert!(help.starts_with("Examples:\n") && examples.len() == 2, "{name}: {help}");
+            for example in examples {
+                let given = example.split(['|', '>']).next().unwrap();
+                assert!(given.starts_with(&format!("gestalt {name}")), "{name}: {example}");
+                if let Err(error) = Command::try_parse_from(words(given)) {
+                    panic!("{example}: {error}");
+                }
+            }
+        }
+    }
+
+    #[cfg(feature = "opencv")]
+    #[test]
+    fn what_flags_choose_from_is_listed() {
+        let mut command = Command::command();
+        for (verb, choices) in [("swarm", "confidence_weighted"), ("swarm", "nothing"), ("center", "central")]
+        {
+            let help = command.find_subcommand_mut(verb).unwrap().render_long_help().to_string();
+            assert!(help.contains("possible values") && help.contains(choices), "{help}");
+        }
     }
 }

@@ -1,70 +1,103 @@
 //! `gestalt peer`: one robot.
 
+use std::pin::pin;
 use std::time::{Duration, SystemTime};
 
+use gestalt_strategies::Classify;
 use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::ConfigArgs;
-use super::progress::bar;
-use super::show::{self, line};
+use super::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
+use super::show::{self, Names, line};
 use super::{Failure, interrupted};
 use crate::body::Body;
+use crate::config::Config;
 use gestalt_link::Event;
 use gestalt_link::boot_number;
 
-/// Runs one robot until Ctrl-C.
+/// Run one robot until Ctrl-C
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt peer -c configs/footbot.json5
+  gestalt peer --id 3 --camera laptop --source /dev/video0 --model hands.gestalt --motion")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// Open a round this often: `5s`
+    #[command(flatten)]
+    identity: IdentityArgs,
+
+    #[command(flatten)]
+    camera: CameraArgs,
+
+    /// Open rounds automatically when a hand has moved and is at rest (camera.motion.enabled)
+    #[arg(long)]
+    motion: bool,
+
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// Open a round at this interval, such as `5s`
     #[arg(long, value_name = "DURATION", value_parser = super::duration)]
     open_every: Option<Duration>,
 
-    /// Say what happens as one JSON object a line
+    /// Print events as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    fn config(&self) -> Result<Config, Failure> {
+        let mut settings = self.identity.settings();
+        settings.extend(self.camera.settings()?);
+        settings.extend(self.model.settings());
+        if self.motion {
+            settings.push(super::config_args::Setting::new(&["camera", "motion", "enabled"], json!(true)));
+        }
+        Ok(self.config.load_with(settings)?)
+    }
 }
 
 /// Runs the verb.
 ///
 /// # Errors
-/// Whatever keeps the robot from starting.
+/// Whatever keeps the robot from starting, and what ends it before its time.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let config = args.config.load()?;
-    let training = bar("learning", 0);
-    let model = crate::model::load(&config.model, |done, total| {
-        training.set_length(total as u64);
-        training.set_position(done as u64);
-    })?;
-    training.finish_and_clear();
+    let config = args.config()?;
+    let model = crate::model::load(&config.model)?;
+    let names = model.as_ref().map(|model| Names::new(model.classifier.vocabulary())).unwrap_or_default();
     super::runtime()?.block_on(async {
-        let body = Body::start(&config, model, boot_number(SystemTime::now())).await?;
+        let mut interrupted = pin!(interrupted());
+        let body = tokio::select! {
+            body = Body::start(&config, model, boot_number(SystemTime::now())) => body?,
+            () = &mut interrupted => return Ok(()),
+        };
         let mut events = body.robot().events();
+        let locators = body.robot().locators();
         line(
             args.json,
-            &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "locators": body.robot().locators()}),
-            &format!("{} of swarm '{}' listens on {}", config.name(), config.swarm.0, body.robot().locators().join(" ")),
+            &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "locators": locators}),
+            &format!("robot {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
         )?;
         let mut schedule = args.open_every.map(tokio::time::interval);
         if let Some(schedule) = &mut schedule {
             schedule.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         }
-        loop {
+        let ended = loop {
             tokio::select! {
-                () = interrupted() => break,
+                () = &mut interrupted => break Ok(()),
                 () = tick(&mut schedule) => body.robot().open_round(),
                 event = events.recv() => match event {
-                    Ok(event) => report(args.json, &event)?,
-                    Err(RecvError::Lagged(missed)) => tracing::warn!("{missed} events passed unreported"),
-                    Err(RecvError::Closed) => break,
+                    Ok(event) => report(args.json, &event, &names)?,
+                    Err(RecvError::Lagged(missed)) => lagged(missed),
+                    Err(RecvError::Closed) => break Err("the robot has ended".into()),
                 },
+                failure = body.robot().ended() => break Err(failure.to_string().into()),
             }
-        }
+        };
         body.stop().await;
-        Ok(())
+        ended
     })
 }
 
@@ -77,55 +110,57 @@ async fn tick(schedule: &mut Option<tokio::time::Interval>) {
     }
 }
 
-pub(super) fn report(as_json: bool, event: &Event) -> Result<(), Failure> {
-    match event {
-        Event::Opened(round) => {
-            line(as_json, &json!({"event": "opened", "round": round}), &format!("round {round} opens"))
-        }
+pub(super) fn lagged(missed: u64) {
+    tracing::warn!("{missed} events were not printed: the output is too slow");
+}
+
+/// Prints what happened to a robot.
+pub(super) fn report(as_json: bool, event: &Event, names: &Names) -> Result<(), Failure> {
+    let (object, words) = match event {
+        Event::Opened(round) => (
+            json!({"event": "opened", "round": round}),
+            format!("round {} opened by robot {}", round.counter, round.opener),
+        ),
         Event::Closed(round) => {
-            line(as_json, &json!({"event": "closed", "round": round}), &format!("round {round} is over"))
+            (json!({"event": "closed", "round": round}), format!("round {} closed", round.counter))
         }
-        Event::Held(decision) => line(
-            as_json,
-            &json!({"event": "held", "decision": decision}),
-            &format!("holds {}", show::decision(decision, None)),
+        Event::Held(decision) => (
+            json!({"event": "held", "decision": decision}),
+            format!("holds: {}", show::decision(decision, None, names)),
         ),
-        Event::Announced(announcement) => line(
-            as_json,
-            &json!({"event": "announced", "decision": announcement}),
-            &format!("swarm: {}", show::decision(&announcement.decision, announcement.label.as_deref())),
+        Event::Announced(announcement) => (
+            json!({"event": "announced", "decision": announcement}),
+            format!("decided: {}", show::announced(announcement, names)),
         ),
-        Event::Neighbours(robots) => line(
-            as_json,
-            &json!({"event": "neighbours", "robots": robots}),
-            &format!("linked to {}", show::robots(robots)),
+        Event::Neighbours(robots) => (
+            json!({"event": "neighbours", "robots": robots}),
+            match robots.len() {
+                0 => "linked to no robot".to_owned(),
+                1 => format!("linked to robot {}", show::robots(robots)),
+                _ => format!("linked to robots {}", show::robots(robots)),
+            },
         ),
-        Event::Alive(robots) => line(
-            as_json,
-            &json!({"event": "alive", "robots": robots}),
-            &format!("alive: {}", show::robots(robots)),
+        Event::Alive(robots) => {
+            (json!({"event": "alive", "robots": robots}), format!("robots alive: {}", show::robots(robots)))
+        }
+        Event::Shared(samples) => (
+            json!({"event": "shared", "samples": samples}),
+            format!("shared {}", show::counted(samples.len(), "sample")),
         ),
-        Event::Shared(samples) => line(
-            as_json,
-            &json!({"event": "shared", "samples": samples}),
-            &format!("shares {} samples", samples.len()),
+        Event::Answered(instructor, answer) => (
+            json!({"event": "answered", "instructor": instructor, "answer": answer}),
+            format!("answered instructor {instructor}: {}", answer.outcome.describe()),
         ),
-        Event::Answered(instructor, answer) => line(
-            as_json,
-            &json!({"event": "answered", "instructor": instructor, "answer": answer}),
-            &format!("answers {instructor}: {}", answer.outcome.describe()),
+        Event::Remembered(revision) => (
+            json!({"event": "remembered", "revision": revision}),
+            format!("memory saved (revision {revision})"),
         ),
-        Event::Remembered(revision) => line(
-            as_json,
-            &json!({"event": "remembered", "revision": revision}),
-            &format!("remembers revision {revision}"),
-        ),
-        Event::Failed { part, cause } => line(
-            as_json,
-            &json!({"event": "failed", "part": part.name(), "cause": cause}),
-            &format!("{part} failed: {cause}"),
+        Event::Failed { part, cause } => (
+            json!({"event": "failed", "part": part.name(), "cause": cause}),
+            format!("{part} failed: {}", show::clean(cause)),
         ),
         // What a later release may have to tell.
-        _ => Ok(()),
-    }
+        _ => return Ok(()),
+    };
+    line(as_json, &object, &words)
 }

@@ -18,7 +18,7 @@ pub fn text(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -
     let mut text = format!("  accuracy          {}\n", proportion(evaluation.accuracy()));
     if !survey.without_hand.is_empty() {
         text += &format!(
-            "  of all images     {}   no hand found in {}\n",
+            "  incl. no hand     {}   no hand found in {} images\n",
             proportion(of_all(evaluation, survey)),
             survey.without_hand.len()
         );
@@ -63,17 +63,17 @@ pub fn rejected(survey: &Survey) {
             eprintln!("warning: {}: {cause}", image.path.display());
         }
         if rejected.len() > 3 {
-            eprintln!("warning: {} images {what} in all", rejected.len());
+            eprintln!("warning: {} images in total {what}", rejected.len());
         }
     };
-    tell("cannot be read", &survey.unreadable);
-    tell("show no hand", &survey.without_hand);
+    tell("could not be read", &survey.unreadable);
+    tell("with no hand found", &survey.without_hand);
 }
 
 /// Says on stderr which folders were left out.
 pub fn ignored(folders: &[String]) {
     if !folders.is_empty() {
-        eprintln!("note: left out the folders {}", folders.join(", "));
+        eprintln!("note: ignored folders: {}", folders.join(", "));
     }
 }
 

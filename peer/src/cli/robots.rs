@@ -1,10 +1,11 @@
 //! Robots at a glance: one aligned line each.
 
+use super::show::{clean, quoted};
 use gestalt_protocol::{Camera, CameraState, MotionState, Status};
 
 /// What the columns of [`table`] are.
 pub(super) const HEADER: [&str; 9] =
-    ["robot", "name", "camera", "state", "size", "fps", "delay", "motion", "opinion"];
+    ["robot", "name", "source", "state", "size", "fps", "latency", "motion", "opinion"];
 
 /// A line for each robot, under the [`HEADER`] if that is asked for: what it sees with, and what it makes of it.
 pub(super) fn table(statuses: &[Status], header: bool) -> Vec<String> {
@@ -26,16 +27,16 @@ fn row(status: &Status) -> [String; 9] {
     let delivers = *fps > 0.0;
     [
         status.robot.to_string(),
-        status.name.clone(),
-        source.clone(),
+        clean(&status.name),
+        clean(source),
         state_word(*state).to_owned(),
         if *width == 0 { none() } else { format!("{width}×{height}") },
         if delivers { format!("{fps:.1}") } else { none() },
         if delivers { format!("{delay_ms:.0} ms") } else { none() },
         motion.as_ref().map_or_else(none, |motion| {
-            format!("{} (±{:.0} ms)", motion_word(motion.state), motion.delay_ms)
+            format!("{} (detected ≤ {:.0} ms late)", motion_word(motion.state), motion.delay_ms)
         }),
-        opinion.as_ref().map_or_else(none, |it| format!("{} {:.2}", it.gesture, it.probability)),
+        opinion.as_ref().map_or_else(none, |it| format!("{} p = {:.2}", quoted(&it.gesture), it.probability)),
     ]
 }
 
@@ -81,13 +82,13 @@ mod tests {
             ..Camera::default()
         };
         let blind = Camera { source: "none".to_owned(), ..Camera::default() };
-        let lines = table(&[status(7, "parrot-7", sees), status(100, "centre", blind)], true);
+        let lines = table(&[status(7, "parrot-7", sees), status(100, "ce\u{1b}", blind)], true);
         assert_eq!(
             lines,
             [
-                "robot  name      camera  state  size     fps   delay  motion           opinion",
-                "7      parrot-7  stream  live   640×360  30.0  12 ms  still (±300 ms)  three 0.88",
-                "100    centre    none    -      -        -     -      -                -",
+                "robot  name      source  state  size     fps   latency  motion                          opinion",
+                "7      parrot-7  stream  live   640×360  30.0  12 ms    still (detected ≤ 300 ms late)  \"three\" p = 0.88",
+                "100    ce\\u{1b}  none    -      -        -     -        -                               -",
             ]
         );
     }

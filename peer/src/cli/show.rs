@@ -1,53 +1,215 @@
 //! Decisions and robots in words, and results as lines on stdout.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use gestalt_protocol::{ClassId, Decision, FusionRule, RobotId};
+use gestalt_link::Announcement;
+use gestalt_protocol::{Certificate, ClassId, Decision, FusionRule, RobotId, RoundId, Status};
+use gestalt_strategies::Vocabulary;
 use serde_json::Value;
 
 use super::Failure;
 
 /// Prints one result on a line of its own: as a JSON object, or in words.
 pub(super) fn line(as_json: bool, object: &Value, words: &str) -> Result<(), Failure> {
-    super::say(&if as_json { format!("{object}\n") } else { format!("{words}\n") })
+    super::say(&if as_json { format!("{object}\n") } else { format!("{}\n", plain(words)) })
 }
 
-/// A decision with its certificate in short: `round 3@1: three .998 (8 robots in 812 ms, log pool: 1→3 2→2 …)`.
-pub(super) fn decision(decision: &Decision, label: Option<&str>) -> String {
+/// What others said, made fit for a terminal: whatever would move its cursor, change its colours or turn its writing is
+/// written out, and so is the end of a line.
+pub fn clean(said: &str) -> String {
+    escape(said, |_| false)
+}
+
+/// The same of our own words, which may have several lines.
+pub(super) fn plain(words: &str) -> String {
+    escape(words, |c| c == '\n')
+}
+
+fn escape(text: &str, kept: impl Fn(char) -> bool) -> String {
+    let turns =
+        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        if (c.is_control() || turns(c)) && !kept(c) {
+            escaped.extend(c.escape_default());
+        } else {
+            escaped.push(c);
+        }
+    }
+    escaped
+}
+
+/// The names of the gestures, by the vocabulary that a decision is made in.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names(Vec<Vocabulary>);
+
+impl Names {
+    /// Those of one vocabulary.
+    pub(super) fn new(vocabulary: &Vocabulary) -> Self {
+        Self(vec![vocabulary.clone()])
+    }
+
+    /// Those that the robots of a swarm report.
+    pub(super) fn reported(statuses: &[Status]) -> Self {
+        // A robot without a classifier reports none, which is not a vocabulary.
+        let labels: BTreeSet<&[String]> =
+            statuses.iter().map(|status| status.vocabulary.as_slice()).collect();
+        Self(labels.into_iter().filter_map(|labels| Vocabulary::new(labels.iter().cloned()).ok()).collect())
+    }
+
+    /// Whether they suffice for a decision.
+    pub(super) fn cover(&self, decision: &Decision) -> bool {
+        self.of(&decision.certificate).is_some()
+    }
+
+    fn of(&self, certificate: &Certificate) -> Option<&Vocabulary> {
+        self.0.iter().find(|vocabulary| vocabulary.id() == certificate.vocabulary)
+    }
+
+    /// A gesture in words: `"three"`, or `class 3` where there is no name for it.
+    pub(super) fn gesture(&self, class: ClassId, certificate: &Certificate) -> String {
+        let label = self.of(certificate).and_then(|vocabulary| vocabulary.label(class));
+        label.map_or_else(|| format!("class {class}"), quoted)
+    }
+}
+
+/// A label, so that it cannot be taken for a number of something.
+pub(super) fn quoted(label: &str) -> String {
+    format!("\"{}\"", clean(label))
+}
+
+/// A decision with its certificate in short: `round 18 (opened by robot 1) → "2", p = 1.000 · 8 votes in 252 ms, log-pool · by
+/// robot 1:"1" 2:"2" 3:"2"`.
+pub(super) fn decision(decision: &Decision, label: Option<&str>, names: &Names) -> String {
     let Decision { round, class, confidence, certificate, .. } = decision;
     let what = match (class, label) {
-        (Some(_), Some(label)) => label.to_owned(),
-        (Some(class), None) => format!("class {class}"),
-        (None, _) => "no decision".to_owned(),
+        (Some(_), Some(label)) => format!("{}, p = {confidence:.3}", quoted(label)),
+        (Some(class), None) => format!("{}, p = {confidence:.3}", names.gesture(*class, certificate)),
+        (None, _) => "undecided".to_owned(),
     };
-    let rule = match &certificate.rule {
-        FusionRule::Majority => "majority",
-        FusionRule::MeanProbability => "mean of probabilities",
-        FusionRule::LogPool => "log pool",
-        FusionRule::ConfidenceWeighted => "confidence-weighted pool",
-        FusionRule::Other(name) => name.as_str(),
-    };
+    let votes = &certificate.votes;
     let mut words = format!(
-        "round {round}: {what} {confidence:.3} ({} robots in {} ms, {rule}:",
-        certificate.votes.len(),
-        certificate.elapsed_ms
+        "{} → {what} · {} in {} ms, {}",
+        opened(*round),
+        counted(votes.len(), "vote"),
+        certificate.elapsed_ms,
+        rule(certificate.rule)
     );
     // The first votes show how it came about; a large swarm's would fill the screen.
     const SHOWN: usize = 12;
-    for vote in certificate.votes.iter().take(SHOWN) {
-        let ClassId(class) = vote.class;
+    for (i, vote) in votes.iter().take(SHOWN).enumerate() {
+        let voted = match label {
+            Some(label) if Some(vote.class) == *class => quoted(label),
+            _ => names.gesture(vote.class, certificate),
+        };
         // Writing to a string cannot fail.
-        let _ = write!(words, " {}→{class}", vote.robot);
+        let _ = write!(words, "{}{}:{voted}", if i == 0 { " · by robot " } else { " " }, vote.robot);
     }
-    if certificate.votes.len() > SHOWN {
+    if votes.len() > SHOWN {
         words.push_str(" …");
     }
-    words.push(')');
     words
 }
 
-/// `1 2 3`, or `nobody`.
+/// The same of a decision as it was announced.
+pub(super) fn announced(announcement: &Announcement, names: &Names) -> String {
+    decision(&announcement.decision, announcement.label.as_deref(), names)
+}
+
+/// `round 18 (opened by robot 1)`.
+pub(super) fn opened(RoundId { counter, opener }: RoundId) -> String {
+    format!("round {counter} (opened by robot {opener})")
+}
+
+/// `1 vote`, `8 votes`.
+pub(super) fn counted(number: usize, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+/// A fusion rule's name, as in a configuration, but for the underscores.
+fn rule(rule: FusionRule) -> String {
+    clean(&rule.name().replace('_', "-"))
+}
+
+/// `1 2 3`, or `none`.
 pub(super) fn robots<'a>(robots: impl IntoIterator<Item = &'a RobotId>) -> String {
     let ids: Vec<String> = robots.into_iter().map(ToString::to_string).collect();
-    if ids.is_empty() { "nobody".to_owned() } else { ids.join(" ") }
+    if ids.is_empty() { "none".to_owned() } else { ids.join(" ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{CountedVote, Stamp, VocabularyId};
+
+    use super::*;
+
+    fn of(class: Option<u8>, votes: &[(u32, u8)], vocabulary: VocabularyId) -> Decision {
+        let vote = |&(robot, class): &(u32, u8)| CountedVote {
+            robot: RobotId(robot),
+            stamp: Stamp { boot: 1, sequence: 1 },
+            class: ClassId(class),
+            weight: 1.0,
+        };
+        Decision {
+            round: RoundId { counter: 18, opener: RobotId(1) },
+            class: class.map(ClassId),
+            confidence: 0.9996,
+            author: RobotId(2),
+            certificate: Certificate {
+                vocabulary,
+                rule: FusionRule::LogPool,
+                probabilities: Vec::new(),
+                votes: votes.iter().map(vote).collect(),
+                elapsed_ms: 252,
+            },
+        }
+    }
+
+    #[test]
+    fn a_decision_says_what_each_number_is() {
+        let gestures = Vocabulary::new(["fist", "1", "palm"]).unwrap();
+        let made = of(Some(2), &[(1, 1), (2, 2), (3, 2)], gestures.id());
+        assert_eq!(
+            decision(&made, Some("palm"), &Names::new(&gestures)),
+            "round 18 (opened by robot 1) → \"palm\", p = 1.000 · 3 votes in 252 ms, log-pool · by robot 1:\"1\" \
+             2:\"palm\" 3:\"palm\""
+        );
+        // Without their names gestures have numbers, except the one that came with its label.
+        assert_eq!(
+            decision(&made, Some("palm"), &Names::default()),
+            "round 18 (opened by robot 1) → \"palm\", p = 1.000 · 3 votes in 252 ms, log-pool · by robot 1:class 1 \
+             2:\"palm\" 3:\"palm\""
+        );
+        assert_eq!(
+            decision(&of(None, &[(7, 0)], gestures.id()), None, &Names::new(&gestures)),
+            "round 18 (opened by robot 1) → undecided · 1 vote in 252 ms, log-pool · by robot 7:\"fist\""
+        );
+        assert!(
+            decision(&of(None, &[], gestures.id()), None, &Names::default())
+                .ends_with("0 votes in 252 ms, log-pool")
+        );
+    }
+
+    #[test]
+    fn the_names_are_those_of_the_decisions_vocabulary() {
+        let (mine, other) = (Vocabulary::new(["a", "b"]).unwrap(), Vocabulary::new(["c", "d"]).unwrap());
+        let status =
+            Status { vocabulary: mine.labels().to_vec(), ..Status::new(RobotId(1), String::new(), 1) };
+        let names = Names::reported(&[status, Status::new(RobotId(2), String::new(), 1)]);
+        assert!(names.cover(&of(None, &[], mine.id())) && !names.cover(&of(None, &[], other.id())));
+        assert!(decision(&of(Some(0), &[], other.id()), None, &names).contains("→ class 0,"));
+    }
+
+    #[test]
+    fn what_others_say_cannot_touch_the_terminal() {
+        let gestures = Vocabulary::new(["x", "y"]).unwrap();
+        let made = of(Some(0), &[(1, 0)], gestures.id());
+        let evil = "\x1b[2J\r\n\u{9b}31m\u{202e}fist";
+        let words = plain(&decision(&made, Some(evil), &Names::default()));
+        assert!(words.contains("\\u{1b}[2J\\r\\n\\u{9b}31m\\u{202e}fist"), "{words}");
+        assert!(!words.chars().any(char::is_control));
+        assert_eq!(plain("two\nlines\x07 · ± „ж“"), "two\nlines\\u{7} · ± „ж“");
+        assert_eq!(clean("a\nb"), "a\\nb");
+    }
 }

@@ -1,25 +1,36 @@
-//! `gestalt stream`: a camera whose pictures are looked at elsewhere.
+//! `gestalt stream`: a camera whose frames are processed elsewhere.
 
+use std::pin::pin;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde_json::json;
 
 use super::config_args::ConfigArgs;
-use super::show::{self, line};
+use super::robot_args::{CameraArgs, IdentityArgs};
+use super::show::{self, Names, line};
 use super::{Failure, interrupted};
 use crate::stream::{Feed, Sender, SenderConfig, StreamEvent};
 
-/// Sends what a robot's camera sees to a fusion centre, and prints what the swarm decides, until Ctrl-C or the camera's end.
+/// Stream a camera to a fusion centre and print the swarm's decisions, until Ctrl-C or the end of the source
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt stream -c configs/parrot.json5 -e tcp/192.168.1.5:7447
+  gestalt stream --id 7 --source /dev/video0 -e tcp/192.168.1.5:7447 --quality 70")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// The quality of the JPEG pictures; files that are JPEG already are sent as they are
+    #[command(flatten)]
+    identity: IdentityArgs,
+
+    #[command(flatten)]
+    camera: CameraArgs,
+
+    /// JPEG quality, 1 to 100; files that are JPEG already are sent unchanged
     #[arg(long, default_value_t = 80, value_name = "1..100", value_parser = clap::value_parser!(i32).range(1..=100))]
     quality: i32,
 
-    /// Say what happens as one JSON object a line
+    /// Print events as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
 }
@@ -27,17 +38,19 @@ pub struct Args {
 /// Runs the verb.
 ///
 /// # Errors
-/// Whatever keeps the camera from opening, and what no waiting mends.
+/// Whatever keeps the camera from opening, and what no waiting changes.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let (config, link) = args.config.streaming()?;
+    let (config, link) =
+        args.config.streaming([args.identity.settings(), args.camera.settings()?].concat())?;
     let (swarm, robot) = (config.swarm.0.clone(), config.robot.id);
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let feed = Feed::open(&config.camera, robot, clock)?.ok_or(
-        "there is no camera to stream from: set camera.source to rendered, images, video or a device",
+        "no camera source to stream: set camera.source (--source) to rendered, images, video or device",
     )?;
     let source = feed.describe();
     let camera = config.camera.model.properties().name;
     super::runtime()?.block_on(async {
+        let mut interrupted = pin!(interrupted());
         let sender = Sender::start(
             SenderConfig { swarm: swarm.clone(), link, robot, camera, quality: args.quality },
             feed,
@@ -45,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         line(
             args.json,
             &json!({"event": "started", "robot": robot, "name": config.name(), "source": source}),
-            &format!("{} of swarm '{swarm}' streams {source}", config.name()),
+            &format!("robot {robot} \"{}\" of swarm \"{swarm}\" is streaming {source}", config.name()),
         )?;
         let mut failed = None;
         let sending = sender.run(|event| {
@@ -54,7 +67,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         });
         tokio::select! {
-            () = interrupted() => {}
+            () = &mut interrupted => {}
             ended = sending => ended?,
         }
         failed.map_or(Ok(()), Err)
@@ -64,18 +77,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn report(as_json: bool, event: &StreamEvent) -> Result<(), Failure> {
     match event {
         StreamEvent::Attached => line(as_json, &json!({"event": "attached"}), "attached"),
-        StreamEvent::Detached { cause } => line(
-            as_json,
-            &json!({"event": "detached", "cause": cause}),
-            &format!("attached to nobody: {cause}"),
-        ),
+        StreamEvent::Detached { cause } => {
+            line(as_json, &json!({"event": "detached", "cause": cause}), &format!("detached: {cause}"))
+        }
         StreamEvent::Failed { cause } => {
             line(as_json, &json!({"event": "failed", "cause": cause}), &format!("failed: {cause}"))
         }
         StreamEvent::Decided(announced) => line(
             as_json,
             &json!({"event": "announced", "decision": announced}),
-            &show::decision(&announced.decision, announced.label.as_deref()),
+            &show::announced(announced, &Names::default()),
         ),
         // For programs; a person would drown in it.
         StreamEvent::Count { sent, taken, overwritten } if as_json => line(

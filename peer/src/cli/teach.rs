@@ -1,6 +1,7 @@
-//! `gestalt teach`: a human at a keyboard teaches a running swarm.
+//! `gestalt teach`: a person at a keyboard teaches a running swarm.
 
 use std::io::BufRead;
+use std::pin::pin;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId, RoundId};
@@ -8,35 +9,39 @@ use serde_json::json;
 use tokio::sync::mpsc;
 
 use super::config_args::ConfigArgs;
-use super::show::{self, line};
+use super::show::{self, Names, line};
 use super::{Failure, interrupted};
 use gestalt_link::{Client, News};
 
-/// Teaches a swarm what its last gesture was.
+/// Give a swarm feedback on its decisions
 ///
-/// With a word, says it and ends. Without, reads words from the keyboard, one a line, until `quit`.
+/// With a command, sends it and exits. Without one, reads commands from the keyboard, one per line, until `quit`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt teach open -e tcp/192.168.1.5:7447
+  gestalt teach was three --round 5@2")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// `open`: look now. `was GESTURE`: it was that one. `right`, `wrong`: about the decision. `undo`: I said nothing
-    #[arg(value_name = "WORD")]
+    /// `open`: start a round. `was GESTURE`: it was that gesture. `right`, `wrong`: the decision was. `undo`: withdraw my
+    /// last feedback
+    #[arg(value_name = "COMMAND")]
     words: Vec<String>,
 
-    /// The round it is about, as `5@2`; the last decided one if left out
+    /// Round the feedback is about, such as `5@2` (counter@opener) [default: the last one decided]
     #[arg(long)]
     round: Option<RoundId>,
 
-    /// The name to speak under
+    /// Instructor name
     #[arg(long, default_value = "console")]
     instructor: InstructorId,
 
     /// How long to wait for a decision or an answer
-    #[arg(long, default_value = "15s", value_parser = super::duration)]
-    patience: Duration,
+    #[arg(long, alias = "patience", default_value = "15s", value_name = "DURATION", value_parser = super::duration)]
+    timeout: Duration,
 
-    /// Print decisions and answers as one JSON object a line
+    /// Print decisions and answers as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
 }
@@ -65,9 +70,9 @@ impl Word {
             ["class", number] => number
                 .parse()
                 .map(|class| Self::Was(Gesture::Class(ClassId(class))))
-                .map_err(|_| format!("'{number}' is no class: write its number, like 'class 3'")),
+                .map_err(|_| format!("'{number}' is not a class number: write, for example, 'class 3'")),
             other => Err(format!(
-                "'{}' means nothing here: say 'open', 'was GESTURE', 'class NUMBER', 'right', 'wrong', 'undo' or 'quit'",
+                "unknown command '{}': use open, was GESTURE, class NUMBER, right, wrong, undo or quit",
                 other.join(" ")
             )),
         }
@@ -96,7 +101,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let client = Client::open(&swarm, &link).await?;
         let news = client.news().await?;
         let last = client.last_decision(super::ANSWER).await?.map(|last| last.decision.round);
-        let mut lesson = Lesson { args, client, news, last: args.round.or(last) };
+        let mut lesson = Lesson { args, client, news, last: args.round.or(last), names: Names::default() };
         let said = match word {
             Some(word) => lesson.say(word).await,
             None => lesson.converse().await,
@@ -112,6 +117,7 @@ struct Lesson<'a> {
     news: News,
     /// The round that words are about.
     last: Option<RoundId>,
+    names: Names,
 }
 
 impl Lesson<'_> {
@@ -126,9 +132,10 @@ impl Lesson<'_> {
                 }
             }
         });
+        let mut interrupted = pin!(interrupted());
         loop {
             let typed = tokio::select! {
-                () = interrupted() => return Ok(()),
+                () = &mut interrupted => return Ok(()),
                 typed = keyboard.recv() => match typed {
                     Some(typed) => typed,
                     None => return Ok(()),
@@ -144,7 +151,7 @@ impl Lesson<'_> {
                 Err(error) => Err(error.into()),
             };
             if let Err(error) = said {
-                eprintln!("{error}");
+                eprintln!("{}", show::clean(&error.to_string()));
             }
         }
     }
@@ -153,30 +160,40 @@ impl Lesson<'_> {
         if word == Word::Open {
             return self.open().await;
         }
-        let round =
-            self.last.ok_or("no round was decided yet: say 'open' first, or name one with --round")?;
+        let round = self
+            .last
+            .ok_or("no round has been decided yet: open one with 'open', or name one with --round")?;
         let Some(instruction) = word.about(round) else { return Ok(()) };
-        let patience = self.args.patience;
-        let answer = self.client.teach(&self.args.instructor, &instruction, patience).await?;
-        let answer = answer.ok_or_else(|| format!("no answer within {patience:?}: is a robot alive?"))?;
+        let timeout = self.args.timeout;
+        let answer = self.client.teach(&self.args.instructor, &instruction, timeout).await?;
+        let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
         let samples = match (&instruction, answer.samples) {
-            (Instruction::Retract { .. }, 0) => "what was seen in it counts for nothing now".to_owned(),
-            (_, samples) => format!("robot {} learns from {samples} samples of it", answer.robot),
+            (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
+            (_, samples) => format!(
+                "robot {} learns from {} of this round",
+                answer.robot,
+                show::counted(samples as usize, "sample")
+            ),
         };
-        let words = format!("round {round}: {}; {samples}", answer.outcome.describe());
+        let words = format!("round {}: {}; {samples}", round.counter, answer.outcome.describe());
         line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)
     }
 
     async fn open(&mut self) -> Result<(), Failure> {
         let before = self.news.newest().max(self.last.map(|round| round.counter));
-        let (instructor, patience) = (&self.args.instructor, self.args.patience);
-        let decided = super::open_round(&self.client, &mut self.news, instructor, before, patience).await?;
-        let decided = decided.ok_or_else(|| format!("no decision within {patience:?}: is a robot alive?"))?;
+        let (instructor, timeout) = (&self.args.instructor, self.args.timeout);
+        let decided = super::open_round(&self.client, &mut self.news, instructor, before, timeout).await?;
+        let decided = decided.ok_or_else(|| {
+            format!("no decision within {timeout:?}: is a robot running? (gestalt watch --status)")
+        })?;
         self.last = Some(decided.decision.round);
+        if !self.args.json && !self.names.cover(&decided.decision) {
+            self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
+        }
         line(
             self.args.json,
             &json!({"event": "decision", "decision": decided}),
-            &show::decision(&decided.decision, decided.label.as_deref()),
+            &show::announced(&decided, &self.names),
         )
     }
 }

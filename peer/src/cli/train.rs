@@ -1,65 +1,75 @@
-//! `gestalt train`: from a folder of photographs to a model.
+//! `gestalt train`: from a folder of labelled images to a model.
+
+mod outcome;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ArgGroup;
-use gestalt_strategies::{
-    Classify, Components, Evaluation, Folding, Reduction, ScalingMethod, TrainOptions, Trained, train,
-};
+use gestalt_strategies::{Classify, Components, Evaluation, ScalingMethod, TrainOptions, Trained, train};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::json;
 
+use self::outcome::Outcome;
+use super::show::line;
 use super::{Failure, progress, report, say};
 use gestalt_vision::dataset::{Dataset, LabelledImage};
+use gestalt_vision::model::train_on_rendered;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::survey::Survey;
 
-/// Trains a classifier on a folder of photographs: one folder per gesture, the images in it. File names `sNNN_…` tell
-/// who shows the gesture; then cross-validation and --test-share keep people apart.
+/// Train a classifier on labelled images: one folder per gesture. File names `sNNN_…` identify the subject, so that
+/// cross-validation and --test-share never put one subject on both sides
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt train --dataset hands --out hands.gestalt
+  gestalt train --dataset hands --classes fist,palm,1-3 --test-share 0.3 --out hands.gestalt")]
 #[command(group = ArgGroup::new("reduction").args(["components", "variance"]))]
 pub struct Args {
-    /// The folder of photographs
-    #[arg(long, value_name = "DIR")]
-    dataset: PathBuf,
-    /// The model file to write
+    /// Dataset folder, with one subfolder per gesture
+    #[arg(long, value_name = "DIR", required_unless_present = "rendered")]
+    dataset: Option<PathBuf>,
+    /// Make the embedded model again, from synthetic hands: gestures 0 to 5, always the same
+    #[arg(long, conflicts_with_all = ["dataset", "features", "classes", "components", "variance", "costs", "gammas", "folds", "test_share", "split_seed", "seed"])]
+    rendered: bool,
+    /// Model file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// What to look at: `hog` (gradients of the hand's picture) or `shape` (110 measures of its outline)
+    /// Feature set: `hog` (histogram of oriented gradients) or `shape` (110 shape descriptors)
     #[arg(long, default_value = "hog", value_name = "SET")]
     features: FeatureSet,
-    /// The gestures to learn, in this order: `fist,palm` or `0-5`; all folders if not given
+    /// Gestures, in this order: `fist,palm` or `0-5` [default: all folders]
     #[arg(long, value_name = "LIST")]
     classes: Option<Labels>,
-    /// How many principal components to keep [default: 60]
+    /// Number of principal components to keep [default: 60]
     #[arg(long, value_name = "N")]
     components: Option<usize>,
-    /// Keep as many principal components as carry this part of the variance, such as 0.95
-    #[arg(long, value_name = "PART")]
+    /// Keep enough principal components for this share of the variance, such as 0.95
+    #[arg(long, value_name = "SHARE")]
     variance: Option<f64>,
-    /// The values of C to try
+    /// Values of C for the grid search
     #[arg(long, value_delimiter = ',', default_value = "1,4,16", value_name = "LIST")]
     costs: Vec<f64>,
-    /// The values of gamma to try, in units of 1 / (total variance of the reduced features)
+    /// Values of gamma for the grid search, in units of 1 / (total variance of the reduced features)
     #[arg(long, value_delimiter = ',', default_value = "0.125,0.25,0.5,1", value_name = "LIST")]
     gammas: Vec<f64>,
-    /// Parts of the cross-validation that chooses C and gamma and calibrates the probabilities
+    /// Number of cross-validation folds (choice of C and gamma, calibration of probabilities)
     #[arg(long, default_value_t = 5, value_name = "N")]
     folds: usize,
-    /// Hold out this share of the people: not trained on, but measured on at the end (and by `gestalt evaluate`)
+    /// Hold out this share of the subjects as a test set (never trained on; reported at the end and used by `gestalt
+    /// evaluate`)
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     test_share: f64,
-    /// Which people are held out
+    /// Random seed of the held-out split
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     split_seed: u64,
-    /// For everything else that is left to chance
+    /// Random seed of the training
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
-    /// Report as one JSON object on stdout
+    /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
 }
@@ -79,8 +89,8 @@ impl std::str::FromStr for Labels {
                 .and_then(|(from, to)| Some((from.parse::<u16>().ok()?, to.parse::<u16>().ok()?)));
             match range {
                 Some((from, to)) if from <= to => labels.extend((from..=to).map(|n| n.to_string())),
-                Some(_) => return Err(format!("the range {part} runs backwards")),
-                None if part.is_empty() => return Err("a gesture without a name".to_owned()),
+                Some(_) => return Err(format!("{part}: the range is reversed")),
+                None if part.is_empty() => return Err("empty gesture name".to_owned()),
                 None => labels.push(part.to_owned()),
             }
         }
@@ -110,17 +120,18 @@ impl Args {
 /// Trains, writes the model, reports.
 ///
 /// # Errors
-/// When the dataset, the options or the place of the model are no good; each says what and why.
+/// When the dataset, the options or the place of the model cannot be used; each says what and why.
 pub fn run(args: Args) -> Result<(), Failure> {
+    let Some(folder) = args.dataset.as_deref() else { return remake(&args) };
     if !(0.0..1.0).contains(&args.test_share) {
-        return Err(format!("--test-share {} is not within 0 and 1", args.test_share).into());
+        return Err(format!("--test-share is {}: choose a value between 0 and 1", args.test_share).into());
     }
     Model::check_writable(&args.out)?;
-    let dataset = Dataset::list(&args.dataset, args.classes.as_ref().map(|labels| labels.0.as_slice()))?;
+    let dataset = Dataset::list(folder, args.classes.as_ref().map(|labels| labels.0.as_slice()))?;
     let held_out = dataset.draw_people(args.test_share, &mut ChaCha8Rng::seed_from_u64(args.split_seed));
     if args.test_share > 0.0 && held_out.is_empty() {
         return Err(
-            "--test-share holds out people, but the file names tell of fewer than two (sNNN_…)".into()
+            "--test-share holds out subjects, but the file names (sNNN_…) identify fewer than two".into()
         );
     }
     let mut perception = Perception::new(args.features, HandConfig::default())?;
@@ -146,22 +157,43 @@ pub fn run(args: Args) -> Result<(), Failure> {
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
 
-    let origin = origin(&args, &survey, &trained)?;
+    let origin = origin(&args, folder, &survey, &trained)?;
     let model = Model { classifier: trained.classifier.clone(), origin };
     model.write(&args.out)?;
 
     let test = (!tested.is_empty()).then(|| measure(&tested, &model, &mut perception)).transpose()?;
     report::ignored(&dataset.ignored);
-    if args.json {
-        let summary = summary(&args, &model, &trained, &survey, seconds, test.as_ref(), &dataset.ignored);
-        say(&format!("{summary}\n"))
-    } else {
-        say(&text(&args, &model, &trained, &survey, seconds, test.as_ref()))
-    }
+    let outcome = Outcome {
+        folder,
+        out: &args.out,
+        model: &model,
+        trained: &trained,
+        folds: args.folds,
+        survey: &survey,
+        seconds,
+        test: test.as_ref(),
+        ignored: &dataset.ignored,
+    };
+    say(&if args.json { format!("{}\n", outcome.json()) } else { outcome.text() })
+}
+
+/// Makes the model that is embedded in the program: what `peer/vision/models/rendered.gestalt` holds.
+fn remake(args: &Args) -> Result<(), Failure> {
+    Model::check_writable(&args.out)?;
+    let bar = progress::bar("features", 0);
+    let model = train_on_rendered(|done, total| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    model.write(&args.out)?;
+    let (made_of, vectors) = (&model.origin.dataset, model.classifier.support_vectors());
+    let words = format!("{made_of}; {vectors} support vectors → {}", args.out.display());
+    line(args.json, &json!({"model": args.out, "dataset": made_of, "support_vectors": vectors}), &words)
 }
 
 fn look(images: &[LabelledImage], perception: &mut Perception) -> Survey {
-    let bar = progress::bar("looking", images.len());
+    let bar = progress::bar("features", images.len());
     let survey = Survey::of(images, perception, || bar.inc(1));
     bar.finish_and_clear();
     survey
@@ -181,10 +213,10 @@ pub(super) fn measure(
     Ok((evaluation, survey))
 }
 
-fn origin(args: &Args, survey: &Survey, trained: &Trained) -> Result<Origin, Failure> {
+fn origin(args: &Args, folder: &Path, survey: &Survey, trained: &Trained) -> Result<Origin, Failure> {
     let people: BTreeSet<u32> = survey.seen.iter().filter_map(|(image, _)| image.person).collect();
     let images: Result<BTreeSet<u64>, _> = survey.seen.iter().map(|(image, _)| image.fingerprint()).collect();
-    let name = args.dataset.canonicalize()?;
+    let name = folder.canonicalize()?;
     Ok(Origin {
         dataset: name.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
         people: people.into_iter().collect(),
@@ -193,94 +225,6 @@ fn origin(args: &Args, survey: &Survey, trained: &Trained) -> Result<Origin, Fai
         cost: trained.cost,
         gamma: trained.gamma,
     })
-}
-
-fn text(
-    args: &Args,
-    model: &Model,
-    trained: &Trained,
-    survey: &Survey,
-    seconds: f64,
-    test: Option<&(Evaluation, Survey)>,
-) -> String {
-    let classifier = &model.classifier;
-    let people = model.origin.people.len();
-    let folding = match trained.folding {
-        Folding::ByGroup => "by person",
-        Folding::BySample => "by image: the same people are on both sides",
-    };
-    let mut lines = vec![
-        format!("{} images of {people} people, {}", survey.seen.len(), args.dataset.display()),
-        format!("  gestures   {}", classifier.vocabulary().labels().join(" ")),
-        format!(
-            "  features   {} → {} principal components, {:.1} % of the variance",
-            classifier.space().feature_set(),
-            classifier.space().components(),
-            100.0 * explained(classifier)
-        ),
-        format!(
-            "  machine    C = {}, γ = {}, {} support vectors",
-            trained.cost,
-            trained.gamma,
-            classifier.support_vectors()
-        ),
-        format!(
-            "  held out   accuracy {:.3} in {}-fold cross-validation {folding}",
-            trained.accuracy, args.folds
-        ),
-        format!("  trained in {seconds:.1} s → {}", args.out.display()),
-    ];
-    if let Some((evaluation, survey)) = test {
-        lines.push(format!("\n{} images of people held out:", evaluation.count()));
-        lines.push(report::text(evaluation, survey, classifier.vocabulary()));
-    }
-    lines.join("\n") + "\n"
-}
-
-fn summary(
-    args: &Args,
-    model: &Model,
-    trained: &Trained,
-    survey: &Survey,
-    seconds: f64,
-    test: Option<&(Evaluation, Survey)>,
-    ignored: &[String],
-) -> serde_json::Value {
-    let classifier = &model.classifier;
-    let path = |path: &Path| path.display().to_string();
-    json!({
-        "model": path(&args.out),
-        "dataset": path(&args.dataset),
-        "gestures": classifier.vocabulary().labels(),
-        "ignored": ignored,
-        "feature_set": classifier.space().feature_set(),
-        "space": classifier.space().id().to_string(),
-        "components": classifier.space().components(),
-        "variance": explained(classifier),
-        "cost": trained.cost,
-        "gamma": trained.gamma,
-        "support_vectors": classifier.support_vectors(),
-        "images": survey.seen.len(),
-        "without_hand": survey.without_hand.len(),
-        "unreadable": survey.unreadable.len(),
-        "people": model.origin.people.len(),
-        "cross_validation": {
-            "folds": args.folds,
-            "by_person": trained.folding == Folding::ByGroup,
-            "accuracy": trained.accuracy,
-            "log_loss": trained.log_loss,
-        },
-        "seconds": seconds,
-        "test": test.map(|(evaluation, survey)| report::json(evaluation, survey, classifier.vocabulary())),
-    })
-}
-
-/// Part of the variance that the classifier's space keeps, `0.0..=1.0`.
-fn explained(classifier: &gestalt_strategies::Classifier) -> f64 {
-    match classifier.space().reduction() {
-        Reduction::Pca(pca) => pca.explained(),
-        Reduction::Selected { width, kept } => kept.len() as f64 / *width as f64,
-    }
 }
 
 #[cfg(test)]

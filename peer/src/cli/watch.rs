@@ -8,29 +8,32 @@ use tokio::time::MissedTickBehavior;
 
 use super::config_args::ConfigArgs;
 use super::robots::table;
-use super::show::{self, line};
+use super::show::{self, Names, clean, line};
 use super::{Failure, interrupted};
 use gestalt_link::{Client, Heard, News};
 
-/// Attaches to a swarm and prints its decisions, and robots as they come and go, until Ctrl-C.
+/// Attach to a swarm and print its decisions, and robots joining and leaving, until Ctrl-C
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt watch -e tcp/192.168.1.5:7447
+  gestalt watch --robots")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// Stop after so many decisions
+    /// Stop after this many decisions
     #[arg(long, value_name = "N")]
     count: Option<u64>,
 
-    /// Print each robot's status once, and stop
+    /// Print the status of each robot once and exit
     #[arg(long)]
     status: bool,
 
-    /// Show all robots, anew every second: camera, frames a second, delay, motion, opinion
+    /// Show a table of all robots, refreshed every second: source, frames per second, latency, motion, opinion
     #[arg(long, conflicts_with_all = ["status", "count"])]
     robots: bool,
 
-    /// Print one JSON object a line
+    /// Print JSON Lines, one object per line
     #[arg(long)]
     json: bool,
 }
@@ -54,7 +57,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let mut news = client.news().await?;
             tokio::select! {
                 () = interrupted() => {}
-                watched = watch(args, &mut news) => watched?,
+                watched = watch(args, &client, &mut news) => watched?,
             }
         }
         client.close().await;
@@ -62,12 +65,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-async fn watch(args: &Args, news: &mut News) -> Result<(), Failure> {
+async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Failure> {
+    let mut names = Names::default();
     let mut decisions = 0;
     while let Some(heard) = news.next().await {
         match heard {
             Heard::Decided(it) => {
-                let words = show::decision(&it.decision, it.label.as_deref());
+                if !args.json && !names.cover(&it.decision) {
+                    names = Names::reported(&client.statuses(super::ANSWER).await?);
+                }
+                let words = show::announced(&it, &names);
                 line(args.json, &json!({"event": "decision", "decision": it}), &words)?;
                 decisions += 1;
                 if args.count.is_some_and(|count| decisions >= count) {
@@ -75,7 +82,7 @@ async fn watch(args: &Args, news: &mut News) -> Result<(), Failure> {
                 }
             }
             Heard::Came(robot) => {
-                line(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} came"))?;
+                line(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} joined"))?;
             }
             Heard::Left(robot) => {
                 line(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
@@ -110,30 +117,30 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
     let statuses = client.statuses(super::ANSWER).await?;
     for (status, camera) in statuses.iter().zip(table(&statuses, false)) {
         let state = match (status.round, status.open) {
-            (Some(round), true) => format!("round {round} open"),
-            (Some(round), false) => format!("round {round} over"),
+            (Some(round), true) => format!("round {} open", round.counter),
+            (Some(round), false) => format!("round {} closed", round.counter),
             (None, _) => "no round yet".to_owned(),
         };
         let mut words = format!(
-            "{camera}  model {}, {state}, linked to {}, {} alive",
-            status.model,
+            "{camera}  model: {}, {state}, linked to {}, {} alive",
+            clean(&status.model),
             show::robots(&status.neighbours),
             status.alive.len()
         );
         if let Some(learning) = &status.learning {
             let total = |classes: &[usize]| classes.iter().sum::<usize>();
             words.push_str(&format!(
-                ", holds {} personal, {} shared, {} external samples of {} at most (common knowledge {}, memory {})",
+                ", samples: {} personal, {} shared, {} external, at most {} (common knowledge {}; memory: {})",
                 total(&learning.personal),
                 total(&learning.shared),
                 total(&learning.external),
                 learning.capacity,
                 learning.common,
-                learning.memory
+                clean(&learning.memory)
             ));
         }
         if let Some(error) = status.errors.last() {
-            words.push_str(&format!(", last error: {}", error.what));
+            words.push_str(&format!(", last error: {}", clean(&error.what)));
         }
         line(as_json, &serde_json::to_value(status)?, &words)?;
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{CameraChoice, ConfigError};
 
-/// A fusion centre: it looks through the cameras of robots without a computer.
+/// A fusion centre: it processes the frames of robots without a computer.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CenterSection {
@@ -16,7 +16,7 @@ pub struct CenterSection {
     pub fuse: Fuse,
     /// The most robots served at a time. Range `1..=256`.
     pub max_robots: usize,
-    /// How many threads look at frames; `null`: one per core. Range `1..=64`.
+    /// Perception threads; `null`: one per core. Range `1..=64`.
     pub workers: Option<usize>,
     /// A robot silent for this long counts as frozen.
     #[serde(with = "humantime_serde")]
@@ -43,7 +43,7 @@ pub enum Fuse {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StreamingSection {
-    /// Its name for people; `null`: its camera's and its id.
+    /// Its display name; `null`: its camera's and its id.
     pub name: Option<String>,
     /// Its camera; `null`: what it says itself, or else the centre's `camera.model`.
     pub camera: Option<CameraChoice>,
@@ -63,25 +63,26 @@ impl Default for CenterSection {
 }
 
 impl CenterSection {
-    pub(super) fn validate(&self) -> Result<(), ConfigError> {
+    /// Each value outside its range.
+    pub(super) fn check(&self) -> Vec<ConfigError> {
+        let mut found = Vec::new();
         if !(1..=256).contains(&self.max_robots) {
-            let cause = format!("{} is outside 1..=256: 64 suit most machines", self.max_robots);
-            return Err(ConfigError::value("center.max_robots", cause));
+            let cause = format!("{} is outside 1..=256: 64 suits most machines", self.max_robots);
+            found.push(ConfigError::value("center.max_robots", cause));
         }
         if let Some(workers) = self.workers.filter(|workers| !(1..=64).contains(workers)) {
-            let cause = format!("{workers} is outside 1..=64: null takes one per core");
-            return Err(ConfigError::value("center.workers", cause));
+            let cause = format!("{workers} is outside 1..=64: null means one per core");
+            found.push(ConfigError::value("center.workers", cause));
         }
         let day = Duration::from_secs(24 * 60 * 60);
         if self.frozen_after.is_zero() || self.gone_after < self.frozen_after || self.gone_after > day {
             let cause = "must be at least center.frozen_after, which must be above 0, and at most a day";
-            return Err(ConfigError::value("center.gone_after", cause));
+            found.push(ConfigError::value("center.gone_after", cause));
         }
-        for (robot, about) in &self.robots {
-            if let Some(camera) = &about.camera {
-                camera.validate(&format!("center.robots.{robot}.camera"))?;
-            }
-        }
-        Ok(())
+        let cameras = self.robots.iter().filter_map(|(robot, about)| {
+            about.camera.as_ref()?.check(&format!("center.robots.{robot}.camera")).err()
+        });
+        found.extend(cameras);
+        found
     }
 }

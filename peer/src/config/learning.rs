@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use gestalt_strategies::LearningConfig;
 use serde::{Deserialize, Serialize};
 
-/// Learning from what a human says.
+/// Learning from instructor feedback.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearningSection {
@@ -13,7 +13,7 @@ pub struct LearningSection {
     pub enabled: bool,
     /// What it starts from.
     pub from: LearnFrom,
-    /// The file it keeps its memory in; none: it forgets all when it stops.
+    /// The file it keeps its memory in; none: nothing is kept across restarts.
     pub memory: Option<PathBuf>,
     /// What its random choices follow from, together with its id and the number of its start.
     pub seed: u64,
@@ -28,6 +28,6 @@ pub enum LearnFrom {
     /// The model's classifier: it votes from the first round on, and learns on.
     #[default]
     Model,
-    /// Nothing: of the model it takes the feature space and the list of gestures, and no gesture is known.
+    /// Nothing: of the model it takes the feature space and the vocabulary, and no gesture is known.
     Nothing,
 }

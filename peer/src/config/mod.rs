@@ -1,69 +1,36 @@
 //! What a robot is told before it starts: one commented JSON5 file.
 
+mod camera;
 mod center;
+#[cfg(feature = "opencv")]
+pub mod check;
 mod document;
+mod error;
 mod learning;
+mod links;
+mod template;
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::str::FromStr;
 
 use gestalt_protocol::{Keys, RobotId};
 use gestalt_strategies::MindConfig;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use thiserror::Error;
 
 use gestalt_link::{LinkConfig, LinkError, Scouting};
-use gestalt_vision::camera_model::CameraModel;
-use gestalt_vision::pose::Pose;
 
+pub use camera::{
+    CameraChoice, CameraSection, DeviceSection, FilesSection, RenderedSection, SourceSection, StreamSection,
+};
 pub use center::{CenterSection, Fuse, StreamingSection};
 pub use document::{Document, Override};
+pub use error::ConfigError;
 pub use gestalt_vision::config::{LayerConfig, MotionConfig, MotionConfigError, Schedule};
 pub use learning::{LearnFrom, LearningSection};
-
-/// A configuration that cannot be used. Each variant names the key and the mend.
-#[derive(Debug, Error)]
-pub enum ConfigError {
-    /// The file cannot be read.
-    #[error("cannot read the configuration {path}: {cause}")]
-    Unreadable {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        cause: std::io::Error,
-    },
-    /// The text is not JSON5.
-    #[error("{origin} is not JSON5: {cause}")]
-    Syntax {
-        /// The file, or the flag.
-        origin: String,
-        /// Where and why.
-        cause: String,
-    },
-    /// A `--cfg` that is not of the form `KEY:VALUE`, or whose key leads through something that is no object.
-    #[error("--cfg '{given}': {mend}")]
-    Override {
-        /// What was given.
-        given: String,
-        /// What is expected.
-        mend: String,
-    },
-    /// A key that does not exist, or a value of the wrong kind or unit.
-    #[error("{key}: {cause}")]
-    Value {
-        /// The path of the key, `rounds.deadline`.
-        key: String,
-        /// What is wrong, and what is expected.
-        cause: String,
-    },
-}
-
-impl ConfigError {
-    fn value(key: &str, cause: impl Into<String>) -> Self {
-        Self::Value { key: key.to_owned(), cause: cause.into() }
-    }
-}
+pub use links::{LinksSection, ScoutingSection};
+pub use template::TEMPLATE;
 
 /// One robot: who it is, what it sees with, how it decides, whom it talks to.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -73,11 +40,11 @@ pub struct Config {
     pub robot: RobotSection,
     /// The swarm's name.
     pub swarm: SwarmName,
-    /// The eye, and what is before it.
+    /// The camera, and what is in front of it.
     pub camera: CameraSection,
     /// The classifier.
     pub model: ModelSection,
-    /// How the robot learns from what a human says.
+    /// How the robot learns from feedback.
     pub learning: LearningSection,
     /// How the swarm decides; the same for all its robots.
     pub rounds: MindConfig,
@@ -85,7 +52,7 @@ pub struct Config {
     pub center: CenterSection,
     /// How the robot finds others, and how many it links to.
     pub links: LinksSection,
-    /// Zenoh's own configuration, verbatim; it wins over what Gestalt sets, key by key.
+    /// Zenoh's own configuration, verbatim; it takes precedence over what Gestalt sets, key by key.
     pub zenoh: Map<String, Value>,
 }
 
@@ -95,7 +62,7 @@ pub struct Config {
 pub struct RobotSection {
     /// Its number, unique in the swarm.
     pub id: RobotId,
-    /// Its name for people; `robot-<id>` when empty.
+    /// Its display name; `robot-<id>` when empty.
     pub name: String,
 }
 
@@ -116,146 +83,29 @@ impl Default for SwarmName {
     }
 }
 
-/// The eye, and what is before it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CameraSection {
-    /// What the camera does to a picture, and how often it takes one.
-    pub model: CameraChoice,
-    /// Which stages make its frames like those of other cameras.
-    pub layer: LayerConfig,
-    /// Where the frames come from.
-    pub source: SourceSection,
-    /// How motion before it is watched.
-    pub motion: MotionConfig,
-    /// τ of this camera: how long until its view may have changed enough to count as another look. `None`: as long as
-    /// `rounds.decorrelation` says for the swarm.
-    #[serde(with = "humantime_serde")]
-    pub decorrelation: Option<Duration>,
-}
-
-/// A camera by name, or described.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CameraChoice {
-    /// 384×288 at 2 frames per second.
-    #[default]
-    Footbot,
-    /// 640×360 at 30 frames per second.
-    Parrot,
-    /// 640×480 at 15 frames per second.
-    Laptop,
-    /// Any other.
-    Custom(CameraModel),
-}
-
-/// Where a robot's frames come from.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum SourceSection {
-    /// Nowhere: a robot that relays and counts, but sees nothing.
-    #[default]
-    None,
-    /// A drawn, gloved hand.
-    Rendered(RenderedSection),
-    /// A camera of this machine.
-    Device(DeviceSection),
-    /// The image files of a folder, in the order of their names.
-    Images(FilesSection),
-    /// A video file.
-    Video(FilesSection),
-    /// What `gestalt stream` sends from another machine.
-    Stream(StreamSection),
-}
-
-/// Frames from another machine.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StreamSection {
-    /// Whose frames; `null`: those sent in this robot's own name.
-    pub robot: Option<RobotId>,
-}
-
-/// A drawn hand before a robot that stands somewhere.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RenderedSection {
-    /// Where the robot stands.
-    pub pose: Pose,
-    /// What the human shows in each round, and this robot's noise, follow from it. The same at all robots that
-    /// look at the same human.
-    pub seed: u64,
-    /// When the human shows gestures; none: in every round, from its opening to its end.
-    pub schedule: Option<Schedule>,
-}
-
-/// A camera of this machine, by V4L2.
-///
-/// It is asked for the size and rate of `camera.model`. One that is not there, is unplugged, frozen, or delivers no pictures is
-/// no reason to stop: the robot says so in its status, goes on without it, and tries again every few seconds.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DeviceSection {
-    /// Its file, `/dev/video0`.
-    pub path: PathBuf,
-}
-
-/// Frames from the disk.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FilesSection {
-    /// The folder or the file.
-    pub path: PathBuf,
-    /// Whether to start again at the end.
-    #[serde(default, rename = "loop")]
-    pub repeat: bool,
-}
-
 /// Which classifier a robot starts with.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ModelSection {
-    /// None: the robot relays and counts the votes of others.
+    /// None: the robot relays, and takes part in decisions without voting.
     #[default]
     None,
-    /// One trained at the start on drawn hands, gestures `0` to `5`; takes some seconds.
+    /// The embedded one, trained on synthetic hands, gestures `0` to `5`.
     Rendered,
     /// One that `gestalt train` wrote.
     File(PathBuf),
 }
 
-/// How a robot finds others, and how many it links to. Endpoints stand in the `zenoh` block.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LinksSection {
-    /// Looking for robots by UDP multicast.
-    pub scouting: ScoutingSection,
-    /// The most links that scouting builds up to. Range `2..=16`.
-    pub max_links: usize,
-}
+impl FromStr for ModelSection {
+    type Err = Infallible;
 
-impl Default for LinksSection {
-    fn default() -> Self {
-        Self { scouting: ScoutingSection::default(), max_links: LinkConfig::default().max_links }
-    }
-}
-
-/// Looking for robots by UDP multicast.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ScoutingSection {
-    /// Off: the endpoints of the `zenoh` block alone.
-    pub enabled: bool,
-    /// The multicast group and port.
-    pub address: String,
-    /// The network interface, or `auto`.
-    pub interface: String,
-}
-
-impl Default for ScoutingSection {
-    fn default() -> Self {
-        let Scouting { address, interface } = Scouting::default();
-        Self { enabled: true, address, interface }
+    /// `none`, `rendered`, or else the path of a file (`./rendered` for one of that name).
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text {
+            "none" => Self::None,
+            "rendered" => Self::Rendered,
+            path => Self::File(path.into()),
+        })
     }
 }
 
@@ -282,7 +132,7 @@ impl Config {
         Ok(config)
     }
 
-    /// The robot's name for people.
+    /// The robot's display name.
     #[must_use]
     pub fn name(&self) -> String {
         match self.robot.name.as_str() {
@@ -315,102 +165,71 @@ impl Config {
     /// Checks what no single value shows: ranges, and what does not go together.
     ///
     /// # Errors
-    /// [`ConfigError::Value`].
+    /// [`ConfigError::Value`]: the first of the [problems](Self::problems).
     pub fn validate(&self) -> Result<(), ConfigError> {
-        Keys::new(&self.swarm.0).map_err(|error| ConfigError::value("swarm", error.to_string()))?;
-        self.rounds.validate().map_err(|error| ConfigError::value("rounds", error.to_string()))?;
-        self.learning
-            .samples
-            .validate()
-            .map_err(|error| ConfigError::value("learning.samples", error.to_string()))?;
-        if self.learning.enabled && matches!(self.model, ModelSection::None) {
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Everything outside its range, and everything that does not go together; empty for a configuration that can be used
+    /// if the files that it names can be (see [`check`]).
+    #[must_use]
+    pub fn problems(&self) -> Vec<ConfigError> {
+        let mut found = Vec::new();
+        let mut note = |checked: Result<(), ConfigError>| found.extend(checked.err());
+        note(Keys::new(&self.swarm.0).map(drop).map_err(|error| ConfigError::value("swarm", error)));
+        let rounds = self.rounds.validate().map_err(|error| ConfigError::value("rounds", error));
+        // What is wrong for the whole swarm is wrong for this robot as well, and said once.
+        note(match rounds {
+            Ok(()) => {
+                self.mind().validate().map_err(|error| ConfigError::value("camera.decorrelation", error))
+            }
+            wrong => wrong,
+        });
+        let samples = &self.learning.samples;
+        note(samples.validate().map_err(|error| ConfigError::value("learning.samples", error)));
+        note(self.links.check());
+        found.extend(self.camera.check());
+        found.extend(self.check_model().err());
+        found.extend(self.center.check());
+        // Too few links would be said again, in other words.
+        if self.links.check().is_ok()
+            && let Err(error) = self.link().check(self.robot.id)
+        {
+            found.push(match error {
+                LinkError::Config { key, cause } => ConfigError::Value { key, cause },
+                other => ConfigError::value("zenoh", other),
+            });
+        }
+        found
+    }
+
+    /// Whether there is a model for all that needs one.
+    fn check_model(&self) -> Result<(), ConfigError> {
+        if self.model != ModelSection::None {
+            return Ok(());
+        }
+        if self.learning.enabled {
             return Err(ConfigError::value(
                 "learning.enabled",
-                "a robot that learns needs a feature space and a list of gestures, which a model brings: set model to \"rendered\" or {file: \"FILE\"}; with learning.from: \"nothing\" its classifier is not used",
+                "learning needs a feature space and a vocabulary, which come with a model: set model to \"rendered\" or {file: \"FILE\"} (with learning.from: \"nothing\" its classifier is not used)",
             ));
         }
-        self.center.validate()?;
-        if !(2..=16).contains(&self.links.max_links) {
-            return Err(ConfigError::value(
-                "links.max_links",
-                format!(
-                    "{} is outside 2..=16: two connect a swarm, four give it spare ways",
-                    self.links.max_links
-                ),
-            ));
+        if matches!(self.camera.source, SourceSection::None) {
+            return Ok(());
         }
-        self.camera.model.validate("camera.model")?;
-        self.mind()
-            .validate()
-            .map_err(|error| ConfigError::value("camera.decorrelation", error.to_string()))?;
-        self.camera
-            .motion
-            .validate()
-            .map_err(|error| ConfigError::value("camera.motion", error.to_string()))?;
-        if let SourceSection::Rendered(RenderedSection { schedule: Some(schedule), .. }) = &self.camera.source
-        {
-            schedule
-                .validate()
-                .map_err(|cause| ConfigError::value("camera.source.rendered.schedule", cause))?;
-        }
-        let sees = !matches!(self.camera.source, SourceSection::None);
-        if sees && matches!(self.model, ModelSection::None) {
-            return Err(ConfigError::value(
-                "model",
-                "a robot with a camera source needs a classifier: \"rendered\" or {file: \"FILE\"}, or set camera.source to \"none\"",
-            ));
-        }
-        self.link().check(self.robot.id).map_err(|error| match error {
-            LinkError::Config { key, cause } => ConfigError::Value { key, cause },
-            other => ConfigError::value("zenoh", other.to_string()),
-        })
-    }
-}
-
-impl CameraSection {
-    /// What its frames are seen with.
-    #[cfg(feature = "opencv")]
-    pub(crate) fn sight(&self) -> gestalt_vision::sight::SightConfig {
-        let camera = self.model.properties();
-        gestalt_vision::sight::SightConfig { camera, layer: self.layer, motion: self.motion.clone() }
-    }
-}
-
-impl CameraChoice {
-    /// The camera of that name; `None` for a name that is none.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        match name {
-            "footbot" => Some(Self::Footbot),
-            "parrot" => Some(Self::Parrot),
-            "laptop" => Some(Self::Laptop),
-            _ => None,
-        }
-    }
-
-    fn validate(&self, key: &str) -> Result<(), ConfigError> {
-        match self {
-            Self::Custom(model) => model
-                .validate()
-                .map_err(|error| ConfigError::value(&format!("{key}.custom"), error.to_string())),
-            Self::Footbot | Self::Parrot | Self::Laptop => Ok(()),
-        }
-    }
-
-    /// The properties of the chosen camera.
-    #[must_use]
-    pub fn properties(&self) -> CameraModel {
-        match self {
-            Self::Footbot => CameraModel::footbot(),
-            Self::Parrot => CameraModel::parrot(),
-            Self::Laptop => CameraModel::laptop(),
-            Self::Custom(model) => model.clone(),
-        }
+        Err(ConfigError::value(
+            "model",
+            "a robot with a camera source needs a classifier: \"rendered\" or {file: \"FILE\"}, or set camera.source to \"none\"",
+        ))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
+    use gestalt_vision::camera_model::CameraModel;
+
     use super::*;
 
     fn config(text: &str) -> Result<Config, ConfigError> {
@@ -457,8 +276,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named_with_its_key_and_its_mend() {
-        for (text, key, mend) in [
+    fn what_is_wrong_is_named_with_its_key_and_how_to_fix_it() {
+        for (text, key, fix) in [
             ("{rouns: {}}", "rouns", "rounds"),
             ("{rounds: {alpha: 0.7}}", "rounds", "below 0.5"),
             ("{rounds: {deadline: 5}}", "rounds.deadline", "duration"),
@@ -477,6 +296,11 @@ mod tests {
             ("{center: {robots: {'7': {camera: 'kite'}}}}", "center.robots.7.camera", "parrot"),
             ("{links: {max_links: 1}}", "links.max_links", "2..=16"),
             ("{camera: {source: {video: {path: 'x.mp4'}}}}", "model", "classifier"),
+            (
+                "{camera: {source: {rendered: {pose: {bearing_deg: 0, elevation_deg: 0, distance_m: 0}}}}, model: 'rendered'}",
+                "pose",
+                "0.3",
+            ),
             ("{camera: {motion: {area: 2}}}", "camera.motion", "0.0002"),
             ("{camera: {motion: {hold: 3}}}", "camera.motion.hold", "duration"),
             ("{camera: {source: {rendered: {schedule: {period: '2s', still: '2s'}}}}}", "schedule", "4s"),
@@ -484,8 +308,34 @@ mod tests {
             ("{zenoh: {id: 'a1'}}", "zenoh.id", "leave it out"),
         ] {
             let error = config(text).unwrap_err().to_string();
-            assert!(error.contains(key) && error.contains(mend), "{text}: {error}");
+            assert!(error.contains(key) && error.contains(fix), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn all_problems_are_found_at_once() {
+        let config: Config = Document::parse(
+            "{swarm: 'a/b', rounds: {alpha: 0.7}, camera: {motion: {area: 2}, source: {rendered: {pose: {bearing_deg: 999, \
+             elevation_deg: 0, distance_m: 1}}}}, links: {max_links: 1}, center: {workers: 0, max_robots: 0}}",
+            "test",
+        )
+        .unwrap()
+        .meaning()
+        .unwrap();
+        let found = config.problems().iter().map(ToString::to_string).collect::<Vec<_>>();
+        let keys = ["swarm", "rounds", "model", "links.max_links", "camera.motion", "camera.source.rendered"];
+        for key in keys.into_iter().chain(["center.max_robots", "center.workers"]) {
+            let of_key = found.iter().filter(|problem| problem.starts_with(&format!("{key}: "))).count();
+            assert_eq!(of_key, 1, "{key}: {found:?}");
+        }
+        assert_eq!(found.len(), 8, "{found:?}");
+    }
+
+    #[test]
+    fn a_model_is_named_or_a_file() {
+        let read = |text: &str| text.parse::<ModelSection>().unwrap();
+        assert_eq!((read("none"), read("rendered")), (ModelSection::None, ModelSection::Rendered));
+        assert_eq!(read("./rendered"), ModelSection::File("./rendered".into()));
     }
 
     #[test]

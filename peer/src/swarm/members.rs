@@ -39,7 +39,7 @@ pub enum MembersError {
         cause: std::io::Error,
     },
     /// Its process ended, or said nothing, before it listened.
-    #[error("{0} did not start: its own words are above")]
+    #[error("{0} did not start; its error message is above")]
     Silent(String),
 }
 

@@ -5,22 +5,21 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::config::CameraChoice;
-use gestalt_vision::camera_model::CameraModel;
 
 /// The most robots one machine is asked to run.
 const MAX_MEMBERS: usize = 1000;
 
-/// A text that is no roster.
+/// A text that is not a roster.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum RosterError {
     /// A part that is not `KIND:COUNT`.
-    #[error("'{0}' is not KIND:COUNT, for example footbot:6")]
+    #[error("'{0}': write KIND:COUNT, such as footbot:6")]
     Part(String),
     /// A kind of robot that does not exist.
-    #[error("'{0}' is no kind of robot: take footbot, parrot or laptop")]
+    #[error("'{0}' is not a camera model: use footbot, parrot or laptop")]
     Kind(String),
     /// No robots, or more than a machine can run.
-    #[error("a swarm has 1 to {MAX_MEMBERS} robots, this one {0}")]
+    #[error("{0} robots: a swarm on one machine has 1 to {MAX_MEMBERS}")]
     Size(usize),
 }
 
@@ -46,27 +45,14 @@ impl FromStr for Roster {
         for part in text.split(',') {
             let (kind, count) = part.split_once(':').ok_or_else(|| RosterError::Part(part.to_owned()))?;
             let count: usize = count.parse().map_err(|_| RosterError::Part(part.to_owned()))?;
-            if kinds.len() + count > MAX_MEMBERS {
-                return Err(RosterError::Size(kinds.len() + count));
+            let robots = kinds.len().saturating_add(count);
+            if robots > MAX_MEMBERS {
+                return Err(RosterError::Size(robots));
             }
-            let camera = match kind {
-                "footbot" => CameraChoice::Footbot,
-                "parrot" => CameraChoice::Parrot,
-                "laptop" => CameraChoice::Laptop,
-                other => return Err(RosterError::Kind(other.to_owned())),
-            };
+            let camera = CameraChoice::named(kind).ok_or_else(|| RosterError::Kind(kind.to_owned()))?;
             kinds.extend(std::iter::repeat_n(camera, count));
         }
         if kinds.is_empty() { Err(RosterError::Size(0)) } else { Ok(Self { kinds }) }
-    }
-}
-
-impl CameraChoice {
-    /// The kind's name: the camera's.
-    #[must_use]
-    pub fn kind(&self) -> String {
-        let CameraModel { name, .. } = self.properties();
-        name
     }
 }
 
@@ -77,12 +63,12 @@ mod tests {
     #[test]
     fn robots_are_counted_by_kind() {
         let roster: Roster = "footbot:2,parrot:1".parse().unwrap();
-        let kinds: Vec<_> = roster.cameras().iter().map(CameraChoice::kind).collect();
+        let kinds: Vec<_> = roster.cameras().iter().map(CameraChoice::name).collect();
         assert_eq!(kinds, ["footbot", "footbot", "parrot"]);
     }
 
     #[test]
-    fn a_bad_roster_names_the_part_and_the_mend() {
+    fn a_bad_roster_names_the_part_and_what_to_write() {
         for (text, named) in [
             ("footbot", "KIND:COUNT"),
             ("footbot:x", "footbot:x"),

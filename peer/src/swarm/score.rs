@@ -12,6 +12,7 @@ pub struct Tally {
     rounds: u64,
     right: u64,
     undecided: u64,
+    missed: u64,
     robots: BTreeMap<RobotId, u64>,
     history: Vec<Round>,
 }
@@ -32,6 +33,8 @@ pub struct Score {
     pub rounds: u64,
     /// Rounds that ended without a decision; they count as wrong.
     pub undecided: u64,
+    /// Gestures that were shown without a round being decided; they count for nothing else.
+    pub missed: u64,
     /// The swarm's accuracy with its 95 % interval (Wilson).
     pub swarm: Option<Proportion>,
     /// The accuracy of single robots, over all robots and rounds. A robot that saw no hand was not right.
@@ -65,6 +68,11 @@ impl Tally {
         self.history.push(Round { single, right: decision.class == Some(truth) });
     }
 
+    /// Takes a gesture into account that led to no round.
+    pub fn miss(&mut self) {
+        self.missed += 1;
+    }
+
     /// Every round so far.
     #[must_use]
     pub fn history(&self) -> &[Round] {
@@ -78,6 +86,7 @@ impl Tally {
         Score {
             rounds: self.rounds,
             undecided: self.undecided,
+            missed: self.missed,
             swarm: Proportion::wilson(self.right, self.rounds),
             single: Proportion::wilson(self.robots.values().sum(), opinions),
             robots: self

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use gestalt_strategies::{Classifier, MAX_MODEL, ModelError};
 use serde::{Deserialize, Serialize};
+use tempfile::NamedTempFile;
 use thiserror::Error;
 
 const MAGIC: &[u8; 8] = b"GESTALT\n";
@@ -20,7 +21,7 @@ const HEADER: usize = 8 + 2 + 8 + 4;
 /// Longest body that is read: a classifier, and the record of its training.
 const MAX_BODY: u64 = 2 * MAX_MODEL as u64;
 
-/// A file that is no usable model.
+/// A file that is not a usable model.
 #[derive(Debug, Error)]
 pub enum ModelFileError {
     /// It cannot be read or written.
@@ -34,10 +35,10 @@ pub enum ModelFileError {
         source: io::Error,
     },
     /// Something else altogether.
-    #[error("{} is no model: `gestalt train` writes one", .0.display())]
+    #[error("{} is not a model file: `gestalt train` writes one", .0.display())]
     NotAModel(PathBuf),
     /// Written by another version of the program.
-    #[error("the model {} has file version {found}, this program reads version {VERSION}: train it anew", path.display())]
+    #[error("the model {} has file version {found}, this program reads version {VERSION}: train it again", path.display())]
     Version {
         /// The file.
         path: PathBuf,
@@ -45,7 +46,7 @@ pub enum ModelFileError {
         found: u16,
     },
     /// Its end is missing.
-    #[error("the model {} is cut short: {found} of {expected} bytes; copy it again or train it anew", path.display())]
+    #[error("the model {} is truncated ({found} of {expected} bytes): copy it again, or train it again", path.display())]
     CutShort {
         /// The file.
         path: PathBuf,
@@ -55,7 +56,7 @@ pub enum ModelFileError {
         expected: u64,
     },
     /// Its contents are not those that were written.
-    #[error("the model {} is damaged (checksum): copy it again or train it anew", .0.display())]
+    #[error("the model {} is corrupted (checksum mismatch): copy it again, or train it again", .0.display())]
     Damaged(PathBuf),
     /// Checksum right, contents wrong: written by another program.
     #[error("the model {} cannot be used: {source}", path.display())]
@@ -66,7 +67,7 @@ pub enum ModelFileError {
         source: ModelError,
     },
     /// Larger than any model.
-    #[error("the model {} claims {size} bytes, more than the {MAX_BODY} a model may take", path.display())]
+    #[error("the model {} declares {size} bytes; at most {MAX_BODY} are allowed", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -75,7 +76,7 @@ pub enum ModelFileError {
     },
     /// Trained on other features than those that are computed here.
     #[error(
-        "the model takes {expected} features of the set '{model}', perception gives {found} of '{perception}': train a model for '{perception}'"
+        "the model expects {expected} features of the '{model}' set, but perception gives {found} of '{perception}': train a model for '{perception}'"
     )]
     FeatureSet {
         /// The model's feature set.
@@ -92,7 +93,7 @@ pub enum ModelFileError {
 /// How a model came to be: what must be known to measure it honestly, and to make it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Name of the dataset's folder.
+    /// Name of the dataset's folder; of synthetic hands, what was rendered.
     pub dataset: String,
     /// The people it has seen in training, by the numbers of that dataset.
     pub people: Vec<u32>,
@@ -132,14 +133,20 @@ impl Model {
         if !fs::metadata(path).map_err(failed)?.is_file() {
             return Err(failed(io::Error::other("it is not a regular file")));
         }
-        let mut file = File::open(path).map_err(failed)?.take(HEADER as u64 + MAX_BODY + 1);
-        let mut header = [0; HEADER];
-        if let Err(error) = file.read_exact(&mut header) {
-            return Err(match error.kind() {
-                io::ErrorKind::UnexpectedEof => ModelFileError::NotAModel(path.to_owned()),
-                _ => failed(error),
-            });
-        }
+        let mut bytes = Vec::new();
+        let file = File::open(path).map_err(failed)?;
+        file.take(HEADER as u64 + MAX_BODY + 1).read_to_end(&mut bytes).map_err(failed)?;
+        Self::decode(&bytes, path)
+    }
+
+    /// Reads a model from the bytes of its file; `path` is named in errors.
+    ///
+    /// # Errors
+    /// See [`ModelFileError`].
+    pub fn decode(bytes: &[u8], path: &Path) -> Result<Self, ModelFileError> {
+        let Some((header, body)) = bytes.split_at_checked(HEADER) else {
+            return Err(ModelFileError::NotAModel(path.to_owned()));
+        };
         let (magic, rest) = header.split_at(8);
         let (version, rest) = rest.split_at(2);
         let (length, checksum) = rest.split_at(8);
@@ -154,17 +161,15 @@ impl Model {
         if expected > MAX_BODY {
             return Err(ModelFileError::TooLarge { path: path.to_owned(), size: expected });
         }
-        let mut body = Vec::new();
-        file.read_to_end(&mut body).map_err(failed)?;
         let found = body.len() as u64;
         if found < expected {
             return Err(ModelFileError::CutShort { path: path.to_owned(), found, expected });
         }
-        if found > expected || u64::from(crc32fast::hash(&body)) != little_endian(checksum) {
+        if found > expected || u64::from(crc32fast::hash(body)) != little_endian(checksum) {
             return Err(ModelFileError::Damaged(path.to_owned()));
         }
         let contents = |source| ModelFileError::Contents { path: path.to_owned(), source };
-        let body: Body = postcard::from_bytes(&body).map_err(|_| contents(ModelError::Malformed))?;
+        let body: Body = postcard::from_bytes(body).map_err(|_| contents(ModelError::Malformed))?;
         let classifier = Classifier::decode(&body.classifier).map_err(contents)?;
         Ok(Self { classifier, origin: body.origin })
     }
@@ -184,14 +189,16 @@ impl Model {
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
 
-        let temporary = temporary(path);
-        let written = File::create(&temporary)
-            .and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()))
-            .and_then(|()| fs::rename(&temporary, path));
-        written.map_err(|source| {
-            // What could not be created cannot be removed; the first error is the one that tells.
-            let _ = fs::remove_file(&temporary);
-            ModelFileError::Io { action: "write", path: path.to_owned(), source }
+        let written = NamedTempFile::new_in(folder(path)).and_then(|mut file| {
+            file.write_all(&bytes)?;
+            file.as_file().sync_all()?;
+            allow_reading(file.as_file())?;
+            file.persist(path).map_err(|error| error.error)
+        });
+        written.map(drop).map_err(|source| ModelFileError::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
         })
     }
 
@@ -200,13 +207,11 @@ impl Model {
     /// # Errors
     /// [`ModelFileError::Io`] when the folder does not exist or may not be written.
     pub fn check_writable(path: &Path) -> Result<(), ModelFileError> {
-        let temporary = temporary(path);
         let failed = |source| ModelFileError::Io { action: "write", path: path.to_owned(), source };
         if path.is_dir() {
             return Err(failed(io::Error::other("it is a folder")));
         }
-        File::create(&temporary).map_err(failed)?;
-        fs::remove_file(&temporary).map_err(failed)
+        NamedTempFile::new_in(folder(path)).map(drop).map_err(failed)
     }
 
     /// Checks that the model takes what perception gives.
@@ -230,12 +235,21 @@ fn little_endian(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
 
-/// A name beside `path` that no other process takes: a rename within one folder is atomic.
-fn temporary(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.tmp", std::process::id()));
-    path.with_file_name(name)
+/// The folder a file is in: a rename within one folder is atomic.
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A temporary file is its owner's alone; a model is for whoever runs a robot.
+fn allow_reading(file: &File) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.set_permissions(fs::Permissions::from_mode(0o644))?;
+    }
+    #[cfg(not(unix))]
+    let _ = file;
+    Ok(())
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub struct LayerConfig {
     pub colour: bool,
     /// Blur and noise of the close view made comparable. Off: the hand is measured at the camera's own pixels.
     pub resolution: bool,
-    /// Evidence counts by the seconds between frames. Off: every frame counts alike, however many a second. Perception
+    /// Evidence counts by the seconds between frames. Off: every frame counts alike, however many per second. Perception
     /// only carries this: it is the mind that weighs.
     pub time: bool,
 }

@@ -5,11 +5,11 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Parameters no motion detector can work with; each names the field and the mend.
+/// Parameters no motion detector can work with; each names the field and its range.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum MotionConfigError {
     /// A share or a factor outside its range.
-    #[error("{field} is {value}: set it within {low}..={high}")]
+    #[error("{field} is {value}: choose a value from {low} to {high}")]
     Range {
         /// The field.
         field: &'static str,
@@ -21,7 +21,7 @@ pub enum MotionConfigError {
         high: f64,
     },
     /// A duration outside its range.
-    #[error("{field} is {value:?}: set it within {low:?} and {high:?}")]
+    #[error("{field} is {value:?}: choose a value from {low:?} to {high:?}")]
     Duration {
         /// The field.
         field: &'static str,
@@ -34,11 +34,11 @@ pub enum MotionConfigError {
     },
 }
 
-/// How motion is told from stillness, and somebody from nobody. All in seconds and in shares of the picture, so that the
+/// How motion is told from rest, and a person from the empty scene. All in seconds and in shares of the frame, so that the
 /// same values serve cameras of 2 to 30 frames per second and of any size.
 ///
-/// A robot that watches motion opens rounds by itself: when somebody has moved and then holds still. Its camera must stand
-/// still; before one that flies everything moves, and no round ever opens.
+/// A robot that watches motion opens rounds by itself: when a hand has moved and is then at rest. Its camera must not move;
+/// in front of one that flies everything moves, and no round ever opens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionConfig {
@@ -52,14 +52,14 @@ pub struct MotionConfig {
     /// that. Default 80 ms, range 0 to 1 s.
     #[serde(with = "humantime_serde")]
     pub react: Duration,
-    /// How long nothing must move before somebody holds still; people pause for less within a movement. One frame of a
+    /// How long nothing must move for a hand to be at rest; people pause for less within a movement. One frame of a
     /// camera of 2 frames per second. Default 500 ms, range 100 ms to 5 s.
     #[serde(with = "humantime_serde")]
     pub hold: Duration,
-    /// The share of the picture that must change for a movement to begin; it lasts while half of that changes. Between frames
-    /// more than 250 ms apart it is three times as much. A hand 1.6 m before a Foot-bot covers 0.01. Default 0.001, range 0.0002 to 0.2.
+    /// The share of the frame that must change for a movement to begin; it lasts while half of that changes. Between frames
+    /// more than 250 ms apart it is three times as much. A hand 1.6 m in front of a Foot-bot covers 0.01. Default 0.001, range 0.0002 to 0.2.
     pub area: f64,
-    /// The share of the picture that must differ from the empty scene for somebody to be there. Default 0.002, range
+    /// The share of the frame that must differ from the empty scene for a person to be present. Default 0.002, range
     /// 0.0002 to 0.5.
     pub presence: f64,
     /// How many standard deviations of its own noise a pixel must change by. Default 5, range 2 to 20.

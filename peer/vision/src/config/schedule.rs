@@ -1,11 +1,11 @@
-//! When the human before rendered cameras shows gestures.
+//! When the person in front of rendered cameras shows gestures.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
 /// Gestures by the clock of the machine: the same for every process whose clock is right, so that rounds can begin by what
-/// is seen. In every period there is nobody first; then a hand comes in within half a second, holds a gesture still, and
+/// is seen. In every period the scene is empty first; then a hand comes in within half a second, holds a gesture still, and
 /// leaves within half a second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,7 +22,7 @@ impl Schedule {
     /// How long the hand takes to come into its place, and to leave it.
     pub const MOVE: Duration = Duration::from_millis(500);
 
-    /// How long there is nobody.
+    /// How long the scene is empty.
     #[must_use]
     pub fn nobody(&self) -> Duration {
         self.period.saturating_sub(self.still + 2 * Self::MOVE)
@@ -37,17 +37,17 @@ impl Schedule {
         (number as u64, Duration::from_nanos(passed as u64))
     }
 
-    /// Checks that a gesture fits into its period, with a second of nobody.
+    /// Checks that a gesture fits into its period, with a second of an empty scene.
     ///
     /// # Errors
-    /// What is wrong, and the mend.
+    /// What is wrong, and the range.
     pub fn validate(&self) -> Result<(), String> {
         if !(Duration::from_secs(1)..=Duration::from_secs(600)).contains(&self.still) {
-            return Err(format!("still is {:?}: set it within 1s and 10min", self.still));
+            return Err(format!("still is {:?}: choose a value from 1s to 10min", self.still));
         }
         let least = self.still + 2 * Self::MOVE + Duration::from_secs(1);
         if !(least..=Duration::from_secs(3600)).contains(&self.period) {
-            return Err(format!("period is {:?}: set it within {least:?} and 1h", self.period));
+            return Err(format!("period is {:?}: choose a value from {least:?} to 1h", self.period));
         }
         Ok(())
     }

@@ -38,6 +38,7 @@ use colour::ColourModel;
 pub use features::{FEATURES, Feature, GROUPS, features};
 use frame::View;
 use hand::HandFinder;
+pub use hog::columns as hog_columns;
 pub use layer::LayerConfig;
 use resolution::Resolution;
 

@@ -1,0 +1,218 @@
+//! `gestalt look`: what perception makes of one frame, stage by stage.
+
+mod view;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use opencv::core::Mat;
+
+use self::view::View;
+use super::Failure;
+use super::source_arg::{Kind, Rendered, SourceArg, kind};
+use crate::config::{CameraChoice, CameraSection, Config, ModelSection, SourceSection};
+use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::pose::Pose;
+use gestalt_vision::source::{
+    Device, Glove, ImageFolder, RenderedSource, Scene, Source, SourceError, Video, read_image,
+};
+
+/// Show what perception makes of one frame: raw, white-balanced, mask, hand, features, opinion
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt look hand.jpg
+  gestalt look /dev/video0 --camera laptop --out stages.png")]
+pub struct Args {
+    /// Image, folder of images, video, device (/dev/video0), or `rendered:3` (a synthetic hand showing 3 fingers;
+    /// `rendered`: an empty scene; `rendered:3,bearing=-30,distance=1.2,seed=7`)
+    #[arg(value_name = "SOURCE", required_unless_present = "from")]
+    source: Option<SourceArg>,
+    /// The same as SOURCE
+    #[arg(long = "source", value_name = "SOURCE", conflicts_with = "source")]
+    from: Option<SourceArg>,
+    /// PNG file to write [default: SOURCE.look.png in this folder]
+    #[arg(long, value_name = "FILE.png")]
+    out: Option<PathBuf>,
+    /// Model file written by `gestalt train` [default: the configuration's, or the embedded model]
+    #[arg(long, value_name = "FILE|rendered")]
+    model: Option<ModelSection>,
+    /// Camera model [default: the configuration's, or none in particular]
+    #[arg(long, value_name = "MODEL", value_parser = super::choice::camera())]
+    camera: Option<CameraChoice>,
+    /// Feature set: shape or hog [default: the model's]
+    #[arg(long, value_name = "SET")]
+    features: Option<FeatureSet>,
+    /// Configuration file: camera model, heterogeneity layer, pose and model are taken from it
+    #[arg(short, long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Image of the empty scene
+    #[arg(long, value_name = "FILE")]
+    background: Option<PathBuf>,
+    /// Index of the frame within a folder, a video, a camera or a synthetic scene, from 0 [default: 0; of a camera 10, since
+    /// its first frames are taken while it still adjusts to the light]
+    #[arg(long, value_name = "N")]
+    frame: Option<u64>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// How many frames a camera takes to adjust to the light.
+const WARM_UP: u64 = 10;
+
+/// Looks, draws and says what it saw.
+///
+/// # Errors
+/// When the source, the background, the model or the configuration cannot be used, or the picture not be written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let source = args.source.as_ref().or(args.from.as_ref()).ok_or("give a SOURCE to look at")?;
+    let out = args.out.clone().unwrap_or_else(|| beside(source));
+    gestalt_draw::check(&out)?;
+    let config = args.config.as_deref().map(Config::read).transpose()?;
+    let section = config.as_ref().map(|config| &config.camera);
+    let model = model(args, config.as_ref().map(|config| &config.model))?;
+    let camera = args.camera.as_ref().map(CameraChoice::properties);
+    let camera = camera.or_else(|| section.map(|section| section.model.properties()));
+    // What is rendered is rendered for a camera.
+    let rendered = matches!(source, SourceArg::Rendered(_)).then(CameraModel::footbot);
+    let camera = camera.or(rendered);
+    let (frame, described) = frame(source, args.frame, camera.as_ref(), section)?;
+    let background = args.background.as_deref().map(read_image).transpose()?;
+    let set = args.features.unwrap_or(model.features);
+    let layer = section.map(|section| section.layer).unwrap_or_default();
+    let mut perception = match &camera {
+        Some(camera) => Perception::for_camera(set, HandConfig::default(), layer, camera)?,
+        None => Perception::new(set, HandConfig::default())?,
+    };
+    let seen = perception.observe_before(&frame, background.as_ref());
+    let camera = camera.map_or("unspecified camera".to_owned(), |camera| camera.name);
+    let view = View { camera, source: described, frame, perception, seen, model };
+    gestalt_draw::write(&view.draw()?, &out)?;
+    view.say(&out, args.json)
+}
+
+/// Where the picture goes when nobody says: into this folder, under the source's name.
+fn beside(source: &SourceArg) -> PathBuf {
+    let stem = match source {
+        SourceArg::Rendered(Rendered { fingers: Some(fingers), .. }) => format!("rendered-{fingers}"),
+        SourceArg::Rendered(_) => "rendered".to_owned(),
+        SourceArg::Path(path) => {
+            path.file_stem().map_or_else(|| "frame".to_owned(), |stem| stem.to_string_lossy().into_owned())
+        }
+    };
+    PathBuf::from(format!("{stem}.look.png"))
+}
+
+/// The frame to be looked at, and what it is, in words.
+fn frame(
+    source: &SourceArg,
+    index: Option<u64>,
+    camera: Option<&CameraModel>,
+    section: Option<&CameraSection>,
+) -> Result<(Mat, String), SourceError> {
+    let first = index.unwrap_or(0);
+    match source {
+        SourceArg::Rendered(hand) => {
+            let (pose, seed) = match section.map(|section| &section.source) {
+                Some(SourceSection::Rendered(rendered)) => (rendered.pose, rendered.seed),
+                _ => (Pose::FRONTAL, 1),
+            };
+            let (pose, seed) = (hand.pose.unwrap_or(pose), hand.seed.unwrap_or(seed));
+            let camera = camera.cloned().unwrap_or_else(CameraModel::footbot);
+            let rendered = RenderedSource::new(camera, pose, Glove::default(), seed)?;
+            let described = match hand.fingers {
+                None => "synthetic empty scene".to_owned(),
+                Some(fingers) => format!("synthetic hand showing {fingers} fingers"),
+            };
+            Ok((skip(rendered, first, &Scene { gesture: hand.fingers, seed })?, described))
+        }
+        SourceArg::Path(path) => {
+            let named = |index: u64| format!("{}, frame {index}", path.display());
+            let still = Scene::default();
+            Ok(match kind(path) {
+                Kind::Image => (read_image(path)?, path.display().to_string()),
+                Kind::Folder => {
+                    (skip(ImageFolder::open(path, Duration::ZERO, false)?, first, &still)?, named(first))
+                }
+                Kind::Video => (skip(Video::open(path, false)?, first, &still)?, named(first)),
+                Kind::Device => {
+                    let index = index.unwrap_or(WARM_UP);
+                    let wanted = camera.cloned().unwrap_or_else(CameraModel::laptop);
+                    (skip(Device::open(path, &wanted)?, index, &still)?, named(index))
+                }
+            })
+        }
+    }
+}
+
+/// The frame of that index.
+fn skip(mut source: impl Source, index: u64, scene: &Scene) -> Result<Mat, SourceError> {
+    for _ in 0..index {
+        source.next_frame(Duration::ZERO, scene)?;
+    }
+    Ok(source.next_frame(Duration::ZERO, scene)?.image)
+}
+
+/// The classifier: of the file named, of the configuration, or the embedded one.
+fn model(args: &Args, section: Option<&ModelSection>) -> Result<RobotModel, Failure> {
+    let named = args.model.as_ref().or(section).filter(|section| **section != ModelSection::None);
+    let model = crate::model::load(named.unwrap_or(&ModelSection::Rendered))?;
+    model.ok_or_else(|| "a look needs a model: give --model FILE".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn args(source: &str, out: &Path) -> Args {
+        Args {
+            source: Some(source.parse().unwrap()),
+            from: None,
+            out: Some(out.into()),
+            model: None,
+            camera: None,
+            features: None,
+            config: None,
+            background: None,
+            frame: None,
+            json: true,
+        }
+    }
+
+    #[test]
+    fn a_source_that_is_missing_or_broken_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("x.png");
+        let failure = |source: &Path| run(&args(source.to_str().unwrap(), &out)).unwrap_err().to_string();
+        assert!(failure(&folder.path().join("none.jpg")).contains("none.jpg does not exist"));
+        assert!(failure(&folder.path().join("none.mp4")).contains("none.mp4 does not exist"));
+        assert!(
+            failure(Path::new("/dev/video-that-is-not")).contains("/dev/video-that-is-not does not exist")
+        );
+        assert!(failure(Path::new("/dev/null")).contains("V4L2"));
+        for name in ["broken.png", "broken.mkv"] {
+            let broken = folder.path().join(name);
+            std::fs::write(&broken, "neither").unwrap();
+            assert!(failure(&broken).contains(name));
+        }
+        let empty = folder.path().join("empty");
+        std::fs::create_dir(&empty).unwrap();
+        assert!(failure(&empty).contains("no images"));
+    }
+
+    #[test]
+    fn a_look_leaves_its_picture_under_the_sources_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("x.png");
+        run(&args("rendered:3", &out)).unwrap();
+        assert!(std::fs::read(&out).unwrap().starts_with(b"\x89PNG"));
+        let named = |source: &str| beside(&source.parse().unwrap());
+        assert_eq!(named("some/where/fist.jpg"), Path::new("fist.look.png"));
+        assert_eq!(named("/dev/video0"), Path::new("video0.look.png"));
+        assert_eq!(named("rendered:3,seed=2"), Path::new("rendered-3.look.png"));
+    }
+}

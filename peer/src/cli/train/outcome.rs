@@ -1,0 +1,110 @@
+//! What came of a training, as text and as JSON.
+
+use std::path::Path;
+
+use gestalt_strategies::{Classifier, Classify, Evaluation, Folding, Reduction, Trained};
+use serde_json::{Value, json};
+
+use super::super::report;
+use gestalt_vision::model_file::Model;
+use gestalt_vision::survey::Survey;
+
+/// A training that is over.
+pub(super) struct Outcome<'a> {
+    /// The folder it was trained on.
+    pub folder: &'a Path,
+    /// The file it was written to.
+    pub out: &'a Path,
+    /// What was written.
+    pub model: &'a Model,
+    /// What the search found.
+    pub trained: &'a Trained,
+    /// How many folds it was found in.
+    pub folds: usize,
+    /// The images trained on.
+    pub survey: &'a Survey,
+    /// How long the training took.
+    pub seconds: f64,
+    /// How it did on the images held out, if there are any.
+    pub test: Option<&'a (Evaluation, Survey)>,
+    /// Folders that were left out.
+    pub ignored: &'a [String],
+}
+
+impl Outcome<'_> {
+    /// Some lines for people.
+    pub(super) fn text(&self) -> String {
+        let Self { model, trained, .. } = self;
+        let classifier = &model.classifier;
+        let people = model.origin.people.len();
+        let folding = match trained.folding {
+            Folding::ByGroup => "by subject",
+            Folding::BySample => "by image (subjects appear on both sides of the split)",
+        };
+        let mut lines = vec![
+            format!("{} images of {people} subjects, {}", self.survey.seen.len(), self.folder.display()),
+            format!("  gestures   {}", classifier.vocabulary().labels().join(" ")),
+            format!(
+                "  features   {} → {} principal components, {:.1} % of the variance",
+                classifier.space().feature_set(),
+                classifier.space().components(),
+                100.0 * explained(classifier)
+            ),
+            format!(
+                "  SVM        C = {}, γ = {}, {} support vectors",
+                trained.cost,
+                trained.gamma,
+                classifier.support_vectors()
+            ),
+            format!(
+                "  validation accuracy {:.3}, {}-fold cross-validation {folding}",
+                trained.accuracy, self.folds
+            ),
+            format!("  trained in {:.1} s → {}", self.seconds, self.out.display()),
+        ];
+        if let Some((evaluation, survey)) = self.test {
+            lines.push(format!("\n{} images of held-out subjects:", evaluation.count()));
+            lines.push(report::text(evaluation, survey, classifier.vocabulary()));
+        }
+        lines.join("\n") + "\n"
+    }
+
+    /// All of it, for programs.
+    pub(super) fn json(&self) -> Value {
+        let Self { model, trained, survey, .. } = self;
+        let classifier = &model.classifier;
+        json!({
+            "model": self.out.display().to_string(),
+            "dataset": self.folder.display().to_string(),
+            "gestures": classifier.vocabulary().labels(),
+            "ignored": self.ignored,
+            "feature_set": classifier.space().feature_set(),
+            "space": classifier.space().id().to_string(),
+            "components": classifier.space().components(),
+            "variance": explained(classifier),
+            "cost": trained.cost,
+            "gamma": trained.gamma,
+            "support_vectors": classifier.support_vectors(),
+            "images": survey.seen.len(),
+            "without_hand": survey.without_hand.len(),
+            "unreadable": survey.unreadable.len(),
+            "people": model.origin.people.len(),
+            "cross_validation": {
+                "folds": self.folds,
+                "by_person": trained.folding == Folding::ByGroup,
+                "accuracy": trained.accuracy,
+                "log_loss": trained.log_loss,
+            },
+            "seconds": self.seconds,
+            "test": self.test.map(|(evaluation, survey)| report::json(evaluation, survey, classifier.vocabulary())),
+        })
+    }
+}
+
+/// Part of the variance that the classifier's space keeps, `0.0..=1.0`.
+fn explained(classifier: &Classifier) -> f64 {
+    match classifier.space().reduction() {
+        Reduction::Pca(pca) => pca.explained(),
+        Reduction::Selected { width, kept } => kept.len() as f64 / *width as f64,
+    }
+}
