@@ -1,5 +1,5 @@
 //! What a user would write first. Run one with `cargo run -p gestalt-examples --example subscribe`:
 //!
 //! - `subscribe.rs`, `subscribe.py`: print each decision of a running swarm, from any Zenoh client;
-//! - `embed.rs`: a controller of one's own around a robot;
-//! - `in_process.rs`: a test of one's own with robots in one process.
+//! - `embed.rs`: your own controller around a robot;
+//! - `in_process.rs`: your own test with robots in one process.
