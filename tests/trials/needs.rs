@@ -46,7 +46,9 @@ impl Need {
             Self::Namespaces => namespaces(),
             Self::Mount => mount(),
             Self::Data if data().is_dir() => Ok(()),
-            Self::Data => Err(format!("no {} (set GESTALT_DATA)", data().display())),
+            Self::Data => {
+                Err("needs photographs and recordings (GESTALT_DATA names their folder)".to_owned())
+            }
         }
     }
 }
