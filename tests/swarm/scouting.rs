@@ -20,7 +20,9 @@ fn scouting(id: u32, swarm: &str) -> RobotConfig {
     let scouting = Scouting { address: format!("239.255.77.77:{port}"), interface: "lo".to_owned() };
     let plain = config(id, swarm, &[]);
     let link = LinkConfig { scouting: Some(scouting), lease: LEASE, ..plain.link };
-    RobotConfig { link, mind: MindConfig { quorum: 8, ..MindConfig::default() }, ..plain }
+    // A busy machine may take long to bring the votes together; no round is to end undecided for that.
+    let mind = MindConfig { quorum: 8, deadline: Duration::from_secs(30), ..MindConfig::default() };
+    RobotConfig { link, mind, ..plain }
 }
 
 /// Seconds of processor time this process has used.
