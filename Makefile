@@ -1,7 +1,7 @@
 # `make demo` and `make test` need Rust and git; everything else they install themselves.
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
-.PHONY: demo test bench lint packages
+.PHONY: demo test bench lint packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
@@ -23,18 +23,21 @@ endef
 packages:
 	@$(call install,$(PACKAGES))
 
+test-packages: packages
+	@$(call install,$(TEST_PACKAGES))
+
 # A heterogeneous swarm of real Zenoh peers that knows no gesture looks, decides, is told what it was, and learns.
-# Leaves its pictures in out/. One build serves the demo and the tests: the dev profile is optimised.
+# Leaves its pictures in out/.
 demo: packages
-	cargo build --workspace --bins
+	cargo build -p gestalt-peer --bin gestalt
 	mkdir -p out
 	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
 	  --learn nothing --picture out/round.png --curve out/curve.png
 
-# One test after the other: whole swarms measure time, and share the processor.
-test: packages
-	@$(call install,$(TEST_PACKAGES))
-	cargo test --workspace --lib --bins --tests --examples -- --test-threads=1
+# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,data makes failures
+# of what is skipped for want of them.
+test: test-packages
+	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
 
 # Every speed the README states, with its yardstick in the same run.
 bench: packages
@@ -43,3 +46,6 @@ bench: packages
 lint: packages
 	cargo fmt --check
 	cargo clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+	@if ! cargo deny --version >/dev/null 2>&1; then echo "skipped: cargo deny is not installed"; \
+	else cargo deny check; fi

@@ -1,4 +1,5 @@
-//! A controller of one's own around a robot: it takes part in the swarm's decisions, and acts on them.
+//! Your own controller around a robot: it takes part in the swarm's decisions, and acts on them. Neither OpenCV nor
+//! libclang is needed to build it.
 //!
 //! The robot's camera and perception are the controller's own; what it hands over are feature vectors and a
 //! classifier for them. Here the "camera" is a number, and the classifier tells small from large.

@@ -1,4 +1,4 @@
-//! A test of one's own with robots in one process: three in a line, of which only the first sees the hand.
+//! Your own test with robots in one process: three in a line, of which only the first sees the hand.
 //!
 //! ```text
 //! cargo test -p gestalt-examples --example in_process

@@ -16,7 +16,7 @@ mod streaming;
 
 pub use classifier::{Fixed, look};
 pub use learning::{gesture, learning, short_rounds, space};
-pub use namespaces::{Namespaces, not_permitted};
+pub use namespaces::Namespaces;
 pub use process::Process;
-pub use robots::{Watched, config, start, start_learning, unique};
-pub use streaming::{Hands, center_config, sender_config};
+pub use robots::{Watched, agreed, config, start, start_learning, unique};
+pub use streaming::{Hands, center_config, model, sender_config};

@@ -103,7 +103,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
             }
             line = stdin.recv() => match line.as_deref() {
                 Some("open") => robot.open_round(),
-                // `shown 3`: what is before its camera from now on.
+                // `shown 3`: what is in front of its camera from now on.
                 Some(order) if order.starts_with("shown ") => {
                     sees = order["shown ".len()..].parse().ok().map(ClassId);
                 }
@@ -209,6 +209,7 @@ fn outcome(event: &str, decision: &Decision) -> Value {
         "author": decision.author.0,
         "votes": decision.certificate.votes.len(),
         "voters": ids(decision.certificate.votes.iter().map(|vote| &vote.robot)),
+        "decision": decision,
     })
 }
 

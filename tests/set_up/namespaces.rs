@@ -4,26 +4,6 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-/// Says, on stderr, when this machine does not let the test make network namespaces, or not enter them (a chroot may
-/// do the one without the other).
-#[must_use]
-pub fn not_permitted() -> bool {
-    let name = format!("gt{}", std::process::id());
-    let ip = |words: &[&str]| {
-        let done = Command::new("ip").args(words).stderr(Stdio::null()).status();
-        done.is_ok_and(|status| status.success())
-    };
-    let made = ip(&["netns", "add", &name]);
-    let entered = made && ip(&["netns", "exec", &name, "true"]);
-    if made {
-        ip(&["netns", "del", &name]);
-    }
-    if !entered {
-        eprintln!("SKIPPED: no right to make and enter network namespaces here (needs root and iproute2)");
-    }
-    !entered
-}
-
 /// Robots' namespaces and the links between them. Every link runs over a bridge of its own in a namespace of
 /// their own; a cut takes one end off the bridge, so that both sides notice nothing but silence.
 pub struct Namespaces {

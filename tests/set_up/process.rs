@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde_json::Value;
@@ -15,6 +16,7 @@ pub struct Process {
     child: Child,
     stdin: ChildStdin,
     told: Told,
+    teller: Option<JoinHandle<()>>,
 }
 
 impl Process {
@@ -48,7 +50,7 @@ impl Process {
         let stdout = child.stdout.take().expect("stdout is piped");
         let told = Told::default();
         let teller = told.clone();
-        std::thread::spawn(move || {
+        let teller = std::thread::spawn(move || {
             for line in BufReader::new(stdout).lines().map_while(Result::ok) {
                 let Ok(mut value) = serde_json::from_str::<Value>(&line) else { continue };
                 if value["at_ms"].is_null() {
@@ -59,7 +61,7 @@ impl Process {
                 teller.1.notify_all();
             }
         });
-        Self { child, stdin, told }
+        Self { child, stdin, told, teller: Some(teller) }
     }
 
     /// Gives an order: `open`, `status`, `quit`.
@@ -87,18 +89,27 @@ impl Process {
         }
     }
 
-    /// The class of the decision it holds for that round, and when it came to it, once that round is over;
-    /// `Some(None)` is "no decision".
-    pub fn decision(&self, round: u64, patience: Duration) -> Option<(Option<u64>, u64)> {
+    /// The decision it holds for that round, whole, once that round is over.
+    pub fn decision(&self, round: u64, patience: Duration) -> Option<Value> {
         self.wait(patience, |told| {
             let of = |event: &'static str| {
                 told.iter().rev().find(move |t| t["event"] == event && t["round"] == round)
             };
             let taking_part = of("opened").is_some();
             let over = !taking_part || of("closed").is_some();
-            let held = of("held").filter(|_| over)?;
-            Some((held["class"].as_u64(), held["at_ms"].as_u64()?))
+            Some(of("held").filter(|_| over)?["decision"].clone())
         })
+    }
+
+    /// Everything it told before it was killed, to the last line.
+    #[must_use]
+    pub fn told_to_the_end(&mut self) -> Vec<Value> {
+        self.kill();
+        if let Some(teller) = self.teller.take() {
+            // It ends with the pipe, which ends with the process.
+            let _ = teller.join();
+        }
+        self.told()
     }
 
     /// Sends it a signal, such as `STOP` or `CONT`.

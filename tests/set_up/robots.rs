@@ -111,6 +111,35 @@ async fn look_when_open(
     }
 }
 
+/// Waits until a round is over for all robots and all hold one and the same decision of it, certificate and all.
+///
+/// # Panics
+/// When they do not within `patience`.
+pub async fn agreed(robots: &mut [Watched], counter: u32, patience: Duration) -> Decision {
+    let deadline = Instant::now() + patience;
+    let mut held = Vec::new();
+    for robot in &mut *robots {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let decision = robot.decision(counter, left).await;
+        held.push(decision.unwrap_or_else(|| panic!("round {counter}: {:?}", robot.robot.status())));
+    }
+    // Who decided early hears of a greater decision later.
+    while held.iter().any(|decision| *decision != held[0]) {
+        assert!(Instant::now() < deadline, "round {counter} ended differently: {held:#?}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        for (robot, held) in robots.iter_mut().zip(&mut held) {
+            let greater = |event| match event {
+                Event::Held(decision) if decision.round.counter == counter => Some(decision),
+                _ => None,
+            };
+            if let Some(decision) = robot.wait(Duration::ZERO, greater).await {
+                *held = decision;
+            }
+        }
+    }
+    held.swap_remove(0)
+}
+
 impl Watched {
     /// Waits for an event for which `pick` has a value.
     pub async fn wait<T>(

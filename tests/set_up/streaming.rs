@@ -15,24 +15,30 @@ use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
 use serde_json::{Value, json};
 
+/// A classifier of drawn hands, learned once for all scenarios.
+///
+/// # Panics
+/// When it cannot be trained.
+#[must_use]
+pub fn model() -> RobotModel {
+    static MODEL: OnceLock<RobotModel> = OnceLock::new();
+    MODEL.get_or_init(|| RobotModel::rendered(|_, _| {}).expect("it can be trained")).clone()
+}
+
 /// A folder of pictures of one gesture, and a file with the classifier that tells it.
 pub struct Hands {
     folder: tempfile::TempDir,
 }
 
 impl Hands {
-    /// Draws a hand that shows so many fingers, and trains the classifier, which takes some seconds the first time.
+    /// Draws a hand that shows so many fingers, and writes the classifier, which takes some seconds the first time.
     ///
     /// # Panics
     /// When there is no room for files.
     #[must_use]
     pub fn new(fingers: u8) -> Self {
         let hands = Self { folder: tempfile::tempdir().expect("a folder for the pictures") };
-        // The same for all scenarios of this process.
-        static MODEL: OnceLock<RobotModel> = OnceLock::new();
-        let train = || RobotModel::rendered().ok();
-        let model = MODEL.get_or_init(|| train().expect("it can be trained"));
-        model.write(&hands.model()).expect("the model is written");
+        model().write(&hands.model()).expect("the model is written");
         std::fs::create_dir(hands.images()).expect("a folder for the pictures");
         std::fs::create_dir(hands.encoded()).expect("a folder for the pictures");
         let mut source = RenderedSource::new(CameraModel::parrot(), Pose::FRONTAL, Glove::Cyan, 1)

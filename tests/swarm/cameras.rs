@@ -13,12 +13,10 @@ use gestalt_peer::config::{
 use gestalt_peer::picture::write_png;
 use gestalt_peer::swarm::Members;
 use gestalt_protocol::{Camera, CameraState, Decision, RobotId};
-use gestalt_tests::unique;
+use gestalt_tests::{model, unique};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
 use serde_json::json;
-
-use super::motion::model;
 
 const PATIENCE: Duration = Duration::from_secs(15);
 
@@ -65,8 +63,7 @@ async fn decision(events: &mut tokio::sync::broadcast::Receiver<Event>) -> Decis
     tokio::time::timeout(PATIENCE, held).await.expect("a decision")
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_robot_whose_camera_is_missing_relays_and_agrees() {
+pub async fn a_robot_whose_camera_is_missing_relays_and_agrees() {
     let swarm = unique("cameras");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video7");
@@ -97,8 +94,7 @@ async fn a_robot_whose_camera_is_missing_relays_and_agrees() {
     members.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_camera_that_hangs_keeps_nobody() {
+pub async fn a_camera_that_hangs_keeps_nobody() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("video8");
     // Opening a pipe that nobody writes to never returns.
@@ -106,14 +102,11 @@ async fn a_camera_that_hangs_keeps_nobody() {
     let body = Body::start(&config(1, &unique("cameras"), device(&path)), Some(model()), 1).await.unwrap();
     let hung = camera(&body, |camera| camera.state == CameraState::Frozen).await;
     assert!(hung.trouble.contains("no frame for"), "{hung:?}");
-    let began = Instant::now();
     body.robot().open_round();
-    body.stop().await;
-    assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
+    tokio::time::timeout(PATIENCE, body.stop()).await.expect("it stops though its camera hangs");
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn pictures_that_vanish_and_come_back_are_taken_up_again() {
+pub async fn pictures_that_vanish_and_come_back_are_taken_up_again() {
     let folder = tempfile::tempdir().unwrap();
     let shown = folder.path().join("shown");
     std::fs::create_dir(&shown).unwrap();

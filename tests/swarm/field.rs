@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use gestalt_tests::{Namespaces, Process, unique};
-use serde_json::json;
+use serde_json::{Value, json};
 
 const PORT: u16 = 7447;
 
@@ -15,42 +15,35 @@ pub struct Field {
     /// Where they live.
     pub namespaces: Namespaces,
     swarm: String,
-    sees: Vec<Option<u8>>,
-    p: f64,
+    sees: Vec<Sees>,
     quorum: u32,
 }
 
-impl Field {
-    /// Starts a robot in each of `nodes` namespaces and waits until all know of all.
-    pub fn new(nodes: u32, links: &[(u32, u32)], sees: impl Fn(u32) -> Option<u8>) -> Self {
-        Self::with(nodes, links, sees, 0.9, 1)
-    }
+/// The class that a robot sees, and how sure of it it is; `None` for one that cannot see.
+pub type Sees = Option<(u8, f64)>;
 
-    /// The same with robots that see a class with probability `p`, and decide when `quorum` of them have voted.
-    pub fn with(
-        nodes: u32,
-        links: &[(u32, u32)],
-        sees: impl Fn(u32) -> Option<u8>,
-        p: f64,
-        quorum: u32,
-    ) -> Self {
+impl Field {
+    /// Starts a robot in each of `nodes` namespaces and waits until all know of all. They decide when `quorum` of them have
+    /// seen something.
+    pub fn new(nodes: u32, links: &[(u32, u32)], quorum: u32, sees: impl Fn(u32) -> Sees) -> Self {
         let namespaces = Namespaces::new(nodes, links);
         let sees = (0..nodes).map(sees).collect();
-        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, p, quorum };
+        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, quorum };
         for node in 0..nodes {
             let robot = field.process(node);
             field.robots.push(robot);
         }
-        field.wait_for_all(Duration::from_secs(15));
+        field.wait_for_all(Duration::from_secs(30));
         field
     }
 
     fn process(&self, node: u32) -> Process {
+        let sees = self.sees[node as usize];
         let orders = json!({
             "id": node,
             "swarm": self.swarm,
-            "sees": self.sees[node as usize],
-            "p": self.p,
+            "sees": sees.map(|(class, _)| class),
+            "p": sees.map(|(_, p)| p),
             "quorum": self.quorum,
             "link": {
                 "listen": [format!("tcp/0.0.0.0:{PORT}")],
@@ -77,20 +70,19 @@ impl Field {
         }
     }
 
-    /// What each robot holds as the outcome of a round, as soon as all hold the same, or when the time is up:
-    /// `None` for a robot that holds nothing or is still in the midst of it.
-    pub fn decisions(&self, round: u64, patience: Duration) -> Vec<Option<Option<u64>>> {
+    /// The decision of a round that robots hold, as soon as it is over for all of them and all hold the same, certificate and
+    /// all. Each is as the program prints it.
+    pub fn agreed(&self, round: u64, robots: &[usize], patience: Duration) -> Value {
         let deadline = Instant::now() + patience;
         loop {
-            let held: Vec<_> = self
-                .robots
-                .iter()
-                .map(|robot| robot.decision(round, Duration::ZERO).map(|(class, _)| class))
-                .collect();
-            let agreed = held.iter().all(|class| class.is_some() && *class == held[0]);
-            if agreed || Instant::now() > deadline {
-                return held;
+            let held: Vec<Option<Value>> =
+                robots.iter().map(|i| self.robots[*i].decision(round, Duration::ZERO)).collect();
+            if let Some(Some(decision)) = held.first()
+                && held.iter().all(|other| other.as_ref() == Some(decision))
+            {
+                return decision.clone();
             }
+            assert!(Instant::now() < deadline, "round {round} of robots {robots:?}: {held:#?}");
             std::thread::sleep(Duration::from_millis(20));
         }
     }

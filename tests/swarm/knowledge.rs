@@ -3,13 +3,19 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use gestalt_tests::{Namespaces, Process, not_permitted, unique};
+use gestalt_tests::{Namespaces, Process, unique};
 use serde_json::{Value, json};
 
 const PORT: u16 = 7447;
 
 /// Part of all messages that every robot drops unread.
 const LOSS: f64 = 0.3;
+
+/// How many gestures are shown and named.
+const LESSONS: u32 = 8;
+
+/// Far above what any of this takes: who is not there by then is stuck.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The robot that is killed, and the one that joins late.
 const DEAD: u32 = 2;
@@ -43,17 +49,15 @@ fn status(robot: &mut Process) -> Value {
 
 /// How many samples of the common knowledge it holds.
 fn common(status: &Value) -> u64 {
-    let of = |part: &str| {
-        status["learning"][part].as_array().map_or(0, |n| n.iter().filter_map(Value::as_u64).sum::<u64>())
-    };
-    of("shared") + of("external")
+    sum(status, "shared") + sum(status, "external")
 }
 
-#[test]
-fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge() {
-    if not_permitted() {
-        return;
-    }
+/// How many samples it holds in that part of its training set.
+fn sum(status: &Value, part: &str) -> u64 {
+    status["learning"][part].as_array().map_or(0, |n| n.iter().filter_map(Value::as_u64).sum::<u64>())
+}
+
+pub fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge() {
     // A ring of five, and the place of one that joins between the third and the fifth.
     let links = [(0, 1), (1, 2), (2, 3), (3, 4), (0, 4), (3, LATE), (4, LATE)];
     let namespaces = Namespaces::new(6, &links);
@@ -64,10 +68,10 @@ fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge() {
             let alive = told.iter().rev().find(|told| told["event"] == "alive")?;
             (alive["robots"].as_array()?.len() >= 4).then_some(())
         };
-        assert!(robot.wait(Duration::from_secs(15), all).is_some(), "all know all");
+        assert!(robot.wait(PATIENCE, all).is_some(), "all know all");
     }
     let mut shared = 0;
-    for lesson in 0..8_u32 {
+    for lesson in 0..LESSONS {
         let class = lesson % 6;
         // One link after the other is cut, and healed when the next one is.
         let cut = links[lesson as usize % 5];
@@ -88,24 +92,66 @@ fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge() {
         namespaces.heal(cut);
     }
     assert_eq!(shared, 1, "the one that is killed had shared");
+    let of_the_dead = shares(&robots[DEAD as usize].told_to_the_end());
     robots[DEAD as usize] = robot(&namespaces, &swarm, LATE);
     let calm = Instant::now();
-    let mut known = Vec::new();
-    while calm.elapsed() < Duration::from_secs(10) {
-        known = robots.iter_mut().map(status).collect();
-        let digest = |status: &Value| status["learning"]["common"].clone();
-        if known.iter().all(|status| digest(status) == digest(&known[0]) && common(status) >= 30) {
-            let samples = common(&known[0]);
-            return eprintln!(
-                "the same {samples} samples everywhere {:?} after the last fault",
-                calm.elapsed()
-            );
+    let known: Vec<Value> = loop {
+        let known: Vec<Value> = robots.iter_mut().map(status).collect();
+        let of_the_living: u64 = known.iter().map(|status| sum(status, "shared")).sum();
+        // All that the living shared is known to all; what the dead one said last may have died with it.
+        let due = of_the_living..=of_the_living + of_the_dead;
+        let complete = |status: &Value| {
+            status["learning"]["common"] == known[0]["learning"]["common"] && due.contains(&common(status))
+        };
+        if known.iter().all(complete) {
+            break known;
         }
+        let sizes: Vec<_> =
+            known.iter().map(|s| (&s["learning"]["common"], common(s), &s["neighbours"])).collect();
+        assert!(calm.elapsed() < PATIENCE, "{due:?} samples are due: {sizes:#?}");
         std::thread::sleep(Duration::from_millis(100));
+    };
+    eprintln!(
+        "the same {} samples everywhere {:?} after the last fault, {of_the_dead} by the dead",
+        common(&known[0]),
+        calm.elapsed()
+    );
+    // All that was shared is there, however much that is; loss keeps a robot out of a lesson now and then. In full it would be
+    // half of three observations of each robot and lesson, some sixty.
+    assert!(common(&known[0]) >= 36, "hardly anything was learned: {} samples", common(&known[0]));
+
+    // What was learned is decided alike, though one of them sees something else.
+    robots.iter_mut().for_each(|robot| robot.order("shown 1"));
+    robots[4].order("shown 3");
+    robots[0].order("open");
+    let decision = agreed(&robots);
+    assert_eq!(decision["class"], json!(1), "{decision}");
+}
+
+/// The last decision they hold, once it is one and the same and names a gesture.
+fn agreed(robots: &[Process]) -> Value {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let last = |robot: &Process| {
+            let told = robot.told();
+            let held = told.iter().rfind(|told| told["event"] == "held")?;
+            let over = told.iter().any(|t| t["event"] == "closed" && t["round"] == held["round"]);
+            let after_lessons = held["round"].as_u64()? > u64::from(LESSONS);
+            (over && after_lessons).then(|| held["decision"].clone())
+        };
+        let held: Vec<Option<Value>> = robots.iter().map(last).collect();
+        if let Some(Some(decision)) = held.first()
+            && held.iter().all(|other| other.as_ref() == Some(decision))
+        {
+            return decision.clone();
+        }
+        assert!(Instant::now() < deadline, "{held:#?}");
+        std::thread::sleep(Duration::from_millis(20));
     }
-    let sizes: Vec<_> = known
-        .iter()
-        .map(|status| (&status["learning"]["common"], common(status), &status["neighbours"]))
-        .collect();
-    panic!("10 s after the last fault: {sizes:#?}");
+}
+
+/// How many samples it told it shared.
+fn shares(told: &[Value]) -> u64 {
+    let shared = told.iter().filter(|told| told["event"] == "shared");
+    shared.map(|told| told["samples"].as_array().map_or(0, Vec::len) as u64).sum()
 }

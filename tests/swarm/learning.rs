@@ -9,13 +9,13 @@ use gestalt_protocol::{
     ClassId, Envelope, FeatureSpaceId, Gesture, Instruction, InstructorId, Keys, Message, Outcome, RobotId,
     RoundId, SampleId, Samples, SharedSample, Stamp, Status, Topic, Vector,
 };
-use gestalt_tests::{Watched, config, learning, short_rounds, space, start, start_learning, unique};
+use gestalt_tests::{Watched, agreed, config, learning, short_rounds, space, start, start_learning, unique};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Robots that learn, a client, and what is before all cameras.
+/// Robots that learn, a client, and what is in front of all cameras.
 struct School {
     swarm: String,
     robots: Vec<Watched>,
@@ -65,10 +65,7 @@ impl School {
         self.shown.store(class, Ordering::Relaxed);
         let before = self.robots[0].robot.status().round.map_or(0, |round| round.counter);
         self.client.instruct(&self.ada, &Instruction::Open).await.unwrap();
-        let decision = self.robots[0].decision(before + 1, PATIENCE).await.expect("the round ends");
-        for robot in &mut self.robots[1..] {
-            assert!(robot.decision(before + 1, PATIENCE).await.is_some(), "the round ends for all");
-        }
+        let decision = agreed(&mut self.robots, before + 1, PATIENCE).await;
         // A robot that decided early looks on until it has what it keeps, and no request counts so soon.
         tokio::time::sleep(Duration::from_millis(500)).await;
         decision.round
@@ -107,8 +104,7 @@ fn sizes(status: &Status) -> [usize; 3] {
     [&learning.personal, &learning.shared, &learning.external].map(|classes| classes.iter().sum())
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gestures_apart() {
+pub async fn ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gestures_apart() {
     let mut school = School::on_a_ring(10, 5, 0.2).await;
     for class in 0..6 {
         school.lesson(class).await;
@@ -130,8 +126,7 @@ async fn ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gestures_ap
     school.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn the_size_follows_the_formula_over_real_links() {
+pub async fn the_size_follows_the_formula_over_real_links() {
     for (robots, fraction) in [(5, 0.1), (5, 1.0)] {
         let mut school = School::on_a_ring(robots, 5, fraction).await;
         for class in 0..6 {
@@ -151,8 +146,7 @@ async fn the_size_follows_the_formula_over_real_links() {
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_correction_and_an_undo_reach_every_robot() {
+pub async fn a_correction_and_an_undo_reach_every_robot() {
     let mut school = School::on_a_ring(4, 3, 1.0).await;
     let round = school.lesson(2).await;
     let counts = |class: usize, n: usize| {
@@ -177,8 +171,7 @@ async fn a_correction_and_an_undo_reach_every_robot() {
     school.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_them() {
+pub async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_them() {
     let school = School::on_a_ring(2, 3, 1.0).await;
     let mut zenoh = zenoh::Config::default();
     zenoh.insert_json5("mode", "\"client\"").unwrap();
@@ -215,7 +208,22 @@ async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_
             .await
             .unwrap();
     }
-    tokio::time::sleep(Duration::from_millis(500)).await;
+    let refused = |status: &Status| {
+        let of =
+            |(counter, ..): &(&str, FeatureSpaceId, SharedSample)| status.counters.get(*counter).copied();
+        forged.iter().all(|forged| of(forged).is_some())
+            && status
+                .counters
+                .iter()
+                .filter(|(name, _)| name.starts_with("refused_sample"))
+                .map(|(_, n)| n)
+                .sum::<u64>()
+                >= forged.len() as u64
+    };
+    let deadline = tokio::time::Instant::now() + PATIENCE;
+    while !school.statuses().iter().all(refused) && tokio::time::Instant::now() < deadline {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
     for status in school.statuses() {
         for (counter, ..) in &forged {
             let expected = forged.iter().filter(|(other, ..)| other == counter).count() as u64;
@@ -228,8 +236,18 @@ async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_
     school.end().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_robot_votes_and_decides_while_it_trains() {
+pub async fn a_robot_votes_and_decides_while_it_trains() {
+    // Now and then the training is over too soon to show anything.
+    for _ in 0..3 {
+        if decides_while_training().await {
+            return;
+        }
+    }
+    panic!("the training was over before the decision, each time");
+}
+
+/// Whether it decided before its training was over; it must decide in any case.
+async fn decides_while_training() -> bool {
     const SAMPLES: u32 = 4000;
     let swarm = unique("busy");
     let mut apprenticeship = learning(3, 1.0, None);
@@ -269,9 +287,9 @@ async fn a_robot_votes_and_decides_while_it_trains() {
     let decision = busy.decision(1, PATIENCE).await.expect("a decision");
     let (after, trainings) = (opened.elapsed(), learned(&busy).trainings);
     eprintln!("decided after {after:?}, while training on {SAMPLES} samples");
-    assert_eq!(trainings, 0, "the training was over too soon to show anything");
     assert_eq!(decision.class, Some(ClassId(4)));
     giver.close().await.unwrap();
     sees.stop().await;
     busy.stop().await;
+    trainings == 0
 }

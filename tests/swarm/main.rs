@@ -1,4 +1,5 @@
-//! Whole swarms on real Zenoh, one scenario a file. Run them one after the other: they measure time.
+//! Whole swarms on real Zenoh, one subject a file. Each line of the table says what a scenario does most of its time, and
+//! what it needs of the machine; what waits runs side by side. The long ones come first.
 
 mod cameras;
 mod center;
@@ -12,7 +13,51 @@ mod line;
 mod memory;
 mod mixed;
 mod motion;
+mod partition;
 mod ring;
 mod scouting;
 mod stream;
 mod trouble;
+
+fn main() -> std::process::ExitCode {
+    gestalt_trials::run(gestalt_trials::trials![
+        [Works] mixed::footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike,
+        [Waits] in_process::twenty_robots_agree_in_each_of_fifty_rounds.await,
+        [Waits, Namespaces] churn::a_grid_under_churn_never_ends_a_round_differently_and_agrees_in_calm,
+        [Works] motion::gestures_start_rounds_and_all_robots_decide_them_alike.await,
+        [Waits, Namespaces] ring::a_round_in_which_a_relay_freezes_ends_the_same_everywhere,
+        [Waits, Namespaces] knowledge::under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge,
+        [Waits] memory::killed_at_any_moment_it_remembers_and_shares_nothing_twice.await,
+        [Works, Namespaces] center::a_stream_cut_and_a_centre_killed_come_back_to_a_centre_that_decides,
+        [Waits] learning::ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gestures_apart.await,
+        [Waits] learning::the_size_follows_the_formula_over_real_links.await,
+        [Works, Namespaces] center::a_stream_cut_and_a_centre_killed_come_back_to_robots_that_gossip,
+        [Waits] clients::a_client_hears_each_decision_once_and_can_ask_and_instruct.await,
+        [Waits] clients::a_decision_is_announced_once_though_the_spokesrobot_is_killed.await,
+        [Waits, Namespaces] partition::the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal,
+        [Waits] trouble::votes_cost_little_while_a_round_is_open_and_nothing_otherwise.await,
+        [Waits, Mount] memory::a_full_disk_is_reported_and_the_robot_votes_on_and_recovers.await,
+        [Works, Namespaces] center::foot_bots_and_parrots_of_a_centre_that_decides_are_one_ballot,
+        [Works, Namespaces] center::foot_bots_and_parrots_of_a_centre_in_which_they_gossip_are_one_ballot,
+        [Waits] cameras::a_robot_whose_camera_is_missing_relays_and_agrees.await,
+        [Waits] cameras::a_camera_that_hangs_keeps_nobody.await,
+        [Waits] cameras::pictures_that_vanish_and_come_back_are_taken_up_again.await,
+        [Waits, Namespaces] line::the_eighth_in_a_line_decides_what_the_first_two_see,
+        [Waits, Namespaces] ring::a_ring_goes_on_after_a_relay_is_killed,
+        [Waits] in_process::what_the_first_two_of_a_line_see_the_last_decides.await,
+        [Waits] learning::a_correction_and_an_undo_reach_every_robot.await,
+        [Waits] learning::forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_them.await,
+        [Works] learning::a_robot_votes_and_decides_while_it_trains.await,
+        [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
+        [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
+        [Waits] stream::nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks.await,
+        [Waits] stream::who_is_there_already_and_who_comes_too_many_is_refused_and_counted.await,
+        [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
+        [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
+        [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,
+        [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
+        [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
+        [Alone] stream::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
+        [Alone] scouting::a_hundred_robots_in_hearing_keep_four_links_each_and_agree.await,
+    ])
+}

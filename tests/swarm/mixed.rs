@@ -2,15 +2,13 @@
 //! All are processes of the program itself, in a line, and nobody opens rounds but what they see move.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_tests::{Process, unique};
+use gestalt_tests::{Process, model, unique};
 use gestalt_vision::human::{Human, Schedule};
 use serde_json::{Value, json};
-
-use crate::motion::model;
 
 const SCHEDULE: Schedule = Schedule { period: Duration::from_secs(5), still: Duration::from_millis(2400) };
 const SEED: u64 = 11;
@@ -39,7 +37,7 @@ impl Cast {
         });
         let file = self.folder.path().join(format!("{id}.json5"));
         std::fs::write(&file, config.to_string()).unwrap();
-        let gestalt = Path::new(env!("CARGO_BIN_EXE_test-robot")).with_file_name("gestalt");
+        let gestalt = env!("CARGO_BIN_EXE_test-gestalt");
         Process::run(Command::new(gestalt).args([verb, "--json", "--config"]).arg(file))
     }
 
@@ -82,8 +80,7 @@ fn decisions(process: &Process, event: &str) -> BTreeMap<u64, Value> {
         .collect()
 }
 
-#[test]
-fn footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike() {
+pub fn footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike() {
     let cast = Cast { folder: tempfile::tempdir().unwrap(), swarm: unique("mixed") };
     model().write(&cast.model()).unwrap();
     // The robots wake up while nobody is there.

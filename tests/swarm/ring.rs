@@ -1,66 +1,59 @@
 //! A ring of processes: relays that are killed or frozen.
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-use gestalt_tests::not_permitted;
+use serde_json::json;
 
-use crate::field::Field;
+use crate::field::{Field, Sees};
 
 const NODES: u32 = 6;
 
-fn now_ms() -> u64 {
-    u64::try_from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_millis()).unwrap()
+/// Far above what any of this takes: who is not there by then is stuck.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn ring(sees: impl Fn(u32) -> Sees) -> Field {
+    let links: Vec<_> = (0..NODES).map(|i| (i, (i + 1) % NODES)).collect();
+    Field::new(NODES, &links, 2, sees)
 }
 
-#[test]
-fn a_ring_goes_on_after_a_relay_is_killed() {
-    if not_permitted() {
-        return;
-    }
-    let links: Vec<_> = (0..NODES).map(|i| (i, (i + 1) % NODES)).collect();
-    let mut field = Field::new(NODES, &links, |node| (node == 0).then_some(2));
+pub fn a_ring_goes_on_after_a_relay_is_killed() {
+    let mut field = ring(|node| match node {
+        0 | 2 => Some((2, 0.9)),
+        4 => Some((3, 0.9)),
+        _ => None,
+    });
     field.robots[0].order("open");
-    assert_eq!(field.decisions(1, Duration::from_secs(8)), vec![Some(Some(2)); 6]);
+    assert_eq!(field.agreed(1, &[0, 1, 2, 3, 4, 5], PATIENCE)["class"], json!(2));
     field.robots[1].kill();
+    // A request to open a round right after the last one counts as a copy of that one's.
     std::thread::sleep(Duration::from_millis(700));
-    let began = Instant::now();
     field.robots[0].order("open");
-    field.robots.remove(1);
-    let decisions = field.decisions(2, Duration::from_secs(8));
-    eprintln!("ring, a relay killed: all agree {:?} after the next round was opened", began.elapsed());
-    assert_eq!(decisions, vec![Some(Some(2)); 5]);
+    assert_eq!(field.agreed(2, &[0, 2, 3, 4, 5], PATIENCE)["class"], json!(2));
 }
 
-#[test]
-fn a_round_in_which_a_relay_freezes_ends_the_same_everywhere() {
-    if not_permitted() {
-        return;
-    }
-    // Robot 0 sees, and needs several looks; what it says goes round the ring both ways.
-    let links: Vec<_> = (0..NODES).map(|i| (i, (i + 1) % NODES)).collect();
-    let mut field = Field::with(NODES, &links, |node| (node == 0).then_some(5), 0.6, 1);
+pub fn a_round_in_which_a_relay_freezes_ends_the_same_everywhere() {
+    // Robots 0 and 3 see different things and need several looks; what they say goes round the ring both ways.
+    let mut field = ring(|node| match node {
+        0 => Some((5, 0.75)),
+        3 => Some((1, 0.3)),
+        _ => None,
+    });
     for (round, relay) in [(1, 1), (2, 5), (3, 2), (4, 4)] {
         field.robots[0].order("open");
-        std::thread::sleep(Duration::from_millis(100));
+        let opened = |told: &[serde_json::Value]| {
+            told.iter().any(|t| t["event"] == "opened" && t["round"] == round).then_some(())
+        };
+        field.robots[relay].wait(PATIENCE, opened).expect("the relay takes part");
         field.robots[relay].signal("STOP");
-        let frozen_at = now_ms();
-        let live = (0..field.robots.len()).filter(|i| *i != relay);
-        let times: Vec<_> = live
-            .map(|i| {
-                let (class, at) = field.robots[i]
-                    .decision(round, Duration::from_secs(10))
-                    .expect("every live robot decides");
-                assert_eq!(class, Some(5));
-                at.saturating_sub(frozen_at)
-            })
-            .collect();
+        let frozen = Instant::now();
+        let live: Vec<usize> = (0..NODES as usize).filter(|i| *i != relay).collect();
+        let decision = field.agreed(round, &live, PATIENCE);
+        eprintln!("ring, relay {relay} frozen in mid-round: all others agree {:?} later", frozen.elapsed());
+        assert_eq!(decision["class"], json!(5), "{decision}");
         field.robots[relay].signal("CONT");
-        eprintln!("ring, relay {relay} frozen in mid-round: decided {times:?} ms after the freeze");
-        // The first to decide had what it needed; how much later the last one did is the outage.
-        let (first, last) = (times.iter().min().unwrap(), times.iter().max().unwrap());
-        assert!(last - first <= 1500, "an outage of {} ms", last - first);
-        std::thread::sleep(Duration::from_millis(1500));
+        // The one that slept through it comes to hold what the others do.
+        field.agreed(round, &[0, 1, 2, 3, 4, 5], PATIENCE);
         // A token that Zenoh lost on the way is found by the census, the second of which comes after some eight seconds.
-        field.wait_for_all(Duration::from_secs(15));
+        field.wait_for_all(Duration::from_secs(30));
     }
 }

@@ -73,6 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                     Err(RecvError::Lagged(missed)) => lagged(missed),
                     Err(RecvError::Closed) => break Err("the fusion centre has ended".into()),
                 },
+                failure = center.robot().ended() => break Err(failure.to_string().into()),
             }
         };
         center.stop().await;

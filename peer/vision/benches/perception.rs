@@ -11,6 +11,7 @@ use std::time::Duration;
 use bare::Bare;
 use divan::{Bencher, black_box};
 use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::motion::{MotionConfig, MotionDetector};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
@@ -54,6 +55,23 @@ fn observe_shape_in_a_room_known_empty(bencher: Bencher<'_, '_>) {
         Perception::new(FeatureSet::Shape, HandConfig::default()).expect("the defaults are valid");
     bencher.bench_local(|| {
         perception.observe_before(black_box(&frame), Some(&room)).expect("the frame shows a hand")
+    });
+}
+
+/// Nobody there, and a hand.
+#[divan::bench(args = [None, Some(3)])]
+fn watch_for_motion(bencher: Bencher<'_, '_>, gesture: Option<u8>) {
+    let camera = CameraModel::parrot();
+    let mut source =
+        RenderedSource::new(camera, Pose::FRONTAL, Glove::Cyan, 1).expect("the preset is a valid camera");
+    let mut take = || source.next_frame(Duration::ZERO, &Scene { gesture, seed: 2 });
+    let frames: Vec<Mat> = (0..30).map(|_| take().expect("0 to 5 fingers can be drawn").image).collect();
+    let mut detector = MotionDetector::new(MotionConfig::watching()).expect("the defaults are valid");
+    let mut number = 0_u32;
+    bencher.bench_local(|| {
+        number += 1;
+        let frame = &frames[number as usize % frames.len()];
+        detector.watch(black_box(frame), number * Duration::from_millis(33)).expect("it is a frame")
     });
 }
 

@@ -1,6 +1,6 @@
 //! One hand, two cameras: what the heterogeneity layer buys, and what each of its stages does.
 //!
-//! `GESTALT_LONG=1 cargo test -p gestalt-peer --test cameras -- --nocapture` measures over 20 seeds and prints the
+//! `GESTALT_LONG=1 cargo test -p gestalt-vision --test cameras -- --nocapture` measures over 20 seeds and prints the
 //! tables; without it, two seeds.
 
 #![cfg(feature = "opencv")]

@@ -1,7 +1,7 @@
 //! Real photographs of people never seen in training. The data are not part of the project: `GESTALT_DATA`, or
 //! `../shared/data` seen from the workspace; skipped where there are none.
 //!
-//! `cargo test -p gestalt-peer --test real_hands -- --nocapture` prints the figures.
+//! `cargo test -p gestalt-vision --test real_hands` prints the figures.
 
 #![cfg(feature = "opencv")]
 
@@ -21,15 +21,18 @@ use opencv::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-fn data(folder: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("GESTALT_DATA").map(PathBuf::from);
-    let root = root.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"));
-    let path = root.join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: no {} (set GESTALT_DATA)", path.display());
-        return None;
-    }
-    Some(path)
+fn main() -> std::process::ExitCode {
+    gestalt_trials::run(gestalt_trials::trials![
+        [Works, Data] a_cast_a_dim_light_noise_and_compression_cost_the_shape_little,
+        [Works, Data] a_cast_a_dim_light_noise_and_compression_cost_the_gradients_little,
+        [Works, Data] gradients_tell_ten_signs_of_people_never_seen,
+        [Works, Data] shape_tells_six_signs_of_people_never_seen,
+        [Works, Data] fingers_before_another_camera_are_told_better_than_by_the_reference,
+    ])
+}
+
+fn data(folder: &str) -> PathBuf {
+    gestalt_trials::data().join(folder)
 }
 
 fn options(set: FeatureSet) -> TrainOptions {
@@ -42,11 +45,11 @@ fn options(set: FeatureSet) -> TrainOptions {
 
 /// Accuracy over all images, those without a hand counting as wrong, and calibration error: means over two splits
 /// with 30 % of the people held out.
-fn on_people_never_seen(set: FeatureSet, labels: std::ops::RangeInclusive<u8>) -> Option<(f64, f64)> {
+fn on_people_never_seen(set: FeatureSet, labels: std::ops::RangeInclusive<u8>) -> (f64, f64) {
     const SPLITS: u64 = 2;
     let labels: Vec<String> = labels.map(|label| label.to_string()).collect();
     let what = format!("{}-{}", set.name(), labels.len());
-    let dataset = Dataset::list(&data("asl-digits")?, Some(&labels)).unwrap();
+    let dataset = Dataset::list(&data("asl-digits"), Some(&labels)).unwrap();
     let mut perception = Perception::new(set, HandConfig::default()).unwrap();
     let survey = Survey::of(&dataset.images, &mut perception, || ());
     assert!(survey.unreadable.is_empty(), "{:?}", survey.unreadable);
@@ -76,26 +79,21 @@ fn on_people_never_seen(set: FeatureSet, labels: std::ops::RangeInclusive<u8>) -
         error += ours.calibration_error().unwrap() / SPLITS as f64;
     }
     eprintln!("{what}: {accuracy:.4} of all images, calibration error {error:.3}");
-    Some((accuracy, error))
+    (accuracy, error)
 }
 
-#[test]
 fn shape_tells_six_signs_of_people_never_seen() {
-    if let Some((accuracy, error)) = on_people_never_seen(FeatureSet::Shape, 0..=5) {
-        assert!(accuracy >= 0.985 && error <= 0.05, "{accuracy} {error}");
-    }
+    let (accuracy, error) = on_people_never_seen(FeatureSet::Shape, 0..=5);
+    assert!(accuracy >= 0.985 && error <= 0.05, "{accuracy} {error}");
 }
 
-#[test]
 fn gradients_tell_ten_signs_of_people_never_seen() {
-    if let Some((accuracy, error)) = on_people_never_seen(FeatureSet::Hog, 0..=9) {
-        assert!(accuracy >= 0.965 && error <= 0.05, "{accuracy} {error}");
-    }
+    let (accuracy, error) = on_people_never_seen(FeatureSet::Hog, 0..=9);
+    assert!(accuracy >= 0.965 && error <= 0.05, "{accuracy} {error}");
 }
 
-#[test]
 fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
-    let (Some(signs), Some(webcam)) = (data("asl-digits"), data("webcam-fingers")) else { return };
+    let (signs, webcam) = (data("asl-digits"), data("webcam-fingers"));
     let vocabulary = Vocabulary::new(["1", "2", "3", "4", "5"]).unwrap();
     let set = FeatureSet::Shape;
     let mut perception = Perception::new(set, HandConfig::default()).unwrap();
@@ -113,11 +111,11 @@ fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
     side_by_side::print("webcam", &evaluation);
     let seen = evaluation.count() as f64;
     let accuracy = evaluation.accuracy().unwrap().value * seen / (seen + unseen.without_hand.len() as f64);
-    // scikit-learn with 30 shape features, untuned: 0.654.
-    assert!(accuracy > 0.654, "{accuracy} of all images");
+    // Measured: 0.780. scikit-learn with 30 shape features, untuned: 0.654.
+    assert!(accuracy >= 0.76, "{accuracy} of all images");
 
     // The same frames before the wall known empty.
-    let wall = data("webcam-fingers/background").unwrap();
+    let wall = data("webcam-fingers/background");
     let mut walls: Vec<PathBuf> =
         std::fs::read_dir(wall).unwrap().map(|entry| entry.unwrap().path()).collect();
     walls.sort();
@@ -200,9 +198,9 @@ impl Fault {
 
 /// What each fault costs a classifier that was trained on clean pictures, in points of accuracy on people never seen,
 /// pictures without a hand found counting as wrong: means over three splits.
-fn cost_of_faults(set: FeatureSet) -> Option<Vec<(Fault, f64)>> {
+fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
     const SPLITS: u64 = 3;
-    let dataset = Dataset::list(&data("asl-digits")?, None).unwrap();
+    let dataset = Dataset::list(&data("asl-digits"), None).unwrap();
     let images: Vec<(&LabelledImage, Mat)> =
         dataset.images.iter().map(|image| (image, read_image(&image.path).unwrap())).collect();
     let mut perception = Perception::new(set, HandConfig::default()).unwrap();
@@ -248,18 +246,20 @@ fn cost_of_faults(set: FeatureSet) -> Option<Vec<(Fault, f64)>> {
         eprintln!("  {fault:?}: costs {:.2} points, no hand in {lost}", reference - right);
         (fault, reference - right)
     };
-    Some(Fault::ALL.into_iter().map(cost).collect())
+    Fault::ALL.into_iter().map(cost).collect()
 }
 
-#[test]
-fn a_cast_a_dim_light_noise_and_compression_cost_little() {
-    for set in FeatureSet::ALL {
-        let Some(costs) = cost_of_faults(set) else { return };
-        for (fault, cost) in costs {
-            // Twice the light makes wall and highlights of the skin the same 255 in all channels: what is left of
-            // their border is the shade around it. The gradients within the hand remain.
-            let lost = matches!((set, fault), (FeatureSet::Shape, Fault::Gain(2.0, 2.0, 2.0)));
-            assert!(cost <= if lost { 9.0 } else { 3.0 }, "{} {fault:?}: {cost:.2} points", set.name());
-        }
+fn a_cast_a_dim_light_noise_and_compression_cost_the_shape_little() {
+    for (fault, cost) in cost_of_faults(FeatureSet::Shape) {
+        // Twice the light makes wall and highlights of the skin the same 255 in all channels: what is left of their border
+        // is the shade around it.
+        let most = if matches!(fault, Fault::Gain(2.0, 2.0, 2.0)) { 9.0 } else { 3.0 };
+        assert!(cost <= most, "{fault:?}: {cost:.2} points");
+    }
+}
+
+fn a_cast_a_dim_light_noise_and_compression_cost_the_gradients_little() {
+    for (fault, cost) in cost_of_faults(FeatureSet::Hog) {
+        assert!(cost <= 3.0, "{fault:?}: {cost:.2} points");
     }
 }

@@ -32,8 +32,8 @@ pub struct Args {
     /// The same as SOURCE
     #[arg(long = "source", value_name = "SOURCE", conflicts_with = "source")]
     from: Option<SourceArg>,
-    /// PNG file to write [default: SOURCE.look.png in this folder]
-    #[arg(long, value_name = "FILE.png")]
+    /// SVG or PNG file to write [default: SOURCE.look.png in this folder]
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
     out: Option<PathBuf>,
     /// Model file written by `gestalt train` [default: the configuration's, or the embedded model]
     #[arg(long, value_name = "FILE|rendered")]

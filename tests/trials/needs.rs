@@ -1,0 +1,103 @@
+//! What a trial needs of the machine, and whether this one has it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+/// Something that not every machine has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// The right to make network namespaces and to enter them: root, and `ip` of iproute2.
+    Namespaces,
+    /// The right to mount a file system: root, outside most containers.
+    Mount,
+    /// Recordings and photographs, which are not part of the project: see [`data`].
+    Data,
+}
+
+/// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
+#[must_use]
+pub fn data() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    std::env::var_os("GESTALT_DATA").map_or_else(beside, PathBuf::from)
+}
+
+impl Need {
+    const ALL: [Self; 3] = [Self::Namespaces, Self::Mount, Self::Data];
+
+    /// Its name in `GESTALT_REQUIRE`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Namespaces => "namespaces",
+            Self::Mount => "mount",
+            Self::Data => "data",
+        }
+    }
+
+    /// Why this machine does not have it; `None` when it does. Tried once.
+    pub(crate) fn missing(self) -> Option<String> {
+        static TRIED: [OnceLock<Option<String>>; 3] = [const { OnceLock::new() }; 3];
+        TRIED[self as usize].get_or_init(|| self.attempt().err()).clone()
+    }
+
+    fn attempt(self) -> Result<(), String> {
+        match self {
+            Self::Namespaces => namespaces(),
+            Self::Mount => mount(),
+            Self::Data if data().is_dir() => Ok(()),
+            Self::Data => {
+                Err("needs photographs and recordings (GESTALT_DATA names their folder)".to_owned())
+            }
+        }
+    }
+}
+
+/// Those that the text names, separated by commas.
+pub(crate) fn required(text: Option<&str>) -> Result<Vec<Need>, String> {
+    let names = text.unwrap_or_default().split(',').map(str::trim).filter(|name| !name.is_empty());
+    let known = |name: &str| Need::ALL.into_iter().find(|need| need.name() == name);
+    names.map(|name| known(name).ok_or(format!("'{name}' is none of namespaces, mount, data"))).collect()
+}
+
+fn done(program: &str, words: &[&str]) -> bool {
+    let done = Command::new(program).args(words).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    done.is_ok_and(|status| status.success())
+}
+
+/// A chroot may let a process make namespaces, and not enter them.
+fn namespaces() -> Result<(), String> {
+    let name = format!("gt{}", std::process::id());
+    let made = done("ip", &["netns", "add", &name]);
+    let entered = made && done("ip", &["netns", "exec", &name, "true"]);
+    if made {
+        done("ip", &["netns", "del", &name]);
+    }
+    if entered { Ok(()) } else { Err("needs network namespaces (root and iproute2)".to_owned()) }
+}
+
+fn mount() -> Result<(), String> {
+    let folder = std::env::temp_dir().join(format!("gestalt-mount-{}", std::process::id()));
+    let path = folder.display().to_string();
+    let made = std::fs::create_dir(&folder).is_ok();
+    let mounted = made && done("mount", &["-t", "tmpfs", "-o", "size=64k", "tmpfs", &path]);
+    if mounted {
+        done("umount", &[&path]);
+    }
+    // Left behind where it is still mounted; the test that needs it then says more.
+    let _ = std::fs::remove_dir(&folder);
+    if mounted { Ok(()) } else { Err("needs the right to mount a file system (root)".to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_required_is_named_exactly() {
+        assert_eq!(required(None), Ok(vec![]));
+        assert_eq!(required(Some("")), Ok(vec![]));
+        assert_eq!(required(Some("mount, namespaces")), Ok(vec![Need::Mount, Need::Namespaces]));
+        assert!(required(Some("mounts")).unwrap_err().contains("'mounts' is none of"));
+    }
+}

@@ -1,0 +1,127 @@
+//! The walls of the house, as far as a compiler does not keep them: which crate may know of which, that no files import each
+//! other in a circle, that files stay readable, and that a name means one thing in a crate.
+
+mod circles;
+mod exceptions;
+mod sources;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+use sources::{CRATES, Source, sources};
+
+/// The packages a package is built with, itself included, as its users get them: without its tests, with its default features.
+fn built_with(package: &str) -> BTreeSet<String> {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let words = ["tree", "--offline", "-e", "normal", "--prefix", "none", "-f", "{p}", "-p"];
+    let mut tree = Command::new(cargo);
+    let tree = tree.args(words).arg(package).current_dir(sources::root()).output().expect("cargo runs");
+    assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+    let listed = String::from_utf8(tree.stdout).expect("names of packages");
+    listed.lines().filter_map(|line| Some(line.split(' ').next()?.to_owned())).collect()
+}
+
+#[track_caller]
+fn knows_none(package: &str, others: &[&str]) {
+    let built = built_with(package);
+    assert!(built.contains(package), "the tree of {package} is empty");
+    // The crates of a family stand and fall together: `zenoh` is `zenoh-protocol` as well.
+    let of = |name: &str, other: &str| {
+        name == other || name.strip_prefix(other).is_some_and(|rest| rest.starts_with('-'))
+    };
+    let found: Vec<_> = built.iter().filter(|name| others.iter().any(|other| of(name, other))).collect();
+    assert!(found.is_empty(), "{package} is built with {found:?}");
+}
+
+#[test]
+fn decisions_are_made_without_learning_and_without_a_network() {
+    knows_none("gestalt-protocol", &["nalgebra", "linfa", "ndarray", "zenoh", "tokio", "opencv", "clap"]);
+    knows_none("gestalt-rounds", &["nalgebra", "linfa", "ndarray", "zenoh", "tokio", "opencv", "clap"]);
+}
+
+#[test]
+fn the_mind_knows_no_host() {
+    knows_none("gestalt-strategies", &["linfa", "zenoh", "tokio", "opencv", "clap"]);
+}
+
+#[test]
+fn a_controller_links_without_opencv_and_without_a_command_line() {
+    knows_none("gestalt-link", &["linfa", "opencv", "clap"]);
+    knows_none("gestalt-examples", &["linfa", "opencv", "clap"]);
+}
+
+#[test]
+fn swarms_are_emulated_without_a_network_and_without_eyes() {
+    knows_none("gestalt-lab", &["zenoh", "opencv", "clap", "tokio"]);
+}
+
+#[test]
+fn only_eyes_and_who_uses_them_need_opencv() {
+    let seeing: Vec<&str> =
+        CRATES.iter().map(|(package, _)| *package).filter(|p| built_with(p).contains("opencv")).collect();
+    assert_eq!(seeing, ["gestalt-vision", "gestalt-peer", "gestalt-tests"]);
+}
+
+#[test]
+fn no_two_files_import_each_other_in_a_circle() {
+    let found: BTreeSet<Vec<String>> =
+        CRATES.iter().flat_map(|(_, folder)| circles::circles(folder)).collect();
+    let is_part =
+        |circle: &[String], known: &[&str]| circle.iter().all(|file| known.contains(&file.as_str()));
+    let new: Vec<_> = found
+        .iter()
+        .filter(|circle| !exceptions::CIRCLES.iter().any(|(known, _)| is_part(circle, known)))
+        .collect();
+    assert!(new.is_empty(), "files that import each other: {new:#?}");
+    let gone =
+        exceptions::CIRCLES.iter().filter(|(known, _)| !found.iter().any(|circle| is_part(circle, known)));
+    let gone: Vec<_> = gone.collect();
+    assert!(gone.is_empty(), "no circles any more, take them off the list: {gone:#?}");
+}
+
+#[test]
+fn files_stay_readable() {
+    const MOST: usize = 450;
+    const MEDIAN: usize = 140;
+    let all: Vec<Source> = CRATES.iter().flat_map(|(_, folder)| sources(folder)).collect();
+    let mut lines: Vec<usize> = all.iter().map(|source| source.text.lines().count()).collect();
+    let long: Vec<_> = all.iter().zip(&lines).filter(|(_, lines)| **lines > MOST).collect();
+    let long: BTreeMap<_, _> =
+        long.into_iter().map(|(source, lines)| (source.path.as_str(), *lines)).collect();
+    let known: BTreeMap<_, _> = exceptions::LONG.iter().copied().collect();
+    let longer = |(path, lines): &(&&str, &usize)| known.get(*path).is_none_or(|most| *lines > most);
+    let new: Vec<_> = long.iter().filter(longer).collect();
+    assert!(new.is_empty(), "files with more than {MOST} lines: {new:#?}");
+    let gone: Vec<_> = known.keys().filter(|path| !long.contains_key(*path)).collect();
+    assert!(gone.is_empty(), "short enough, take them off the list: {gone:?}");
+    lines.sort_unstable();
+    assert!(lines.len() > 100 && lines[lines.len() / 2] <= MEDIAN, "median {}", lines[lines.len() / 2]);
+}
+
+#[test]
+fn a_public_name_means_one_thing_in_a_crate() {
+    let mut twice: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
+    for (package, folder) in CRATES {
+        let mut declared: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for source in sources(folder).iter().filter(|source| !source.is_test()) {
+            for name in source.code().lines().filter_map(declared_type) {
+                declared.entry(name.to_owned()).or_default().push(source.path.clone());
+            }
+        }
+        declared.retain(|_, files| files.len() > 1);
+        twice.extend(declared.into_iter().map(|(name, files)| ((package.to_owned(), name), files)));
+    }
+    let known: BTreeSet<_> =
+        exceptions::NAMES.iter().map(|(package, name)| ((*package).to_owned(), (*name).to_owned())).collect();
+    let new: Vec<_> = twice.iter().filter(|(name, _)| !known.contains(name)).collect();
+    assert!(new.is_empty(), "one name, several types: {new:#?}");
+    let gone: Vec<_> = known.iter().filter(|name| !twice.contains_key(name)).collect();
+    assert!(gone.is_empty(), "one thing each, take them off the list: {gone:?}");
+}
+
+/// The name in `pub struct Name`, at the outermost level of a file.
+fn declared_type(line: &str) -> Option<&str> {
+    let rest = line.strip_prefix("pub ")?;
+    let rest = ["struct ", "enum ", "trait ", "type "].iter().find_map(|kind| rest.strip_prefix(kind))?;
+    rest.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+}
