@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 #[must_use]
 pub fn model() -> RobotModel {
     static MODEL: OnceLock<RobotModel> = OnceLock::new();
-    MODEL.get_or_init(|| RobotModel::rendered(|_, _| {}).expect("it can be trained")).clone()
+    MODEL.get_or_init(|| RobotModel::rendered().expect("it can be trained")).clone()
 }
 
 /// A folder of pictures of one gesture, and a file with the classifier that tells it.

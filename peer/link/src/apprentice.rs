@@ -7,8 +7,8 @@ use std::time::SystemTime;
 
 use gestalt_protocol::{Digest, Learning, RobotId};
 use gestalt_strategies::{
-    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, MindConfig, OwnRules,
-    RecordChange, RobotMemory, TrainingChange, Vocabulary,
+    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, MindConfig,
+    OwnRules, RecordChange, RobotMemory, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
