@@ -161,7 +161,7 @@ async fn stream(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let sending = sender.run(|event| match event {
         StreamEvent::Attached => say(id, json!({"event": "attached"})),
         StreamEvent::Detached { cause } => say(id, json!({"event": "detached", "cause": cause})),
-        StreamEvent::Failed { cause } => say(id, json!({"event": "failed", "cause": cause})),
+        StreamEvent::Failed { cause, .. } => say(id, json!({"event": "failed", "cause": cause})),
         StreamEvent::Decided(announced) => say(id, outcome("announced", &announced.decision)),
         StreamEvent::Count { sent, taken, .. } => {
             say(id, json!({"event": "count", "sent": sent, "taken": taken}));

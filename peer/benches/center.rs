@@ -215,9 +215,7 @@ async fn run(parrots: u32, model: &RobotModel, pictures: &Path, time: Duration) 
             source: SourceSection::Images(FilesSection { path: pictures.to_owned(), repeat: true }),
             ..CameraSection::default()
         };
-        let feed = Feed::open(&camera, RobotId(id), Duration::ZERO)
-            .expect("the pictures are there")
-            .expect("a camera");
+        let feed = Feed::new(&camera, RobotId(id), Duration::ZERO).expect("a camera");
         let config = SenderConfig {
             swarm: SWARM.to_owned(),
             link: link.clone(),

@@ -12,6 +12,7 @@ use crate::config::{Config, LearnFrom, LearningSection};
 use crate::eye::{Eye, EyeError, Seen, look};
 use gestalt_link::{LinkError, Robot, RobotConfig, RobotLearning, fresh_nonce};
 use gestalt_vision::model::RobotModel;
+use gestalt_vision::source::Opener;
 
 /// Why a robot cannot start.
 #[derive(Debug, Error)]
@@ -47,6 +48,30 @@ impl Body {
             }
             None => None,
         };
+        Self::looking_through(eye, config, model, boot).await
+    }
+
+    /// The same with a source of frames of your own, whatever `camera.source` says. `open` is called now, and again whenever
+    /// the source fails or panics.
+    ///
+    /// # Errors
+    /// See [`BodyError`]: also what `open` says the first time.
+    pub async fn start_with(
+        config: &Config,
+        model: RobotModel,
+        boot: u32,
+        open: Opener,
+    ) -> Result<Self, BodyError> {
+        let eye = Eye::with(&config.camera, &model, open)?;
+        Self::looking_through(Some(eye), config, Some(model), boot).await
+    }
+
+    async fn looking_through(
+        eye: Option<Eye>,
+        config: &Config,
+        model: Option<RobotModel>,
+        boot: u32,
+    ) -> Result<Self, BodyError> {
         let learning = model.as_ref().and_then(|model| learning(&config.learning, model));
         let robot = Arc::new(
             Robot::start(RobotConfig {

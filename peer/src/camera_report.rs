@@ -3,13 +3,14 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use gestalt_protocol::{Camera, CameraState, Motion};
+use gestalt_protocol::{Camera, CameraState, Motion, Opinion};
 use gestalt_strategies::Classify;
 use opencv::core::Mat;
 use opencv::prelude::*;
 
 use crate::opinion::opinion;
-use gestalt_vision::source::{Frame, SourceError};
+use gestalt_vision::source::SourceError;
+use gestalt_vision::steady::caught;
 
 /// The status is written this often at most.
 pub const INTERVAL: Duration = Duration::from_millis(250);
@@ -23,13 +24,20 @@ const FRAMES: std::ops::RangeInclusive<usize> = 3..=256;
 /// A camera that delivers nothing, or the same picture, for this long is frozen; a slow one has the time of three frames.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// After this many errors in a row a camera fails.
+/// After this many errors in a row a file fails.
 const ERRORS: u32 = 3;
 
-/// Follows one camera: its frames, its failures, and when neither comes. All times since the same moment.
-#[derive(Debug, Default)]
+/// Follows one camera, here or at the other end of a stream: its frames, its failures, and when neither comes. All times
+/// since the same moment.
+#[derive(Debug)]
 pub struct CameraReport {
-    live: bool,
+    /// The same picture over and over is a fault.
+    changes: bool,
+    /// After this many errors in a row it fails.
+    errors_allowed: u32,
+    patience: Duration,
+    /// What to do when no frames come.
+    if_silent: &'static str,
     /// Since when frames are expected; `None` while nobody looks.
     expected: Option<Duration>,
     taken: VecDeque<Duration>,
@@ -38,18 +46,70 @@ pub struct CameraReport {
     errors: u32,
     error: Option<String>,
     ended: bool,
+    /// What keeps its frames from being judged.
+    broken: Option<String>,
+    /// The classifier panicked at the last hand.
+    unclassified: Option<String>,
     picture: u32,
     picture_since: Duration,
     /// The features of the last hand, and when it was seen.
     hand: Option<(Vec<f32>, Duration)>,
     written: Option<Duration>,
+    /// Something came over it that is not to wait until it is time to write.
+    urgent: bool,
+    said: (CameraState, String),
+    blind: bool,
+}
+
+/// What has changed since the status was written last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct News {
+    /// Whether the robot sees nothing from now on, or sees again.
+    pub blind: Option<bool>,
+    /// Its state, or what is wrong with a failing one, is not what was told last.
+    pub state: bool,
 }
 
 impl CameraReport {
-    /// A camera that nobody looks through yet. `live`: it runs by itself, and the same picture over and over is a fault.
+    /// A camera of this machine that nobody looks through yet. `live`: it runs by itself, so that any error, and the same
+    /// picture over and over, is a fault.
     #[must_use]
-    pub fn new(live: bool) -> Self {
-        Self { live, ..Self::default() }
+    pub fn of_camera(live: bool) -> Self {
+        Self {
+            changes: live,
+            errors_allowed: if live { 1 } else { ERRORS },
+            patience: PATIENCE,
+            if_silent: "check the camera, its cable and its driver",
+            expected: None,
+            taken: VecDeque::new(),
+            size: [0, 0],
+            delay: None,
+            errors: 0,
+            error: None,
+            ended: false,
+            broken: None,
+            unclassified: None,
+            picture: 0,
+            picture_since: Duration::ZERO,
+            hand: None,
+            written: None,
+            urgent: false,
+            said: (CameraState::None, String::new()),
+            blind: false,
+        }
+    }
+
+    /// A camera at the other end of a stream, from `now` on: it is blind until its first frame, and silent after `patience`.
+    #[must_use]
+    pub fn of_stream(patience: Duration, now: Duration) -> Self {
+        Self {
+            errors_allowed: 1,
+            patience,
+            if_silent: "see that `gestalt stream` runs, and check its way here",
+            expected: Some(now),
+            blind: true,
+            ..Self::of_camera(false)
+        }
     }
 
     /// Frames are expected from now on.
@@ -65,27 +125,28 @@ impl CameraReport {
         self.expected = None;
     }
 
-    /// The camera delivered a frame. Says whether it is worth looking at: a frozen picture is not.
-    pub fn note_frame(&mut self, frame: &Frame) -> bool {
+    /// The camera delivered a picture at that time. Says whether it is worth looking at: a frozen one is not.
+    pub fn note_frame(&mut self, image: &Mat, at: Duration) -> bool {
+        self.urgent |= self.errors > 0 || self.taken.is_empty();
         self.errors = 0;
         self.error = None;
         let side = |length: i32| u32::try_from(length).unwrap_or_default();
-        self.size = [side(frame.image.cols()), side(frame.image.rows())];
-        self.taken.push_back(frame.at);
+        self.size = [side(image.cols()), side(image.rows())];
+        self.taken.push_back(at);
         while self.taken.len() > *FRAMES.end()
             || self.taken.len() > *FRAMES.start()
-                && self.taken.front().is_some_and(|first| *first + WINDOW < frame.at)
+                && self.taken.front().is_some_and(|first| *first + WINDOW < at)
         {
             self.taken.pop_front();
         }
-        if !self.live {
+        if !self.changes {
             return true;
         }
-        let picture = checksum(&frame.image);
+        let picture = checksum(image);
         if picture != self.picture {
-            (self.picture, self.picture_since) = (picture, frame.at);
+            (self.picture, self.picture_since) = (picture, at);
         }
-        !self.is_same_picture(frame.at)
+        !self.is_same_picture(at)
     }
 
     /// A frame was judged at that time; these are the features of its hand.
@@ -94,6 +155,7 @@ impl CameraReport {
         let delay = now.saturating_sub(taken);
         let before = self.delay.unwrap_or(delay);
         self.delay = Some(before.mul_f64(1.0 - WEIGHT) + delay.mul_f64(WEIGHT));
+        self.urgent |= self.broken.take().is_some();
         if let Some(features) = features {
             self.hand = Some((features, taken));
         }
@@ -101,9 +163,18 @@ impl CameraReport {
 
     /// The camera failed.
     pub fn note_error(&mut self, error: &SourceError) {
-        self.errors = self.errors.saturating_add(1);
+        // What panicked is closed, if it were a file or not.
+        let errors = if matches!(error, SourceError::Panicked(_)) { self.errors_allowed } else { 1 };
+        self.errors = self.errors.saturating_add(errors);
         self.error = Some(error.to_string());
         self.ended = matches!(error, SourceError::Ended(_));
+        self.urgent = true;
+    }
+
+    /// Its frames come, and cannot be judged: why, and how to fix it.
+    pub fn note_broken(&mut self, trouble: String) {
+        self.urgent |= self.broken.as_ref() != Some(&trouble);
+        self.broken = Some(trouble);
     }
 
     /// How the camera goes, and what is wrong with it.
@@ -114,16 +185,16 @@ impl CameraReport {
         if self.ended {
             return (CameraState::Ended, trouble);
         }
-        if self.errors >= ERRORS || (self.live && self.errors > 0) {
+        if self.errors >= self.errors_allowed {
             return (CameraState::Failing, trouble);
+        }
+        if let Some(trouble) = self.broken.as_ref().or(self.unclassified.as_ref()) {
+            return (CameraState::Failing, trouble.clone());
         }
         if let Some(expected) = self.expected {
             let silent = now.saturating_sub(last.map_or(expected, |last| last.max(expected)));
             if silent > self.patience() {
-                let trouble = format!(
-                    "no frame for {:.0} s: check the camera, its cable and its driver",
-                    silent.as_secs_f64()
-                );
+                let trouble = format!("no frame for {:.0} s: {}", silent.as_secs_f64(), self.if_silent);
                 return (CameraState::Frozen, trouble);
             }
         }
@@ -149,44 +220,87 @@ impl CameraReport {
             .then(|| (self.taken.len() - 1) as f32 / seconds)
     }
 
+    /// Whether something came over it that is not to wait until it is time to write.
+    #[must_use]
+    pub fn is_urgent(&self) -> bool {
+        self.urgent
+    }
+
     /// Whether it is time to write to the status again.
     #[must_use]
     pub fn is_due(&self, now: Duration) -> bool {
-        self.written.is_none_or(|written| now.saturating_sub(written) >= INTERVAL)
+        self.urgent || self.written.is_none_or(|written| now.saturating_sub(written) >= INTERVAL)
     }
 
-    /// What the status is to say. The opinion is that of `classifier`, of the last hand seen.
+    /// What the status is to say, and what of it is news. The opinion is that of `classifier`, of the last hand seen.
     pub fn write(
         &mut self,
         now: Duration,
         source: &str,
         motion: Option<Motion>,
         classifier: Option<&dyn Classify>,
-    ) -> Camera {
+    ) -> (Camera, News) {
         self.written = Some(now);
+        self.urgent = false;
+        let opinion = classifier.and_then(|classifier| self.opinion(classifier));
         let (state, trouble) = self.state(now);
-        let seen = classifier.zip(self.hand.as_ref());
-        let opinion = seen.and_then(|(classifier, (features, at))| opinion(classifier, features, *at));
-        Camera {
+        let news = self.news(state, &trouble);
+        let camera = Camera {
             source: source.to_owned(),
             state,
             trouble,
             size: self.size,
-            fps: self.fps().unwrap_or_default(),
+            fps: self.fps().filter(|_| state == CameraState::Live).unwrap_or_default(),
             delay_ms: self.delay.unwrap_or_default().as_secs_f32() * 1000.0,
             motion,
             opinion,
+        };
+        (camera, news)
+    }
+
+    fn news(&mut self, state: CameraState, trouble: &str) -> News {
+        let blind = match state {
+            CameraState::Live => false,
+            CameraState::Frozen | CameraState::Failing | CameraState::Ended => true,
+            // Nobody knows yet.
+            CameraState::None | CameraState::Opening => self.blind,
+        };
+        let (said, words) = &self.said;
+        let unsaid = *said != state || (state == CameraState::Failing && words != trouble);
+        let news = News { blind: (blind != self.blind).then_some(blind), state: unsaid };
+        self.blind = blind;
+        if unsaid {
+            self.said = (state, trouble.to_owned());
+        }
+        news
+    }
+
+    fn opinion(&mut self, classifier: &dyn Classify) -> Option<Opinion> {
+        let (features, at) = self.hand.as_ref()?;
+        match caught(|| opinion(classifier, features, *at)) {
+            Ok(opinion) => {
+                self.unclassified = None;
+                opinion
+            }
+            Err(message) => {
+                self.unclassified = Some(format!(
+                    "the classifier panicked ({message}) and judges nothing: give the robot another model; RUST_BACKTRACE=1 shows where"
+                ));
+                // It would do so again.
+                self.hand = None;
+                None
+            }
         }
     }
 
     /// How long a frame may fail to appear.
     fn patience(&self) -> Duration {
         let period = self.fps().map_or(Duration::ZERO, |fps| Duration::from_secs_f32(1.0 / fps));
-        PATIENCE.max(3 * period)
+        self.patience.max(3 * period)
     }
 
     fn is_same_picture(&self, at: Duration) -> bool {
-        self.live && at.saturating_sub(self.picture_since) > self.patience()
+        self.changes && at.saturating_sub(self.picture_since) > self.patience()
     }
 }
 
@@ -205,75 +319,4 @@ fn checksum(image: &Mat) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use opencv::core::{CV_8UC3, Scalar};
-
-    use super::*;
-
-    fn frame(level: f64, at_ms: u64) -> Frame {
-        let image = Mat::new_rows_cols_with_default(48, 64, CV_8UC3, Scalar::all(level)).unwrap();
-        Frame { image, at: Duration::from_millis(at_ms) }
-    }
-
-    fn state(report: &CameraReport, at_ms: u64) -> CameraState {
-        report.state(Duration::from_millis(at_ms)).0
-    }
-
-    #[test]
-    fn a_camera_that_falls_silent_is_frozen_until_it_delivers_again() {
-        let mut report = CameraReport::new(true);
-        assert_eq!(state(&report, 0), CameraState::Opening);
-        report.expect(Duration::ZERO);
-        for at in 0..30 {
-            assert!(report.note_frame(&frame(at as f64, at * 100)));
-        }
-        assert_eq!(state(&report, 3000), CameraState::Live);
-        assert!((report.fps().unwrap() - 10.0).abs() < 0.5);
-        assert_eq!(state(&report, 6000), CameraState::Frozen);
-        assert!(report.state(Duration::from_secs(6)).1.contains("no frame for 3 s"));
-        report.note_frame(&frame(90.0, 6100));
-        assert_eq!(state(&report, 6200), CameraState::Live);
-    }
-
-    #[test]
-    fn the_same_picture_over_and_over_is_frozen_and_not_worth_looking_at() {
-        let mut report = CameraReport::new(true);
-        report.expect(Duration::ZERO);
-        let worth: Vec<bool> = (0..40).map(|at| report.note_frame(&frame(9.0, at * 100))).collect();
-        assert!(worth[..20].iter().all(|worth| *worth) && !worth[39]);
-        assert_eq!(state(&report, 3900), CameraState::Frozen);
-        assert!(report.note_frame(&frame(10.0, 4000)));
-        assert_eq!(state(&report, 4000), CameraState::Live);
-        // A file may show the same picture for as long as it likes.
-        let mut report = CameraReport::new(false);
-        assert!((0..40).all(|at| report.note_frame(&frame(9.0, at * 100))));
-    }
-
-    #[test]
-    fn a_camera_that_nobody_looks_through_is_not_frozen() {
-        let mut report = CameraReport::new(false);
-        report.expect(Duration::ZERO);
-        report.note_frame(&frame(1.0, 0));
-        report.rest();
-        assert_eq!(state(&report, 60_000), CameraState::Live);
-        report.expect(Duration::from_secs(60));
-        assert_eq!(state(&report, 61_000), CameraState::Live);
-        assert_eq!(state(&report, 64_000), CameraState::Frozen);
-    }
-
-    #[test]
-    fn errors_in_a_row_are_a_failing_camera_and_the_end_is_the_end() {
-        let mut report = CameraReport::new(false);
-        let error = SourceError::NoFrame("/dev/video9".into());
-        report.note_error(&error);
-        assert_eq!(state(&report, 0), CameraState::Opening);
-        report.note_error(&error);
-        report.note_error(&error);
-        assert_eq!(state(&report, 0), CameraState::Failing);
-        assert!(report.state(Duration::ZERO).1.contains("/dev/video9"));
-        report.note_frame(&frame(1.0, 100));
-        assert_eq!(state(&report, 100), CameraState::Live);
-        report.note_error(&SourceError::Ended("video".to_owned()));
-        assert_eq!(state(&report, 200), CameraState::Ended);
-    }
-}
+mod tests;

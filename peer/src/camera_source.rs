@@ -10,12 +10,24 @@ use gestalt_vision::source::{
 
 use crate::config::{CameraSection, SourceSection};
 
-/// Who stands before the camera of a configuration, if it is a rendered one.
+/// Who stands in front of the camera of a configuration, if it is a rendered one.
 #[must_use]
 pub fn human_before(camera: &CameraSection) -> Human {
     match &camera.source {
         SourceSection::Rendered(rendered) => Human::new(rendered.seed),
         _ => Human::new(0),
+    }
+}
+
+/// The camera of a configuration, in words.
+pub(crate) fn describe(camera: &CameraSection) -> String {
+    match &camera.source {
+        SourceSection::None => "none".to_owned(),
+        SourceSection::Stream(_) => "stream".to_owned(),
+        SourceSection::Rendered(_) => "rendered".to_owned(),
+        SourceSection::Device(device) => format!("device {}", device.path.display()),
+        SourceSection::Images(files) => format!("images {}", files.path.display()),
+        SourceSection::Video(files) => format!("video {}", files.path.display()),
     }
 }
 

@@ -1,26 +1,25 @@
 //! A robot's eye: frames in, observations out, while a round is open; all the time where motion is watched.
 
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+mod look;
+
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Event, Robot};
-use gestalt_protocol::{CameraState, RobotId, RoundId};
+use gestalt_protocol::{RobotId, RoundId};
 use gestalt_strategies::Classify;
 use gestalt_vision::human::Human;
 use gestalt_vision::model::RobotModel;
-use gestalt_vision::sight::{Sight, SightError, Taken};
-use gestalt_vision::source::{Frame, Opener, Reader, Scene, Source, SourceError};
+use gestalt_vision::sight::{Sight, SightError, one_thread_per_frame};
+use gestalt_vision::source::{Opener, Source, SourceError};
+use gestalt_vision::steady::Steady;
 use opencv::core::Mat;
 use thiserror::Error;
-use tokio::sync::broadcast::Receiver;
-use tokio::sync::broadcast::error::RecvError;
-use tokio::time::MissedTickBehavior;
 
-use crate::camera_report::{self, CameraReport};
-use crate::camera_source::{human_before, open_source};
+use crate::camera_source::{describe, human_before, open_source};
 use crate::config::{CameraSection, SourceSection};
 use crate::stream::{Inlet, StreamSource};
-use crate::telling::tell;
+
+pub(crate) use look::look;
 
 /// Why an eye cannot open.
 #[derive(Debug, Error)]
@@ -31,6 +30,9 @@ pub enum EyeError {
     /// What it sees with.
     #[error(transparent)]
     Sight(#[from] SightError),
+    /// OpenCV would not take one thread per frame.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
 }
 
 /// An open eye.
@@ -42,7 +44,8 @@ pub struct Eye {
     /// Whether it looks also while no round is open.
     watches: bool,
     live: bool,
-    sight: Sight,
+    period: Duration,
+    sight: Steady<Sight>,
     human: Human,
     /// Where its frames come in, if they come from another machine.
     inlet: Option<Arc<Inlet>>,
@@ -82,34 +85,51 @@ impl Eye {
         robot: RobotId,
         clock: Duration,
     ) -> Result<Option<Self>, EyeError> {
-        if matches!(camera.source, SourceSection::None) {
-            return Ok(None);
+        let (section, period) = (camera.clone(), camera.model.properties().period());
+        Ok(match &camera.source {
+            SourceSection::None => None,
+            SourceSection::Stream(stream) => {
+                let inlet = Inlet::new(stream.robot.unwrap_or(robot));
+                let frames_from = inlet.clone();
+                let open: Opener =
+                    Box::new(move || Ok(Box::new(StreamSource::new(frames_from.clone(), period))));
+                Some(Self { inlet: Some(inlet), ..Self::with(camera, model, open)? })
+            }
+            SourceSection::Device(_) => {
+                let open = Box::new(move || open_source(&section, robot, clock));
+                // A driver may hang: it is opened where it keeps nobody.
+                Some(Self::new(camera, model, None, open)?)
+            }
+            _ => Some(Self::with(camera, model, Box::new(move || open_source(&section, robot, clock)))?),
+        })
+    }
+
+    /// Opens an eye that looks through a source of your own, whatever `camera.source` says; the rest of `camera` counts. `open`
+    /// is called now, and again whenever the source fails or panics.
+    ///
+    /// # Errors
+    /// See [`EyeError`]: also what `open` says the first time.
+    pub fn with(camera: &CameraSection, model: &RobotModel, mut open: Opener) -> Result<Self, EyeError> {
+        let source = open()?;
+        Self::new(camera, model, Some(source), open)
+    }
+
+    fn new(
+        camera: &CameraSection,
+        model: &RobotModel,
+        source: Option<Box<dyn Source>>,
+        open: Opener,
+    ) -> Result<Self, EyeError> {
+        one_thread_per_frame()?;
+        let (mut period, mut live) = (camera.model.properties().period(), true);
+        let mut describe = describe(camera);
+        if let Some(source) = &source {
+            (period, live, describe) = (source.period(), source.is_live(), source.describe());
         }
-        let inlet = match &camera.source {
-            SourceSection::Stream(stream) => Some(Inlet::new(stream.robot.unwrap_or(robot))),
-            _ => None,
-        };
-        let (section, frames_from) = (camera.clone(), inlet.clone());
-        let zero = Instant::now();
-        let mut open: Opener = Box::new(move || match &frames_from {
-            Some(inlet) => {
-                let period = section.model.properties().period();
-                Ok(Box::new(StreamSource::new(inlet.clone(), period)) as Box<dyn Source>)
-            }
-            None => open_source(&section, robot, clock),
-        });
-        let (source, describe, live) = match &camera.source {
-            // A driver may hang: it is opened where it keeps nobody.
-            SourceSection::Device(device) => (None, format!("device {}", device.path.display()), true),
-            _ => {
-                let source = open()?;
-                let (describe, live) = (source.describe(), source.is_live());
-                (Some(source), describe, live)
-            }
-        };
-        let sight = Sight::new(camera.sight(), model.features)?;
+        let sight = Sight::steady(camera.sight(), model.features)?;
         let (watches, human) = (camera.motion.enabled, human_before(camera));
-        Ok(Some(Self { source, open, describe, watches, live, sight, human, inlet, zero }))
+        let zero = Instant::now();
+        Ok(Self { source, open, describe, watches, live, period, sight, human, inlet: None, zero })
     }
 
     /// Where its frames come in, if they come from another machine: to be opened at the robot's session.
@@ -123,130 +143,4 @@ impl Eye {
     pub fn describe(&self) -> String {
         self.describe.clone()
     }
-}
-
-/// Looks until the robot is gone. The camera has a thread of its own and judging is done beside the robot's task, so that
-/// neither delays a vote; a frame that comes while one is judged waits, and is replaced by the next.
-pub(crate) async fn look(
-    eye: Eye,
-    robot: Weak<Robot>,
-    mut events: Receiver<Event>,
-    seen: Arc<Mutex<Option<Seen>>>,
-) {
-    let Eye { source, open, describe, watches, live, mut sight, human, zero, inlet: _inlet } = eye;
-    let reader = match Reader::start(source, open, zero) {
-        Ok(reader) => reader,
-        Err(error) => {
-            if let Some(robot) = robot.upgrade() {
-                robot.report_error(&format!("no thread for the camera: {error}"));
-            }
-            return;
-        }
-    };
-    let mut report = CameraReport::new(live);
-    let mut state = CameraState::None;
-    let mut round = None;
-    if watches {
-        reader.want(Some(Scene::default()));
-    }
-    if watches || live {
-        report.expect(zero.elapsed());
-    }
-    let mut tick = tokio::time::interval(camera_report::INTERVAL);
-    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    loop {
-        tokio::select! {
-            event = events.recv() => match event {
-                Ok(Event::Opened(opened)) => {
-                    round = Some(opened);
-                    reader.want(Some(human.shows(opened)));
-                    report.expect(zero.elapsed());
-                }
-                Ok(Event::Closed(closed)) if round == Some(closed) => {
-                    round = None;
-                    reader.want(watches.then(Scene::default));
-                    if !(watches || live) {
-                        report.rest();
-                    }
-                }
-                Ok(_) | Err(RecvError::Lagged(_)) => {}
-                Err(RecvError::Closed) => return,
-            },
-            frame = reader.next() => {
-                let Some(robot) = robot.upgrade() else { return };
-                match frame {
-                    Ok(frame) => {
-                        let worth = report.note_frame(&frame);
-                        if !worth || (round.is_none() && !watches) {
-                            continue;
-                        }
-                        let (current, shared) = (round, seen.clone());
-                        let judged = tokio::task::spawn_blocking(move || {
-                            let taken = judge(&mut sight, frame, current, &shared);
-                            (sight, taken)
-                        });
-                        let Ok((returned, taken)) = judged.await else { return };
-                        sight = returned;
-                        let hand = taken.observation.as_ref().and_then(|seen| seen.as_ref().ok());
-                        let features = hand.map(|observation| observation.features.clone());
-                        report.note_judged(taken.at, zero.elapsed(), features);
-                        tell(taken, &robot, zero);
-                    }
-                    Err(error) => {
-                        report.note_error(&error);
-                        robot.count("frames_failed");
-                        robot.report_error(&error.to_string());
-                    }
-                }
-                keep_status(&mut report, &mut state, &robot, &sight, &describe, zero);
-            }
-            _ = tick.tick() => {
-                let Some(robot) = robot.upgrade() else { return };
-                keep_status(&mut report, &mut state, &robot, &sight, &describe, zero);
-            }
-        }
-    }
-}
-
-/// Takes one look. `seen` receives the frame of a round.
-fn judge(sight: &mut Sight, frame: Frame, round: Option<RoundId>, seen: &Mutex<Option<Seen>>) -> Taken {
-    let taken = sight.take(&frame, round.is_some());
-    if let (Some(round), Some(observation)) = (round, &taken.observation) {
-        let features = observation.as_ref().ok().map(|observation| observation.features.clone());
-        *seen.lock().unwrap_or_else(PoisonError::into_inner) =
-            Some(Seen { round, image: frame.image, features });
-    }
-    taken
-}
-
-/// Writes to the robot's status what there is to say of its camera, when it is time to.
-fn keep_status(
-    report: &mut CameraReport,
-    state: &mut CameraState,
-    robot: &Robot,
-    sight: &Sight,
-    source: &str,
-    zero: Instant,
-) {
-    let now = zero.elapsed();
-    if !report.is_due(now) {
-        return;
-    }
-    let classifier = robot.classifier();
-    let mut camera = report.write(now, source, sight.motion(), classifier.as_deref());
-    if let Some(opinion) = &mut camera.opinion {
-        // The eye was open before the robot started.
-        let before = robot.started().saturating_duration_since(zero).as_millis();
-        opinion.at_ms = opinion.at_ms.saturating_sub(u64::try_from(before).unwrap_or(u64::MAX));
-    }
-    let blind = |state| matches!(state, CameraState::Frozen | CameraState::Failing | CameraState::Ended);
-    if blind(camera.state) != blind(*state) {
-        robot.blind(blind(camera.state));
-    }
-    // What came over a camera is told once, and stays among the errors when it is over.
-    if camera.state != *state && camera.state == CameraState::Frozen {
-        robot.report_error(&camera.trouble);
-    }
-    *state = camera.state;
-    robot.update_camera(|before| *before = camera);
 }

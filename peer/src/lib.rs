@@ -4,9 +4,9 @@
 //! config ─► Body = eye (gestalt-vision) + Robot (gestalt-link: Zenoh and the mind) ─► votes, decisions ─► other robots, clients
 //! ```
 //!
-//! [`body::Body`] is a robot with an eye, from a [`config::Config`]. Cameras without a computer stream ([`stream::Sender`]) to a
-//! fusion centre ([`center::Center`]). The verbs of the binary `gestalt` are in [`cli`]. A controller with a camera of its own
-//! needs none of this: it embeds `gestalt-link`.
+//! [`body::Body`] is a robot with an eye, from a [`config::Config`], or with a camera of your own. Cameras without a computer
+//! stream ([`stream::Sender`]) to a fusion centre ([`center::Center`]). The verbs of the binary `gestalt` are in [`cli`]. A
+//! controller with a perception of its own needs none of this: it embeds `gestalt-link`.
 //!
 //! OpenCV sits behind the feature `opencv` (on by default): without it, swarms can be watched, instructed and emulated.
 

@@ -107,7 +107,7 @@ pub fn center_config(orders: &Value) -> Config {
 /// {"images": "DIR"}}`.
 ///
 /// # Panics
-/// When they are no orders, or there are no pictures.
+/// When they are no orders.
 #[must_use]
 pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
     let robot: RobotId = serde_json::from_value(orders["id"].clone()).expect("\"id\": a number");
@@ -118,7 +118,7 @@ pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
         source: SourceSection::Images(FilesSection { path, repeat: true }),
         ..CameraSection::default()
     };
-    let feed = Feed::open(&camera, robot, Duration::ZERO).expect("the pictures are there").expect("a camera");
+    let feed = Feed::new(&camera, robot, Duration::ZERO).expect("a camera");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name").to_owned();
     (SenderConfig { swarm, link, robot, camera: "parrot".to_owned(), quality: 80 }, feed)
 }

@@ -5,6 +5,7 @@ mod cameras;
 mod center;
 mod churn;
 mod clients;
+mod eyes;
 mod field;
 mod in_process;
 mod knowledge;

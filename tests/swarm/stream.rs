@@ -9,13 +9,14 @@ use gestalt_link::boot_number;
 use gestalt_link::{Event, Robot};
 use gestalt_peer::body::Body;
 use gestalt_peer::center::Center;
-use gestalt_peer::config::{SourceSection, StreamSection};
-use gestalt_peer::stream::{Sender, StreamEvent};
+use gestalt_peer::config::{CameraChoice, CameraSection, FilesSection, SourceSection, StreamSection};
+use gestalt_peer::stream::{Feed, Sender, SenderConfig, StreamEvent};
 use gestalt_protocol::{
     CameraState, ClassId, FrameHeader, FrameTaken, ImageEncoding, Keys, RobotId, Status, Topic,
 };
 use gestalt_tests::{Hands, center_config, config, sender_config, unique};
 use gestalt_vision::model::RobotModel;
+use gestalt_vision::source::{Frame, Scene, Source, SourceError};
 use serde_json::json;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -207,6 +208,151 @@ pub async fn who_is_there_already_and_who_comes_too_many_is_refused_and_counted(
     second.abort();
     on_board.stop().await;
     center.stop().await;
+}
+
+/// A thin client's messages, and a robot that takes its frames.
+struct Taken {
+    robot: Robot,
+    _gate: Arc<std::sync::OnceLock<gestalt_link::FrameGate>>,
+    frames: Arc<AtomicU64>,
+    failures: Arc<std::sync::Mutex<Vec<(String, u64)>>>,
+    sending: tokio::task::JoinHandle<()>,
+    began: Instant,
+}
+
+impl Taken {
+    async fn from(feed: Feed, swarm: &str) -> Self {
+        let robot = Robot::start(config(1, swarm, &[])).await.unwrap();
+        let gate = Arc::new(std::sync::OnceLock::<gestalt_link::FrameGate>::new());
+        let (frames, failures) = (Arc::<AtomicU64>::default(), Arc::<std::sync::Mutex<Vec<_>>>::default());
+        let (of_gate, counted) = (gate.clone(), frames.clone());
+        let opened = robot
+            .receive_frames(None, move |frame| {
+                counted.fetch_add(1, Ordering::Relaxed);
+                let FrameHeader { nonce, sequence, .. } = frame.header;
+                if let Some(gate) = of_gate.get() {
+                    gate.taken(frame.robot, &FrameTaken { nonce, sequence, round: None });
+                }
+            })
+            .await
+            .unwrap();
+        assert!(gate.set(opened).is_ok());
+        let link = serde_json::from_value(json!({"connect": robot.locators()})).unwrap();
+        let swarm = swarm.to_owned();
+        let of_camera =
+            SenderConfig { swarm, link, robot: RobotId(7), camera: "parrot".to_owned(), quality: 80 };
+        let sender = Sender::start(of_camera, feed).unwrap();
+        let (said, began) = (failures.clone(), Instant::now());
+        let sending = tokio::spawn(async move {
+            let tell = |event| {
+                if let StreamEvent::Failed { cause, times } = event {
+                    said.lock().unwrap().push((cause, times));
+                }
+            };
+            sender.run(tell).await.unwrap();
+        });
+        Self { robot, _gate: gate, frames, failures, sending, began }
+    }
+
+    /// Waits until so many more frames have arrived.
+    async fn more(&self, frames: u64) {
+        let wanted = self.frames.load(Ordering::Relaxed) + frames;
+        wait_for("frames", || (self.frames.load(Ordering::Relaxed) >= wanted).then_some(())).await;
+    }
+
+    /// Waits until that was said, from the message of that number on.
+    async fn said(&self, what: &str, from: usize) {
+        wait_for(what, || {
+            let said = self.failures.lock().unwrap();
+            said.iter().skip(from).any(|(cause, _)| cause.contains(what)).then_some(())
+        })
+        .await;
+    }
+
+    fn messages(&self) -> usize {
+        self.failures.lock().unwrap().len()
+    }
+
+    async fn stop(self) {
+        let (messages, seconds) = (self.messages(), self.began.elapsed().as_secs_f64());
+        assert!(messages as f64 <= seconds + 1.0, "{messages} messages in {seconds:.1} s");
+        assert!(!self.sending.is_finished());
+        self.sending.abort();
+        self.robot.stop().await;
+    }
+}
+
+/// A camera that delivers while it is plugged in, and fails at once, again and again, while it is not.
+struct Plug(Arc<std::sync::atomic::AtomicBool>);
+
+impl Source for Plug {
+    fn describe(&self) -> String {
+        "a camera in a test".to_owned()
+    }
+    fn period(&self) -> Duration {
+        Duration::from_millis(5)
+    }
+    fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        match self.0.load(Ordering::Relaxed) {
+            true => Frame::from_bgr(32, 24, &[90; 32 * 24 * 3], now),
+            false => Err(SourceError::NoFrame("/dev/plug".into())),
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_there() {
+    let plugged = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let of_feed = plugged.clone();
+    let feed = Feed::with(
+        "a camera in a test",
+        Box::new(move || match of_feed.load(Ordering::Relaxed) {
+            true => Ok(Box::new(Plug(of_feed.clone()))),
+            false => Err(SourceError::Missing("/dev/plug".into())),
+        }),
+    );
+    let taken = Taken::from(feed, &unique("vanishing")).await;
+    taken.said("/dev/plug does not exist", 0).await;
+    for _ in 0..2 {
+        plugged.store(true, Ordering::Relaxed);
+        taken.more(20).await;
+        let before = taken.messages();
+        plugged.store(false, Ordering::Relaxed);
+        // It fails two hundred times a second until it is closed.
+        taken.said("delivers no frame", before).await;
+        taken.said("does not exist", before).await;
+    }
+    taken.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pictures_that_appear_late_and_bad_ones_among_them_are_streamed() {
+    let hands = Hands::new(2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("late");
+    let camera = CameraSection {
+        model: CameraChoice::Parrot,
+        source: SourceSection::Images(FilesSection { path: path.clone(), repeat: true }),
+        ..CameraSection::default()
+    };
+    let feed = Feed::new(&camera, RobotId(7), Duration::ZERO).unwrap();
+    assert!(feed.describe().contains("late"));
+    let taken = Taken::from(feed, &unique("late")).await;
+    taken.said("does not exist", 0).await;
+    // Twelve bad ones in front, at thirty pictures a second.
+    let filling = folder.path().join("filling");
+    std::fs::create_dir(&filling).unwrap();
+    for k in 0..12 {
+        std::fs::write(filling.join(format!("0{k:02}.jpg")), "a shopping list").unwrap();
+    }
+    for entry in std::fs::read_dir(hands.encoded()).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), filling.join(format!("9{}", entry.file_name().display()))).unwrap();
+    }
+    std::fs::rename(&filling, &path).unwrap();
+    taken.more(30).await;
+    taken.said("no image that can be decoded", 0).await;
+    taken.stop().await;
 }
 
 /// Memory of this process, in MB.

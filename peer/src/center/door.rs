@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use gestalt_protocol::{CameraState, RobotId};
+use gestalt_protocol::RobotId;
 use gestalt_strategies::Classify;
 use thiserror::Error;
-use tokio::sync::mpsc;
+use tokio::sync::{Mutex, mpsc};
+use tokio::task::JoinSet;
 use tokio::time::MissedTickBehavior;
 
 use super::Frames;
-use super::desk::Put;
+use super::frame_queue::Put;
 use super::seat::Seat;
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
 use gestalt_link::boot_number;
@@ -60,37 +61,68 @@ pub(super) struct Door {
     config: Config,
     model: RobotModel,
     robot: Arc<Robot>,
-    desk: Arc<Frames>,
+    queue: Arc<Frames>,
+}
+
+/// What reaches the door.
+pub(super) struct Calls {
+    /// Frames of robots that are not served yet.
+    pub knocks: mpsc::Receiver<FrameArrival>,
+    /// Closed when the centre is left.
+    pub left: mpsc::Receiver<()>,
 }
 
 impl Door {
-    pub fn new(config: Config, model: RobotModel, robot: Arc<Robot>, desk: Arc<Frames>) -> Self {
-        Self { config, model, robot, desk }
+    pub fn new(config: Config, model: RobotModel, robot: Arc<Robot>, queue: Arc<Frames>) -> Self {
+        Self { config, model, robot, queue }
     }
 
-    /// Runs until the centre is left; then all robots leave.
-    pub async fn run(self, mut knocks: mpsc::Receiver<FrameArrival>, mut left: mpsc::Receiver<()>) {
+    /// Runs until the centre is left; then all robots leave. A panic costs what was at hand, and is reported.
+    pub async fn run(self, calls: Calls) {
+        let (door, calls) = (Arc::new(self), Arc::new(Mutex::new(calls)));
+        loop {
+            let (at_work, calls) = (door.clone(), calls.clone());
+            // A task of its own: what panics in it ends it alone.
+            let mut served = JoinSet::new();
+            served.spawn(async move { at_work.serve(&mut *calls.lock().await).await });
+            match served.join_next().await {
+                Some(Err(error)) if error.is_panic() => door.robot.report_error(&format!(
+                    "the centre's door panicked and goes on: {error}; RUST_BACKTRACE=1 shows where"
+                )),
+                _ => break,
+            }
+            // It may do so again at once.
+            tokio::time::sleep(PERIOD).await;
+        }
+        door.clear().await;
+    }
+
+    async fn serve(&self, calls: &mut Calls) {
         let mut rounds = tokio::time::interval(PERIOD);
         rounds.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
-                Some(frame) = knocks.recv() => self.open(frame).await,
+                Some(frame) = calls.knocks.recv() => self.open(frame).await,
                 _ = rounds.tick() => self.look_after().await,
-                _ = left.recv() => break,
+                _ = calls.left.recv() => break,
             }
         }
-        for (robot, seat) in self.desk.seats() {
-            drop(self.desk.dismiss(robot));
+    }
+
+    /// All robots leave.
+    async fn clear(&self) {
+        for (robot, seat) in self.queue.seats() {
+            drop(self.queue.dismiss(robot));
             seat.leave().await;
         }
     }
 
     /// A frame of a robot that is not served, or was not when it arrived.
     async fn open(&self, frame: FrameArrival) {
-        let Put::Unknown(frame) = self.desk.put(frame.robot, frame) else { return };
+        let Put::Unknown(frame) = self.queue.put(frame.robot, frame) else { return };
         match self.admit(&frame).await {
             // It has its seat now: it waits there.
-            Ok(()) => drop(self.desk.put(frame.robot, frame)),
+            Ok(()) => drop(self.queue.put(frame.robot, frame)),
             Err(refusal) => {
                 self.robot.count(refusal.counter());
                 self.robot.report_error(&refusal.to_string());
@@ -99,7 +131,7 @@ impl Door {
     }
 
     async fn admit(&self, frame: &FrameArrival) -> Result<(), Refusal> {
-        let (id, served) = (frame.robot, self.desk.seats().len());
+        let (id, served) = (frame.robot, self.queue.seats().len());
         if served >= self.config.center.max_robots {
             return Err(Refusal::TooMany(id, served));
         }
@@ -111,19 +143,14 @@ impl Door {
         let model = about.camera.or(stated).unwrap_or_else(|| self.config.camera.model.clone());
         let name = about.name.unwrap_or_else(|| format!("{}-{id}", model.properties().name));
         let camera = CameraSection { model, ..self.config.camera.clone() };
-        let sight = Sight::new(camera.sight(), self.model.features)
+        let sight = Sight::steady(camera.sight(), self.model.features)
             .map_err(|cause| Refusal::Perception(id, cause))?;
         let robot = self.start(id, name).await.map_err(|cause| Refusal::Link(id, cause))?;
-        robot.update_camera(|camera| {
-            camera.source = "stream".to_owned();
-            camera.state = CameraState::Opening;
-        });
         // Nobody reads them, so none need be kept.
         drop(robot.events());
-        // Until a picture of it was seen.
-        robot.blind(true);
         robot.learned(self.model.classifier.clone(), &self.model.name);
-        self.desk.admit(id, Arc::new(Seat::new(Arc::new(robot), sight, Instant::now())));
+        let seat = Seat::new(Arc::new(robot), sight, self.config.center.frozen_after);
+        self.queue.admit(id, Arc::new(seat));
         Ok(())
     }
 
@@ -163,12 +190,12 @@ impl Door {
     async fn look_after(&self) {
         let now = Instant::now();
         let center = &self.config.center;
-        let seats = self.desk.seats();
+        let seats = self.queue.seats();
         self.robot.set("robots_served", seats.len() as u64);
         for (robot, seat) in seats {
-            if seat.report(now, self.desk.count(robot), center.frozen_after) >= center.gone_after {
+            if seat.report(now, self.queue.count(robot)) >= center.gone_after {
                 self.robot.count("robots_gone");
-                drop(self.desk.dismiss(robot));
+                drop(self.queue.dismiss(robot));
                 seat.leave().await;
             }
         }

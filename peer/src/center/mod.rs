@@ -2,35 +2,36 @@
 //! decisions back.
 //!
 //! ```text
-//! robot/<id>/frame ─► door ─► desk: newest frame of each robot ─► workers: decode ─► sight ─► that robot ─► vote
-//!                      │                     └──────► robot/<id>/taken                          ▲
-//!                      └─ admits: a guest of the centre (central), or a robot of its own (swarm) ┘
+//! robot/<id>/frame ─► door ─► queue: newest frame of each robot ─► workers: decode ─► sight ─► that robot ─► vote
+//!                      │                      └──────► robot/<id>/taken                          ▲
+//!                      └─ admits: a guest of the centre (central), or a robot of its own (swarm) ─┘
 //! ```
 //!
 //! The centre itself is a robot without eyes: it relays, repairs, and decides. Fused centrally, the robots it serves are its
 //! guests; as a swarm, each is a robot with a mind and a session of its own, linked to the centre within this process.
 
-mod desk;
 mod door;
+mod frame_queue;
 mod seat;
-mod tally;
+mod service;
+mod workers;
 
-use std::num::NonZeroUsize;
-use std::sync::Arc;
-use std::thread::JoinHandle;
+use std::sync::{Arc, Weak};
 
-use gestalt_protocol::Status;
+use gestalt_protocol::{FrameTaken, RobotId, Status};
 use gestalt_strategies::Classify;
 use serde_json::{Value, json};
 use thiserror::Error;
 use tokio::sync::mpsc;
 
 use crate::config::{Config, Fuse};
-use desk::{Desk, Put};
-use door::Door;
-use gestalt_link::{FrameGate, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
+use door::{Calls, Door};
+use frame_queue::{FrameQueue, Put, Turn};
+use gestalt_link::{FrameArrival, FrameGate, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
 use gestalt_vision::model::RobotModel;
+use gestalt_vision::sight::one_thread_per_frame;
 use seat::Seat;
+use workers::{Work, Workers, cores};
 
 /// How many frames of robots not served yet wait at the door.
 const MAX_WAITING: usize = 64;
@@ -44,7 +45,7 @@ pub enum CenterError {
     /// Its threads.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] std::io::Error),
-    /// OpenCV would not take one thread a frame.
+    /// OpenCV would not take one thread per frame.
     #[error("OpenCV: {0}")]
     OpenCv(#[from] opencv::Error),
     /// A centre looks through the cameras of others.
@@ -55,13 +56,13 @@ pub enum CenterError {
     Learning,
 }
 
-type Frames = Desk<Seat, gestalt_link::FrameArrival>;
+type Frames = FrameQueue<Seat, FrameArrival>;
 
 /// A running centre.
 pub struct Center {
     robot: Arc<Robot>,
-    desk: Arc<Frames>,
-    workers: Vec<JoinHandle<()>>,
+    queue: Arc<Frames>,
+    workers: Workers<Seat, FrameArrival>,
     door: tokio::task::JoinHandle<()>,
     leave: mpsc::Sender<()>,
 }
@@ -78,8 +79,7 @@ impl Center {
         if config.learning.enabled {
             return Err(CenterError::Learning);
         }
-        // Frames are shared out among the workers; OpenCV is not to share out each one as well.
-        opencv::core::set_num_threads(1)?;
+        one_thread_per_frame()?;
         let robot = Arc::new(
             Robot::start(RobotConfig {
                 id: config.robot.id,
@@ -96,10 +96,24 @@ impl Center {
             .await?,
         );
         robot.blind(true);
+        match Self::open(config, model, robot.clone()).await {
+            Ok(center) => Ok(center),
+            Err(error) => {
+                // Nothing is left running.
+                if let Some(robot) = Arc::into_inner(robot) {
+                    robot.stop().await;
+                }
+                Err(error)
+            }
+        }
+    }
+
+    /// Opens the door and puts the workers behind it.
+    async fn open(config: &Config, model: RobotModel, robot: Arc<Robot>) -> Result<Self, CenterError> {
         let workers = config.center.workers.unwrap_or_else(cores);
-        let desk = Arc::new(Frames::new(2 * workers.max(2)));
+        let queue = Arc::new(Frames::new(2 * workers.max(2)));
         let (knock, knocks) = mpsc::channel(MAX_WAITING);
-        let (of_gate, of_robot) = (desk.clone(), Arc::downgrade(&robot));
+        let (of_gate, of_robot) = (queue.clone(), Arc::downgrade(&robot));
         let gate = robot
             .receive_frames(None, move |frame| {
                 if let Put::Unknown(frame) = of_gate.put(frame.robot, frame)
@@ -110,12 +124,12 @@ impl Center {
                 }
             })
             .await?;
-        let gate = Arc::new(gate);
-        let workers: Result<_, _> = (0..workers).map(|_| work(desk.clone(), gate.clone())).collect();
+        let looking = Arc::new(Looking { gate, center: Arc::downgrade(&robot) });
+        let workers = Workers::start(workers, &queue, &looking)?;
         let (leave, left) = mpsc::channel(1);
-        let door = Door::new(config.clone(), model, robot.clone(), desk.clone());
-        let door = tokio::spawn(door.run(knocks, left));
-        Ok(Self { robot, desk, workers: workers?, door, leave })
+        let door = Door::new(config.clone(), model, robot.clone(), queue.clone());
+        let door = tokio::spawn(door.run(Calls { knocks, left }));
+        Ok(Self { robot, queue, workers, door, leave })
     }
 
     /// The centre itself.
@@ -127,18 +141,12 @@ impl Center {
     /// The account of every robot it serves now, by robot.
     #[must_use]
     pub fn served(&self) -> Vec<Status> {
-        self.desk.seats().into_iter().map(|(_, seat)| seat.status()).collect()
+        self.queue.seats().into_iter().map(|(_, seat)| seat.status()).collect()
     }
 
     /// Lets all robots leave the swarm, then the centre, and waits until that is done.
     pub async fn stop(self) {
-        self.desk.close();
-        for worker in self.workers {
-            // It ends with the frame it has at hand.
-            if tokio::task::block_in_place(|| worker.join()).is_err() {
-                tracing::error!("a worker of the centre ended badly");
-            }
-        }
+        tokio::task::block_in_place(|| drop(self.workers));
         drop(self.leave);
         if let Err(error) = self.door.await {
             tracing::error!("the centre's task ended badly: {error}");
@@ -147,10 +155,6 @@ impl Center {
             robot.stop().await;
         }
     }
-}
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
 /// How the centre is linked; robots with sessions of their own reach it within this machine.
@@ -167,12 +171,34 @@ fn link(config: &Config) -> LinkConfig {
     link
 }
 
-/// A thread that looks at one frame after the other.
-fn work(desk: Arc<Frames>, gate: Arc<FrameGate>) -> std::io::Result<JoinHandle<()>> {
-    std::thread::Builder::new().name("centre".to_owned()).spawn(move || {
-        while let Some((robot, seat, frame)) = desk.next(|robot, taken| gate.taken(robot, &taken)) {
-            seat.look(&frame);
-            desk.done(robot);
+/// What the workers do, and where they say what goes wrong.
+struct Looking {
+    gate: FrameGate,
+    center: Weak<Robot>,
+}
+
+impl Looking {
+    fn report_error(&self, what: &str) {
+        if let Some(center) = self.center.upgrade() {
+            center.report_error(what);
         }
-    })
+    }
+}
+
+impl Work<Seat, FrameArrival> for Looking {
+    fn grant(&self, robot: RobotId, taken: &FrameTaken) {
+        self.gate.taken(robot, taken);
+    }
+
+    fn look(&self, turn: &Turn<'_, Seat, FrameArrival>) {
+        if let Err(broken) = turn.seat.look(&turn.frame) {
+            self.report_error(&format!("robot {}: perception {broken}", turn.robot));
+        }
+    }
+
+    fn panicked(&self, message: &str) {
+        self.report_error(&format!(
+            "a worker panicked ({message}) and goes on; it is a bug: RUST_BACKTRACE=1 shows where"
+        ));
+    }
 }

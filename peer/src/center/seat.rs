@@ -3,124 +3,128 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{CameraState, RoundId, Status};
+use gestalt_protocol::{Motion, RoundId, Status};
 use opencv::core::Mat;
-use opencv::prelude::*;
 
-use super::desk::{Count, Look};
-use super::tally::{Lately, Tally};
-use crate::opinion::opinion;
+use super::frame_queue::{Count, Look};
+use super::service::{Lately, Service};
+use crate::camera_report::CameraReport;
 use crate::stream::MAX_MEGAPIXELS;
-use crate::telling::tell;
+use crate::telling::{tell, tell_camera};
 use gestalt_link::{FrameArrival, Robot};
-use gestalt_vision::sight::Sight;
-use gestalt_vision::source::{Frame, decode};
+use gestalt_vision::sight::{Sight, Taken};
+use gestalt_vision::source::{Frame, PictureError, SourceError, decode};
+use gestalt_vision::steady::{Broken, Steady};
+
+/// What the status says of the camera.
+const SOURCE: &str = "stream";
 
 /// A robot that is served.
 pub(super) struct Seat {
     robot: Arc<Robot>,
-    state: Mutex<State>,
+    /// Held while a frame is decoded and looked at: by workers alone.
+    eye: Mutex<Eye>,
+    /// Never held for long.
+    record: Mutex<Record>,
 }
 
-struct State {
-    sight: Sight,
+struct Eye {
+    sight: Steady<Sight>,
     /// The frame at hand; its buffer is used again.
     frame: Frame,
-    tally: Tally,
+}
+
+struct Record {
+    camera: CameraReport,
+    motion: Option<Motion>,
+    service: Service,
     heard: Instant,
-    camera: CameraState,
-    trouble: String,
     judged: u64,
-    /// The hand it saw last, and when, since its robot's start.
-    hand: Option<(Vec<f32>, Duration)>,
 }
 
 impl Seat {
-    pub fn new(robot: Arc<Robot>, sight: Sight, now: Instant) -> Self {
+    /// A seat for that robot, which counts as blind until a picture of it was seen. It is silent after `patience`.
+    pub fn new(robot: Arc<Robot>, sight: Steady<Sight>, patience: Duration) -> Self {
+        let now = Instant::now();
+        robot.blind(true);
+        let mut camera = CameraReport::of_stream(patience, robot.started().elapsed());
+        tell_camera(&mut camera, &robot, SOURCE, None, robot.started());
         let frame = Frame { image: Mat::default(), at: Duration::ZERO };
-        let tally = Tally::new(now);
-        let (camera, trouble) = (CameraState::Opening, String::new());
-        let state = State { sight, frame, tally, heard: now, camera, trouble, judged: 0, hand: None };
-        Self { robot, state: Mutex::new(state) }
+        let record = Record { camera, motion: None, service: Service::new(now), heard: now, judged: 0 };
+        Self { robot, eye: Mutex::new(Eye { sight, frame }), record: Mutex::new(record) }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn record(&self) -> MutexGuard<'_, Record> {
+        self.record.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Looks at a frame, and tells the robot what it showed.
-    pub fn look(&self, arrival: &FrameArrival) {
-        let mut state = self.lock();
-        let state = &mut *state;
-        state.heard = arrival.at;
-        if let Err(cause) = decode(&arrival.picture(), MAX_MEGAPIXELS, &mut state.frame.image) {
-            self.robot.count("frames_failed");
-            self.robot.report_error(&format!("streams {cause}"));
-            return self.note(state, CameraState::Failing, &cause.to_string());
-        }
+    ///
+    /// # Errors
+    /// When whatever looks for the robot is broken; its status says so already.
+    pub fn look(&self, arrival: &FrameArrival) -> Result<(), Broken> {
+        self.record().heard = arrival.at;
         let zero = self.robot.started();
         let age = Duration::from_micros(u64::from(arrival.header.age_us));
+        let mut eye = self.eye.lock().unwrap_or_else(PoisonError::into_inner);
+        let Eye { sight, frame } = &mut *eye;
         // Two frames of which the older was longer under way must not change places.
-        let at = arrival.at.saturating_duration_since(zero).saturating_sub(age);
-        state.frame.at = at.max(state.frame.at);
+        frame.at = arrival.at.saturating_duration_since(zero).saturating_sub(age).max(frame.at);
         let judge = self.round().is_some();
-        let taken = state.sight.take(&state.frame, judge);
-        if let Some(Ok(observation)) = &taken.observation {
-            state.hand = Some((observation.features.clone(), taken.at));
-        }
-        tell(taken, &self.robot, zero);
-        state.judged += u64::from(judge);
-        state.tally.served(age + arrival.at.elapsed());
-        self.note(state, CameraState::Live, "");
-    }
-
-    fn note(&self, state: &mut State, camera: CameraState, trouble: &str) {
-        if state.camera == camera && state.trouble == trouble {
-            return;
-        }
-        state.camera = camera;
-        trouble.clone_into(&mut state.trouble);
-        self.robot.blind(camera != CameraState::Live);
-        let size = [state.frame.image.cols(), state.frame.image.rows()];
-        self.robot.update_camera(|status| {
-            status.state = camera;
-            trouble.clone_into(&mut status.trouble);
-            status.size = size.map(i32::unsigned_abs);
+        let now = zero.elapsed();
+        let looked = sight.run(now, |sight| -> Result<Taken, PictureError> {
+            decode(&arrival.picture(), MAX_MEGAPIXELS, &mut frame.image)?;
+            Ok(sight.take(frame, judge))
         });
+        let motion = sight.get().and_then(Sight::motion);
+        let mut record = self.record();
+        let record = &mut *record;
+        record.motion = motion;
+        let said = match looked {
+            Ok(Ok(taken)) => {
+                record.camera.note_frame(&frame.image, arrival.at.saturating_duration_since(zero));
+                let hand = taken.observation.as_ref().and_then(|seen| seen.as_ref().ok());
+                let features = hand.map(|observation| observation.features.clone());
+                record.camera.note_judged(taken.at, zero.elapsed(), features);
+                record.judged += u64::from(judge);
+                record.service.served(age + arrival.at.elapsed());
+                tell(taken, &self.robot, zero);
+                Ok(())
+            }
+            Ok(Err(cause)) => {
+                self.robot.count("frames_failed");
+                record.camera.note_error(&SourceError::Garbled { robot: arrival.robot, cause });
+                Ok(())
+            }
+            Err(broken) => {
+                record.camera.note_broken(format!("perception {broken}"));
+                Err(broken)
+            }
+        };
+        if record.camera.is_urgent() {
+            tell_camera(&mut record.camera, &self.robot, SOURCE, motion, zero);
+        }
+        said
     }
 
     /// Puts how it goes into the robot's status. Says for how long nothing was heard of it.
-    pub fn report(&self, now: Instant, count: Count, frozen_after: Duration) -> Duration {
-        let mut state = self.lock();
-        let Lately { fps_received, fps_served, delay } = state.tally.lately(now, count.received);
-        let silent = now.saturating_duration_since(state.heard);
-        if silent >= frozen_after {
-            let trouble = "no frames arrive: see that `gestalt stream` runs, and its way here";
-            self.note(&mut state, CameraState::Frozen, trouble);
-        }
-        let size = [state.frame.image.cols(), state.frame.image.rows()];
-        let motion = state.sight.motion();
-        let seen = state.hand.take().zip(self.robot.classifier());
-        let opinion = seen.and_then(|((features, at), classifier)| opinion(&*classifier, &features, at));
-        self.robot.update_camera(|status| {
-            status.motion = motion;
-            status.opinion = opinion.or(status.opinion.take());
-            status.fps = fps_served as f32;
-            status.delay_ms = delay.0.as_secs_f32() * 1e3;
-            status.size = size.map(i32::unsigned_abs);
-        });
+    pub fn report(&self, now: Instant, count: Count) -> Duration {
+        let mut record = self.record();
+        let record = &mut *record;
+        let Lately { fps_received, delay } = record.service.lately(now, count.received);
+        tell_camera(&mut record.camera, &self.robot, SOURCE, record.motion, self.robot.started());
         let whole = |value: f64| value.round() as u64;
         for (name, value) in [
             ("frames_received", count.received),
             ("frames_overwritten", count.overwritten),
-            ("frames_judged", state.judged),
+            ("frames_judged", record.judged),
             ("frames_received_per_second", whole(fps_received)),
             ("frame_delay_p50_us", whole(delay.0.as_secs_f64() * 1e6)),
             ("frame_delay_p99_us", whole(delay.1.as_secs_f64() * 1e6)),
         ] {
             self.robot.set(name, value);
         }
-        silent
+        now.saturating_duration_since(record.heard)
     }
 
     /// The robot's account of itself.

@@ -38,13 +38,13 @@ pub struct Args {
 /// Runs the verb.
 ///
 /// # Errors
-/// Whatever keeps the camera from opening, and what no waiting changes.
+/// A robot without a camera, and what no waiting changes. A camera that is missing is waited for.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (config, link) =
         args.config.streaming([args.identity.settings(), args.camera.settings()?].concat())?;
     let (swarm, robot) = (config.swarm.0.clone(), config.robot.id);
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    let feed = Feed::open(&config.camera, robot, clock)?.ok_or(
+    let feed = Feed::new(&config.camera, robot, clock).ok_or(
         "no camera source to stream: set camera.source (--source) to rendered, images, video or device",
     )?;
     let source = feed.describe();
@@ -80,8 +80,13 @@ fn report(as_json: bool, event: &StreamEvent) -> Result<(), Failure> {
         StreamEvent::Detached { cause } => {
             line(as_json, &json!({"event": "detached", "cause": cause}), &format!("detached: {cause}"))
         }
-        StreamEvent::Failed { cause } => {
-            line(as_json, &json!({"event": "failed", "cause": cause}), &format!("failed: {cause}"))
+        StreamEvent::Failed { cause, times } => {
+            let often = if *times > 1 { format!("failed {times} times") } else { "failed".to_owned() };
+            line(
+                as_json,
+                &json!({"event": "failed", "cause": cause, "times": times}),
+                &format!("{often}: {cause}"),
+            )
         }
         StreamEvent::Decided(announced) => line(
             as_json,

@@ -1,25 +1,35 @@
 //! What a thin client sends: its camera's pictures, or files as they are.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
-use gestalt_protocol::{MAX_FRAME, RobotId, RoundId};
+use gestalt_protocol::{MAX_FRAME, RobotId};
 use opencv::core::Mat;
 
-use crate::camera_source::{human_before, open_source};
+use crate::camera_source::{describe, human_before, open_source};
 use crate::config::{CameraSection, SourceSection};
 use gestalt_vision::human::Human;
-use gestalt_vision::source::{ImageFolder, Scene, Source, SourceError, read_image, read_jpeg};
+use gestalt_vision::source::{ImageFolder, Opener, Scene, Source, SourceError, read_image, read_jpeg};
 
-/// A camera whose pictures are sent, not looked at.
-pub enum Feed {
-    /// JPEG files: a camera that encodes by itself.
-    Files(ImageFolder),
-    /// Any other source, and the human before a rendered one.
-    Camera(Box<dyn Source>, Human),
+/// A camera whose pictures are sent, not looked at. It is opened by whoever reads it: one that is missing may come later.
+pub struct Feed {
+    describe: String,
+    /// Who stands in front of it, if it is a rendered one.
+    pub(super) human: Human,
+    pub(super) open: Opener<Shot>,
 }
 
-/// One picture.
+/// One picture, and when it was taken.
+#[derive(Debug)]
+pub struct Shot {
+    /// The picture.
+    pub content: Content,
+    /// When it was taken, in the time of its reader.
+    pub at: Duration,
+    /// The time between two pictures.
+    pub period: Duration,
+}
+
+/// What a picture is.
 #[derive(Debug)]
 pub enum Content {
     /// As the camera encoded it: JPEG.
@@ -29,61 +39,79 @@ pub enum Content {
 }
 
 impl Feed {
-    /// Opens the camera a configuration describes; `None` for a robot without one, or whose pictures come from elsewhere.
-    /// `clock` is the time since 1970 now, for a human who goes by it.
-    ///
-    /// # Errors
-    /// See [`SourceError`].
-    pub fn open(
-        camera: &CameraSection,
-        robot: RobotId,
-        clock: Duration,
-    ) -> Result<Option<Self>, SourceError> {
-        if let SourceSection::Images(files) = &camera.source {
-            let period = camera.model.properties().period();
-            return Ok(Some(Self::Files(ImageFolder::open(&files.path, period, files.repeat)?)));
-        }
-        if matches!(camera.source, SourceSection::None | SourceSection::Stream(_)) {
-            return Ok(None);
-        }
-        Ok(Some(Self::Camera(open_source(camera, robot, clock)?, human_before(camera))))
+    /// The camera a configuration describes; `None` for a robot without one, or whose pictures come from elsewhere. `clock` is
+    /// the time since 1970 now, for a human who goes by it.
+    #[must_use]
+    pub fn new(camera: &CameraSection, robot: RobotId, clock: Duration) -> Option<Self> {
+        let section = camera.clone();
+        let open: Opener<Shot> = match &camera.source {
+            SourceSection::None | SourceSection::Stream(_) => return None,
+            SourceSection::Images(files) => {
+                let (files, period) = (files.clone(), camera.model.properties().period());
+                Box::new(move || Ok(Box::new(Files(ImageFolder::open(&files.path, period, files.repeat)?))))
+            }
+            _ => encodable(Box::new(move || open_source(&section, robot, clock))),
+        };
+        Some(Self { describe: describe(camera), human: human_before(camera), open })
+    }
+
+    /// A camera of your own, in words, and what opens it; again whenever it fails.
+    #[must_use]
+    pub fn with(describe: &str, open: Opener) -> Self {
+        Self { describe: describe.to_owned(), human: Human::new(0), open: encodable(open) }
     }
 
     /// What it is, in words.
     #[must_use]
     pub fn describe(&self) -> String {
-        match self {
-            Self::Files(folder) => folder.describe(),
-            Self::Camera(source, _) => source.describe(),
-        }
+        self.describe.clone()
+    }
+}
+
+fn encodable(mut open: Opener) -> Opener<Shot> {
+    Box::new(move || Ok(Box::new(Camera(open()?))))
+}
+
+/// JPEG files: a camera that encodes by itself.
+struct Files(ImageFolder);
+
+impl Source<Shot> for Files {
+    fn describe(&self) -> String {
+        self.0.describe()
     }
 
-    /// The time between two frames.
-    #[must_use]
-    pub fn period(&self) -> Duration {
-        match self {
-            Self::Files(folder) => folder.period(),
-            Self::Camera(source, _) => source.period(),
-        }
+    fn period(&self) -> Duration {
+        self.0.period()
     }
 
-    /// The next picture, taken at `now`; before a rendered camera somebody shows what belongs to the round.
-    ///
-    /// # Errors
-    /// See [`SourceError`]. After an error about one picture, the next call goes on with the next.
-    pub fn next(&mut self, now: Duration, round: Option<RoundId>) -> Result<Content, SourceError> {
-        match self {
-            Self::Files(folder) => {
-                let path: PathBuf = folder.next_file()?.to_owned();
-                match read_jpeg(&path, MAX_FRAME)? {
-                    Some(jpeg) => Ok(Content::Encoded(jpeg)),
-                    None => read_image(&path).map(Content::Picture),
-                }
-            }
-            Self::Camera(source, human) => {
-                let scene = round.map_or(Scene::default(), |round| human.shows(round));
-                Ok(Content::Picture(source.next_frame(now, &scene)?.image))
-            }
-        }
+    fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Shot, SourceError> {
+        let path = self.0.next_file()?;
+        let content = match read_jpeg(path, MAX_FRAME)? {
+            Some(jpeg) => Content::Encoded(jpeg),
+            None => Content::Picture(read_image(path)?),
+        };
+        Ok(Shot { content, at: now, period: self.period() })
+    }
+}
+
+/// Any other source.
+struct Camera(Box<dyn Source>);
+
+impl Source<Shot> for Camera {
+    fn describe(&self) -> String {
+        self.0.describe()
+    }
+
+    fn period(&self) -> Duration {
+        self.0.period()
+    }
+
+    fn is_live(&self) -> bool {
+        self.0.is_live()
+    }
+
+    fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<Shot, SourceError> {
+        let frame = self.0.next_frame(now, scene)?;
+        Ok(Shot { content: Content::Picture(frame.image), at: frame.at, period: self.period() })
     }
 }

@@ -75,13 +75,15 @@ impl Inlet {
 pub struct StreamSource {
     inlet: Arc<Inlet>,
     period: Duration,
+    /// When the last frame was taken.
+    last: Duration,
 }
 
 impl StreamSource {
     /// The frames that come in there, one every `period`, or as they come.
     #[must_use]
     pub fn new(inlet: Arc<Inlet>, period: Duration) -> Self {
-        Self { inlet, period }
+        Self { inlet, period, last: Duration::ZERO }
     }
 }
 
@@ -101,6 +103,8 @@ impl Source for StreamSource {
         decode(&arrival.picture(), MAX_MEGAPIXELS, &mut image)
             .map_err(|cause: PictureError| SourceError::Garbled { robot: self.inlet.robot, cause })?;
         let age = Duration::from_micros(u64::from(arrival.header.age_us)) + arrival.at.elapsed();
-        Ok(Frame { image, at: (now + called.elapsed()).saturating_sub(age) })
+        // Two frames of which the older was longer under way must not change places.
+        self.last = self.last.max((now + called.elapsed()).saturating_sub(age));
+        Ok(Frame { image, at: self.last })
     }
 }

@@ -8,12 +8,12 @@
 //! ```
 
 mod credit;
+mod failures;
 mod feed;
 mod inlet;
-mod lens;
 mod sender;
 
 pub use credit::{Credit, PROBE};
-pub use feed::{Content, Feed};
+pub use feed::{Content, Feed, Shot};
 pub use inlet::{Inlet, MAX_MEGAPIXELS, StreamSource};
 pub use sender::{Sender, SenderConfig, StreamEvent};

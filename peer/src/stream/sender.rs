@@ -1,6 +1,5 @@
 //! The thin client: it sends what its camera sees, and hears what the swarm decides.
 
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId};
@@ -9,10 +8,11 @@ use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
 use super::credit::Credit;
-use super::feed::{Content, Feed};
-use super::lens::{Lens, Shot};
+use super::failures::Failures;
+use super::feed::{Content, Feed, Shot};
 use gestalt_link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
-use gestalt_vision::source::{SourceError, encode_jpeg};
+use gestalt_vision::human::Human;
+use gestalt_vision::source::{Reader, Scene, SourceError, encode_jpeg};
 
 /// How many acknowledgements wait to be read: one is expected, more are somebody's nonsense.
 const MAX_WAITING: usize = 16;
@@ -44,17 +44,19 @@ pub struct SenderConfig {
 pub enum StreamEvent {
     /// It is attached to a robot or a centre.
     Attached,
-    /// It is attached to nobody, and tries again.
+    /// It is attached to nobody, and tries again. The same cause is told once.
     Detached {
-        /// Why, and the mend.
+        /// Why, and how to fix it.
         cause: String,
     },
     /// The swarm decided.
     Decided(Box<Announcement>),
-    /// A picture could not be taken or sent, or something arrived that is no acknowledgement.
+    /// A picture could not be taken or sent, or something arrived that is no acknowledgement. Told at most once a second.
     Failed {
-        /// Why, and the mend.
+        /// Why, and how to fix it: the latest of those since the last message.
         cause: String,
+        /// How many there were since the last message.
+        times: u64,
     },
     /// How it goes, once a second: since the start, frames sent, acknowledged, and overwritten by newer ones unsent.
     Count {
@@ -70,8 +72,11 @@ pub enum StreamEvent {
 /// Sends the frames of one camera.
 pub struct Sender {
     config: SenderConfig,
-    lens: Arc<Lens>,
-    fps: f32,
+    reader: Reader<Shot>,
+    /// The zero of the pictures' time.
+    zero: Instant,
+    human: Human,
+    failures: Failures,
     nonce: u64,
     sent: u64,
     taken: u64,
@@ -84,14 +89,17 @@ enum End {
 }
 
 impl Sender {
-    /// Starts the camera.
+    /// Starts to read the camera. One that is missing, or fails later, is opened again and again.
     ///
     /// # Errors
     /// [`LinkError::Thread`] when the machine has no room for one more.
     pub fn start(config: SenderConfig, feed: Feed) -> Result<Self, LinkError> {
-        let fps = 1.0 / feed.period().as_secs_f32().max(0.001);
-        let lens = Lens::open(feed)?;
-        Ok(Self { config, lens, fps, nonce: fresh_nonce(), sent: 0, taken: 0 })
+        let Feed { open, human, .. } = feed;
+        let zero = Instant::now();
+        let reader = Reader::start(None, open, zero)?;
+        reader.want(Some(Scene::default()));
+        let failures = Failures::default();
+        Ok(Self { config, reader, zero, human, failures, nonce: fresh_nonce(), sent: 0, taken: 0 })
     }
 
     /// Sends, and tells of what happens, until the camera has come to its end. It stays through whatever becomes of the robot
@@ -101,22 +109,30 @@ impl Sender {
     /// What no waiting mends: see [`LinkError`].
     pub async fn run(mut self, mut tell: impl FnMut(StreamEvent)) -> Result<(), LinkError> {
         let mut credit = Credit::new(self.nonce);
+        let mut unattached = String::new();
         loop {
             let client = match Client::open(&self.config.swarm, &self.config.link).await {
                 Ok(client) => client,
                 Err(LinkError::Open(cause)) => {
-                    tell(StreamEvent::Detached { cause });
+                    if cause != unattached {
+                        unattached.clone_from(&cause);
+                        tell(StreamEvent::Detached { cause });
+                    }
                     tokio::time::sleep(LOOKOUT).await;
                     continue;
                 }
                 Err(error) => return Err(error),
             };
+            unattached.clear();
             let end = self.serve(&client, &mut credit, &mut tell).await;
             client.close().await;
             match end {
                 Ok(End::CameraEnded) => return Ok(()),
                 Ok(End::Detached) => {}
-                Err(error) => tell(StreamEvent::Failed { cause: error.to_string() }),
+                Err(error) => {
+                    self.failures.note(error.to_string());
+                    self.tell_failures(&mut tell);
+                }
             }
         }
     }
@@ -139,24 +155,23 @@ impl Sender {
         let mut lookout = tokio::time::interval(LOOKOUT);
         lookout.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (mut attached, mut missed) = (false, 0);
-        let lens = self.lens.clone();
         loop {
             let picture = async {
                 if let Some(waits) = credit.waits_until() {
                     tokio::time::sleep_until(waits.into()).await;
                 }
-                lens.newest().await
+                self.reader.next().await
             };
             tokio::select! {
                 shot = picture => {
-                    if let Err(SourceError::Ended(_)) = shot.content {
+                    if let Err(SourceError::Ended(_)) = shot {
                         return Ok(End::CameraEnded);
                     }
                     if let Err(cause) = self.send(&sender, credit, shot).await {
-                        tell(StreamEvent::Failed { cause });
+                        self.failures.note(cause);
                     }
                 }
-                Some(taken) = acknowledged.recv() => self.on_taken(taken, credit, tell),
+                Some(taken) = acknowledged.recv() => self.on_taken(taken, credit),
                 decision = next(&mut decisions) => match decision {
                     Some(decision) => tell(StreamEvent::Decided(Box::new(decision))),
                     None => return Ok(End::Detached),
@@ -176,43 +191,50 @@ impl Sender {
                     if missed > PATIENCE {
                         return Ok(End::Detached);
                     }
-                    let (sent, taken, overwritten) = (self.sent, self.taken, lens.overwritten());
+                    let (sent, taken, overwritten) = (self.sent, self.taken, self.reader.dropped());
                     tell(StreamEvent::Count { sent, taken, overwritten });
                 }
             }
+            self.tell_failures(tell);
         }
     }
 
-    fn on_taken(
-        &mut self,
-        taken: Result<FrameTaken, DecodeError>,
-        credit: &mut Credit,
-        tell: &mut impl FnMut(StreamEvent),
-    ) {
+    fn tell_failures(&mut self, tell: &mut impl FnMut(StreamEvent)) {
+        if let Some((cause, times)) = self.failures.due(Instant::now()) {
+            tell(StreamEvent::Failed { cause, times });
+        }
+    }
+
+    fn on_taken(&mut self, taken: Result<FrameTaken, DecodeError>, credit: &mut Credit) {
         match taken {
             Ok(taken) if credit.taken(&taken) => {
                 self.taken += 1;
-                self.lens.look_for(taken.round);
+                let scene = taken.round.map_or(Scene::default(), |round| self.human.shows(round));
+                self.reader.want(Some(scene));
             }
             Ok(_) => {}
-            Err(error) => {
-                tell(StreamEvent::Failed { cause: format!("an acknowledgement that is none: {error}") })
-            }
+            Err(error) => self.failures.note(format!("malformed acknowledgement: {error}")),
         }
     }
 
-    async fn send(&mut self, sender: &FrameSender, credit: &mut Credit, shot: Shot) -> Result<(), String> {
-        let Shot { content, at } = shot;
-        let jpeg = match content.map_err(|error| error.to_string())? {
+    async fn send(
+        &mut self,
+        sender: &FrameSender,
+        credit: &mut Credit,
+        shot: Result<Shot, SourceError>,
+    ) -> Result<(), String> {
+        let Shot { content, at, period } = shot.map_err(|error| error.to_string())?;
+        let jpeg = match content {
             Content::Encoded(jpeg) => jpeg,
             Content::Picture(picture) => tokio::task::block_in_place(|| self.encode(&picture))?,
         };
+        let age = self.zero.elapsed().saturating_sub(at);
         let header = FrameHeader {
             nonce: self.nonce,
             sequence: credit.sent(Instant::now()),
-            age_us: u32::try_from(at.elapsed().as_micros()).unwrap_or(u32::MAX),
+            age_us: u32::try_from(age.as_micros()).unwrap_or(u32::MAX),
             encoding: ImageEncoding::Jpeg,
-            fps: self.fps,
+            fps: 1.0 / period.as_secs_f32().max(0.001),
             camera: self.config.camera.clone(),
         };
         self.sent += 1;

@@ -27,5 +27,6 @@ pub mod pose;
 pub mod sight;
 #[cfg(feature = "opencv")]
 pub mod source;
+pub mod steady;
 #[cfg(feature = "opencv")]
 pub mod survey;

@@ -15,6 +15,7 @@ use crate::config::{LayerConfig, MotionConfig};
 use crate::motion::{Change, MotionDetector, MotionError};
 use crate::perception::{FeatureSet, HandConfig, NoObservation, Perception, PerceptionError};
 use crate::source::Frame;
+use crate::steady::Steady;
 use mismatch::Mismatch;
 
 /// What a robot sees with, and what is done to its frames.
@@ -38,6 +39,15 @@ pub enum SightError {
     /// No motion detector.
     #[error(transparent)]
     Motion(#[from] MotionError),
+}
+
+/// Keeps OpenCV from sharing out each frame among threads, in the whole process: the frames of several cameras are shared out
+/// already, and a frame is too small to be worth it. To be called where a program starts its eyes.
+///
+/// # Errors
+/// OpenCV's.
+pub fn one_thread_per_frame() -> Result<(), opencv::Error> {
+    opencv::core::set_num_threads(1)
 }
 
 /// The sight of one camera.
@@ -77,6 +87,15 @@ impl Sight {
             layer,
             features,
         })
+    }
+
+    /// The same, made anew when it panics.
+    ///
+    /// # Errors
+    /// See [`SightError`].
+    pub fn steady(config: SightConfig, features: FeatureSet) -> Result<Steady<Self>, SightError> {
+        let sight = Self::new(config.clone(), features)?;
+        Ok(Steady::new(sight, move || Self::new(config.clone(), features).map_err(|error| error.to_string())))
     }
 
     /// Takes in the next frame; `judge`: also says what hand it shows. Frames between which no round is open are taken

@@ -14,11 +14,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
-use opencv::core::Mat;
+use opencv::core::{CV_8UC3, Mat, Scalar};
+use opencv::prelude::*;
 use thiserror::Error;
 
 use crate::camera_model::CameraModelError;
 use crate::pose::PoseError;
+use crate::steady::Broken;
 
 pub use device::Device;
 pub use emulated_view::EmulatedView;
@@ -49,8 +51,34 @@ pub struct Scene {
     pub seed: u64,
 }
 
-/// A stream of frames.
-pub trait Source: Send {
+impl Frame {
+    /// A picture from the bytes of its pixels: blue, green, red, row by row from the top, without gaps.
+    ///
+    /// # Errors
+    /// [`SourceError::Own`] when there are not `3 * width * height` bytes, or none.
+    pub fn from_bgr(width: u32, height: u32, bytes: &[u8], at: Duration) -> Result<Self, SourceError> {
+        let expected = 3 * u128::from(width) * u128::from(height);
+        let sides = (i32::try_from(width), i32::try_from(height));
+        let (Ok(columns), Ok(rows)) = sides else { return Err(not_a_picture(width, height, bytes)) };
+        if expected == 0 || bytes.len() as u128 != expected {
+            return Err(not_a_picture(width, height, bytes));
+        }
+        let mut image = Mat::new_rows_cols_with_default(rows, columns, CV_8UC3, Scalar::all(0.0))?;
+        image.data_bytes_mut()?.copy_from_slice(bytes);
+        Ok(Self { image, at })
+    }
+}
+
+fn not_a_picture(width: u32, height: u32, bytes: &[u8]) -> SourceError {
+    let found = bytes.len();
+    SourceError::Own(format!("{found} bytes are no picture of {width}×{height} pixels with 3 bytes each"))
+}
+
+/// A stream of frames, or, for a camera whose pictures are not looked at here, of whatever it delivers.
+///
+/// Implement it for a camera of your own. It is read by a thread of its own ([`Reader`]), so that a read may take its time;
+/// one that panics is dropped and opened anew.
+pub trait Source<F = Frame>: Send {
     /// What it is, in words: `rendered`, `video hand.mp4`, `images DIR`.
     fn describe(&self) -> String;
 
@@ -67,7 +95,7 @@ pub trait Source: Send {
     ///
     /// # Errors
     /// See [`SourceError`]. After an error about one image, the next call goes on with the next image.
-    fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<Frame, SourceError>;
+    fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<F, SourceError>;
 }
 
 /// Why there is no frame.
@@ -141,12 +169,32 @@ pub enum SourceError {
     /// A place where no camera can be.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// What a source of your own says is wrong.
+    #[error("{0}")]
+    Own(String),
+    /// The source panicked.
+    #[error("the camera's source {0}")]
+    Panicked(#[from] Broken),
     /// OpenCV failed where it should not.
     #[error("OpenCV: {0}")]
     OpenCv(#[from] opencv::Error),
 }
 
 impl SourceError {
+    /// Whether one picture is bad and the next may be good: nothing that opening the source anew would change.
+    #[must_use]
+    pub fn is_of_one_picture(&self) -> bool {
+        matches!(
+            self,
+            Self::Permission(_)
+                | Self::Empty(_)
+                | Self::Truncated(_)
+                | Self::NotAnImage(_)
+                | Self::TooLarge { .. }
+                | Self::Garbled { .. }
+        )
+    }
+
     /// The error of the operating system, told apart by its mend.
     pub(crate) fn io(path: impl Into<PathBuf>, cause: io::Error) -> Self {
         let path = path.into();
@@ -161,6 +209,18 @@ impl SourceError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_is_made_of_as_many_bytes_as_it_has_pixels() {
+        let bytes: Vec<u8> = (0..18).collect();
+        let frame = Frame::from_bgr(3, 2, &bytes, Duration::ZERO).unwrap();
+        assert_eq!((frame.image.cols(), frame.image.rows()), (3, 2));
+        assert_eq!(frame.image.at_2d::<opencv::core::Vec3b>(1, 0).unwrap().0, [9, 10, 11]);
+        for (width, height) in [(3, 3), (0, 0), (u32::MAX, u32::MAX)] {
+            let error = Frame::from_bgr(width, height, &bytes, Duration::ZERO).unwrap_err();
+            assert!(error.to_string().contains("18 bytes are no picture"), "{error}");
+        }
+    }
 
     #[test]
     fn an_error_of_the_system_names_the_path_and_the_mend() {

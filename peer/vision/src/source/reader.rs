@@ -9,130 +9,157 @@ use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 
 use super::{Frame, Scene, Source, SourceError};
+use crate::steady::{BACK_OFF, Broken, Panics, caught};
 
 /// Opens a source anew.
-pub type Opener = Box<dyn FnMut() -> Result<Box<dyn Source>, SourceError> + Send>;
+pub type Opener<F = Frame> = Box<dyn FnMut() -> Result<Box<dyn Source<F>>, SourceError> + Send>;
 
-/// How long to wait before the second try, and the longest wait.
-const BACK_OFF: (Duration, Duration) = (Duration::from_millis(250), Duration::from_secs(4));
-
-/// After this many errors in a row a file's source is opened anew; one bad image among good ones needs none of that.
+/// After this many errors in a row a file's source is opened anew, unless they are each of one picture.
 const TOLERATED: u32 = 8;
 
 /// A source being read. Dropping it ends the thread as soon as its read returns.
-pub struct Reader {
-    desk: Arc<Desk>,
+pub struct Reader<F = Frame> {
+    shared: Arc<Shared<F>>,
 }
 
-/// Where the thread and its owner meet.
-struct Desk {
-    state: Mutex<State>,
+/// What the thread and its owner share.
+struct Shared<F> {
+    state: Mutex<State<F>>,
     changed: Condvar,
     delivered: Notify,
 }
 
-#[derive(Default)]
-struct State {
+struct State<F> {
     /// What the human shows; `None` while no frames are wanted.
     wanted: Option<Scene>,
     /// Frames are wanted again since the last one: the next one need not wait for its turn.
     hurry: bool,
     ended: bool,
-    newest: Option<Result<Frame, SourceError>>,
+    newest: Option<Result<F, SourceError>>,
     dropped: u64,
 }
 
-impl Reader {
+impl<F: Send + 'static> Reader<F> {
     /// Reads `source`, and what `open` gives when that fails, or at once when there is none yet. Frames are taken at the
     /// time since `zero`. Nothing is read before [`Reader::want`], but for a source that runs by itself.
     ///
+    /// A source that panics is dropped and opened anew, until it has panicked [`PANICS`](crate::steady::PANICS) times in a row.
+    ///
     /// # Errors
     /// When the system has no thread to spare.
-    pub fn start(source: Option<Box<dyn Source>>, open: Opener, zero: Instant) -> std::io::Result<Self> {
-        let state = Mutex::new(State::default());
-        let desk = Arc::new(Desk { state, changed: Condvar::new(), delivered: Notify::new() });
-        let of_thread = desk.clone();
-        std::thread::Builder::new()
-            .name("camera".to_owned())
-            .spawn(move || of_thread.read(source, open, zero))?;
-        Ok(Self { desk })
+    pub fn start(
+        source: Option<Box<dyn Source<F>>>,
+        open: Opener<F>,
+        zero: Instant,
+    ) -> std::io::Result<Self> {
+        let state = State { wanted: None, hurry: false, ended: false, newest: None, dropped: 0 };
+        let shared =
+            Arc::new(Shared { state: Mutex::new(state), changed: Condvar::new(), delivered: Notify::new() });
+        let reading = Reading { shared: shared.clone(), source, open, zero, panics: Panics::default() };
+        std::thread::Builder::new().name("camera".to_owned()).spawn(move || reading.run())?;
+        Ok(Self { shared })
     }
 
     /// Says whether frames are wanted, and what the human shows in them.
     pub fn want(&self, scene: Option<Scene>) {
-        let mut state = self.desk.lock();
+        let mut state = self.shared.lock();
         state.hurry |= state.wanted.is_none() && scene.is_some();
         state.wanted = scene;
         drop(state);
-        self.desk.changed.notify_one();
+        self.shared.changed.notify_one();
     }
 
     /// Waits for the newest frame, or what is wrong with it. Cancelled, it has taken none.
-    pub async fn next(&self) -> Result<Frame, SourceError> {
+    pub async fn next(&self) -> Result<F, SourceError> {
         loop {
-            if let Some(newest) = self.desk.lock().newest.take() {
+            if let Some(newest) = self.shared.lock().newest.take() {
                 return newest;
             }
-            self.desk.delivered.notified().await;
+            self.shared.delivered.notified().await;
         }
     }
 
     /// How many frames were replaced by newer ones before anybody took them.
     #[must_use]
     pub fn dropped(&self) -> u64 {
-        self.desk.lock().dropped
+        self.shared.lock().dropped
     }
 }
 
-impl Drop for Reader {
+impl<F> Drop for Reader<F> {
     fn drop(&mut self) {
-        self.desk.lock().ended = true;
-        self.desk.changed.notify_one();
+        self.shared.lock().ended = true;
+        self.shared.changed.notify_one();
     }
 }
 
-impl Desk {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// The thread's side.
+struct Reading<F> {
+    shared: Arc<Shared<F>>,
+    source: Option<Box<dyn Source<F>>>,
+    open: Opener<F>,
+    zero: Instant,
+    panics: Panics,
+}
 
-    /// The thread's work.
-    fn read(&self, mut source: Option<Box<dyn Source>>, mut open: Opener, zero: Instant) {
+impl<F> Reading<F> {
+    fn run(mut self) {
         let (first, longest) = BACK_OFF;
         let mut back_off = first;
         let mut errors = 0;
         let mut turn = Instant::now();
         loop {
-            let Some(reading) = &mut source else {
-                match open() {
-                    Ok(opened) => source = Some(opened),
-                    Err(error) => {
-                        self.deliver(Err(error));
-                        if self.ended_within(back_off) {
+            let Some(source) = &mut self.source else {
+                match caught(&mut self.open) {
+                    Ok(Ok(opened)) => self.source = Some(opened),
+                    Ok(Err(error)) => {
+                        self.shared.deliver(Err(error));
+                        if self.shared.ended_within(back_off) {
                             return;
                         }
                         back_off = longest.min(2 * back_off);
                     }
+                    Err(message) => {
+                        if !self.goes_on_after_panic(message) {
+                            return;
+                        }
+                    }
                 }
                 continue;
             };
-            let Some(scene) = self.wait_for(turn, reading.is_live()) else { return };
-            match reading.next_frame(zero.elapsed(), &scene) {
+            let (shared, zero) = (&*self.shared, self.zero);
+            let read = caught(|| {
+                let scene = shared.wait_for(turn, source.is_live())?;
+                let read = source.next_frame(zero.elapsed(), &scene);
+                Some((read, source.is_live(), source.period()))
+            });
+            let (read, live, period) = match read {
+                Ok(Some(read)) => read,
+                // Nobody reads any more.
+                Ok(None) => return,
+                Err(message) => {
+                    if !self.goes_on_after_panic(message) {
+                        return;
+                    }
+                    continue;
+                }
+            };
+            match read {
                 Ok(frame) => {
                     (errors, back_off) = (0, first);
-                    self.deliver(Ok(frame));
+                    self.shared.deliver(Ok(frame));
                 }
                 Err(error) => {
                     let is_over = matches!(error, SourceError::Ended(_));
-                    self.deliver(Err(error));
+                    errors = if error.is_of_one_picture() { 0 } else { errors + 1 };
+                    self.shared.deliver(Err(error));
                     if is_over {
                         return;
                     }
-                    errors += 1;
-                    if reading.is_live() || errors > TOLERATED {
+                    if live || errors > TOLERATED {
                         // Closed before it is opened again: a device serves one at a time.
-                        source = None;
-                        if self.ended_within(back_off) {
+                        self.close();
+                        if self.shared.ended_within(back_off) {
                             return;
                         }
                         back_off = longest.min(2 * back_off);
@@ -141,8 +168,31 @@ impl Desk {
                 }
             }
             // One that fell behind drops frames; it never hurries to make up for them.
-            turn = Instant::now().max(turn + reading.period());
+            turn = Instant::now().max(turn + period);
         }
+    }
+
+    /// Closes the source that panicked, tells of it, and waits. `false`: it is given up, or nobody reads any more.
+    fn goes_on_after_panic(&mut self, message: String) -> bool {
+        self.close();
+        let wait = self.panics.note(self.zero.elapsed());
+        let broken = if wait.is_some() { Broken::Again(message) } else { Broken::GivenUp(message) };
+        self.shared.deliver(Err(broken.into()));
+        wait.is_some_and(|wait| !self.shared.ended_within(wait))
+    }
+
+    /// A source may panic also as it is closed; then it is gone as well.
+    fn close(&mut self) {
+        let source = self.source.take();
+        if let Err(message) = caught(|| drop(source)) {
+            tracing::error!("the camera's source panicked as it was closed: {message}");
+        }
+    }
+}
+
+impl<F> Shared<F> {
+    fn lock(&self) -> MutexGuard<'_, State<F>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits until a frame is wanted and it is its turn; at once for a source that runs by itself. `None` at the end.
@@ -172,9 +222,10 @@ impl Desk {
         waited.unwrap_or_else(PoisonError::into_inner).0.ended
     }
 
-    fn deliver(&self, newest: Result<Frame, SourceError>) {
+    fn deliver(&self, newest: Result<F, SourceError>) {
         let mut state = self.lock();
-        state.dropped += u64::from(state.newest.replace(newest).is_some());
+        let replaced = state.newest.replace(newest);
+        state.dropped += u64::from(matches!(replaced, Some(Ok(_))));
         drop(state);
         self.delivered.notify_one();
     }
@@ -265,5 +316,72 @@ mod tests {
         plug_in.send(Told(told)).unwrap();
         tell.send(true).unwrap();
         while !matches!(next(&reader).await, Some(Ok(_))) {}
+    }
+
+    /// Numbers that panic from one of them on.
+    struct Fragile {
+        reads: u32,
+        panics_from: u32,
+    }
+
+    impl Source<u32> for Fragile {
+        fn describe(&self) -> String {
+            "numbers".to_owned()
+        }
+        fn period(&self) -> Duration {
+            Duration::from_millis(1)
+        }
+        fn next_frame(&mut self, _: Duration, _: &Scene) -> Result<u32, SourceError> {
+            self.reads += 1;
+            assert!(self.reads < self.panics_from, "no more than {} numbers", self.panics_from);
+            Ok(self.reads)
+        }
+    }
+
+    #[tokio::test]
+    async fn a_source_that_panics_is_named_and_opened_again_until_it_is_given_up() {
+        let mut opened = 0;
+        let open: Opener<u32> = Box::new(move || {
+            opened += 1;
+            // Opening panics, too.
+            assert!(opened != 2, "not now");
+            Ok(Box::new(Fragile { reads: 10 * opened, panics_from: 10 * opened + 3 }))
+        });
+        let reader = Reader::start(None, open, Instant::now()).unwrap();
+        reader.want(Some(Scene::default()));
+        let mut panics = Vec::new();
+        loop {
+            match tokio::time::timeout(PATIENCE, reader.next()).await.expect("it goes on") {
+                Ok(_) => {}
+                Err(SourceError::Panicked(broken @ Broken::GivenUp(_))) => {
+                    panics.push(broken.to_string());
+                    break;
+                }
+                Err(error) => panics.push(error.to_string()),
+            }
+        }
+        assert_eq!(panics.len(), 5, "{panics:?}");
+        assert!(panics[0].contains("no more than 13 numbers") && panics[1].contains("not now"), "{panics:?}");
+        assert!(tokio::time::timeout(Duration::from_millis(50), reader.next()).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn bad_pictures_in_a_row_do_not_keep_a_folder_from_its_good_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        for k in 0..12 {
+            std::fs::write(folder.path().join(format!("{k:02}.jpg")), "a shopping list").unwrap();
+        }
+        let good = Mat::new_rows_cols_with_default(20, 22, CV_8UC3, Scalar::all(90.0)).unwrap();
+        let path = folder.path().join("good.png");
+        assert!(opencv::imgcodecs::imwrite(&path, &good, &opencv::core::Vector::new()).unwrap());
+        let path = folder.path().to_owned();
+        let open: Opener = Box::new(move || {
+            Ok(Box::new(super::super::ImageFolder::open(&path, Duration::from_millis(1), true)?))
+        });
+        let reader = Reader::start(None, open, Instant::now()).unwrap();
+        reader.want(Some(Scene::default()));
+        for _ in 0..2 {
+            while !matches!(next(&reader).await.expect("the next picture"), Ok(_)) {}
+        }
     }
 }

@@ -25,7 +25,7 @@ pub(super) trait Look {
 /// wait as the workers need to be busy, acknowledgements wait too, and go to the robots in the order in which they were
 /// served: then every camera sends its frame just before its turn, and overload makes frames fewer, not older.
 #[derive(Debug)]
-pub(super) struct Desk<S, F> {
+pub(super) struct FrameQueue<S, F> {
     state: Mutex<State<S, F>>,
     changed: Condvar,
     /// How many frames may wait before acknowledgements do.
@@ -59,7 +59,7 @@ pub(super) struct Count {
     pub overwritten: u64,
 }
 
-/// What became of a frame that was put on the desk.
+/// What became of a frame that was put into the queue.
 #[derive(Debug)]
 pub(super) enum Put<F> {
     /// It waits.
@@ -68,14 +68,16 @@ pub(super) enum Put<F> {
     Unknown(F),
 }
 
-impl<S: Look, F: Acknowledge> Desk<S, F> {
+impl<S, F> FrameQueue<S, F> {
+    fn lock(&self) -> MutexGuard<'_, State<S, F>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<S: Look, F: Acknowledge> FrameQueue<S, F> {
     pub fn new(ahead: usize) -> Self {
         let state = State { slots: BTreeMap::new(), turn: 0, closed: false };
         Self { state: Mutex::new(state), changed: Condvar::new(), ahead }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State<S, F>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Serves that robot from now on; one that is served already keeps its seat.
@@ -112,15 +114,16 @@ impl<S: Look, F: Acknowledge> Desk<S, F> {
         Put::Waits
     }
 
-    /// Waits for a frame: of those waiting, the one of the robot that was served least recently. [`Desk::done`] must follow.
-    /// `grant` is told which frames are to be acknowledged meanwhile. `None` once the desk is closed.
-    pub fn next(&self, grant: impl Fn(RobotId, FrameTaken)) -> Option<(RobotId, Arc<S>, F)> {
+    /// Waits for a frame: of those waiting, the one of the robot that was served least recently. Until it is dropped, no other
+    /// frame of that robot is given out. `grant` is told which frames are to be acknowledged meanwhile. `None` once the queue
+    /// is closed.
+    pub fn next(&self, grant: impl Fn(RobotId, FrameTaken)) -> Option<Turn<'_, S, F>> {
         let mut state = self.lock();
         loop {
             if state.closed {
                 return None;
             }
-            let taken = state.take();
+            let taken = state.take().map(|(robot, seat, frame)| Turn { queue: self, robot, seat, frame });
             // Nothing to do: whoever can send shall.
             let ahead = if taken.is_some() { self.ahead } else { usize::MAX };
             let granted = state.grants(ahead);
@@ -138,18 +141,28 @@ impl<S: Look, F: Acknowledge> Desk<S, F> {
         }
     }
 
-    /// The frame of that robot was looked at.
-    pub fn done(&self, robot: RobotId) {
-        if let Some(slot) = self.lock().slots.get_mut(&robot) {
-            slot.busy = false;
-        }
-        self.changed.notify_one();
-    }
-
     /// Ends the waiting of all workers.
     pub fn close(&self) {
         self.lock().closed = true;
         self.changed.notify_all();
+    }
+}
+
+/// A frame that is looked at. Dropped, however that ended, it frees its robot for the next.
+#[derive(Debug)]
+pub(super) struct Turn<'a, S, F> {
+    queue: &'a FrameQueue<S, F>,
+    pub robot: RobotId,
+    pub seat: Arc<S>,
+    pub frame: F,
+}
+
+impl<S, F> Drop for Turn<'_, S, F> {
+    fn drop(&mut self) {
+        if let Some(slot) = self.queue.lock().slots.get_mut(&self.robot) {
+            slot.busy = false;
+        }
+        self.queue.changed.notify_one();
     }
 }
 
@@ -201,85 +214,84 @@ mod tests {
         }
     }
 
-    fn desk(robots: u32, ahead: usize) -> Desk<Blind, u32> {
-        let desk = Desk::new(ahead);
-        (0..robots).for_each(|robot| desk.admit(RobotId(robot), Arc::new(Blind)));
-        desk
+    fn queue(robots: u32, ahead: usize) -> FrameQueue<Blind, u32> {
+        let queue = FrameQueue::new(ahead);
+        (0..robots).for_each(|robot| queue.admit(RobotId(robot), Arc::new(Blind)));
+        queue
     }
 
-    fn put(desk: &Desk<Blind, u32>, robot: u32, frame: u32) {
-        assert!(matches!(desk.put(RobotId(robot), frame), Put::Waits));
+    fn put(queue: &FrameQueue<Blind, u32>, robot: u32, frame: u32) {
+        assert!(matches!(queue.put(RobotId(robot), frame), Put::Waits));
     }
 
     /// Takes one frame; says whose, and who was granted the next.
-    fn take(desk: &Desk<Blind, u32>) -> (u32, u32, Vec<u32>) {
+    fn take(queue: &FrameQueue<Blind, u32>) -> (u32, u32, Vec<u32>) {
         let granted = RefCell::new(Vec::new());
-        let (robot, _, frame) = desk.next(|robot, _| granted.borrow_mut().push(robot.0)).unwrap();
-        desk.done(robot);
-        (robot.0, frame, granted.into_inner())
+        let turn = queue.next(|robot, _| granted.borrow_mut().push(robot.0)).unwrap();
+        (turn.robot.0, turn.frame, granted.into_inner())
     }
 
     #[test]
     fn the_newest_frame_replaces_the_one_before() {
-        let desk = desk(1, 4);
-        put(&desk, 0, 1);
-        put(&desk, 0, 2);
-        assert_eq!(take(&desk), (0, 2, vec![0]));
-        assert_eq!(desk.count(RobotId(0)), Count { received: 2, overwritten: 1 });
-        assert!(matches!(desk.put(RobotId(9), 3), Put::Unknown(3)));
+        let queue = queue(1, 4);
+        put(&queue, 0, 1);
+        put(&queue, 0, 2);
+        assert_eq!(take(&queue), (0, 2, vec![0]));
+        assert_eq!(queue.count(RobotId(0)), Count { received: 2, overwritten: 1 });
+        assert!(matches!(queue.put(RobotId(9), 3), Put::Unknown(3)));
     }
 
     #[test]
     fn the_robot_served_least_recently_is_next() {
-        let desk = desk(3, 4);
+        let queue = queue(3, 4);
         let mut order = Vec::new();
         // All have a frame waiting all the time, the last one most of all.
         for frame in 0..6 {
-            (0..3).rev().for_each(|robot| put(&desk, robot, frame));
-            order.push(take(&desk).0);
+            (0..3).rev().for_each(|robot| put(&queue, robot, frame));
+            order.push(take(&queue).0);
         }
         assert_eq!(order, [0, 1, 2, 0, 1, 2]);
     }
 
     #[test]
     fn frames_of_one_robot_are_looked_at_one_by_one() {
-        let desk = desk(2, 4);
-        put(&desk, 0, 1);
-        let (busy, ..) = desk.next(|_, _| {}).unwrap();
-        put(&desk, 0, 2);
-        put(&desk, 1, 3);
-        assert_eq!(take(&desk).0, 1, "0 waits for its own");
-        desk.done(busy);
-        assert_eq!(take(&desk).0, 0);
+        let queue = queue(2, 4);
+        put(&queue, 0, 1);
+        let busy = queue.next(|_, _| {}).unwrap();
+        put(&queue, 0, 2);
+        put(&queue, 1, 3);
+        assert_eq!(take(&queue).0, 1, "0 waits for its own");
+        drop(busy);
+        assert_eq!(take(&queue).0, 0);
     }
 
     #[test]
     fn when_frames_wait_cameras_wait_for_their_turn_to_send() {
-        let desk = desk(5, 2);
-        (0..5).for_each(|robot| put(&desk, robot, 1));
-        assert_eq!(take(&desk), (0, 1, vec![]), "four others wait");
-        assert_eq!(take(&desk), (1, 1, vec![]));
-        assert_eq!(take(&desk), (2, 1, vec![]));
-        assert_eq!(take(&desk), (3, 1, vec![0]), "one waits, one more may");
-        put(&desk, 0, 2);
-        assert_eq!(take(&desk), (4, 1, vec![1]));
-        assert_eq!(take(&desk), (0, 2, vec![2, 3]));
+        let queue = queue(5, 2);
+        (0..5).for_each(|robot| put(&queue, robot, 1));
+        assert_eq!(take(&queue), (0, 1, vec![]), "four others wait");
+        assert_eq!(take(&queue), (1, 1, vec![]));
+        assert_eq!(take(&queue), (2, 1, vec![]));
+        assert_eq!(take(&queue), (3, 1, vec![0]), "one waits, one more may");
+        put(&queue, 0, 2);
+        assert_eq!(take(&queue), (4, 1, vec![1]));
+        assert_eq!(take(&queue), (0, 2, vec![2, 3]));
     }
 
     #[test]
     fn nobody_is_kept_waiting_by_cameras_that_stay_silent() {
-        let desk = desk(5, 1);
-        (0..5).for_each(|robot| put(&desk, robot, 1));
+        let queue = queue(5, 1);
+        (0..5).for_each(|robot| put(&queue, robot, 1));
         for _ in 0..5 {
-            take(&desk);
+            take(&queue);
         }
         let granted = RefCell::new(Vec::new());
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 std::thread::sleep(std::time::Duration::from_millis(50));
-                desk.close();
+                queue.close();
             });
-            assert!(desk.next(|robot, _| granted.borrow_mut().push(robot.0)).is_none());
+            assert!(queue.next(|robot, _| granted.borrow_mut().push(robot.0)).is_none());
         });
         // The last one taken had granted 0.
         assert_eq!(granted.into_inner(), [1, 2, 3, 4]);
