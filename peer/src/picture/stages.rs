@@ -79,10 +79,10 @@ pub fn draw(stages: &Stages<'_>) -> Result<String, PictureError> {
     let seen = format!("{} × {} pixels", frame.cols(), frame.rows());
     let region = found.then_some(stages.region);
     for (column, (title, words, image, marked)) in [
-        ("1  raw", seen.as_str(), Some(frame), region),
-        ("2  white-balanced", stages.balance.as_str(), Some(stages.balanced), region),
-        ("3  mask", part, Some(stages.mask), None),
-        ("4  hand", verdict, hand.as_ref(), None),
+        ("1 raw", seen.as_str(), Some(frame), region),
+        ("2 white-balanced", stages.balance.as_str(), Some(stages.balanced), region),
+        ("3 mask", part, Some(stages.mask), None),
+        ("4 hand", verdict, hand.as_ref(), None),
     ]
     .into_iter()
     .enumerate()
@@ -150,7 +150,7 @@ fn draw_features(sheet: &mut Sheet, stages: &Stages<'_>, place: Place) {
     let (unit, full) = &stages.scale;
     let words =
         if count == 0 { "no hand, no features".to_owned() } else { format!("{count} values; {unit}") };
-    card(sheet, place, "5  features", &words, count > 0);
+    card(sheet, place, "5 features", &words, count > 0);
     if count == 0 {
         return;
     }
@@ -191,11 +191,11 @@ fn draw_features(sheet: &mut Sheet, stages: &Stages<'_>, place: Place) {
 fn draw_opinion(sheet: &mut Sheet, stages: &Stages<'_>, place: Place) {
     let probabilities = match &stages.opinion {
         Ok(probabilities) => probabilities,
-        Err(cause) => return card(sheet, place, "6  opinion", cause, false),
+        Err(cause) => return card(sheet, place, "6 opinion", cause, false),
     };
     let best = probabilities.iter().max_by(|(_, a), (_, b)| a.total_cmp(b));
     let words = best.map_or(String::new(), |(label, p)| format!("{label}, with probability {p:.2}"));
-    card(sheet, place, "6  opinion", &words, true);
+    card(sheet, place, "6 opinion", &words, true);
     let pitch = ((LOWER - INSET) / probabilities.len().max(1) as f64).min(56.0);
     let size = (pitch * 0.36).clamp(6.0, 18.0);
     // As much room as the labels need, and no more than there is.
