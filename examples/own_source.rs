@@ -66,7 +66,7 @@ async fn a_robot_looks_through_it() {
     config.swarm.0 = format!("example-{}", std::process::id());
     config.links.scouting.enabled = false;
     config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));
-    let model = RobotModel::rendered(|_, _| {}).expect("a model, which takes some seconds");
+    let model = RobotModel::rendered().expect("the embedded model");
     let open: Opener = Box::new(|| Ok(Box::new(Square::open()?)));
     let body = Body::start_with(&config, model, 1, open).await.expect("a free port of this machine");
     let camera = loop {
