@@ -60,6 +60,8 @@ fn config(id: u32, swarm: &str, connect: &[String]) -> Config {
         ..CameraSection::default()
     };
     (config.rounds.patience, config.rounds.deadline) = (3 * PATIENCE, 3 * PATIENCE);
+    // Rounds follow one upon the other.
+    config.rounds.refractory = Duration::ZERO;
     config.learning.enabled = false;
     config.links.scouting.enabled = false;
     config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));

@@ -318,8 +318,7 @@ async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_th
         taken.more(20).await;
         let before = taken.messages();
         plugged.store(false, Ordering::Relaxed);
-        // It fails two hundred times a second until it is closed.
-        taken.said("delivers no frame", before).await;
+        // It fails two hundred times a second until it is closed; then it cannot be opened.
         taken.said("does not exist", before).await;
     }
     taken.stop().await;
