@@ -6,15 +6,13 @@ use gestalt_link::Event;
 use gestalt_peer::body::Body;
 use gestalt_peer::config::{CameraChoice, CameraSection, Config, RenderedSection, SourceSection};
 use gestalt_protocol::{Camera, CameraState, Decision, RobotId};
-use gestalt_tests::unique;
+use gestalt_tests::{model, unique};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Frame, Glove, Opener, RenderedSource, Scene, Source, SourceError};
 use serde_json::json;
 use tokio::sync::broadcast::Receiver;
 use tokio::time::{Instant, timeout};
-
-use super::motion::model;
 
 /// A round that waits for a robot which says nothing lasts longer than that.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -97,8 +95,7 @@ async fn decide(body: &Body, events: &mut Receiver<Event>) -> Decision {
     timeout(PATIENCE, decided).await.expect("nobody waits for a robot that cannot see")
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn nobody_waits_for_a_source_that_panics() {
+pub async fn nobody_waits_for_a_source_that_panics() {
     let swarm = unique("eyes");
     let first = Body::start(&config(1, &swarm, &[]), Some(model()), 1).await.unwrap();
     let connect = first.robot().locators().to_vec();

