@@ -8,7 +8,8 @@ use gestalt_strategies::{Evaluation, Vocabulary};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::{DrawError, check, write};
+use crate::error::DrawError;
+use crate::file::{check, write};
 /// A row per true gesture: how often it was judged to be which, its recall and its precision.
 #[must_use]
 pub fn table(evaluation: &Evaluation, vocabulary: &Vocabulary) -> String {

@@ -4,13 +4,15 @@
 //! font, so that the same picture looks the same on every machine. [`Sheet`] draws areas, pictures and text where plotters' charts do not serve.
 
 pub mod confusion;
+mod error;
 mod file;
 mod font;
 mod png;
 mod sheet;
 mod text;
 
-pub use file::{DrawError, Kind, check, save, write};
+pub use error::DrawError;
+pub use file::{Kind, check, save, write};
 pub use png::png;
 pub use sheet::{Anchor, Letters, Place, Sheet, Tone};
 pub use text::{escaped, fitting, text_width};

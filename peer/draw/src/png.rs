@@ -3,7 +3,7 @@
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-use crate::DrawError;
+use crate::error::DrawError;
 use crate::font;
 
 /// No picture is wider or higher, in pixels.

@@ -163,7 +163,7 @@ mod tests {
     use resvg::tiny_skia::Pixmap;
 
     use super::*;
-    use crate::png;
+    use crate::png::png;
 
     fn pixels(sheet: &Sheet) -> Pixmap {
         Pixmap::decode_png(&png(&sheet.svg()).unwrap()).unwrap()

@@ -64,7 +64,7 @@ impl Panel {
     }
 }
 
-/// Draws what each rule picks as an SVG file.
+/// Draws what each rule picks as an SVG or PNG file, by its name.
 ///
 /// # Errors
 /// See [`DrawError`].
@@ -356,8 +356,8 @@ mod tests {
     }
 
     #[test]
-    fn another_name_than_svg_is_refused_before_any_work() {
-        let refused = draw(Subject::Selection, Path::new("rules.png"));
+    fn a_name_of_no_drawing_is_refused_before_any_work() {
+        let refused = draw(Subject::Selection, Path::new("rules.bmp"));
         assert!(matches!(refused, Err(DrawError::Name(_))));
     }
 }

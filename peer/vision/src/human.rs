@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 pub use crate::config::Schedule;
-use crate::source::Scene;
+use crate::source::scene::Scene;
 
 /// How long the hand takes to come into its place, and to leave it.
 const MOVE: Duration = Schedule::MOVE;

@@ -85,7 +85,7 @@ fn rules_that_nobody_brought_are_named() {
 fn a_recognition_experiment_goes_on_where_it_stopped() {
     const ONE: &str =
         "{ title: 't', swarms: [ { line: 'alone', robots: [{ camera: 'footbot', count: 1 }] } ],
-        showings: 2, training_frames: 200, shown_for: '500ms', seeds: 2 }";
+        showings: 2, training_frames: 200, shown_for: '1s', seeds: 2 }";
     let conduct = |folder: &Path| {
         let ran = AtomicUsize::new(0);
         let table = recognition::conduct((ONE, Path::new("one")), folder, None, |progress| {
@@ -94,15 +94,14 @@ fn a_recognition_experiment_goes_on_where_it_stopped() {
                 Ordering::Relaxed,
             );
         });
-        (table, ran.into_inner())
+        (table.unwrap(), ran.into_inner())
     };
     let folder = tempfile::tempdir().unwrap();
     let (table, ran) = conduct(folder.path());
     assert_eq!(ran, 2);
-    let table = table.unwrap();
     // All is there: nothing is run again, and the table is the same.
     let (again, said) = conduct(folder.path());
-    assert_eq!((again.unwrap(), said), (table, 1));
+    assert_eq!((again, said), (table, 1));
     let changed = ONE.replace("'t'", "'other'");
     let refused = recognition::conduct((&changed, Path::new("one")), folder.path(), None, |_| ());
     assert!(matches!(refused, Err(ExperimentError::Other(_))));

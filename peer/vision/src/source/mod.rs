@@ -6,6 +6,7 @@ mod folder;
 mod image_file;
 mod reader;
 pub mod rendered;
+pub(crate) mod scene;
 mod sensor;
 mod video;
 
@@ -30,6 +31,7 @@ pub use image_file::{
 };
 pub use reader::{Opener, Reader};
 pub use rendered::{Glove, RenderedSource, ScheduledSource};
+pub use scene::Scene;
 pub use sensor::Sensor;
 pub use video::Video;
 
@@ -40,15 +42,6 @@ pub struct Frame {
     pub image: Mat,
     /// When it was taken, since the host's start.
     pub at: Duration,
-}
-
-/// What the human shows at the moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Scene {
-    /// How many fingers are raised, 0 to 5; `None`: no hand is in view.
-    pub gesture: Option<u8>,
-    /// Varies the person from round to round: hand, glove, light and background.
-    pub seed: u64,
 }
 
 impl Frame {

@@ -31,7 +31,7 @@ use super::materials::Materials;
 use super::progress::Progress;
 use super::replace::replace;
 use super::{chart, folder};
-use results::Results;
+use results::RecognitionResults;
 use summary::Summary;
 use training::Classifiers;
 
@@ -56,7 +56,7 @@ pub fn conduct(
     let plan = Recognition::parse(text, origin)?;
     let seeds = seeds.unwrap_or(plan.seeds);
     folder::claim(folder, text, &Materials::default(), seeds, &this_program()?)?;
-    let results = Results::open(folder, &plan)?;
+    let results = RecognitionResults::open(folder, &plan)?;
     let runs = run_what_is_left(&plan, results, seeds, &progress)?.finish()?;
 
     let counted: Vec<_> = runs.into_iter().filter(|(seed, _)| *seed < u64::from(seeds)).collect();
@@ -71,10 +71,10 @@ pub fn conduct(
 /// Runs each seed that there are no results of yet. The first error stops all.
 fn run_what_is_left(
     plan: &Recognition,
-    results: Results,
+    results: RecognitionResults,
     seeds: u32,
     progress: &(impl Fn(Progress) + Sync),
-) -> Result<Results, ExperimentError> {
+) -> Result<RecognitionResults, ExperimentError> {
     let left: Vec<u64> = (0..u64::from(seeds)).filter(|seed| !results.runs.contains_key(seed)).collect();
     let ran = seeds as usize - left.len();
     progress(Progress::Ran(ran, seeds as usize));

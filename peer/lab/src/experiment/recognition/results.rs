@@ -28,14 +28,14 @@ struct Row {
 
 /// `results.csv`: the outcomes of all swarms of each seed that ended.
 #[derive(Debug)]
-pub struct Results {
+pub struct RecognitionResults {
     ledger: Ledger,
     /// The outcomes of each seed, in the order of the plan.
     pub runs: BTreeMap<u64, Vec<Outcome>>,
     rows: BTreeMap<u64, Vec<Row>>,
 }
 
-impl Results {
+impl RecognitionResults {
     /// Opens or begins the results in `folder`. Of what is there, those seeds are kept that have all swarms of the plan.
     ///
     /// # Errors
@@ -118,16 +118,16 @@ mod tests {
         };
         let outcomes = vec![outcome(0.0, None), outcome(0.5, Some(0.7))];
         let folder = tempfile::tempdir().unwrap();
-        let mut results = Results::open(folder.path(), &plan).unwrap();
+        let mut results = RecognitionResults::open(folder.path(), &plan).unwrap();
         results.add(&plan, 1, outcomes.clone()).unwrap();
         results.add(&plan, 0, outcomes.clone()).unwrap();
         let all = [(0, outcomes.clone()), (1, outcomes.clone())].into();
-        assert_eq!(Results::open(folder.path(), &plan).unwrap().runs, all);
+        assert_eq!(RecognitionResults::open(folder.path(), &plan).unwrap().runs, all);
 
         let path = folder.path().join("results.csv");
         let whole = std::fs::read_to_string(&path).unwrap();
         let without_last_row = &whole[..whole.trim_end().rfind('\n').unwrap() + 1];
         std::fs::write(&path, without_last_row).unwrap();
-        assert_eq!(Results::open(folder.path(), &plan).unwrap().runs.len(), 1);
+        assert_eq!(RecognitionResults::open(folder.path(), &plan).unwrap().runs.len(), 1);
     }
 }
