@@ -1,6 +1,10 @@
 # `make demo` and `make test` need Rust and git; everything else they install themselves.
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
+# rust-toolchain.toml pins the toolchain; where rustup neither has it nor can fetch it, the stable one that is there serves.
+ifeq ($(shell cargo --version 2>/dev/null),)
+export RUSTUP_TOOLCHAIN := stable
+endif
 .PHONY: demo test bench lint packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
