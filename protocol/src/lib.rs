@@ -44,7 +44,3 @@ pub use sample::{
     Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
 pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
-
-// The former name, for hosts that still say it.
-#[doc(hidden)]
-pub use status::LearningStatus as Learning;

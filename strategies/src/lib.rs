@@ -47,16 +47,3 @@ pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};
 pub use selection::{Selection, SelectionRule};
 pub use training_set::{RestoreError, SampleReceipt, SetChange, TrainingSet};
 pub use vector_codec::{Precision, VectorError, decode_vector};
-
-// The former names of some of these, for hosts that still say them.
-#[doc(hidden)]
-pub use gestalt_rounds::JudgedFrame as Look;
-#[doc(hidden)]
-pub use gestalt_svm::LabelledFeatures as Sample;
-#[cfg(feature = "offline")]
-#[doc(hidden)]
-pub use gestalt_svm::TrainProgress as Progress;
-#[doc(hidden)]
-pub use learning::{RecordChange as Change, RobotMemory as Memory};
-#[doc(hidden)]
-pub use sample::SetPart as Part;

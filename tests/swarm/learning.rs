@@ -77,7 +77,7 @@ impl School {
     }
 
     /// Waits until what all robots have learned is as `pick` says.
-    async fn all(&self, pick: impl Fn(&gestalt_protocol::Learning) -> bool) -> bool {
+    async fn all(&self, pick: impl Fn(&gestalt_protocol::LearningStatus) -> bool) -> bool {
         let deadline = tokio::time::Instant::now() + PATIENCE;
         loop {
             let learned = |status: &Status| status.learning.as_ref().is_some_and(&pick);
@@ -109,7 +109,7 @@ pub async fn ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gesture
     for class in 0..6 {
         school.lesson(class).await;
     }
-    let full = |learning: &gestalt_protocol::Learning| learning.external.iter().sum::<usize>() == 54;
+    let full = |learning: &gestalt_protocol::LearningStatus| learning.external.iter().sum::<usize>() == 54;
     assert!(school.all(full).await, "{:?}", school.statuses().iter().map(sizes).collect::<Vec<_>>());
     for status in school.statuses() {
         assert_eq!(sizes(&status), [24, 6, 54], "robot {}: 84 samples", status.robot);
@@ -134,7 +134,7 @@ pub async fn the_size_follows_the_formula_over_real_links() {
         }
         let own = 6.0 * 5.0;
         let expected = (own + fraction * own * f64::from(robots - 1)).round() as usize;
-        let total = |learning: &gestalt_protocol::Learning| {
+        let total = |learning: &gestalt_protocol::LearningStatus| {
             [&learning.personal, &learning.shared, &learning.external].into_iter().flatten().sum::<usize>()
         };
         assert!(
@@ -150,7 +150,7 @@ pub async fn a_correction_and_an_undo_reach_every_robot() {
     let mut school = School::on_a_ring(4, 3, 1.0).await;
     let round = school.lesson(2).await;
     let counts = |class: usize, n: usize| {
-        move |learning: &gestalt_protocol::Learning| {
+        move |learning: &gestalt_protocol::LearningStatus| {
             learning.personal[class] + learning.shared[class] + learning.external[class] == n
         }
     };

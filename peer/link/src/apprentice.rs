@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-use gestalt_protocol::{Digest, Learning, RobotId};
+use gestalt_protocol::{Digest, LearningStatus, RobotId};
 use gestalt_strategies::{
     Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, MindConfig,
     OwnRules, RecordChange, RobotMemory, TrainingChange, Vocabulary,
@@ -297,9 +297,9 @@ impl Apprentice {
         true
     }
 
-    pub fn status(&self, mind: &Mind) -> Option<Learning> {
+    pub fn status(&self, mind: &Mind) -> Option<LearningStatus> {
         let trainings = self.trainings.load(Ordering::Relaxed);
-        Some(Learning { memory: self.memory.get(), trainings, ..mind.learned()? })
+        Some(LearningStatus { memory: self.memory.get(), trainings, ..mind.learned()? })
     }
 }
 

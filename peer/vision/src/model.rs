@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{Classifier, Progress, Sample, TrainError, TrainOptions, Vocabulary, train};
+use gestalt_strategies::{
+    Classifier, LabelledFeatures, TrainError, TrainOptions, TrainProgress, Vocabulary, train,
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
@@ -131,7 +133,7 @@ fn rendered_samples(
     seed: u64,
     frames: usize,
     mut progress: impl FnMut(usize),
-) -> Result<Vec<Sample>, ModelError> {
+) -> Result<Vec<LabelledFeatures>, ModelError> {
     let mut perception = Perception::new(features, HandConfig::default())?;
     let mut samples = Vec::with_capacity(frames);
     let rendered = TrainingFrames::new(Vec::new(), Glove::default(), BEARING_DEG, seed).take(frames);
@@ -139,7 +141,7 @@ fn rendered_samples(
         let frame = frame?;
         if let Ok(observation) = perception.observe(&frame.image) {
             let (class, group) = (ClassId(frame.class), Some(frame.group));
-            samples.push(Sample { features: observation.features, class, group });
+            samples.push(LabelledFeatures { features: observation.features, class, group });
         }
         progress(done);
     }
@@ -157,12 +159,16 @@ const GAMMA: f64 = 1.0;
 ///
 /// # Panics
 /// Never: the six labels are a vocabulary.
-pub fn learn_fingers(features: FeatureSet, samples: &[Sample], seed: u64) -> Result<Classifier, TrainError> {
+pub fn learn_fingers(
+    features: FeatureSet,
+    samples: &[LabelledFeatures],
+    seed: u64,
+) -> Result<Classifier, TrainError> {
     let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])
         .expect("six different labels of one letter are a vocabulary");
     let options = TrainOptions { costs: vec![COST], gammas: vec![GAMMA], ..TrainOptions::default() };
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-    train(features.name(), &vocabulary, samples, &options, rng, |_: Progress| {})
+    train(features.name(), &vocabulary, samples, &options, rng, |_: TrainProgress| {})
         .map(|trained| trained.classifier)
 }
 
@@ -173,7 +179,7 @@ mod tests {
     use super::*;
 
     /// Frames that the embedded model was not trained on.
-    fn fresh_samples() -> Vec<Sample> {
+    fn fresh_samples() -> Vec<LabelledFeatures> {
         let samples = rendered_samples(FeatureSet::Shape, 4711, 300, |_| ()).unwrap();
         assert!(samples.len() > 250, "a hand in {} of 300 frames", samples.len());
         samples

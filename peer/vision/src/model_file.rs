@@ -255,19 +255,19 @@ fn allow_reading(file: &File) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::ClassId;
-    use gestalt_strategies::{Sample, TrainOptions, Vocabulary, train};
+    use gestalt_strategies::{LabelledFeatures, TrainOptions, Vocabulary, train};
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
 
     use super::*;
 
     fn model() -> Model {
-        let sample = |i: u8| Sample {
+        let sample = |i: u8| LabelledFeatures {
             features: vec![f32::from(i % 2), f32::from(i) / 10.0],
             class: ClassId(i % 2),
             group: None,
         };
-        let samples: Vec<Sample> = (0..10).map(sample).collect();
+        let samples: Vec<LabelledFeatures> = (0..10).map(sample).collect();
         let vocabulary = Vocabulary::new(["fist", "palm"]).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let trained =

@@ -1,6 +1,6 @@
 //! Looks at all images of a dataset, and counts what cannot be used instead of stopping at it.
 
-use gestalt_strategies::Sample;
+use gestalt_strategies::LabelledFeatures;
 
 use crate::dataset::LabelledImage;
 use crate::perception::Perception;
@@ -10,7 +10,7 @@ use crate::source::read_image;
 #[derive(Debug, Default)]
 pub struct Survey {
     /// The images that show a hand, each with its features, gesture and person.
-    pub seen: Vec<(LabelledImage, Sample)>,
+    pub seen: Vec<(LabelledImage, LabelledFeatures)>,
     /// Images without a hand, or whose hand was not found.
     pub without_hand: Vec<Rejected>,
     /// Files that are no image: damaged, cut short, too large.
@@ -36,7 +36,7 @@ impl Survey {
                 Ok(frame) => match perception.observe(&frame) {
                     Ok(observation) => {
                         let (class, group) = (image.class, image.person);
-                        let sample = Sample { features: observation.features, class, group };
+                        let sample = LabelledFeatures { features: observation.features, class, group };
                         survey.seen.push((image.clone(), sample));
                     }
                     Err(error) => survey.without_hand.push(rejected(error.to_string())),
@@ -50,7 +50,7 @@ impl Survey {
 
     /// The labelled feature vectors.
     #[must_use]
-    pub fn samples(&self) -> Vec<Sample> {
+    pub fn samples(&self) -> Vec<LabelledFeatures> {
         self.seen.iter().map(|(_, sample)| sample.clone()).collect()
     }
 }

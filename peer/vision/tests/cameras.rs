@@ -8,7 +8,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{Classifier, Classify, Sample, TrainOptions, Vocabulary, train};
+use gestalt_strategies::{Classifier, Classify, LabelledFeatures, TrainOptions, Vocabulary, train};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::perception::{FeatureSet, HandConfig, LayerConfig, Perception};
 use gestalt_vision::pose::Pose;
@@ -38,28 +38,32 @@ fn frames(camera: CameraModel, seed: u64, count: usize) -> Vec<LabelledFrame> {
 }
 
 /// What perception makes of each frame; `None` where it finds no hand.
-fn samples(frames: &[LabelledFrame], layer: LayerConfig, camera: &CameraModel) -> Vec<Option<Sample>> {
+fn samples(
+    frames: &[LabelledFrame],
+    layer: LayerConfig,
+    camera: &CameraModel,
+) -> Vec<Option<LabelledFeatures>> {
     let mut eyes = eyes(layer, camera);
     let sample = |frame: &LabelledFrame| {
         let observation = eyes.observe(&frame.image).ok()?;
         let class = ClassId(frame.class);
-        Some(Sample { features: observation.features, class, group: Some(frame.group) })
+        Some(LabelledFeatures { features: observation.features, class, group: Some(frame.group) })
     };
     frames.iter().map(sample).collect()
 }
 
-fn learn(samples: &[Option<Sample>], seed: u64) -> Option<Classifier> {
+fn learn(samples: &[Option<LabelledFeatures>], seed: u64) -> Option<Classifier> {
     let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"]).unwrap();
     let options = TrainOptions { costs: vec![8.0], gammas: vec![1.0], ..TrainOptions::default() };
-    let samples: Vec<Sample> = samples.iter().flatten().cloned().collect();
+    let samples: Vec<LabelledFeatures> = samples.iter().flatten().cloned().collect();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let trained = train(FeatureSet::Shape.name(), &vocabulary, &samples, &options, &mut rng, |_| ());
     trained.ok().map(|trained| trained.classifier)
 }
 
 /// The share of frames whose gesture is named, in per cent; one without a hand found is not.
-fn named(classifier: &Classifier, samples: &[Option<Sample>]) -> f64 {
-    let right = |sample: &&Sample| {
+fn named(classifier: &Classifier, samples: &[Option<LabelledFeatures>]) -> f64 {
+    let right = |sample: &&LabelledFeatures| {
         let p = classifier.probabilities(&sample.features).unwrap();
         let best = (0..p.len()).max_by(|&a, &b| p[a].total_cmp(&p[b]));
         best == Some(usize::from(sample.class.0))
@@ -139,7 +143,7 @@ fn ratio(layer: LayerConfig, scenes: u64) -> (f64, usize) {
     let pose = Pose { bearing_deg: 15.0, elevation_deg: -10.0, distance_m: 0.9 };
     let spread = {
         let seen = samples(&frames(cameras[0].clone(), 77, 300), layer, &cameras[0]);
-        let seen: Vec<&Sample> = seen.iter().flatten().collect();
+        let seen: Vec<&LabelledFeatures> = seen.iter().flatten().collect();
         let n = seen.len() as f64;
         let feature = |i: usize| seen.iter().map(move |s| f64::from(s.features[i]));
         let deviation = |i: usize| {
@@ -224,7 +228,7 @@ fn a_room_known_empty_does_no_harm() {
         let sample = |(camera, frame, room, gesture): &(CameraModel, Mat, Mat, u8)| {
             let room = with_room.then_some(room);
             let features = eyes(LayerConfig::ALL, camera).observe_before(frame, room).ok()?.features;
-            Some(Sample { features, class: ClassId(*gesture), group: None })
+            Some(LabelledFeatures { features, class: ClassId(*gesture), group: None })
         };
         named(&classifier, &scenes.iter().map(sample).collect::<Vec<_>>())
     };

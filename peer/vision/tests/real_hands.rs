@@ -10,7 +10,9 @@ mod side_by_side;
 
 use std::path::{Path, PathBuf};
 
-use gestalt_strategies::{Classify, Evaluation, Sample, ScalingMethod, TrainOptions, Vocabulary, train};
+use gestalt_strategies::{
+    Classify, Evaluation, LabelledFeatures, ScalingMethod, TrainOptions, Vocabulary, train,
+};
 use gestalt_vision::dataset::{Dataset, LabelledImage};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::source::read_image;
@@ -58,7 +60,7 @@ fn on_people_never_seen(set: FeatureSet, labels: std::ops::RangeInclusive<u8>) -
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let held_out = dataset.draw_people(0.3, &mut rng);
         let is_held_out = |person: Option<u32>| person.is_some_and(|person| held_out.contains(&person));
-        let (unseen, learned): (Vec<Sample>, Vec<Sample>) =
+        let (unseen, learned): (Vec<LabelledFeatures>, Vec<LabelledFeatures>) =
             survey.samples().into_iter().partition(|sample| is_held_out(sample.group));
         let trained =
             train(set.name(), &dataset.vocabulary, &learned, &options(set), &mut rng, |_| ()).unwrap();
@@ -204,11 +206,11 @@ fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
     let images: Vec<(&LabelledImage, Mat)> =
         dataset.images.iter().map(|image| (image, read_image(&image.path).unwrap())).collect();
     let mut perception = Perception::new(set, HandConfig::default()).unwrap();
-    let mut look = |fault: Fault| -> Vec<Option<Sample>> {
+    let mut look = |fault: Fault| -> Vec<Option<LabelledFeatures>> {
         core::set_rng_seed(1).unwrap();
         let mut sample = |(image, picture): &(&LabelledImage, Mat)| {
             let features = perception.observe(&fault.apply(picture)).ok()?.features;
-            Some(Sample { features, class: image.class, group: image.person })
+            Some(LabelledFeatures { features, class: image.class, group: image.person })
         };
         images.iter().map(&mut sample).collect()
     };
@@ -218,7 +220,8 @@ fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let held_out = dataset.draw_people(0.3, &mut rng);
             let unseen = move |person: Option<u32>| person.is_some_and(|p| held_out.contains(&p));
-            let learned: Vec<Sample> = clean.iter().flatten().filter(|s| !unseen(s.group)).cloned().collect();
+            let learned: Vec<LabelledFeatures> =
+                clean.iter().flatten().filter(|s| !unseen(s.group)).cloned().collect();
             let trained =
                 train(set.name(), &dataset.vocabulary, &learned, &options(set), &mut rng, |_| ()).unwrap();
             (unseen, trained.classifier)

@@ -16,7 +16,7 @@ pub enum RoundsConfigError {
     /// A rule that Gestalt does not have.
     #[error(
         "the fusion rule '{0}' is none of Gestalt's: take one of majority, mean_probability, log_pool and \
-         confidence_weighted; a rule of one's own is handed to the robot by its program"
+         confidence_weighted; a user's rule is handed to the robot by its program"
     )]
     Rule(RuleName),
     /// A quorum that is always or never met.

@@ -8,7 +8,7 @@ use crate::fusion::{self, Fusion};
 
 /// Makes one distribution over the classes of the votes of many robots.
 ///
-/// The rules that come with Gestalt are the variants of [`FusionRule`]; one's own goes into
+/// The rules that come with Gestalt are the variants of [`FusionRule`]; a user's rule goes into
 /// [`Rounds::fused_by`](crate::Rounds::fused_by). All robots of a swarm need the same. Certificates name it, so that nobody
 /// takes its decisions for those of another; a robot that does not have it holds what it heard, as of any rule.
 ///
@@ -50,7 +50,7 @@ use crate::fusion::{self, Fusion};
 /// # Ok::<(), gestalt_rounds::RoundsConfigError>(())
 /// ```
 pub trait Fuse: Debug + Send + Sync {
-    /// How certificates name it: [`FusionRule::Other`] for one's own.
+    /// How certificates name it: [`FusionRule::Other`] for a user's rule.
     fn rule(&self) -> FusionRule;
 
     /// Fuses the votes: centred log-evidence, each of `classes` values in nats, as said and not yet clipped to ±`clip`, in

@@ -1,4 +1,4 @@
-//! Distances and means that are kept up to date: what a rule of one's own needs to be as fast as those that come with
+//! Distances and means that are kept up to date: what a user's rule needs to be as fast as those that come with
 //! Gestalt.
 //!
 //! [`Points`] measures from one point to many, [`Neighbours`] knows who is whose nearest, [`ExactSum`] and [`Cluster`] have

@@ -1,4 +1,4 @@
-//! Rules of one's own, put into a robot.
+//! A user's rules, put into a robot.
 
 use std::fmt;
 use std::sync::Arc;

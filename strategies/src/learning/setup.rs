@@ -25,7 +25,7 @@ pub struct LearningSetup {
     /// What the robot remembers from before; `None` for a robot whose host keeps nothing: such a one is never owed an
     /// [`Input::Remembered`](crate::Input::Remembered).
     pub memory: Option<RobotMemory>,
-    /// Rules of one's own in place of those that the parameters name.
+    /// The user's rules in place of those that the parameters name.
     pub rules: OwnRules,
 }
 

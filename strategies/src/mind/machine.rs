@@ -70,7 +70,7 @@ impl Mind {
         Ok(Self { rounds: Rounds::new(me, boot, config)?, learning: None, answers: Answers::default() })
     }
 
-    /// The same mind, in which votes are fused by a rule of one's own, see [`Rounds::fused_by`].
+    /// The same mind, in which votes are fused by the user's rule, see [`Rounds::fused_by`].
     #[must_use]
     pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {
         self.rounds = self.rounds.fused_by(rule);

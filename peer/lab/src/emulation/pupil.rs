@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
 use gestalt_strategies::{
-    Change, Classifier, Learner, LearningConfig, LearningSetup, Memory, Mind, MindConfig, OwnRules,
-    TrainingChange,
+    Classifier, Learner, LearningConfig, LearningSetup, Mind, MindConfig, OwnRules, RecordChange,
+    RobotMemory, TrainingChange,
 };
 use rand_chacha::ChaCha8Rng;
 
@@ -35,7 +35,7 @@ impl Pupil {
         rng: ChaCha8Rng,
     ) -> Mind {
         let records = self.disk.iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
-        let memory = Memory::read(records).expect("it holds what this robot's minds wrote");
+        let memory = RobotMemory::read(records).expect("it holds what this robot's minds wrote");
         self.stop();
         self.classifier = school.start().cloned();
         self.learner = Some(school.learner().expect("the school was tried when it was made"));
@@ -59,8 +59,8 @@ impl Pupil {
         self.due.clear();
     }
 
-    pub fn remember(&mut self, revision: u64, changes: Vec<Change>) {
-        for Change { key, value } in changes {
+    pub fn remember(&mut self, revision: u64, changes: Vec<RecordChange>) {
+        for RecordChange { key, value } in changes {
             match value {
                 Some(value) => self.disk.insert(key, value),
                 None => self.disk.remove(&key),

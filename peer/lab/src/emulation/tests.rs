@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use gestalt_protocol::{FusionRule, RobotId};
-use gestalt_strategies::{MindConfig, Part};
+use gestalt_strategies::{MindConfig, SetPart};
 
 use super::*;
 use crate::shape::NetworkShape;
@@ -187,7 +187,7 @@ fn held(scenario: &Scenario, seed: u64) -> (Vec<[usize; 3]>, usize) {
     let mut common = sets.clone().map(ids);
     let first = common.next().unwrap();
     let of_all = common.fold(first, |all, ids| all.intersection(&ids).copied().collect());
-    let parts = [Part::Personal, Part::Shared, Part::External];
+    let parts = [SetPart::Personal, SetPart::Shared, SetPart::External];
     (sets.map(|set| parts.map(|part| set.total(part))).collect(), of_all.len())
 }
 

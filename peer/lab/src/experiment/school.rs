@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
-    Classifier, Components, FeatureSpace, Learner, LearnerOptions, Sample, ScalingMethod, Vocabulary,
+    Classifier, Components, FeatureSpace, LabelledFeatures, Learner, LearnerOptions, ScalingMethod,
+    Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -34,8 +35,8 @@ const MODEL_BEARING_DEG: f64 = 10.0;
 #[derive(Debug)]
 pub struct Schools {
     vocabulary: Vocabulary,
-    nothing: Vec<Sample>,
-    model: Vec<Sample>,
+    nothing: Vec<LabelledFeatures>,
+    model: Vec<LabelledFeatures>,
     made: BTreeMap<String, Arc<School>>,
 }
 
@@ -97,7 +98,7 @@ impl Schools {
     }
 }
 
-fn space(samples: &[Sample], method: Method, components: usize) -> FeatureSpace {
+fn space(samples: &[LabelledFeatures], method: Method, components: usize) -> FeatureSpace {
     let scaling = ScalingMethod::PerComponent;
     match method.ranking() {
         None => {
@@ -119,14 +120,14 @@ fn rendered(
     people: usize,
     bearing_deg: f64,
     perception: &mut Perception,
-) -> Result<Vec<Sample>, ExperimentError> {
+) -> Result<Vec<LabelledFeatures>, ExperimentError> {
     let frames = TrainingFrames::new(Vec::new(), Glove::Cyan, bearing_deg, 0x7eac4);
     let mut samples = Vec::new();
     for frame in frames.take(6 * people) {
         let frame = frame?;
         let class = vocabulary.class(&frame.class.to_string());
         if let (Ok(seen), Some(class)) = (perception.observe(&frame.image), class) {
-            samples.push(Sample { features: seen.features, class, group: Some(frame.group) });
+            samples.push(LabelledFeatures { features: seen.features, class, group: Some(frame.group) });
         }
     }
     if samples.len() < 2 {

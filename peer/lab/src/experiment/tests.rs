@@ -53,7 +53,7 @@ fn small(folder: &Path, threads: usize) -> (String, usize, Vec<Progress>) {
 fn the_number_of_threads_changes_nothing_and_what_is_done_is_not_done_again() {
     let (one, three) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (table, asked, _) = small(one.path(), 1);
-    assert!(asked > 0, "the rule of one's own was never asked");
+    assert!(asked > 0, "the user's rule was never asked");
     assert!(table.contains("| pool, as ever |") && table.contains("| first |"), "{table}");
     let csv = |folder: &Path| std::fs::read_to_string(folder.join("results.csv")).unwrap();
     assert_eq!(table, small(three.path(), 3).0);

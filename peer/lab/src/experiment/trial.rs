@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, FusionRule};
-use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, Look};
+use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, JudgedFrame};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -204,7 +204,9 @@ impl Exam {
 /// What one look at a hand says, as a vote would carry it.
 fn evidence_of(p: &[f64]) -> Vec<f32> {
     let mut evidence = Evidence::new(p.len());
-    evidence
-        .add(Look { at: Duration::ZERO, probabilities: p, quality: 1.0, view: &[] }, Duration::from_secs(1));
+    evidence.add(
+        JudgedFrame { at: Duration::ZERO, probabilities: p, quality: 1.0, view: &[] },
+        Duration::from_secs(1),
+    );
     evidence.clipped(CLIP)
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::{Change, Classifier, Memory};
+use gestalt_strategies::{Classifier, RecordChange, RobotMemory};
 
 use super::error::StoreError;
 use super::place::Place;
@@ -35,7 +35,7 @@ pub(crate) enum Told {
 
 /// What a disk that came late holds.
 pub(crate) struct Found {
-    pub memory: Memory,
+    pub memory: RobotMemory,
     pub classifier: Option<Arc<Classifier>>,
     /// The number of this life, now that all starts are counted.
     pub boot: u32,
@@ -88,7 +88,7 @@ impl Scribe {
     }
 
     /// Hands over changes, which [`Told::Wrote`] will name by their revision.
-    pub fn remember(&self, revision: u64, changes: Vec<Change>) {
+    pub fn remember(&self, revision: u64, changes: Vec<RecordChange>) {
         self.0.hand_over(|pending| {
             if !pending.found {
                 pending.records.extend(changes.into_iter().map(|change| (change.key, change.value)));
@@ -156,8 +156,8 @@ impl Writing {
                 return;
             }
             latest = revision.max(latest);
-            let changes: Vec<Change> =
-                records.into_iter().map(|(key, value)| Change { key, value }).collect();
+            let changes: Vec<RecordChange> =
+                records.into_iter().map(|(key, value)| RecordChange { key, value }).collect();
             let written = catch_unwind(AssertUnwindSafe(|| {
                 self.supervisor.stumble(Part::Memory);
                 match &self.store {
@@ -198,7 +198,7 @@ impl Writing {
             // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
             let ended = tray.put_back(
                 |pending| {
-                    for Change { key, value } in changes {
+                    for RecordChange { key, value } in changes {
                         pending.records.entry(key).or_insert(value);
                     }
                     pending.classifier = pending.classifier.take().or(classifier);
@@ -215,7 +215,7 @@ impl Writing {
     /// Writes, to a file that is opened first where there is none open.
     fn write(
         &mut self,
-        changes: &[Change],
+        changes: &[RecordChange],
         classifier: Option<&Arc<Classifier>>,
     ) -> Result<Done, StoreError> {
         if self.store.is_none()
@@ -223,7 +223,7 @@ impl Writing {
         {
             return Ok(Done::Found(found));
         }
-        for Change { key, value } in changes {
+        for RecordChange { key, value } in changes {
             match value {
                 Some(value) => self.known.insert(key.clone(), value.clone()),
                 None => self.known.remove(key),
@@ -244,10 +244,10 @@ impl Writing {
         // What the file should hold and does not: all of it, where it is a new one.
         let holds = store.records()?;
         let lacks = self.known.iter().filter(|(key, value)| holds.get(*key) != Some(value));
-        let lacks = lacks.map(|(key, value)| Change { key: key.clone(), value: Some(value.clone()) });
+        let lacks = lacks.map(|(key, value)| RecordChange { key: key.clone(), value: Some(value.clone()) });
         let surplus = holds.keys().filter(|key| !self.known.contains_key(*key));
-        let surplus = surplus.map(|key| Change { key: key.clone(), value: None });
-        let changes: Vec<Change> = lacks.chain(surplus).collect();
+        let surplus = surplus.map(|key| RecordChange { key: key.clone(), value: None });
+        let changes: Vec<RecordChange> = lacks.chain(surplus).collect();
         let classifier = self.classifier.as_deref().filter(|_| removed);
         if classifier.is_some() || !changes.is_empty() {
             store.write(&changes, classifier)?;

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::{Change, Classifier, Memory};
+use gestalt_strategies::{Classifier, RecordChange, RobotMemory};
 use redb::{Builder, Database, ReadableDatabase, ReadableTable, StorageBackend, TableDefinition};
 
 use super::bytes::Bytes;
@@ -147,10 +147,10 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Damaged`], [`StoreError::Content`], and those of the disk.
-    pub fn memory(&self) -> Result<Memory, StoreError> {
+    pub fn memory(&self) -> Result<RobotMemory, StoreError> {
         let path = self.place.path();
         let records = self.records()?;
-        let read = Memory::read(records.iter().map(|(key, value)| (key.as_slice(), value.as_slice())));
+        let read = RobotMemory::read(records.iter().map(|(key, value)| (key.as_slice(), value.as_slice())));
         read.map_err(|cause| match cause {
             gestalt_strategies::MemoryError::Damaged(what) => StoreError::damaged(path, what),
             cause => StoreError::Content { path: path.to_owned(), cause },
@@ -191,7 +191,7 @@ impl Store {
     /// # Errors
     /// [`StoreError::Removed`] and [`StoreError::Replaced`] when it was written to a file that has lost its name; those of
     /// the disk; [`StoreError::Damaged`].
-    pub fn write(&self, changes: &[Change], classifier: Option<&Classifier>) -> Result<(), StoreError> {
+    pub fn write(&self, changes: &[RecordChange], classifier: Option<&Classifier>) -> Result<(), StoreError> {
         let path = self.place.path();
         guarded(path, || {
             self.commit(changes, classifier)?;
@@ -215,14 +215,14 @@ impl Store {
         }
     }
 
-    fn commit(&self, changes: &[Change], classifier: Option<&Classifier>) -> Result<(), redb::Error> {
+    fn commit(&self, changes: &[RecordChange], classifier: Option<&Classifier>) -> Result<(), redb::Error> {
         let write = self.database.begin_write()?;
         {
             let mut about = write.open_table(ABOUT)?;
             let commits = about.get("commits")?.map_or(0, |commits| commits.value());
             about.insert("commits", commits.wrapping_add(1))?;
             let mut table = write.open_table(RECORDS)?;
-            for Change { key, value } in changes {
+            for RecordChange { key, value } in changes {
                 match value {
                     Some(value) => table.insert(key.as_slice(), value.as_slice())?,
                     None => table.remove(key.as_slice())?,

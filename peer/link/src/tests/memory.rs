@@ -63,7 +63,7 @@ async fn a_memory_that_comes_late_is_taken_up() {
     let mut robot = swarm(&name, 1, with_memory(&name, &disk.join("memory"))).await.pop().unwrap();
     let failing = |status: &gestalt_protocol::Status| {
         let says =
-            |learning: &gestalt_protocol::Learning| learning.memory.contains("its folder is not there");
+            |learning: &gestalt_protocol::LearningStatus| learning.memory.contains("its folder is not there");
         status.learning.as_ref().is_some_and(says)
     };
     robot.status("it says so", failing).await;

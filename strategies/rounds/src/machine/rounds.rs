@@ -145,7 +145,7 @@ impl Rounds {
         })
     }
 
-    /// The same rounds, in which votes are fused by a rule of one's own; the configuration's `rule` then names it. All
+    /// The same rounds, in which votes are fused by the user's rule; the configuration's `rule` then names it. All
     /// robots of a swarm need the same.
     #[must_use]
     pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {

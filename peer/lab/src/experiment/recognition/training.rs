@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{Classifier, Sample};
+use gestalt_strategies::{Classifier, LabelledFeatures};
 
 use super::plan::{Recognition, SwarmPlan, camera};
 use crate::experiment::error::ExperimentError;
@@ -81,7 +81,7 @@ fn train_one(
         let perception = eyes.iter_mut().find(|(name, _)| *name == frame.camera);
         if let Some(Ok(seen)) = perception.map(|(_, perception)| perception.observe(&frame.image)) {
             let class = ClassId(frame.class);
-            samples.push(Sample { features: seen.features, class, group: Some(frame.group) });
+            samples.push(LabelledFeatures { features: seen.features, class, group: Some(frame.group) });
         }
         progress(n + 1);
     }

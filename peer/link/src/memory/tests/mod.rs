@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::Change;
+use gestalt_strategies::RecordChange;
 
 use super::{FilePlace, Place, Records, Store, StoreError};
 
@@ -23,13 +23,13 @@ fn open(path: &Path) -> Result<Store, StoreError> {
     Store::open(place(path), ME, 1).map(|(store, _)| store)
 }
 
-fn change(key: u8, value: Option<u8>) -> Change {
-    Change { key: vec![key], value: value.map(|value| vec![value; 40]) }
+fn change(key: u8, value: Option<u8>) -> RecordChange {
+    RecordChange { key: vec![key], value: value.map(|value| vec![value; 40]) }
 }
 
 /// What the records come to after these changes.
-fn applied(records: &mut Records, changes: &[Change]) {
-    for Change { key, value } in changes {
+fn applied(records: &mut Records, changes: &[RecordChange]) {
+    for RecordChange { key, value } in changes {
         match value {
             Some(value) => records.insert(key.clone(), value.clone()),
             None => records.remove(key),
