@@ -5,7 +5,7 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 use gestalt_vision::human::Human;
 use gestalt_vision::source::{
-    Device, Glove, ImageFolder, RenderedSource, ScheduledSource, Source, SourceError, Video,
+    Device, Glove, ImageFolder, Pipe, RenderedSource, ScheduledSource, Source, SourceError, Video,
 };
 
 use crate::config::{CameraSection, SourceSection};
@@ -58,6 +58,7 @@ pub fn open_source(
         SourceSection::Images(files) => {
             Box::new(ImageFolder::open(&files.path, properties.period(), files.repeat)?)
         }
+        SourceSection::Video(files) if Pipe::is_at(&files.path) => Box::new(Pipe::open(&files.path)?),
         SourceSection::Video(files) => Box::new(Video::open(&files.path, files.repeat)?),
     })
 }

@@ -51,6 +51,7 @@ fn main() -> std::process::ExitCode {
         [Works] learning::a_robot_votes_and_decides_while_it_trains.await,
         [Waits] eyes::nobody_waits_for_a_source_that_panics.await,
         [Waits] stream::a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_there.await,
+        [Waits] stream::a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one.await,
         [Waits] stream::pictures_that_appear_late_and_bad_ones_among_them_are_streamed.await,
         [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,

@@ -1,8 +1,10 @@
 //! Frames on Zenoh: at most one under way, stale ones dropped evenly, nonsense counted.
 
+use std::io::Write;
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use gestalt_link::boot_number;
@@ -283,7 +285,7 @@ impl Taken {
 }
 
 /// A camera that delivers while it is plugged in, and fails at once, again and again, while it is not.
-struct Plug(Arc<std::sync::atomic::AtomicBool>);
+struct Plug(Arc<AtomicBool>);
 
 impl Source for Plug {
     fn describe(&self) -> String {
@@ -301,7 +303,7 @@ impl Source for Plug {
 }
 
 pub async fn a_camera_that_is_missing_vanishes_and_returns_is_streamed_when_it_is_there() {
-    let plugged = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let plugged = Arc::new(AtomicBool::new(false));
     let of_feed = plugged.clone();
     let feed = Feed::with(
         "a camera in a test",
@@ -349,6 +351,43 @@ pub async fn pictures_that_appear_late_and_bad_ones_among_them_are_streamed() {
     std::fs::rename(&filling, &path).unwrap();
     taken.more(30).await;
     taken.said("no image that can be decoded", 0).await;
+    taken.stop().await;
+}
+
+/// Writes JPEG pictures to a pipe, one after the other, as slowly as a camera would, until nobody reads or wants more.
+fn play(pictures: &[Vec<u8>], pipe: &Path, wanted: &AtomicBool) {
+    let mut writer = std::fs::OpenOptions::new().write(true).open(pipe).unwrap();
+    for picture in pictures.iter().cycle() {
+        if !wanted.load(Ordering::Relaxed) || writer.write_all(picture).is_err() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+pub async fn a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one() {
+    let (hands, folder) = (Hands::new(2), tempfile::tempdir().unwrap());
+    let pipe = folder.path().join("camera");
+    let entries = std::fs::read_dir(hands.encoded()).unwrap();
+    let pictures: Arc<Vec<_>> =
+        Arc::new(entries.map(|e| std::fs::read(e.unwrap().path()).unwrap()).collect());
+    let camera = CameraSection {
+        model: CameraChoice::Parrot,
+        source: SourceSection::Video(FilesSection { path: pipe.clone(), repeat: false }),
+        ..CameraSection::default()
+    };
+    let taken = Taken::from(Feed::new(&camera, RobotId(7), Duration::ZERO).unwrap(), &unique("pipe")).await;
+    taken.said("does not exist", 0).await;
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for _ in 0..3 {
+        let (said, wanted) = (taken.messages(), Arc::new(AtomicBool::new(true)));
+        let (pictures, pipe, of_writer) = (pictures.clone(), pipe.clone(), wanted.clone());
+        let writing = tokio::task::spawn_blocking(move || play(&pictures, &pipe, &of_writer));
+        taken.more(20).await;
+        wanted.store(false, Ordering::Relaxed);
+        writing.await.unwrap();
+        taken.said("nobody writes to the pipe", said).await;
+    }
     taken.stop().await;
 }
 

@@ -1,5 +1,6 @@
 //! Where frames come from, as a command line says it.
 
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -132,6 +133,7 @@ pub fn kind(path: &Path) -> Kind {
     let image = ["jpg", "jpeg", "png"].iter().any(|known| extension.eq_ignore_ascii_case(known));
     match std::fs::metadata(path) {
         Ok(about) if about.is_dir() => Kind::Folder,
+        Ok(about) if about.file_type().is_fifo() => Kind::Video,
         Ok(about) if !about.is_file() => Kind::Device,
         Err(_) if path.starts_with("/dev") => Kind::Device,
         _ if image => Kind::Image,

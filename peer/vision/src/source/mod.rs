@@ -4,6 +4,7 @@ mod device;
 mod emulated_view;
 mod folder;
 mod image_file;
+mod pipe;
 mod reader;
 pub mod rendered;
 pub(crate) mod scene;
@@ -29,6 +30,7 @@ pub use folder::ImageFolder;
 pub use image_file::{
     MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, encode_jpeg, read_image, read_jpeg, through_jpeg,
 };
+pub use pipe::Pipe;
 pub use reader::{Opener, Reader};
 pub use rendered::{Glove, RenderedSource, ScheduledSource};
 pub use scene::Scene;
@@ -123,6 +125,9 @@ pub enum SourceError {
     /// Not a video that FFmpeg can decode, or one without a single whole frame.
     #[error("{} is no video that FFmpeg can decode: give an mp4, mkv or avi file", .0.display())]
     NotAVideo(PathBuf),
+    /// The writer of a pipe has closed it.
+    #[error("nobody writes to the pipe {} any more: it is taken up again when somebody does", .0.display())]
+    WriterGone(PathBuf),
     /// Not a camera that V4L2 can open, or one that is in use.
     #[error("{} is no camera that V4L2 can open: check with v4l2-ctl --list-devices that it is one and that no other program uses it", .0.display())]
     NotADevice(PathBuf),

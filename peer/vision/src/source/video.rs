@@ -27,19 +27,11 @@ impl Video {
     /// When the file cannot be read, is empty, is no video, or its frames are too large.
     pub fn open(path: &Path, looping: bool) -> Result<Self, SourceError> {
         check_file(path)?;
-        let capture = capture(path)?;
+        let capture = from_ffmpeg(path)?;
+        check_size(&capture, path)?;
         let fps = capture.get(videoio::CAP_PROP_FPS)?;
-        let (width, height) =
-            (capture.get(videoio::CAP_PROP_FRAME_WIDTH)?, capture.get(videoio::CAP_PROP_FRAME_HEIGHT)?);
         if !(0.01..=1000.0).contains(&fps) {
             return Err(SourceError::NotAVideo(path.into()));
-        }
-        if width * height > MAX_MEGAPIXELS * 1e6 {
-            return Err(SourceError::TooLarge {
-                path: path.into(),
-                size: format!("{width}×{height} pixels"),
-                limit: format!("{MAX_MEGAPIXELS} megapixels"),
-            });
         }
         let period = Duration::from_secs_f64(1.0 / fps);
         Ok(Self { path: path.into(), capture, period, looping, gave_frame: false })
@@ -47,9 +39,22 @@ impl Video {
 }
 
 /// Named explicitly, since OpenCV would otherwise try every backend it was built with.
-fn capture(path: &Path) -> Result<VideoCapture, SourceError> {
+pub(super) fn from_ffmpeg(path: &Path) -> Result<VideoCapture, SourceError> {
     let capture = VideoCapture::from_file(path, videoio::CAP_FFMPEG)?;
     if capture.is_opened()? { Ok(capture) } else { Err(SourceError::NotAVideo(path.into())) }
+}
+
+pub(super) fn check_size(capture: &VideoCapture, path: &Path) -> Result<(), SourceError> {
+    let (width, height) =
+        (capture.get(videoio::CAP_PROP_FRAME_WIDTH)?, capture.get(videoio::CAP_PROP_FRAME_HEIGHT)?);
+    if width * height <= MAX_MEGAPIXELS * 1e6 {
+        return Ok(());
+    }
+    Err(SourceError::TooLarge {
+        path: path.into(),
+        size: format!("{width}×{height} pixels"),
+        limit: format!("{MAX_MEGAPIXELS} megapixels"),
+    })
 }
 
 impl Source for Video {
@@ -70,7 +75,7 @@ impl Source for Video {
             if !self.looping {
                 return Err(SourceError::Ended(self.describe()));
             }
-            self.capture = capture(&self.path)?;
+            self.capture = from_ffmpeg(&self.path)?;
             self.gave_frame = false;
         }
         self.gave_frame = true;

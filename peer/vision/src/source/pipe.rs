@@ -1,0 +1,65 @@
+//! A video that another program writes into a named pipe: a camera that comes and goes with its writer.
+
+use std::fs;
+use std::os::unix::fs::FileTypeExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use opencv::core::Mat;
+use opencv::prelude::*;
+use opencv::videoio::{self, VideoCapture};
+
+use super::video::{check_size, from_ffmpeg};
+use super::{Frame, Scene, Source, SourceError};
+
+/// Assumed where the video does not say how many frames a second it has.
+const PERIOD: Duration = Duration::from_millis(33);
+
+/// The frames of a video that is read from a named pipe, as fast as they are written.
+pub struct Pipe {
+    path: PathBuf,
+    capture: VideoCapture,
+    period: Duration,
+}
+
+impl Pipe {
+    /// Whether a named pipe is at `path`.
+    #[must_use]
+    pub fn is_at(path: &Path) -> bool {
+        fs::metadata(path).is_ok_and(|about| about.file_type().is_fifo())
+    }
+
+    /// Opens the pipe, and waits until somebody writes a video to it.
+    ///
+    /// # Errors
+    /// When what is written is no video, or its frames are too large.
+    pub fn open(path: &Path) -> Result<Self, SourceError> {
+        let capture = from_ffmpeg(path)?;
+        check_size(&capture, path)?;
+        let fps = capture.get(videoio::CAP_PROP_FPS)?;
+        let period = if (0.01..=1000.0).contains(&fps) { Duration::from_secs_f64(1.0 / fps) } else { PERIOD };
+        Ok(Self { path: path.into(), capture, period })
+    }
+}
+
+impl Source for Pipe {
+    fn describe(&self) -> String {
+        format!("video pipe {}", self.path.display())
+    }
+
+    fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn is_live(&self) -> bool {
+        true
+    }
+
+    fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        let mut image = Mat::default();
+        if !self.capture.read(&mut image)? || image.empty() {
+            return Err(SourceError::WriterGone(self.path.clone()));
+        }
+        Ok(Frame { image, at: now })
+    }
+}
