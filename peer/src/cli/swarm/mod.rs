@@ -78,7 +78,7 @@ pub struct Args {
     processes: bool,
 
     /// Write a picture of what each robot saw in the round with most disagreement
-    #[arg(long, value_name = "FILE.png", conflicts_with = "processes")]
+    #[arg(long, value_name = "FILE.svg|FILE.png", conflicts_with = "processes")]
     picture: Option<PathBuf>,
 
     /// Plot the learning curve (SVG or PNG, by the file extension)
