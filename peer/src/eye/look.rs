@@ -31,7 +31,7 @@ pub(crate) async fn look(
         Ok(reader) => reader,
         Err(error) => return last_word.say(&format!("no thread for the camera: {error}")),
     };
-    let mut report = CameraReport::of_camera(live);
+    let mut report = CameraReport::of_camera(live, period);
     if watches {
         reader.want(Some(Scene::default()));
     }
