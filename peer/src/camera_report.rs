@@ -21,7 +21,8 @@ const WINDOW: Duration = Duration::from_secs(3);
 /// The fewest frames of which the rate is taken, and the most that are remembered.
 const FRAMES: std::ops::RangeInclusive<usize> = 3..=256;
 
-/// A camera that delivers nothing, or the same picture, for this long is frozen; a slow one has the time of three frames.
+/// A camera that delivers nothing, or the same picture, for this long is frozen; a slow one has the time of three frames: of
+/// those that came lately, or, until some have, of its model.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// After this many errors in a row a file fails.
@@ -36,6 +37,8 @@ pub struct CameraReport {
     /// After this many errors in a row it fails.
     errors_allowed: u32,
     patience: Duration,
+    /// The time between two frames that its model says.
+    period: Duration,
     /// What to do when no frames come.
     if_silent: &'static str,
     /// Since when frames are expected; `None` while nobody looks.
@@ -72,13 +75,14 @@ pub struct News {
 
 impl CameraReport {
     /// A camera of this machine that nobody looks through yet. `live`: it runs by itself, so that any error, and the same
-    /// picture over and over, is a fault.
+    /// picture over and over, is a fault. `period`: the time between two frames that its model says.
     #[must_use]
-    pub fn of_camera(live: bool) -> Self {
+    pub fn of_camera(live: bool, period: Duration) -> Self {
         Self {
             changes: live,
             errors_allowed: if live { 1 } else { ERRORS },
             patience: PATIENCE,
+            period,
             if_silent: "check the camera, its cable and its driver",
             expected: None,
             taken: VecDeque::new(),
@@ -108,7 +112,7 @@ impl CameraReport {
             if_silent: "see that `gestalt stream` runs, and check its way here",
             expected: Some(now),
             blind: true,
-            ..Self::of_camera(false)
+            ..Self::of_camera(false, Duration::ZERO)
         }
     }
 
@@ -202,7 +206,7 @@ impl CameraReport {
             Some(last) if self.is_same_picture(last) => {
                 let seconds = last.saturating_sub(self.picture_since).as_secs_f64();
                 let trouble = format!(
-                    "the same picture for {seconds:.0} s, to the last bit: the camera hangs; unplug it and plug it in again"
+                    "identical pictures for {seconds:.0} s: covered, saturated, or hanging; look at its lens and light, then unplug it and plug it in again"
                 );
                 (CameraState::Frozen, trouble)
             }
@@ -295,7 +299,7 @@ impl CameraReport {
 
     /// How long a frame may fail to appear.
     fn patience(&self) -> Duration {
-        let period = self.fps().map_or(Duration::ZERO, |fps| Duration::from_secs_f32(1.0 / fps));
+        let period = self.fps().map_or(self.period, |fps| Duration::from_secs_f32(1.0 / fps));
         self.patience.max(3 * period)
     }
 

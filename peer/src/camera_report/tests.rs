@@ -4,6 +4,9 @@ use opencv::core::{CV_8UC3, Scalar};
 
 use super::*;
 
+/// Of a camera of 10 frames per second.
+const PERIOD: Duration = Duration::from_millis(100);
+
 /// The camera delivers a picture of that grey; says whether it is worth looking at.
 fn deliver(report: &mut CameraReport, level: f64, at_ms: u64) -> bool {
     let image = Mat::new_rows_cols_with_default(48, 64, CV_8UC3, Scalar::all(level)).unwrap();
@@ -22,7 +25,7 @@ fn state(report: &CameraReport, at_ms: u64) -> CameraState {
 
 #[test]
 fn a_camera_that_falls_silent_is_frozen_until_it_delivers_again() {
-    let mut report = CameraReport::of_camera(true);
+    let mut report = CameraReport::of_camera(true, PERIOD);
     assert_eq!(state(&report, 0), CameraState::Opening);
     report.expect(Duration::ZERO);
     for at in 0..30 {
@@ -38,21 +41,35 @@ fn a_camera_that_falls_silent_is_frozen_until_it_delivers_again() {
 
 #[test]
 fn the_same_picture_over_and_over_is_frozen_and_not_worth_looking_at() {
-    let mut report = CameraReport::of_camera(true);
+    let mut report = CameraReport::of_camera(true, PERIOD);
     report.expect(Duration::ZERO);
     let worth: Vec<bool> = (0..40).map(|at| deliver(&mut report, 9.0, at * 100)).collect();
     assert!(worth[..20].iter().all(|worth| *worth) && !worth[39]);
     assert_eq!(state(&report, 3900), CameraState::Frozen);
+    let trouble = report.state(Duration::from_millis(3900)).1;
+    assert!(trouble.contains("identical pictures for 4 s: covered, saturated, or hanging"), "{trouble}");
     assert!(deliver(&mut report, 10.0, 4000));
     assert_eq!(state(&report, 4000), CameraState::Live);
     // A file may show the same picture for as long as it likes.
-    let mut report = CameraReport::of_camera(false);
+    let mut report = CameraReport::of_camera(false, PERIOD);
     assert!((0..40).all(|at| deliver(&mut report, 9.0, at * 100)));
 }
 
 #[test]
+fn a_slow_camera_has_the_time_of_three_of_its_frames_from_the_first_on() {
+    let mut report = CameraReport::of_camera(true, Duration::from_secs(10));
+    report.expect(Duration::ZERO);
+    assert_eq!(state(&report, 9_000), CameraState::Opening);
+    deliver(&mut report, 1.0, 10_000);
+    assert_eq!(state(&report, 19_000), CameraState::Live);
+    deliver(&mut report, 2.0, 20_000);
+    assert_eq!(state(&report, 49_000), CameraState::Live);
+    assert_eq!(state(&report, 51_000), CameraState::Frozen);
+}
+
+#[test]
 fn a_camera_that_nobody_looks_through_is_not_frozen() {
-    let mut report = CameraReport::of_camera(false);
+    let mut report = CameraReport::of_camera(false, PERIOD);
     report.expect(Duration::ZERO);
     deliver(&mut report, 1.0, 0);
     report.rest();
@@ -64,7 +81,7 @@ fn a_camera_that_nobody_looks_through_is_not_frozen() {
 
 #[test]
 fn errors_in_a_row_are_a_failing_camera_and_the_end_is_the_end() {
-    let mut report = CameraReport::of_camera(false);
+    let mut report = CameraReport::of_camera(false, PERIOD);
     let error = SourceError::NoFrame("/dev/video9".into());
     report.note_error(&error);
     assert_eq!(state(&report, 0), CameraState::Opening);
@@ -97,7 +114,7 @@ fn a_stream_is_blind_until_its_first_frame_and_from_its_first_bad_one_on() {
 
 #[test]
 fn a_source_that_panics_and_frames_that_cannot_be_judged_blind_at_once() {
-    let mut report = CameraReport::of_camera(false);
+    let mut report = CameraReport::of_camera(false, PERIOD);
     deliver(&mut report, 1.0, 0);
     assert_eq!(news(&mut report, 0).1.blind, None);
     report.note_error(&SourceError::Panicked(Broken::Again("no pixels".to_owned())));
@@ -130,7 +147,7 @@ impl Classify for Fragile {
 #[test]
 fn a_classifier_that_panics_is_named_and_blinds_until_it_judges_again() {
     let classifier = Fragile(Vocabulary::new(["fist", "palm"]).unwrap());
-    let mut report = CameraReport::of_camera(false);
+    let mut report = CameraReport::of_camera(false, PERIOD);
     deliver(&mut report, 1.0, 0);
     let mut write = |at_ms, feature: Option<f32>| {
         let at = Duration::from_millis(at_ms);

@@ -149,7 +149,8 @@ impl Door {
         // Nobody reads them, so none need be kept.
         drop(robot.events());
         robot.learned(self.model.classifier.clone(), &self.model.name);
-        let seat = Seat::new(Arc::new(robot), sight, self.config.center.frozen_after);
+        let period = Duration::from_secs_f32(1.0 / frame.header.fps.max(0.1));
+        let seat = Seat::new(Arc::new(robot), sight, self.config.center.frozen_after.max(3 * period));
         self.queue.admit(id, Arc::new(seat));
         Ok(())
     }

@@ -74,6 +74,7 @@ impl Seat {
         let now = zero.elapsed();
         let looked = sight.run(now, |sight| -> Result<Taken, PictureError> {
             decode(&arrival.picture(), MAX_MEGAPIXELS, &mut frame.image)?;
+            sight.rate_is(f64::from(arrival.header.fps));
             Ok(sight.take(frame, judge))
         });
         let motion = sight.get().and_then(Sight::motion);

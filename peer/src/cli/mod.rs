@@ -21,6 +21,8 @@ mod report;
 #[cfg(feature = "opencv")]
 mod robot_args;
 mod robots;
+#[cfg(feature = "opencv")]
+mod score;
 mod show;
 #[cfg(feature = "opencv")]
 mod source_arg;
@@ -73,10 +75,10 @@ enum Verb {
     Watch(watch::Args),
     /// Teach a running swarm: open rounds and give feedback on its decisions
     Teach(teach::Args),
-    /// Train a classifier on a folder of labelled images
+    /// Train a classifier on folders of labelled images
     #[cfg(feature = "opencv")]
-    Train(train::Args),
-    /// Evaluate a classifier on a folder of labelled images
+    Train(Box<train::Args>),
+    /// Evaluate a classifier on folders of labelled images
     #[cfg(feature = "opencv")]
     Evaluate(evaluate::Args),
     /// Show what perception makes of one frame, stage by stage
@@ -118,9 +120,9 @@ impl Command {
             Verb::Watch(args) => watch::run(&args),
             Verb::Teach(args) => teach::run(&args),
             #[cfg(feature = "opencv")]
-            Verb::Train(args) => train::run(args),
+            Verb::Train(args) => train::run(&args),
             #[cfg(feature = "opencv")]
-            Verb::Evaluate(args) => evaluate::run(args),
+            Verb::Evaluate(args) => evaluate::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Look(args) => look::run(&args),
             Verb::Emulate(args) => emulate::run(&args),

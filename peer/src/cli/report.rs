@@ -1,10 +1,13 @@
 //! The outcome of a measurement, as text and as JSON.
 
+use std::path::Path;
+
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Evaluation, Proportion, Vocabulary};
 use serde_json::json;
 
 use gestalt_draw::confusion;
+use gestalt_vision::dataset::Ignored;
 use gestalt_vision::survey::{Rejected, Survey};
 
 /// The accuracy over all images that can be read: one whose hand is not found is not judged right.
@@ -31,8 +34,6 @@ pub fn text(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -
 
 /// The measurement as a JSON object.
 pub fn json(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -> serde_json::Value {
-    let proportion =
-        |p: Option<Proportion>| p.map(|p| json!({ "value": p.value, "low": p.low, "high": p.high }));
     let classes: Vec<_> = (0_u8..)
         .zip(vocabulary.labels())
         .map(|(class, label)| {
@@ -47,8 +48,8 @@ pub fn json(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -
         "images": evaluation.count(),
         "without_hand": survey.without_hand.len(),
         "unreadable": survey.unreadable.len(),
-        "accuracy": proportion(evaluation.accuracy()),
-        "accuracy_of_all": proportion(of_all(evaluation, survey)),
+        "accuracy": evaluation.accuracy().map(proportion_json),
+        "accuracy_of_all": of_all(evaluation, survey).map(proportion_json),
         "calibration_error": evaluation.calibration_error(),
         "log_loss": evaluation.log_loss(),
         "classes": classes,
@@ -70,13 +71,20 @@ pub fn rejected(survey: &Survey) {
     tell("with no hand found", &survey.without_hand);
 }
 
-/// Says on stderr which folders were left out.
-pub fn ignored(folders: &[String]) {
-    if !folders.is_empty() {
-        eprintln!("note: ignored folders: {}", folders.join(", "));
+/// Says on stderr which folders of a dataset were left out.
+pub fn ignored(folder: &Path, left_out: &[Ignored]) {
+    if !left_out.is_empty() {
+        let folders: Vec<String> = left_out.iter().map(Ignored::to_string).collect();
+        eprintln!("note: {}: ignored folders: {}", folder.display(), folders.join(", "));
     }
 }
 
-fn proportion(p: Option<Proportion>) -> String {
+/// A proportion with its interval in words.
+pub fn proportion(p: Option<Proportion>) -> String {
     p.map_or_else(|| "none".to_owned(), |p| format!("{:.3} (95 % {:.3} to {:.3})", p.value, p.low, p.high))
+}
+
+/// The same as a JSON object.
+pub fn proportion_json(p: Proportion) -> serde_json::Value {
+    json!({ "value": p.value, "low": p.low, "high": p.high })
 }

@@ -1,5 +1,6 @@
-//! `gestalt train`: from a folder of labelled images to a model.
+//! `gestalt train`: from folders of labelled images to a model.
 
+mod leave_one_out;
 mod outcome;
 
 use std::collections::BTreeSet;
@@ -7,37 +8,51 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ArgGroup;
-use gestalt_strategies::{Classify, Components, Evaluation, ScalingMethod, TrainOptions, Trained, train};
+use gestalt_strategies::{
+    Classifier, Classify, Components, Evaluation, LabelledFeatures, ScalingMethod, TrainOptions, Trained,
+    Vocabulary, train,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use self::outcome::Outcome;
 use super::show::line;
-use super::{Failure, progress, report, say};
-use gestalt_vision::dataset::{Dataset, LabelledImage};
+use super::{Failure, progress, report, say, score};
+use gestalt_vision::dataset::{Dataset, LabelledImage, Naming};
 use gestalt_vision::model::train_on_rendered;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
-use gestalt_vision::survey::Survey;
+use gestalt_vision::survey::{Lessons, Survey};
 
 /// Train a classifier on labelled images: one folder per gesture. File names `sNNN_…` identify the subject, so that
-/// cross-validation and --test-share never put one subject on both sides
+/// cross-validation and --test-share never put one subject on both sides. A folder `none` holds images without a gesture:
+/// they are not learned
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt train --dataset hands --out hands.gestalt
-  gestalt train --dataset hands --classes fist,palm,1-3 --test-share 0.3 --out hands.gestalt")]
+  gestalt train --dataset office --dataset garden --counts --leave-one-out")]
 #[command(group = ArgGroup::new("reduction").args(["components", "variance"]))]
 pub struct Args {
-    /// Dataset folder, with one subfolder per gesture
+    /// Dataset folder, with one subfolder per gesture; several are learned as one, and their subjects kept apart
     #[arg(long, value_name = "DIR", required_unless_present = "rendered")]
-    dataset: Option<PathBuf>,
+    dataset: Vec<PathBuf>,
     /// Make the embedded model again, from synthetic hands: gestures 0 to 5, always the same
-    #[arg(long, conflicts_with_all = ["dataset", "features", "classes", "components", "variance", "costs", "gammas", "folds", "test_share", "split_seed", "seed"])]
+    #[arg(long, conflicts_with_all = ["dataset", "features", "classes", "components", "variance", "costs", "gammas", "folds", "test_share", "split_seed", "seed", "counts", "leave_one_out", "augment"])]
     rendered: bool,
     /// Model file to write
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "leave_one_out")]
+    out: Option<PathBuf>,
+    /// Measure how well training carries over: for each dataset, train on the others and score on it
+    #[arg(long)]
+    leave_one_out: bool,
+    /// Folders are counts of fingers: the number that their name begins with, so that `3_thumb_index_middle` is 3. Folders
+    /// that begin with no number are left out
+    #[arg(long)]
+    counts: bool,
+    /// Learn so many variations of each image beside it: mirrored or not, rolled by up to 30°, half to twice as bright. 0: none
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=50))]
+    augment: u8,
     /// Feature set: `hog` (histogram of oriented gradients) or `shape` (110 shape descriptors)
     #[arg(long, default_value = "hog", value_name = "SET")]
     features: FeatureSet,
@@ -99,6 +114,10 @@ impl std::str::FromStr for Labels {
 }
 
 impl Args {
+    fn naming(&self) -> Naming {
+        naming(self.counts)
+    }
+
     fn options(&self) -> TrainOptions {
         TrainOptions {
             scaling: match self.features {
@@ -117,84 +136,131 @@ impl Args {
     }
 }
 
+/// What `--counts` means.
+pub(super) fn naming(counts: bool) -> Naming {
+    if counts { Naming::Counts } else { Naming::Names }
+}
+
 /// Trains, writes the model, reports.
 ///
 /// # Errors
-/// When the dataset, the options or the place of the model cannot be used; each says what and why.
-pub fn run(args: Args) -> Result<(), Failure> {
-    let Some(folder) = args.dataset.as_deref() else { return remake(&args) };
+/// When a dataset, the options or the place of the model cannot be used; each says what and why.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if args.rendered {
+        return remake(args);
+    }
     if !(0.0..1.0).contains(&args.test_share) {
         return Err(format!("--test-share is {}: choose a value between 0 and 1", args.test_share).into());
     }
-    Model::check_writable(&args.out)?;
-    let dataset = Dataset::list(folder, args.classes.as_ref().map(|labels| labels.0.as_slice()))?;
-    let held_out = dataset.draw_people(args.test_share, &mut ChaCha8Rng::seed_from_u64(args.split_seed));
+    if let Some(out) = &args.out {
+        Model::check_writable(out)?;
+    }
+    let labels = args.classes.as_ref().map(|labels| labels.0.as_slice());
+    let sets = Dataset::list_several(&args.dataset, args.naming(), labels)?;
+    for (folder, set) in args.dataset.iter().zip(&sets) {
+        report::ignored(folder, &set.ignored);
+    }
+    let mut perception = Perception::new(args.features, HandConfig::default())?;
+    let compared =
+        args.leave_one_out.then(|| leave_one_out::compare(args, &sets, &mut perception)).transpose()?;
+    let (mut text, mut object) = (String::new(), json!({}));
+    if let Some(out) = &args.out {
+        (text, object) = learn(args, &sets, out, &mut perception)?;
+    }
+    if let Some(scores) = compared {
+        text = format!("each dataset by a model of the others:\n{}{text}", score::table(&scores));
+        object["leave_one_out"] = score::json(&scores);
+    }
+    say(&if args.json { format!("{object}\n") } else { text })
+}
+
+/// Trains on all datasets but the people held out, writes the model, and measures it on those.
+fn learn(
+    args: &Args,
+    sets: &[Dataset],
+    out: &Path,
+    perception: &mut Perception,
+) -> Result<(String, Value), Failure> {
+    let images: Vec<LabelledImage> = sets.iter().flat_map(|set| set.images.iter().cloned()).collect();
+    let vocabulary = &sets.first().ok_or("no dataset")?.vocabulary;
+    let all = Dataset { vocabulary: vocabulary.clone(), images, none: Vec::new(), ignored: Vec::new() };
+    let held_out = all.draw_people(args.test_share, &mut ChaCha8Rng::seed_from_u64(args.split_seed));
     if args.test_share > 0.0 && held_out.is_empty() {
         return Err(
             "--test-share holds out subjects, but the file names (sNNN_…) identify fewer than two".into()
         );
     }
-    let mut perception = Perception::new(args.features, HandConfig::default())?;
     let (tested, learned): (Vec<_>, Vec<_>) =
-        dataset.images.iter().cloned().partition(|image| image.person.is_some_and(|p| held_out.contains(&p)));
-    let survey = look(&learned, &mut perception);
+        all.images.into_iter().partition(|image| image.person.is_some_and(|p| held_out.contains(&p)));
+    let survey = look(&learned, args.augment, args.seed, perception);
     report::rejected(&survey);
 
-    let options = args.options();
     let started = Instant::now();
-    let bar = progress::bar("training", 0);
-    let trained = train(
-        args.features.name(),
-        &dataset.vocabulary,
-        &survey.samples(),
-        &options,
-        &mut ChaCha8Rng::seed_from_u64(args.seed),
-        |progress| {
-            bar.set_length(progress.total as u64);
-            bar.set_position(progress.done as u64);
-        },
-    )?;
-    bar.finish_and_clear();
+    let trained = fit(args, vocabulary, &Lessons::of(&[&survey]))?;
     let seconds = started.elapsed().as_secs_f64();
 
-    let origin = origin(&args, folder, &survey, &trained)?;
+    let origin = origin(args, &survey, &trained)?;
     let model = Model { classifier: trained.classifier.clone(), origin };
-    model.write(&args.out)?;
+    model.write(out)?;
 
-    let test = (!tested.is_empty()).then(|| measure(&tested, &model, &mut perception)).transpose()?;
-    report::ignored(&dataset.ignored);
+    let test = (!tested.is_empty()).then(|| measure(&tested, &model.classifier, perception)).transpose()?;
     let outcome = Outcome {
-        folder,
-        out: &args.out,
+        folders: &args.dataset,
+        out,
         model: &model,
         trained: &trained,
         folds: args.folds,
         survey: &survey,
         seconds,
         test: test.as_ref(),
-        ignored: &dataset.ignored,
+        ignored: sets.iter().flat_map(|set| &set.ignored).map(|ignored| ignored.label.as_str()).collect(),
     };
-    say(&if args.json { format!("{}\n", outcome.json()) } else { outcome.text() })
+    Ok((outcome.text(), outcome.json()))
+}
+
+/// Trains, and shows how far it has come.
+///
+/// C and γ are searched among the images themselves: among the variations as well it takes ten times as long, and what is
+/// found serves people who were held out no better.
+fn fit(args: &Args, vocabulary: &Vocabulary, lessons: &Lessons) -> Result<Trained, Failure> {
+    let learn = |samples: &[LabelledFeatures], options: &TrainOptions| {
+        let bar = progress::bar("training", 0);
+        let rng = &mut ChaCha8Rng::seed_from_u64(args.seed);
+        let trained = train(args.features.name(), vocabulary, samples, options, rng, |progress| {
+            bar.set_length(progress.total as u64);
+            bar.set_position(progress.done as u64);
+        });
+        bar.finish_and_clear();
+        trained
+    };
+    let found = learn(&lessons.images, &args.options())?;
+    if lessons.copies.is_empty() {
+        return Ok(found);
+    }
+    let options = TrainOptions { costs: vec![found.cost], gammas: vec![found.gamma], ..args.options() };
+    Ok(learn(&[&lessons.images[..], &lessons.copies[..]].concat(), &options)?)
 }
 
 /// Makes the model that is embedded in the program: what `peer/vision/models/rendered.gestalt` holds.
 fn remake(args: &Args) -> Result<(), Failure> {
-    Model::check_writable(&args.out)?;
+    let out = args.out.as_deref().ok_or("--out is missing")?;
+    Model::check_writable(out)?;
     let bar = progress::bar("features", 0);
     let model = train_on_rendered(|done, total| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    model.write(&args.out)?;
+    model.write(out)?;
     let (made_of, vectors) = (&model.origin.dataset, model.classifier.support_vectors());
-    let words = format!("{made_of}; {vectors} support vectors → {}", args.out.display());
-    line(args.json, &json!({"model": args.out, "dataset": made_of, "support_vectors": vectors}), &words)
+    let words = format!("{made_of}; {vectors} support vectors → {}", out.display());
+    line(args.json, &json!({"model": out, "dataset": made_of, "support_vectors": vectors}), &words)
 }
 
-fn look(images: &[LabelledImage], perception: &mut Perception) -> Survey {
+/// Looks at images, and at so many variations of each.
+fn look(images: &[LabelledImage], copies: u8, seed: u64, perception: &mut Perception) -> Survey {
     let bar = progress::bar("features", images.len());
-    let survey = Survey::of(images, perception, || bar.inc(1));
+    let survey = Survey::with_copies(images, perception, usize::from(copies), seed, || bar.inc(1));
     bar.finish_and_clear();
     survey
 }
@@ -202,25 +268,41 @@ fn look(images: &[LabelledImage], perception: &mut Perception) -> Survey {
 /// Looks at images that the model has not seen, and judges them.
 pub(super) fn measure(
     images: &[LabelledImage],
-    model: &Model,
+    classifier: &Classifier,
     perception: &mut Perception,
 ) -> Result<(Evaluation, Survey), Failure> {
-    let survey = look(images, perception);
-    let mut evaluation = Evaluation::new(model.classifier.vocabulary().classes());
-    for (_, sample) in &survey.seen {
-        evaluation.record(sample.class, &model.classifier.probabilities(&sample.features)?);
-    }
+    let survey = look(images, 0, 0, perception);
+    let mut evaluation = Evaluation::new(classifier.vocabulary().classes());
+    judge(&survey, classifier, &mut evaluation)?;
     Ok((evaluation, survey))
 }
 
-fn origin(args: &Args, folder: &Path, survey: &Survey, trained: &Trained) -> Result<Origin, Failure> {
+/// Judges what a survey has seen, without the variations.
+pub(super) fn judge(
+    survey: &Survey,
+    classifier: &Classifier,
+    evaluation: &mut Evaluation,
+) -> Result<(), Failure> {
+    for (_, sample) in &survey.seen {
+        evaluation.record(sample.class, &classifier.probabilities(&sample.features)?);
+    }
+    Ok(())
+}
+
+fn origin(args: &Args, survey: &Survey, trained: &Trained) -> Result<Origin, Failure> {
     let people: BTreeSet<u32> = survey.seen.iter().filter_map(|(image, _)| image.person).collect();
-    let images: Result<BTreeSet<u64>, _> = survey.seen.iter().map(|(image, _)| image.fingerprint()).collect();
-    let name = folder.canonicalize()?;
+    let without_hand = survey.without_hand.iter().map(|rejected| &rejected.image);
+    let shown = survey.seen.iter().map(|(image, _)| image).chain(without_hand);
+    let images: BTreeSet<u64> = shown.map(LabelledImage::fingerprint).collect::<Result<_, _>>()?;
+    let mut names = Vec::new();
+    for folder in &args.dataset {
+        let name = folder.canonicalize()?;
+        names.push(name.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()));
+    }
     Ok(Origin {
-        dataset: name.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        dataset: names.join(", "),
         people: people.into_iter().collect(),
-        images: images?.into_iter().collect(),
+        images: images.into_iter().collect(),
         seed: args.seed,
         cost: trained.cost,
         gamma: trained.gamma,

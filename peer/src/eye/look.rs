@@ -15,6 +15,7 @@ use tokio::time::MissedTickBehavior;
 
 use super::{Eye, Seen};
 use crate::camera_report::{self, CameraReport};
+use crate::stream::Inlet;
 use crate::telling::{tell, tell_camera};
 
 /// Looks until the robot is gone. The camera has a thread of its own and judging is done beside the robot's task, so that
@@ -26,20 +27,20 @@ pub(crate) async fn look(
     seen: Arc<Mutex<Option<Seen>>>,
 ) {
     let last_word = LastWord(robot.clone());
-    let Eye { source, open, describe, watches, live, period, sight, human, zero, inlet: _inlet } = eye;
+    let Eye { source, open, describe, watches, live, period, sight, human, zero, inlet } = eye;
     let reader = match Reader::start(source, open, zero) {
         Ok(reader) => reader,
         Err(error) => return last_word.say(&format!("no thread for the camera: {error}")),
     };
-    let mut report = CameraReport::of_camera(live);
+    let mut report = CameraReport::of_camera(live, period);
     if watches {
         reader.want(Some(Scene::default()));
     }
     if watches || live {
         report.expect(zero.elapsed());
     }
-    let rounds = Rounds { now: None, reader, human, watches, live };
-    let mut eye = Looking { rounds, report, sight: Some(sight), describe, period, zero, seen };
+    let rounds = Rounds { now: None, reader, human, watches, live, inlet };
+    let mut eye = Looking { rounds, report, sight: Some(sight), describe, period, zero, seen, replaced: 0 };
     let mut tick = tokio::time::interval(camera_report::INTERVAL);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -79,6 +80,8 @@ struct Rounds {
     human: Human,
     watches: bool,
     live: bool,
+    /// Where its frames come in, if they come from another machine.
+    inlet: Option<Arc<Inlet>>,
 }
 
 struct Looking {
@@ -90,6 +93,8 @@ struct Looking {
     period: Duration,
     zero: Instant,
     seen: Arc<Mutex<Option<Seen>>>,
+    /// How many frames were replaced by newer ones, as far as its sight knows.
+    replaced: u64,
 }
 
 impl Looking {
@@ -102,10 +107,14 @@ impl Looking {
         if round == self.round() {
             return;
         }
-        let Rounds { now, reader, human, watches, live } = &mut self.rounds;
+        let Rounds { now, reader, human, watches, live, inlet } = &mut self.rounds;
         *now = round.map(|round| (round, self.zero.elapsed()));
         match round {
             Some(round) => {
+                if let Some(inlet) = inlet.as_ref().filter(|_| !*watches) {
+                    // What has waited there while nobody looked shows what was before.
+                    inlet.skip_older(self.period);
+                }
                 reader.want(Some(human.shows(round)));
                 self.report.expect(self.zero.elapsed());
             }
@@ -129,8 +138,15 @@ impl Looking {
         let fresh = |(_, since): &(RoundId, Duration)| frame.at + self.period >= *since;
         let round = self.rounds.now.filter(fresh).map(|(round, _)| round);
         let seen = self.seen.clone();
+        let replaced = self.rounds.reader.dropped();
+        let passed_over = replaced - std::mem::replace(&mut self.replaced, replaced);
+        let stated = self.rounds.inlet.as_ref().and_then(|inlet| inlet.fps());
         let judged = tokio::task::spawn_blocking(move || {
-            let taken = judge(&mut sight, frame, round, &seen);
+            let rate = |sight: &mut Sight| match stated {
+                Some(fps) => sight.rate_is(fps),
+                None => sight.passed_over(passed_over),
+            };
+            let taken = judge(&mut sight, frame, round, rate, &seen);
             (sight, taken)
         });
         // What panics there is caught there; it is cancelled only when the program ends.
@@ -162,14 +178,18 @@ impl Looking {
     }
 }
 
-/// Takes one look. `seen` receives the frame of a round.
+/// Takes one look, after `rate` told the sight of the camera's. `seen` receives the frame of a round.
 fn judge(
     sight: &mut Steady<Sight>,
     frame: Frame,
     round: Option<RoundId>,
+    rate: impl FnOnce(&mut Sight),
     seen: &Mutex<Option<Seen>>,
 ) -> Result<Taken, Broken> {
-    let taken = sight.run(frame.at, |sight| sight.take(&frame, round.is_some()))?;
+    let taken = sight.run(frame.at, |sight| {
+        rate(sight);
+        sight.take(&frame, round.is_some())
+    })?;
     if let (Some(round), Some(observation)) = (round, &taken.observation) {
         let features = observation.as_ref().ok().map(|observation| observation.features.clone());
         *seen.lock().unwrap_or_else(PoisonError::into_inner) =

@@ -1,5 +1,6 @@
 //! The frames of one robot, received at a peer: its camera is somewhere else.
 
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -22,13 +23,21 @@ pub struct Inlet {
     newest: Mutex<Option<FrameArrival>>,
     arrived: Condvar,
     gate: OnceLock<FrameGate>,
+    /// The bits of the frames per second that the sender states; 0 until it has.
+    fps: AtomicU32,
 }
 
 impl Inlet {
     /// For the frames of that robot.
     #[must_use]
     pub fn new(robot: RobotId) -> Arc<Self> {
-        Arc::new(Self { robot, newest: Mutex::new(None), arrived: Condvar::new(), gate: OnceLock::new() })
+        Arc::new(Self {
+            robot,
+            newest: Mutex::new(None),
+            arrived: Condvar::new(),
+            gate: OnceLock::new(),
+            fps: AtomicU32::new(0),
+        })
     }
 
     /// Opens it at that robot's session.
@@ -62,12 +71,39 @@ impl Inlet {
             .unwrap_or_else(PoisonError::into_inner);
         let frame = newest.take()?;
         drop(newest);
+        self.acknowledge(&frame);
+        Some(frame)
+    }
+
+    /// Passes over the frame that waits if it was taken longer ago, and asks for the next.
+    pub fn skip_older(&self, than: Duration) {
+        let mut newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let stale = newest.take_if(|frame| age(frame) > than);
+        drop(newest);
+        if let Some(frame) = stale {
+            self.acknowledge(&frame);
+        }
+    }
+
+    /// The frames per second that the camera takes, as its sender states; `None` before its first frame.
+    #[must_use]
+    pub fn fps(&self) -> Option<f64> {
+        let fps = f32::from_bits(self.fps.load(Ordering::Relaxed));
+        (fps > 0.0).then(|| f64::from(fps))
+    }
+
+    fn acknowledge(&self, frame: &FrameArrival) {
+        self.fps.store(frame.header.fps.to_bits(), Ordering::Relaxed);
         if let Some(gate) = self.gate.get() {
             let FrameHeader { nonce, sequence, .. } = frame.header;
             gate.taken(self.robot, &FrameTaken { nonce, sequence, round: gate.round() });
         }
-        Some(frame)
     }
+}
+
+/// How long ago a frame was taken.
+fn age(frame: &FrameArrival) -> Duration {
+    Duration::from_micros(u64::from(frame.header.age_us)) + frame.at.elapsed()
 }
 
 /// A camera that is somewhere else: the frames that `gestalt stream` sends.
@@ -102,7 +138,7 @@ impl Source for StreamSource {
         let mut image = Mat::default();
         decode(&arrival.picture(), MAX_MEGAPIXELS, &mut image)
             .map_err(|cause: PictureError| SourceError::Garbled { robot: self.inlet.robot, cause })?;
-        let age = Duration::from_micros(u64::from(arrival.header.age_us)) + arrival.at.elapsed();
+        let age = age(&arrival);
         // Two frames of which the older was longer under way must not change places.
         self.last = self.last.max((now + called.elapsed()).saturating_sub(age));
         Ok(Frame { image, at: self.last })

@@ -3,7 +3,10 @@
 //! ```text
 //! DIR/fist/s012_0001.jpg      the gesture `fist`, shown by person 12
 //! DIR/palm/anything.png       the gesture `palm`, by no one in particular
+//! DIR/none/office.jpg         no gesture: for counting false alarms
 //! ```
+
+mod folders;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -16,8 +19,9 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use thiserror::Error;
 
-/// Most images that are listed.
-const MAX_IMAGES: usize = 1_000_000;
+use folders::{Folders, MAX_IMAGES, in_order};
+
+pub use folders::{Ignored, NONE, Naming};
 
 /// A folder that is no dataset.
 #[derive(Debug, Error)]
@@ -30,30 +34,40 @@ pub enum DatasetError {
         /// Why.
         source: io::Error,
     },
-    /// It has no folder with images in it.
+    /// It has no folder with images of a gesture in it.
     #[error("{} holds no images: put them into one folder per gesture, as .jpg, .jpeg or .png", .0.display())]
     Empty(PathBuf),
+    /// Named more than once: it would be learned from and measured on at the same time.
+    #[error("{} is given twice: name each dataset once", .0.display())]
+    Twice(PathBuf),
     /// A gesture was asked for that has no folder.
-    #[error("{} has no images of the gesture '{label}': it has {}", path.display(), found.join(", "))]
+    #[error("{} has no images of the gesture '{label}': it has {}", joined(folders), found.join(", "))]
     Missing {
-        /// The dataset.
-        path: PathBuf,
+        /// The datasets.
+        folders: Vec<PathBuf>,
         /// The gesture asked for.
         label: String,
-        /// The gestures it has.
+        /// The gestures they have.
         found: Vec<String>,
     },
-    /// Its folders make no vocabulary.
-    #[error("the folders of {} make no vocabulary: {source}", path.display())]
+    /// [`NONE`] was asked for.
+    #[error("'{NONE}' holds pictures without a gesture, which nobody learns: leave it out of the gestures")]
+    NoGesture,
+    /// The folders make no vocabulary.
+    #[error("the folders of {} make no vocabulary: {source}", joined(folders))]
     Vocabulary {
-        /// The dataset.
-        path: PathBuf,
+        /// The datasets.
+        folders: Vec<PathBuf>,
         /// Why.
         source: VocabularyError,
     },
     /// More images than are ever needed.
     #[error("{} holds more than {MAX_IMAGES} images", .0.display())]
     TooLarge(PathBuf),
+}
+
+fn joined(folders: &[PathBuf]) -> String {
+    folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// A photograph and what is known of it.
@@ -63,7 +77,8 @@ pub struct LabelledImage {
     pub path: PathBuf,
     /// The gesture it shows.
     pub class: ClassId,
-    /// Who shows it: NNN of a file name `sNNN_…`.
+    /// Who shows it: NNN of a file name `sNNN_…`. Where several datasets are listed together, the people of all of them are
+    /// numbered through, so that those of different datasets never share a number.
     pub person: Option<u32>,
 }
 
@@ -95,12 +110,14 @@ impl LabelledImage {
 /// The images of a dataset folder, listed but not yet read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dataset {
-    /// The gestures: names of the folders, by number where all are numbers, else by alphabet.
+    /// The gestures, by number where all are numbers, else by alphabet; or in the order they were asked for.
     pub vocabulary: Vocabulary,
-    /// The images, by gesture, then by file name.
+    /// The images, by gesture, then by folder and file name.
     pub images: Vec<LabelledImage>,
-    /// Folders with images that were not asked for.
-    pub ignored: Vec<String>,
+    /// Images without a gesture: those in the folder [`NONE`].
+    pub none: Vec<PathBuf>,
+    /// Folders with images that were not asked for, or show no gesture.
+    pub ignored: Vec<Ignored>,
 }
 
 impl Dataset {
@@ -109,51 +126,76 @@ impl Dataset {
     /// # Errors
     /// See [`DatasetError`].
     pub fn list(folder: &Path, labels: Option<&[String]>) -> Result<Self, DatasetError> {
-        let mut found = folders_with_images(folder)?;
-        if found.is_empty() {
-            return Err(DatasetError::Empty(folder.to_owned()));
-        }
-        let labels = match labels {
-            Some(labels) => labels.to_vec(),
-            None => in_order(found.keys().cloned().collect()),
+        Ok(Self::list_several(&[folder.to_owned()], Naming::Names, labels)?.remove(0))
+    }
+
+    /// Lists the images of several folders under one vocabulary: of all the gestures that any of them has, or of those in
+    /// `labels`, in that order. One dataset for each folder; of a folder that has none of the gestures, one without images.
+    ///
+    /// # Errors
+    /// See [`DatasetError`]; [`DatasetError::Empty`] also of a folder with no images at all.
+    pub fn list_several(
+        folders: &[PathBuf],
+        naming: Naming,
+        labels: Option<&[String]>,
+    ) -> Result<Vec<Self>, DatasetError> {
+        each_once(folders)?;
+        let read = |folder: &PathBuf| -> Result<Folders, DatasetError> {
+            match Folders::read(folder, naming)? {
+                found if found.gestures.is_empty() && found.none.is_empty() => {
+                    Err(DatasetError::Empty(folder.clone()))
+                }
+                found => Ok(found),
+            }
         };
-        let vocabulary = Vocabulary::new(labels.iter().cloned())
-            .map_err(|source| DatasetError::Vocabulary { path: folder.to_owned(), source })?;
-        let names = in_order(found.keys().cloned().collect());
-        let mut images = Vec::new();
-        for (class, label) in (0_u8..).zip(&labels) {
-            let paths = found.remove(label).ok_or_else(|| DatasetError::Missing {
-                path: folder.to_owned(),
-                label: label.clone(),
-                found: names.clone(),
-            })?;
-            images.extend(paths.into_iter().map(|path| LabelledImage {
-                class: ClassId(class),
-                person: person(&path),
-                path,
-            }));
+        let sets: Vec<Folders> = folders.iter().map(read).collect::<Result<_, _>>()?;
+        let found: BTreeSet<String> = sets.iter().flat_map(|set| set.gestures.keys().cloned()).collect();
+        let found = in_order(found.into_iter().collect());
+        if found.is_empty() {
+            return Err(DatasetError::Empty(folders.first().cloned().unwrap_or_default()));
         }
-        Ok(Self { vocabulary, images, ignored: in_order(found.into_keys().collect()) })
+        let labels = labels.map_or_else(|| found.clone(), <[String]>::to_vec);
+        if labels.iter().any(|label| label == NONE) {
+            return Err(DatasetError::NoGesture);
+        }
+        if let Some(label) = labels.iter().find(|label| !found.contains(label)) {
+            return Err(DatasetError::Missing { folders: folders.to_vec(), label: label.clone(), found });
+        }
+        let vocabulary = Vocabulary::new(labels)
+            .map_err(|source| DatasetError::Vocabulary { folders: folders.to_vec(), source })?;
+        let mut sets: Vec<Self> = sets.into_iter().map(|set| Self::of(set, &vocabulary)).collect();
+        if sets.len() > 1 {
+            number_people_through(&mut sets);
+        }
+        Ok(sets)
     }
 
     /// Lists the images of those gestures of `vocabulary` that `folder` has, under the vocabulary's class ids.
     ///
     /// # Errors
-    /// [`DatasetError::Empty`] when it has none of them; else see [`DatasetError`].
-    pub fn list_known(folder: &Path, vocabulary: &Vocabulary) -> Result<Self, DatasetError> {
-        let mut found = folders_with_images(folder)?;
-        let mut images = Vec::new();
-        for (class, label) in (0_u8..).zip(vocabulary.labels()) {
-            let paths = found.remove(label).unwrap_or_default().into_iter();
-            let labelled =
-                paths.map(|path| LabelledImage { class: ClassId(class), person: person(&path), path });
-            images.extend(labelled);
-        }
-        if images.is_empty() {
+    /// [`DatasetError::Empty`] when it has none of them and no images without a gesture either, unless its folders are
+    /// counts of fingers: they are all ignored then. Else see [`DatasetError`].
+    pub fn list_known(folder: &Path, naming: Naming, vocabulary: &Vocabulary) -> Result<Self, DatasetError> {
+        let dataset = Self::of(Folders::read(folder, naming)?, vocabulary);
+        let nothing = dataset.images.is_empty() && dataset.none.is_empty();
+        if nothing && (naming == Naming::Names || dataset.ignored.is_empty()) {
             return Err(DatasetError::Empty(folder.to_owned()));
         }
-        let ignored = in_order(found.into_keys().collect());
-        Ok(Self { vocabulary: vocabulary.clone(), images, ignored })
+        Ok(dataset)
+    }
+
+    fn of(mut found: Folders, vocabulary: &Vocabulary) -> Self {
+        let mut images = Vec::new();
+        for (class, label) in (0_u8..).zip(vocabulary.labels()) {
+            let paths = found.gestures.remove(label).unwrap_or_default().into_iter();
+            images.extend(paths.map(|path| LabelledImage {
+                class: ClassId(class),
+                person: person(&path),
+                path,
+            }));
+        }
+        let none = std::mem::take(&mut found.none);
+        Self { vocabulary: vocabulary.clone(), images, none, ignored: found.left() }
     }
 
     /// The people who show something.
@@ -176,39 +218,30 @@ impl Dataset {
     }
 }
 
-/// The images of each sub-folder that has any, by file name.
-fn folders_with_images(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>, DatasetError> {
-    let entries = |path: &Path| -> Result<Vec<PathBuf>, DatasetError> {
-        let failed = |source| DatasetError::Io { path: path.to_owned(), source };
-        let entries = fs::read_dir(path).map_err(failed)?;
-        entries.take(MAX_IMAGES + 1).map(|entry| entry.map(|entry| entry.path()).map_err(failed)).collect()
-    };
-    let mut found = BTreeMap::new();
-    let mut count = 0;
-    for path in entries(folder)? {
-        let Some(label) = path.file_name().and_then(|name| name.to_str()).map(str::to_owned) else {
-            continue;
-        };
-        if !path.is_dir() {
-            continue;
-        }
-        let mut images = entries(&path)?;
-        images.retain(|path| is_image(path));
-        images.sort();
-        count += images.len();
-        if count > MAX_IMAGES {
-            return Err(DatasetError::TooLarge(folder.to_owned()));
-        }
-        if !images.is_empty() {
-            found.insert(label, images);
+/// Two names of one folder are one dataset.
+fn each_once(folders: &[PathBuf]) -> Result<(), DatasetError> {
+    let mut seen = BTreeSet::new();
+    for folder in folders {
+        let place =
+            fs::canonicalize(folder).map_err(|source| DatasetError::Io { path: folder.clone(), source })?;
+        if !seen.insert(place) {
+            return Err(DatasetError::Twice(folder.clone()));
         }
     }
-    Ok(found)
+    Ok(())
 }
 
-fn is_image(path: &Path) -> bool {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    ["jpg", "jpeg", "png"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+/// Gives the people of all datasets numbers of their own.
+fn number_people_through(sets: &mut [Dataset]) {
+    let people = sets.iter().enumerate().flat_map(|(set, dataset)| {
+        dataset.people().into_iter().map(move |person| (set, person)).collect::<Vec<_>>()
+    });
+    let numbers: BTreeMap<(usize, u32), u32> = people.zip(0..).collect();
+    for (set, dataset) in sets.iter_mut().enumerate() {
+        for image in &mut dataset.images {
+            image.person = image.person.and_then(|person| numbers.get(&(set, person)).copied());
+        }
+    }
 }
 
 /// NNN of a file name `sNNN_…`.
@@ -216,16 +249,6 @@ fn person(path: &Path) -> Option<u32> {
     let (prefix, _) = path.file_name()?.to_str()?.split_once('_')?;
     let digits = prefix.strip_prefix('s')?;
     digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok())?
-}
-
-/// By number where all labels are numbers (10 after 9), else by alphabet.
-fn in_order(mut labels: Vec<String>) -> Vec<String> {
-    if labels.iter().all(|label| label.parse::<u32>().is_ok()) {
-        labels.sort_by_key(|label| (label.parse::<u32>().ok(), label.clone()));
-    } else {
-        labels.sort();
-    }
-    labels
 }
 
 #[cfg(test)]
@@ -283,7 +306,7 @@ mod tests {
         let folder = dataset(&["a/1.jpg", "b/1.jpg", "c/1.jpg"]);
         let chosen = Dataset::list(folder.path(), Some(&strings(&["c", "a"]))).unwrap();
         assert_eq!(chosen.vocabulary.labels(), ["c", "a"]);
-        assert_eq!(chosen.ignored, ["b"]);
+        assert_eq!(chosen.ignored, [Ignored { label: "b".to_owned(), images: 1 }]);
         let missing = Dataset::list(folder.path(), Some(&strings(&["a", "d"]))).unwrap_err();
         assert!(missing.to_string().contains("'d': it has a, b, c"), "{missing}");
     }
@@ -304,11 +327,76 @@ mod tests {
     fn a_model_sees_the_gestures_it_knows() {
         let folder = dataset(&["1/x.jpg", "background/x.jpg"]);
         let vocabulary = Vocabulary::new(["0", "1"]).unwrap();
-        let known = Dataset::list_known(folder.path(), &vocabulary).unwrap();
+        let known = Dataset::list_known(folder.path(), Naming::Names, &vocabulary).unwrap();
         assert_eq!((known.images.len(), known.images[0].class), (1, ClassId(1)));
-        assert_eq!(known.ignored, ["background"]);
+        assert_eq!(said(&known), ["background (1 images)"]);
         let stranger = Vocabulary::new(["x", "y"]).unwrap();
-        assert!(matches!(Dataset::list_known(folder.path(), &stranger), Err(DatasetError::Empty(_))));
+        let unknown = Dataset::list_known(folder.path(), Naming::Names, &stranger);
+        assert!(matches!(unknown, Err(DatasetError::Empty(_))));
+        // A count that the model does not know is said, and no error.
+        let unknown = Dataset::list_known(folder.path(), Naming::Counts, &stranger).unwrap();
+        assert!(unknown.images.is_empty());
+        assert_eq!(said(&unknown), ["1 (1 images)", "background (1 images)"]);
+    }
+
+    fn said(dataset: &Dataset) -> Vec<String> {
+        dataset.ignored.iter().map(Ignored::to_string).collect()
+    }
+
+    #[test]
+    fn folders_can_be_counts_of_fingers() {
+        let folder = dataset(&[
+            "3/a.jpg",
+            "3_thumb/b.jpg",
+            "3_thumb/boxes.csv",
+            "0/c.jpg",
+            "call/d.jpg",
+            "none/e.jpg",
+            "LICENCE.txt",
+        ]);
+        let folders = [folder.path().to_owned()];
+        let counts = Dataset::list_several(&folders, Naming::Counts, None).unwrap().remove(0);
+        assert_eq!(counts.vocabulary.labels(), ["0", "3"]);
+        assert_eq!(counts.images.iter().map(|image| image.class.0).collect::<Vec<_>>(), [0, 1, 1]);
+        assert_eq!((said(&counts), counts.none.len()), (vec!["call (1 images)".to_owned()], 1));
+    }
+
+    #[test]
+    fn pictures_without_a_gesture_are_nobodys_class() {
+        let folder = dataset(&["a/1.jpg", "b/1.jpg", "none/1.jpg", "none/2.jpg"]);
+        let all = Dataset::list(folder.path(), None).unwrap();
+        assert_eq!(
+            (all.vocabulary.labels(), all.images.len(), all.none.len()),
+            (&strings(&["a", "b"])[..], 2, 2)
+        );
+        let asked = Dataset::list(folder.path(), Some(&strings(&["a", "none"])));
+        assert!(matches!(asked, Err(DatasetError::NoGesture)));
+    }
+
+    #[test]
+    fn several_datasets_have_one_vocabulary_and_no_person_in_common() {
+        let sets = [
+            dataset(&["1/s001_a.jpg", "2/s007_a.jpg", "2/x.jpg"]),
+            dataset(&["2/s001_a.jpg", "3/s002_a.jpg"]),
+        ];
+        let negatives = dataset(&["none/x.jpg"]);
+        let folders: Vec<PathBuf> =
+            sets.iter().chain([&negatives]).map(|folder| folder.path().to_owned()).collect();
+        let listed = Dataset::list_several(&folders, Naming::Names, None).unwrap();
+        assert!(listed.iter().all(|set| set.vocabulary.labels() == ["1", "2", "3"]));
+        let shown = |set: &Dataset| set.images.iter().map(|i| (i.class.0, i.person)).collect::<Vec<_>>();
+        assert_eq!(shown(&listed[0]), [(0, Some(0)), (1, Some(1)), (1, None)]);
+        assert_eq!(shown(&listed[1]), [(1, Some(2)), (2, Some(3))]);
+        assert_eq!((listed[2].images.len(), listed[2].none.len()), (0, 1));
+
+        let chosen = Dataset::list_several(&folders, Naming::Names, Some(&strings(&["3", "1"]))).unwrap();
+        assert_eq!((shown(&chosen[0]), shown(&chosen[1])), (vec![(1, Some(0))], vec![(0, Some(1))]));
+        let missing =
+            Dataset::list_several(&folders, Naming::Names, Some(&strings(&["1", "9"]))).unwrap_err();
+        assert!(missing.to_string().contains("'9': it has 1, 2, 3"), "{missing}");
+        let twice = [folders[0].clone(), folders[0].join("../").join(folders[0].file_name().unwrap())];
+        let twice = Dataset::list_several(&twice, Naming::Names, None);
+        assert!(matches!(twice, Err(DatasetError::Twice(_))));
     }
 
     #[test]

@@ -30,3 +30,5 @@ pub mod source;
 pub mod steady;
 #[cfg(feature = "opencv")]
 pub mod survey;
+#[cfg(feature = "opencv")]
+pub mod variation;

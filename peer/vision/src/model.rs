@@ -65,9 +65,7 @@ impl RobotModel {
     /// # Errors
     /// See [`ModelError`].
     pub fn rendered() -> Result<Self, ModelError> {
-        let name = PathBuf::from("rendered");
-        let model = Model::decode(EMBEDDED, &name)?;
-        Self::new(model.classifier, "trained on synthetic hands".to_owned(), name)
+        Self::new(embedded()?.classifier, "trained on synthetic hands".to_owned(), PathBuf::from("rendered"))
     }
 
     /// The model in a file that `gestalt train` wrote.
@@ -92,6 +90,14 @@ impl RobotModel {
             classifier.space().feature_set().parse().map_err(|cause| ModelError::Features { path, cause })?;
         Ok(Self { classifier: Arc::new(classifier), features, name })
     }
+}
+
+/// The embedded model with the record of its training.
+///
+/// # Errors
+/// See [`ModelFileError`].
+pub fn embedded() -> Result<Model, ModelFileError> {
+    Model::decode(EMBEDDED, Path::new("rendered"))
 }
 
 /// Makes the embedded model: gestures `0` to `5`, rendered for all cameras, from the same seed every time. `progress` is
@@ -187,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_embedded_model_is_made_for_the_perception_of_today() {
-        let model = Model::decode(EMBEDDED, Path::new("embedded")).unwrap();
+        let model = embedded().unwrap();
         assert_eq!(model.classifier.vocabulary().labels(), ["0", "1", "2", "3", "4", "5"]);
         model.check_features(FeatureSet::Shape.name(), FeatureSet::Shape.length()).unwrap();
         assert!(model.origin.dataset.starts_with("1500 rendered frames"), "{}", model.origin.dataset);
@@ -213,9 +219,9 @@ mod tests {
         if std::env::var_os("GESTALT_LONG").is_none() {
             return;
         }
-        let embedded = Model::decode(EMBEDDED, Path::new("embedded")).unwrap();
+        let shipped = embedded().unwrap();
         let again = train_on_rendered(|_, _| ()).unwrap();
-        assert_eq!(again.origin, embedded.origin);
-        assert_eq!(again.classifier, embedded.classifier);
+        assert_eq!(again.origin, shipped.origin);
+        assert_eq!(again.classifier, shipped.classifier);
     }
 }

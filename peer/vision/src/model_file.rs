@@ -93,11 +93,12 @@ pub enum ModelFileError {
 /// How a model came to be: what must be known to measure it honestly, and to make it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Name of the dataset's folder; of synthetic hands, what was rendered.
+    /// Name of the dataset's folder, or of several; of synthetic hands, what was rendered.
     pub dataset: String,
-    /// The people it has seen in training, by the numbers of that dataset.
+    /// The people it has seen in training, by the numbers of that dataset; of several datasets, numbered through.
     pub people: Vec<u32>,
-    /// The [fingerprints](crate::dataset::LabelledImage::fingerprint) of the images it has seen in training, ascending.
+    /// The [fingerprints](crate::dataset::LabelledImage::fingerprint) of the images it was shown in training, ascending, also
+    /// of those in which no hand was found.
     pub images: Vec<u64>,
     /// The seed of the training.
     pub seed: u64,

@@ -123,11 +123,24 @@ impl Sight {
         Some(Motion { state: detector.state(), delay_ms: delay.as_secs_f32() * 1000.0 })
     }
 
+    /// The camera takes so many frames per second, as its sender states. From now on its rate is not taken from the frames
+    /// that come here, which are as many as there is time for.
+    pub fn rate_is(&mut self, fps: f64) {
+        self.mismatch.rate_is(fps);
+    }
+
+    /// The camera delivered so many frames between the last one taken and the next.
+    pub fn passed_over(&mut self, frames: u64) {
+        self.mismatch.passed_over(frames);
+    }
+
     /// Reads frames as what they are when they are not what the configuration says. Says so, once.
     fn adapt_to(&mut self, frame: &Frame) -> Option<String> {
-        let said = self.mismatch.notice(frame)?;
+        let rate = self.mismatch.notice_rate(frame.at);
+        // Every frame says its own size; only what counts in seconds has to be made anew.
+        let Some(said) = rate else { return self.mismatch.notice_size(frame) };
         let model = self.mismatch.model();
-        match Perception::for_camera(self.features, HandConfig::default(), self.layer, model) {
+        match Perception::for_camera(self.features, HandConfig::default(), self.layer, &model) {
             Ok(perception) => {
                 self.perception = perception;
                 Some(said)

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use gestalt_strategies::{
     Classify, Evaluation, LabelledFeatures, ScalingMethod, TrainOptions, Vocabulary, train,
 };
-use gestalt_vision::dataset::{Dataset, LabelledImage};
+use gestalt_vision::dataset::{Dataset, LabelledImage, Naming};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::source::read_image;
 use gestalt_vision::survey::Survey;
@@ -100,7 +100,7 @@ fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
     let set = FeatureSet::Shape;
     let mut perception = Perception::new(set, HandConfig::default()).unwrap();
     let mut look = |folder: &Path| {
-        let dataset = Dataset::list_known(folder, &vocabulary).unwrap();
+        let dataset = Dataset::list_known(folder, Naming::Names, &vocabulary).unwrap();
         Survey::of(&dataset.images, &mut perception, || ())
     };
     let (learned, unseen) = (look(&signs).samples(), look(&webcam));
@@ -124,7 +124,7 @@ fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
     let wall = walls.iter().find_map(|path| read_image(path).ok()).unwrap();
     let mut eyes = Perception::new(set, HandConfig::default()).unwrap();
     let mut evaluation = Evaluation::new(5);
-    let images = Dataset::list_known(&webcam, &vocabulary).unwrap().images;
+    let images = Dataset::list_known(&webcam, Naming::Names, &vocabulary).unwrap().images;
     for image in &images {
         if let Ok(seen) = eyes.observe_before(&read_image(&image.path).unwrap(), Some(&wall)) {
             evaluation.record(image.class, &trained.classifier.probabilities(&seen.features).unwrap());

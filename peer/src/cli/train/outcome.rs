@@ -1,6 +1,6 @@
 //! What came of a training, as text and as JSON.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gestalt_strategies::{Classifier, Classify, Evaluation, Folding, Reduction, Trained};
 use serde_json::{Value, json};
@@ -11,8 +11,8 @@ use gestalt_vision::survey::Survey;
 
 /// A training that is over.
 pub(super) struct Outcome<'a> {
-    /// The folder it was trained on.
-    pub folder: &'a Path,
+    /// The folders it was trained on.
+    pub folders: &'a [PathBuf],
     /// The file it was written to.
     pub out: &'a Path,
     /// What was written.
@@ -28,21 +28,35 @@ pub(super) struct Outcome<'a> {
     /// How it did on the images held out, if there are any.
     pub test: Option<&'a (Evaluation, Survey)>,
     /// Folders that were left out.
-    pub ignored: &'a [String],
+    pub ignored: Vec<&'a str>,
 }
 
 impl Outcome<'_> {
+    fn datasets(&self) -> String {
+        self.folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Whether it is known of every image who shows it.
+    fn by_person(&self) -> bool {
+        self.survey.seen.iter().all(|(image, _)| image.person.is_some())
+    }
+
     /// Some lines for people.
     pub(super) fn text(&self) -> String {
         let Self { model, trained, .. } = self;
         let classifier = &model.classifier;
         let people = model.origin.people.len();
-        let folding = match trained.folding {
-            Folding::ByGroup => "by subject",
-            Folding::BySample => "by image (subjects appear on both sides of the split)",
+        let folding = match (trained.folding, self.by_person()) {
+            (Folding::ByGroup, true) => "by subject",
+            (Folding::ByGroup, false) => "by subject where known, else by image",
+            (Folding::BySample, _) => "by image (subjects appear on both sides of the split)",
+        };
+        let copies = match self.survey.copies.len() {
+            0 => String::new(),
+            copies => format!(" and {copies} variations"),
         };
         let mut lines = vec![
-            format!("{} images of {people} subjects, {}", self.survey.seen.len(), self.folder.display()),
+            format!("{} images{copies} of {people} subjects, {}", self.survey.seen.len(), self.datasets()),
             format!("  gestures   {}", classifier.vocabulary().labels().join(" ")),
             format!(
                 "  features   {} → {} principal components, {:.1} % of the variance",
@@ -75,7 +89,7 @@ impl Outcome<'_> {
         let classifier = &model.classifier;
         json!({
             "model": self.out.display().to_string(),
-            "dataset": self.folder.display().to_string(),
+            "dataset": self.datasets(),
             "gestures": classifier.vocabulary().labels(),
             "ignored": self.ignored,
             "feature_set": classifier.space().feature_set(),
@@ -86,12 +100,13 @@ impl Outcome<'_> {
             "gamma": trained.gamma,
             "support_vectors": classifier.support_vectors(),
             "images": survey.seen.len(),
+            "variations": survey.copies.len(),
             "without_hand": survey.without_hand.len(),
             "unreadable": survey.unreadable.len(),
             "people": model.origin.people.len(),
             "cross_validation": {
                 "folds": self.folds,
-                "by_person": trained.folding == Folding::ByGroup,
+                "by_person": trained.folding == Folding::ByGroup && self.by_person(),
                 "accuracy": trained.accuracy,
                 "log_loss": trained.log_loss,
             },

@@ -14,67 +14,100 @@ const FRAMES: usize = 24;
 /// A rate that differs by no more than this factor is what was meant: cameras slow down in poor light.
 const RATE: f64 = 1.5;
 
-/// Compares frames with a camera's model, and makes the model what they are.
+/// Compares frames with a camera's model.
 pub struct Mismatch {
+    /// As the configuration says.
     model: CameraModel,
+    /// The rate it has instead, once it was said.
+    fps: Option<f64>,
+    /// The rate its sender states.
+    stated: Option<f64>,
+    size_said: bool,
     last: Option<Duration>,
+    /// Frames that were delivered since then.
+    passed_over: u64,
     intervals: VecDeque<Duration>,
-    rate_said: bool,
 }
 
 impl Mismatch {
     pub fn new(model: CameraModel) -> Self {
-        Self { model, last: None, intervals: VecDeque::new(), rate_said: false }
+        Self {
+            model,
+            fps: None,
+            stated: None,
+            size_said: false,
+            last: None,
+            passed_over: 0,
+            intervals: VecDeque::new(),
+        }
     }
 
-    /// What the camera is, as far as its frames show.
-    pub fn model(&self) -> &CameraModel {
-        &self.model
+    /// The camera's model, at the rate that it has. Its size remains what the configuration says, for its blur is measured in
+    /// those pixels.
+    pub fn model(&self) -> CameraModel {
+        CameraModel { fps: self.fps.unwrap_or(self.model.fps), ..self.model.clone() }
     }
 
-    /// What is not as it should be; the model is changed to what is. The same thing is said once.
-    pub fn notice(&mut self, frame: &Frame) -> Option<String> {
+    /// What its sender states.
+    pub fn rate_is(&mut self, fps: f64) {
+        self.stated = (fps > 0.0).then_some(fps);
+    }
+
+    /// So many frames came between the last one and the next.
+    pub fn passed_over(&mut self, frames: u64) {
+        self.passed_over = self.passed_over.saturating_add(frames);
+    }
+
+    /// Another size than the configuration says; said once.
+    pub fn notice_size(&mut self, frame: &Frame) -> Option<String> {
         let size = (frame.image.cols(), frame.image.rows());
         let meant = (self.model.width_px, self.model.height_px);
-        if size != meant && size.0 > 0 && size.1 > 0 {
-            let aspect = |(width, height): (i32, i32)| f64::from(width) / f64::from(height);
-            let shape = match (aspect(size) / aspect(meant) - 1.0).abs() < 0.02 {
-                true => "of the same aspect",
-                false => "of another aspect",
-            };
-            (self.model.width_px, self.model.height_px) = size;
-            return Some(format!(
-                "the camera delivers frames of {}×{} pixels, {shape}, where camera.model says {}×{}: they are read as they are; correct camera.model if that is its format",
-                size.0, size.1, meant.0, meant.1
-            ));
-        }
-        self.notice_rate(frame.at)
-    }
-
-    fn notice_rate(&mut self, at: Duration) -> Option<String> {
-        let last = self.last.replace(at)?;
-        if self.rate_said {
+        if self.size_said || size == meant || size.0 <= 0 || size.1 <= 0 {
             return None;
         }
+        self.size_said = true;
+        let aspect = |(width, height): (i32, i32)| f64::from(width) / f64::from(height);
+        let shape = match (aspect(size) / aspect(meant) - 1.0).abs() < 0.02 {
+            true => "of the same aspect",
+            false => "of another aspect",
+        };
+        Some(format!(
+            "the camera delivers frames of {}×{} pixels, {shape}, where camera.model says {}×{}: every frame is read as it is; correct camera.model if that is its format",
+            size.0, size.1, meant.0, meant.1
+        ))
+    }
+
+    /// Another rate than the configuration says; said once.
+    pub fn notice_rate(&mut self, at: Duration) -> Option<String> {
+        if self.fps.is_some() {
+            return None;
+        }
+        let measured = self.measured(at);
+        let fps = self.stated.or(measured)?;
+        let meant = self.model.fps;
+        if (meant / RATE..=meant * RATE).contains(&fps) {
+            return None;
+        }
+        self.fps = Some(fps.clamp(0.1, 240.0));
+        Some(format!(
+            "the camera delivers {fps:.1} frames per second where camera.model says {meant}: all counts in seconds, so it is used as it is; correct camera.model if that is its rate"
+        ))
+    }
+
+    /// The median rate of what the camera delivered, also of frames that nobody had time for; `None` of too few.
+    fn measured(&mut self, at: Duration) -> Option<f64> {
+        let between = u32::try_from(std::mem::take(&mut self.passed_over)).unwrap_or(u32::MAX);
+        let last = self.last.replace(at)?;
         if self.intervals.len() == FRAMES {
             self.intervals.pop_front();
         }
-        self.intervals.push_back(at.saturating_sub(last));
+        self.intervals.push_back(at.saturating_sub(last) / between.saturating_add(1));
         if self.intervals.len() < FRAMES {
             return None;
         }
         let mut sorted: Vec<Duration> = self.intervals.iter().copied().collect();
         sorted.sort_unstable();
-        let fps = 1.0 / sorted[FRAMES / 2].as_secs_f64().max(1e-3);
-        let meant = self.model.fps;
-        if (meant / RATE..=meant * RATE).contains(&fps) {
-            return None;
-        }
-        self.rate_said = true;
-        self.model.fps = fps.clamp(0.1, 240.0);
-        Some(format!(
-            "the camera delivers {fps:.1} frames per second where camera.model says {meant}: all counts in seconds, so it is used as it is; correct camera.model if that is its rate"
-        ))
+        Some(1.0 / sorted[FRAMES / 2].as_secs_f64().max(1e-3))
     }
 }
 
@@ -89,24 +122,53 @@ mod tests {
         Frame { image, at: Duration::from_millis(at_ms) }
     }
 
-    #[test]
-    fn what_the_configuration_says_is_no_news() {
-        let mut mismatch = Mismatch::new(CameraModel::footbot());
-        assert!((0..100).all(|at| mismatch.notice(&frame(384, 288, at * 500)).is_none()));
+    fn notice(mismatch: &mut Mismatch, frame: &Frame) -> Vec<String> {
+        [mismatch.notice_rate(frame.at), mismatch.notice_size(frame)].into_iter().flatten().collect()
     }
 
     #[test]
-    fn another_size_or_rate_is_said_once_and_taken_for_what_it_is() {
+    fn what_the_configuration_says_is_no_news() {
+        let mut mismatch = Mismatch::new(CameraModel::footbot());
+        assert!((0..100).all(|at| notice(&mut mismatch, &frame(384, 288, at * 500)).is_empty()));
+        assert_eq!(mismatch.model(), CameraModel::footbot());
+    }
+
+    #[test]
+    fn another_size_or_rate_is_said_once_and_against_what_the_configuration_says() {
         let mut mismatch = Mismatch::new(CameraModel::parrot());
-        let said: Vec<String> =
-            (0..200).filter_map(|at| mismatch.notice(&frame(640, 480, at * 100))).collect();
+        // A folder of mixed sizes.
+        let sizes = [(640, 480), (320, 240), (640, 360)];
+        let said: Vec<String> = (0..200)
+            .flat_map(|at| {
+                let (width, height) = sizes[at as usize % 3];
+                notice(&mut mismatch, &frame(width, height, at * 100))
+            })
+            .collect();
         let [size, rate] = &said[..] else { panic!("{said:?}") };
-        assert!(
-            size.contains("640×480") && size.contains("another aspect") && size.contains("640×360"),
-            "{size}"
-        );
+        assert!(size.contains("640×480") && size.contains("another aspect"), "{size}");
+        assert!(size.contains("camera.model says 640×360"), "{size}");
         assert!(rate.contains("10.0 frames") && rate.contains("says 30"), "{rate}");
-        assert_eq!((mismatch.model().height_px, mismatch.model().fps.round()), (480, 10.0));
-        assert!(mismatch.notice(&frame(320, 240, 30_000)).unwrap().contains("of the same aspect"));
+        // The blur is a share of the width that it was measured at.
+        let expected = CameraModel { fps: mismatch.model().fps, ..CameraModel::parrot() };
+        assert_eq!((mismatch.model(), expected.fps.round()), (expected, 10.0));
+    }
+
+    #[test]
+    fn what_a_busy_machine_passes_over_was_delivered_all_the_same() {
+        let mut mismatch = Mismatch::new(CameraModel::parrot());
+        for at in 0..100 {
+            mismatch.passed_over(2);
+            assert_eq!(notice(&mut mismatch, &frame(640, 360, at * 100)), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn the_rate_that_a_sender_states_counts_whatever_arrives() {
+        let mut mismatch = Mismatch::new(CameraModel::parrot());
+        mismatch.rate_is(30.0);
+        assert!((0..100).all(|at| notice(&mut mismatch, &frame(640, 360, at * 500)).is_empty()));
+        mismatch.rate_is(5.0);
+        let said = notice(&mut mismatch, &frame(640, 360, 60_000));
+        assert!(said[0].contains("5.0 frames per second where camera.model says 30"), "{said:?}");
     }
 }

@@ -34,14 +34,7 @@ impl Device {
         if !capture.is_opened()? {
             return Err(SourceError::NotADevice(path.into()));
         }
-        let wishes = [
-            (videoio::CAP_PROP_FRAME_WIDTH, f64::from(model.width_px)),
-            (videoio::CAP_PROP_FRAME_HEIGHT, f64::from(model.height_px)),
-            (videoio::CAP_PROP_FPS, model.fps),
-            // Frames that wait in the driver are old.
-            (videoio::CAP_PROP_BUFFERSIZE, 1.0),
-        ];
-        for (property, value) in wishes {
+        for (property, value) in wishes(model)? {
             if !capture.set(property, value)? {
                 tracing::debug!("{}: refuses property {property} = {value}", path.display());
             }
@@ -49,6 +42,24 @@ impl Device {
         Ok(Self { path: path.into(), capture, period: model.period() })
     }
 }
+
+/// What a camera is asked for, in this order. It may refuse each of it.
+fn wishes(model: &CameraModel) -> Result<[(i32, f64); 5], SourceError> {
+    Ok([
+        // Uncompressed, most USB cameras have no room for more than 5 to 10 large frames a second. The format comes first:
+        // sizes and rates depend on it.
+        (videoio::CAP_PROP_FOURCC, f64::from(videoio::VideoWriter::fourcc('M', 'J', 'P', 'G')?)),
+        (videoio::CAP_PROP_FRAME_WIDTH, f64::from(model.width_px)),
+        (videoio::CAP_PROP_FRAME_HEIGHT, f64::from(model.height_px)),
+        (videoio::CAP_PROP_FPS, model.fps),
+        // With one buffer the driver has none to fill while the last frame is converted, and every other frame is lost. None
+        // grows old in the others: they are emptied all the time.
+        (videoio::CAP_PROP_BUFFERSIZE, BUFFERS),
+    ])
+}
+
+/// Buffers of the driver: one being filled, one waiting, one being converted, and one to spare.
+const BUFFERS: f64 = 4.0;
 
 impl Source for Device {
     fn describe(&self) -> String {
@@ -76,6 +87,15 @@ impl Source for Device {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_camera_is_asked_for_compressed_frames_first_and_for_buffers_to_spare() {
+        let wishes = wishes(&CameraModel::laptop()).unwrap();
+        let mjpg = i32::from_le_bytes(*b"MJPG");
+        assert_eq!(wishes[0], (videoio::CAP_PROP_FOURCC, f64::from(mjpg)));
+        let (_, buffers) = wishes.iter().find(|(wish, _)| *wish == videoio::CAP_PROP_BUFFERSIZE).unwrap();
+        assert!((3.0..=4.0).contains(buffers), "{buffers}");
+    }
 
     #[test]
     fn what_is_no_camera_is_refused_by_name() {

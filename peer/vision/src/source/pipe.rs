@@ -9,11 +9,8 @@ use opencv::core::Mat;
 use opencv::prelude::*;
 use opencv::videoio::{self, VideoCapture};
 
-use super::video::{check_size, from_ffmpeg};
+use super::video::{check_size, from_ffmpeg, period};
 use super::{Frame, Scene, Source, SourceError};
-
-/// Assumed where the video does not say how many frames a second it has.
-const PERIOD: Duration = Duration::from_millis(33);
 
 /// The frames of a video that is read from a named pipe, as fast as they are written.
 pub struct Pipe {
@@ -36,8 +33,7 @@ impl Pipe {
     pub fn open(path: &Path) -> Result<Self, SourceError> {
         let capture = from_ffmpeg(path)?;
         check_size(&capture, path)?;
-        let fps = capture.get(videoio::CAP_PROP_FPS)?;
-        let period = if (0.01..=1000.0).contains(&fps) { Duration::from_secs_f64(1.0 / fps) } else { PERIOD };
+        let period = period(capture.get(videoio::CAP_PROP_FPS)?);
         Ok(Self { path: path.into(), capture, period })
     }
 }

@@ -10,7 +10,16 @@ use opencv::videoio::{self, VideoCapture};
 use super::image_file::{MAX_MEGAPIXELS, check_file};
 use super::{Frame, Scene, Source, SourceError};
 
-/// The frames of a video file, decoded by FFmpeg.
+/// Assumed where a video does not say how many frames per second it has.
+const PERIOD: Duration = Duration::from_millis(33);
+
+/// So many frames are passed over one by one; beyond that it is quicker to seek.
+const GRABBED: u64 = 60;
+
+/// The most that are passed over in a video that says nothing of its length.
+const MOST_GRABBED: u64 = 30 * GRABBED;
+
+/// The frames of a video file, decoded by FFmpeg. It runs on while nobody reads it, as what happens in front of a camera does.
 pub struct Video {
     path: PathBuf,
     capture: VideoCapture,
@@ -18,6 +27,8 @@ pub struct Video {
     looping: bool,
     /// Whether this pass through the file has given a frame: one that gives none would loop for ever.
     gave_frame: bool,
+    /// When its last frame was read.
+    last: Option<Duration>,
 }
 
 impl Video {
@@ -29,13 +40,55 @@ impl Video {
         check_file(path)?;
         let capture = from_ffmpeg(path)?;
         check_size(&capture, path)?;
-        let fps = capture.get(videoio::CAP_PROP_FPS)?;
-        if !(0.01..=1000.0).contains(&fps) {
-            return Err(SourceError::NotAVideo(path.into()));
-        }
-        let period = Duration::from_secs_f64(1.0 / fps);
-        Ok(Self { path: path.into(), capture, period, looping, gave_frame: false })
+        let period = period(capture.get(videoio::CAP_PROP_FPS)?);
+        Ok(Self { path: path.into(), capture, period, looping, gave_frame: false, last: None })
     }
+
+    /// Passes over what has been shown since the last frame was read. A video that ends meanwhile says so at the next.
+    fn run_on(&mut self, now: Duration) -> Result<(), SourceError> {
+        let Some(last) = self.last.replace(now) else { return Ok(()) };
+        // A frame that is read a little late is the next one all the same.
+        let shown = (now.saturating_sub(last).as_secs_f64() / self.period.as_secs_f64() + 1e-6) as u64;
+        let passed_over = shown.saturating_sub(1);
+        if passed_over <= GRABBED || !self.seek(passed_over)? {
+            for _ in 0..passed_over.min(MOST_GRABBED) {
+                if self.capture.grab()? {
+                    self.gave_frame = true;
+                } else if self.looping && self.gave_frame {
+                    self.capture = from_ffmpeg(&self.path)?;
+                    self.gave_frame = self.capture.grab()?;
+                } else {
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on by so many frames at once; `false` where the video does not say how many it has, or cannot.
+    fn seek(&mut self, by: u64) -> Result<bool, SourceError> {
+        let count = self.capture.get(videoio::CAP_PROP_FRAME_COUNT)?;
+        let next = self.capture.get(videoio::CAP_PROP_POS_FRAMES)?;
+        if !(count >= 1.0 && next >= 0.0) {
+            return Ok(false);
+        }
+        let to = next + by as f64;
+        if self.looping {
+            return Ok(self.capture.set(videoio::CAP_PROP_POS_FRAMES, to % count)?);
+        }
+        if to < count {
+            return Ok(self.capture.set(videoio::CAP_PROP_POS_FRAMES, to)?);
+        }
+        // Its last frame is passed over with the others.
+        let reached = self.capture.set(videoio::CAP_PROP_POS_FRAMES, count - 1.0)?;
+        while reached && self.capture.grab()? {}
+        Ok(reached)
+    }
+}
+
+/// The time between two frames, of a video that says it has so many per second.
+pub(super) fn period(fps: f64) -> Duration {
+    if (0.01..=1000.0).contains(&fps) { Duration::from_secs_f64(1.0 / fps) } else { PERIOD }
 }
 
 /// Named explicitly, since OpenCV would otherwise try every backend it was built with.
@@ -67,6 +120,7 @@ impl Source for Video {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        self.run_on(now)?;
         let mut image = Mat::default();
         while !self.capture.read(&mut image)? || image.empty() {
             if !self.gave_frame {
@@ -95,6 +149,9 @@ mod tests {
         video.next_frame(Duration::ZERO, &Scene::default())
     }
 
+    /// Each frame is so much brighter than the one before, in grey levels.
+    const STEP: f64 = 20.0;
+
     /// A video of `frames` grey frames at 10 per second.
     fn record(path: &Path, frames: u8) {
         let codec = videoio::VideoWriter::fourcc('M', 'J', 'P', 'G').unwrap();
@@ -103,7 +160,7 @@ mod tests {
             videoio::VideoWriter::new_with_backend(path, videoio::CAP_FFMPEG, codec, 10.0, size, true)
                 .unwrap();
         for frame in 0..frames {
-            let grey = Scalar::all(f64::from(frame) * 20.0);
+            let grey = Scalar::all(f64::from(frame) * STEP);
             writer.write(&Mat::new_size_with_default(size, core::CV_8UC3, grey).unwrap()).unwrap();
         }
         writer.release().unwrap();
@@ -133,6 +190,39 @@ mod tests {
         assert_eq!(levels[0], levels[3]);
         assert_eq!(levels[1], levels[4]);
         assert!(levels[0] < levels[1] && levels[1] < levels[2], "{levels:?}");
+    }
+
+    /// Which of its frames a video of [`record`] shows at that time, in tenths of a second.
+    fn shown(video: &mut Video, tenths: u32) -> Result<u32, SourceError> {
+        let frame = video.next_frame(Duration::from_millis(100) * tenths, &Scene::default())?;
+        Ok((f64::from(frame.image.data_bytes()?[0]) / STEP).round() as u32)
+    }
+
+    #[test]
+    fn a_video_runs_on_while_nobody_looks() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ten.avi");
+        record(&path, 12);
+        let mut video = Video::open(&path, true).unwrap();
+        for at in [0, 1, 2, 7, 8] {
+            assert_eq!(shown(&mut video, at).unwrap(), at);
+        }
+        // Once around, by one frame after the other, and eight times, by a jump.
+        assert_eq!(shown(&mut video, 8 + 12).unwrap(), 8);
+        assert_eq!(shown(&mut video, 8 + 12 + 8 * 12 + 2).unwrap(), 10);
+        for pause in [20, 200] {
+            let mut video = Video::open(&path, false).unwrap();
+            assert_eq!(shown(&mut video, 0).unwrap(), 0);
+            assert!(matches!(shown(&mut video, pause), Err(SourceError::Ended(_))), "{pause}");
+        }
+    }
+
+    #[test]
+    fn a_video_that_does_not_say_its_rate_is_a_video_all_the_same() {
+        assert_eq!(period(10.0), Duration::from_millis(100));
+        for unknown in [0.0, -1.0, f64::NAN, f64::INFINITY, 90_000.0] {
+            assert_eq!(period(unknown), PERIOD, "{unknown}");
+        }
     }
 
     #[test]
