@@ -36,7 +36,7 @@ pub struct Body {
 impl Body {
     /// Starts the robot that a configuration describes.
     ///
-    /// `boot` must be higher at each start of this robot, see [`boot_number`].
+    /// `boot` must be higher at each start of this robot, see [`boot_number`](gestalt_link::boot_number).
     ///
     /// # Errors
     /// See [`BodyError`].

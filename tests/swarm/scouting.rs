@@ -58,7 +58,7 @@ pub async fn a_hundred_robots_in_hearing_keep_four_links_each_and_agree() {
     let began = Instant::now();
     // Ten see the gesture. Disagreement is for smaller swarms: a hundred sessions in one process deliver votes too slowly for a
     // quorum of theirs.
-    let sees = |id: u32| (id % 10 == 0).then_some(ClassId(1));
+    let sees = |id: u32| id.is_multiple_of(10).then_some(ClassId(1));
     let starts = (0..100).map(|id| start(scouting(id, &swarm), sees(id)));
     let mut robots = Vec::new();
     for robot in starts {

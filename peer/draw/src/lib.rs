@@ -1,6 +1,6 @@
 //! Pictures for people.
 //!
-//! Everything is drawn as SVG; [`write`] leaves it so or renders it as PNG, by the file's name. PNGs are rendered with one embedded
+//! Everything is drawn as SVG; [`write()`] leaves it so or renders it as PNG, by the file's name. PNGs are rendered with one embedded
 //! font, so that the same picture looks the same on every machine. [`Sheet`] draws areas, pictures and text where plotters' charts do not serve.
 
 pub mod confusion;

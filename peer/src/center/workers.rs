@@ -137,13 +137,13 @@ mod tests {
         let work = Arc::new(Watched { looked: Mutex::new(looked), panics: Mutex::default() });
         let workers = Workers::start(1, &queue, &work).unwrap();
         for times in 1..=10 {
-            drop(queue.put(RobotId(1), Trap(true)));
+            let _ = queue.put(RobotId(1), Trap(true));
             // The same robot's next frame is looked at, by the same only thread, and so are those of others.
             while work.panics.lock().unwrap().len() < times {
                 std::thread::yield_now();
             }
             for robot in 0..3 {
-                drop(queue.put(RobotId(robot), Trap(false)));
+                let _ = queue.put(RobotId(robot), Trap(false));
                 let seen = seen.recv_timeout(std::time::Duration::from_secs(10));
                 assert_eq!(seen.map(|(robot, _)| robot), Ok(robot));
             }
