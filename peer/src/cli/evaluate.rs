@@ -7,11 +7,11 @@ use gestalt_strategies::{Classify, Evaluation};
 use serde_json::json;
 
 use super::score::{self, Score};
-use super::train::{judge, measure, naming};
+use super::train::{measure, naming};
 use super::{Failure, report, say};
 use crate::config::ModelSection;
 use gestalt_draw::confusion;
-use gestalt_vision::dataset::{Dataset, LabelledImage};
+use gestalt_vision::dataset::{Dataset, LabelledImage, joined};
 use gestalt_vision::model::embedded;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
@@ -77,15 +77,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let (of_set, seen) = measure(&kept, &model.classifier, &mut perception)?;
         let alarms = FalseAlarms::count(&dataset.none, &mut perception);
         scores.push(Score::new(folder, &of_set, &seen, alarms));
-        judge(&seen, &model.classifier, &mut evaluation)?;
+        evaluation.append(&of_set);
         survey.append(seen);
     }
     report::rejected(&survey);
     if let Some(path) = &args.plot {
         confusion::draw(&evaluation, vocabulary, path)?;
     }
-    let datasets: Vec<String> = args.dataset.iter().map(|folder| folder.display().to_string()).collect();
-    let datasets = datasets.join(", ");
+    let datasets = joined(&args.dataset);
     if args.json {
         let mut report = report::json(&evaluation, &survey, vocabulary);
         report["model"] = json!(name);

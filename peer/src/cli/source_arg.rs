@@ -4,6 +4,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use gestalt_vision::dataset::has_image_name;
 use gestalt_vision::pose::Pose;
 use thiserror::Error;
 
@@ -129,14 +130,12 @@ impl SourceArg {
 /// What is at a path. Of what is not there, the name tells what it would be.
 #[must_use]
 pub fn kind(path: &Path) -> Kind {
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    let image = ["jpg", "jpeg", "png"].iter().any(|known| extension.eq_ignore_ascii_case(known));
     match std::fs::metadata(path) {
         Ok(about) if about.is_dir() => Kind::Folder,
         Ok(about) if about.file_type().is_fifo() => Kind::Video,
         Ok(about) if !about.is_file() => Kind::Device,
         Err(_) if path.starts_with("/dev") => Kind::Device,
-        _ if image => Kind::Image,
+        _ if has_image_name(path) => Kind::Image,
         _ => Kind::Video,
     }
 }

@@ -278,11 +278,7 @@ pub(super) fn measure(
 }
 
 /// Judges what a survey has seen, without the variations.
-pub(super) fn judge(
-    survey: &Survey,
-    classifier: &Classifier,
-    evaluation: &mut Evaluation,
-) -> Result<(), Failure> {
+fn judge(survey: &Survey, classifier: &Classifier, evaluation: &mut Evaluation) -> Result<(), Failure> {
     for (_, sample) in &survey.seen {
         evaluation.record(sample.class, &classifier.probabilities(&sample.features)?);
     }

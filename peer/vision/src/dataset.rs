@@ -21,7 +21,7 @@ use thiserror::Error;
 
 use folders::{Folders, MAX_IMAGES, in_order};
 
-pub use folders::{Ignored, NONE, Naming};
+pub use folders::{Ignored, NONE, Naming, has_image_name};
 
 /// A folder that is no dataset.
 #[derive(Debug, Error)]
@@ -66,7 +66,9 @@ pub enum DatasetError {
     TooLarge(PathBuf),
 }
 
-fn joined(folders: &[PathBuf]) -> String {
+/// Some folders, in words.
+#[must_use]
+pub fn joined(folders: &[PathBuf]) -> String {
     folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 

@@ -86,6 +86,23 @@ impl Evaluation {
         self.loss -= probabilities[truth.index()].max(1e-12).ln();
     }
 
+    /// Takes in the outcomes of another evaluation over the same classes.
+    ///
+    /// # Panics
+    /// When it is over another number of classes.
+    pub fn append(&mut self, other: &Self) {
+        assert_eq!(other.confusion.len(), self.confusion.len(), "the same classes");
+        for (count, more) in self.confusion.iter_mut().flatten().zip(other.confusion.iter().flatten()) {
+            *count += more;
+        }
+        for (bin, more) in self.bins.iter_mut().zip(&other.bins) {
+            bin.count += more.count;
+            bin.right += more.right;
+            bin.confidence += more.confidence;
+        }
+        self.loss += other.loss;
+    }
+
     /// Outcomes so far.
     #[must_use]
     pub fn count(&self) -> u64 {
@@ -168,6 +185,24 @@ mod tests {
         assert_eq!(e.recall(ClassId(0)).unwrap().value, 0.5);
         assert_eq!(e.precision(ClassId(1)).unwrap().value, 2.0 / 3.0);
         assert_eq!((e.recall(ClassId(2)), e.precision(ClassId(2))), (None, None));
+    }
+
+    #[test]
+    fn two_evaluations_together_are_one_of_all_their_outcomes() {
+        let mut both = evaluation();
+        let mut other = Evaluation::new(3);
+        let outcomes = [(2, [0.1, 0.2, 0.7]), (0, [0.3, 0.6, 0.1])];
+        let mut all = evaluation();
+        for (truth, probabilities) in outcomes {
+            other.record(ClassId(truth), &probabilities);
+            all.record(ClassId(truth), &probabilities);
+        }
+        both.append(&other);
+        assert_eq!((both.confusion(), both.count()), (all.confusion(), 6));
+        assert_eq!(both.accuracy(), all.accuracy());
+        let close = |a: Option<f64>, b: Option<f64>| (a.unwrap() - b.unwrap()).abs() < 1e-12;
+        assert!(close(both.calibration_error(), all.calibration_error()));
+        assert!(close(both.log_loss(), all.log_loss()));
     }
 
     #[test]

@@ -6,6 +6,7 @@ use gestalt_strategies::{Classifier, Classify, Evaluation, Folding, Reduction, T
 use serde_json::{Value, json};
 
 use super::super::report;
+use gestalt_vision::dataset::joined;
 use gestalt_vision::model_file::Model;
 use gestalt_vision::survey::Survey;
 
@@ -32,10 +33,6 @@ pub(super) struct Outcome<'a> {
 }
 
 impl Outcome<'_> {
-    fn datasets(&self) -> String {
-        self.folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
-    }
-
     /// Whether it is known of every image who shows it.
     fn by_person(&self) -> bool {
         self.survey.seen.iter().all(|(image, _)| image.person.is_some())
@@ -56,7 +53,11 @@ impl Outcome<'_> {
             copies => format!(" and {copies} variations"),
         };
         let mut lines = vec![
-            format!("{} images{copies} of {people} subjects, {}", self.survey.seen.len(), self.datasets()),
+            format!(
+                "{} images{copies} of {people} subjects, {}",
+                self.survey.seen.len(),
+                joined(self.folders)
+            ),
             format!("  gestures   {}", classifier.vocabulary().labels().join(" ")),
             format!(
                 "  features   {} → {} principal components, {:.1} % of the variance",
@@ -89,7 +90,7 @@ impl Outcome<'_> {
         let classifier = &model.classifier;
         json!({
             "model": self.out.display().to_string(),
-            "dataset": self.datasets(),
+            "dataset": joined(self.folders),
             "gestures": classifier.vocabulary().labels(),
             "ignored": self.ignored,
             "feature_set": classifier.space().feature_set(),

@@ -104,7 +104,7 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>, 
             continue;
         }
         let mut images = entries(&path)?;
-        images.retain(|path| is_image(path));
+        images.retain(|path| has_image_name(path));
         images.sort();
         count += images.len();
         if count > MAX_IMAGES {
@@ -117,7 +117,9 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>, 
     Ok(found)
 }
 
-fn is_image(path: &Path) -> bool {
+/// Whether a file is named as the images are that can be read.
+#[must_use]
+pub fn has_image_name(path: &Path) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     ["jpg", "jpeg", "png"].iter().any(|known| extension.eq_ignore_ascii_case(known))
 }

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::image_file::read_image;
 use super::{Frame, Scene, Source, SourceError};
+use crate::dataset::has_image_name;
 
 /// The most images that one folder may hold.
 const MAX_IMAGES: usize = 100_000;
@@ -61,11 +62,6 @@ impl ImageFolder {
         self.next += 1;
         Ok(path)
     }
-}
-
-fn has_image_name(path: &Path) -> bool {
-    let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-    ["jpg", "jpeg", "png"].iter().any(|known| extension.as_deref() == Some(known.as_ref()))
 }
 
 impl Source for ImageFolder {

@@ -7,10 +7,9 @@ use std::time::Duration;
 
 use opencv::core::Mat;
 use opencv::prelude::*;
-use opencv::videoio::{self, VideoCapture};
+use opencv::videoio::VideoCapture;
 
-use super::video::{check_size, from_ffmpeg, period};
-use super::{Frame, Scene, Source, SourceError};
+use super::{Frame, Scene, Source, SourceError, video};
 
 /// The frames of a video that is read from a named pipe, as fast as they are written.
 pub struct Pipe {
@@ -31,9 +30,7 @@ impl Pipe {
     /// # Errors
     /// When what is written is no video, or its frames are too large.
     pub fn open(path: &Path) -> Result<Self, SourceError> {
-        let capture = from_ffmpeg(path)?;
-        check_size(&capture, path)?;
-        let period = period(capture.get(videoio::CAP_PROP_FPS)?);
+        let (capture, period) = video::open(path)?;
         Ok(Self { path: path.into(), capture, period })
     }
 }

@@ -38,9 +38,7 @@ impl Video {
     /// When the file cannot be read, is empty, is no video, or its frames are too large.
     pub fn open(path: &Path, looping: bool) -> Result<Self, SourceError> {
         check_file(path)?;
-        let capture = from_ffmpeg(path)?;
-        check_size(&capture, path)?;
-        let period = period(capture.get(videoio::CAP_PROP_FPS)?);
+        let (capture, period) = open(path)?;
         Ok(Self { path: path.into(), capture, period, looping, gave_frame: false, last: None })
     }
 
@@ -87,27 +85,31 @@ impl Video {
 }
 
 /// The time between two frames, of a video that says it has so many per second.
-pub(super) fn period(fps: f64) -> Duration {
+fn period(fps: f64) -> Duration {
     if (0.01..=1000.0).contains(&fps) { Duration::from_secs_f64(1.0 / fps) } else { PERIOD }
 }
 
 /// Named explicitly, since OpenCV would otherwise try every backend it was built with.
-pub(super) fn from_ffmpeg(path: &Path) -> Result<VideoCapture, SourceError> {
+fn from_ffmpeg(path: &Path) -> Result<VideoCapture, SourceError> {
     let capture = VideoCapture::from_file(path, videoio::CAP_FFMPEG)?;
     if capture.is_opened()? { Ok(capture) } else { Err(SourceError::NotAVideo(path.into())) }
 }
 
-pub(super) fn check_size(capture: &VideoCapture, path: &Path) -> Result<(), SourceError> {
+/// A video whose frames are not too large, and the time between two of them.
+pub(super) fn open(path: &Path) -> Result<(VideoCapture, Duration), SourceError> {
+    let capture = from_ffmpeg(path)?;
     let (width, height) =
         (capture.get(videoio::CAP_PROP_FRAME_WIDTH)?, capture.get(videoio::CAP_PROP_FRAME_HEIGHT)?);
-    if width * height <= MAX_MEGAPIXELS * 1e6 {
-        return Ok(());
+    let fits = width * height <= MAX_MEGAPIXELS * 1e6;
+    if !fits {
+        return Err(SourceError::TooLarge {
+            path: path.into(),
+            size: format!("{width}×{height} pixels"),
+            limit: format!("{MAX_MEGAPIXELS} megapixels"),
+        });
     }
-    Err(SourceError::TooLarge {
-        path: path.into(),
-        size: format!("{width}×{height} pixels"),
-        limit: format!("{MAX_MEGAPIXELS} megapixels"),
-    })
+    let period = period(capture.get(videoio::CAP_PROP_FPS)?);
+    Ok((capture, period))
 }
 
 impl Source for Video {
