@@ -39,8 +39,9 @@ demo: packages
 	  --learn nothing --picture out/round.png --curve out/curve.png
 
 # Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,data makes failures
-# of what is skipped for want of them.
+# of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
+	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
 	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
 
 # Every speed the README states, with its yardstick in the same run.
