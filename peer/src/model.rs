@@ -11,6 +11,7 @@ use crate::config::ModelSection;
 pub fn load(section: &ModelSection) -> Result<Option<RobotModel>, ModelError> {
     match section {
         ModelSection::None => Ok(None),
+        ModelSection::Hands => RobotModel::hands().map(Some),
         ModelSection::Rendered => RobotModel::rendered().map(Some),
         ModelSection::File(path) => RobotModel::read(path).map(Some),
     }

@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut config = args.config.load_with(settings)?;
     config.center.fuse = args.fuse.unwrap_or(config.center.fuse);
     let model = crate::model::load(&config.model)?.ok_or(
-        "a fusion centre needs a classifier: set model (--model) to \"rendered\" or {file: \"FILE\"}",
+        "a fusion centre needs a classifier: set model (--model) to \"hands\", \"rendered\" or {file: \"FILE\"}",
     )?;
     let names = Names::new(model.classifier.vocabulary());
     super::runtime()?.block_on(async {

@@ -186,7 +186,7 @@ mod tests {
         assert_eq!((config.robot.id.0, config.name()), (3, "window".to_owned()));
         assert!(matches!(config.camera.source, SourceSection::Device(_)));
         assert!(matches!(config.camera.model, CameraChoice::Laptop));
-        assert_eq!(config.model, ModelSection::Rendered);
+        assert_eq!(config.model, ModelSection::Hands);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::{Failure, report, say};
 use crate::config::ModelSection;
 use gestalt_draw::confusion;
 use gestalt_vision::dataset::{Dataset, LabelledImage, joined};
-use gestalt_vision::model::embedded;
+use gestalt_vision::model;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::survey::{FalseAlarms, Survey};
@@ -27,8 +27,8 @@ pub struct Args {
     /// Dataset folder, with one subfolder per gesture; several are scored one by one and together
     #[arg(long, value_name = "DIR", required = true)]
     dataset: Vec<PathBuf>,
-    /// Model file written by `gestalt train` [default: the embedded model, trained on synthetic hands]
-    #[arg(long, value_name = "FILE|rendered", default_value = "rendered", hide_default_value = true)]
+    /// Model file written by `gestalt train`, `hands` (bare hands before any camera) or `rendered` (synthetic hands)
+    #[arg(long, value_name = "FILE|hands|rendered", default_value = "hands")]
     model: ModelSection,
     /// Folders are counts of fingers: the number that their name begins with, so that `3_thumb_index_middle` is 3. Folders
     /// that begin with no number are left out
@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
         gestalt_draw::check(path)?;
     }
-    let (model, name) = model(&args.model)?;
+    let (model, name) = read_model(&args.model)?;
     let vocabulary = model.classifier.vocabulary();
     // A set that this program does not know is named by the error; one of another length by the check.
     let set: FeatureSet = model.classifier.space().feature_set().parse()?;
@@ -111,10 +111,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// The model, and its name.
-fn model(section: &ModelSection) -> Result<(Model, String), Failure> {
+fn read_model(section: &ModelSection) -> Result<(Model, String), Failure> {
     match section {
         ModelSection::None => Err("an evaluation needs a model: give --model FILE".into()),
-        ModelSection::Rendered => Ok((embedded()?, "rendered".to_owned())),
+        ModelSection::Hands => Ok((model::hands()?, "hands".to_owned())),
+        ModelSection::Rendered => Ok((model::rendered()?, "rendered".to_owned())),
         ModelSection::File(path) => Ok((Model::read(path)?, path.display().to_string())),
     }
 }

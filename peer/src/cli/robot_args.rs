@@ -34,9 +34,9 @@ pub struct CameraArgs {
 /// What the robot judges with.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ModelArgs {
-    /// Model file written by `gestalt train`, `rendered` (the embedded model, trained on synthetic hands) or `none` (model)
-    /// [default with --source: rendered]
-    #[arg(long, value_name = "FILE|rendered|none")]
+    /// Model file written by `gestalt train`, `hands` (bare hands before any camera), `rendered` (synthetic hands) or `none`
+    /// (model) [default with --source: hands, or rendered with a rendered source]
+    #[arg(long, value_name = "FILE|hands|rendered|none")]
     pub model: Option<ModelSection>,
 }
 
@@ -55,7 +55,7 @@ impl CameraArgs {
         let mut settings = Vec::new();
         if let Some(source) = &self.source {
             settings.push(Setting::new(&["camera", "source"], value(&source.section()?)));
-            settings.push(Setting::unless_said(&["model"], value(&ModelSection::Rendered)));
+            settings.push(Setting::unless_said(&["model"], value(&source.usual_model())));
             if matches!(source, SourceArg::Path(path) if kind(path) == Kind::Device) {
                 settings.push(Setting::unless_said(&["camera", "model"], value(&CameraChoice::Laptop)));
             }

@@ -8,7 +8,7 @@ use gestalt_vision::dataset::has_image_name;
 use gestalt_vision::pose::Pose;
 use thiserror::Error;
 
-use crate::config::{DeviceSection, FilesSection, RenderedSection, SourceSection};
+use crate::config::{DeviceSection, FilesSection, ModelSection, RenderedSection, SourceSection};
 
 /// `/dev/video0`, `hand.mp4`, `DIR`, `image.png`, `rendered`, or `rendered:3,bearing=-30,distance=1.2,seed=7`.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,6 +105,15 @@ impl Rendered {
 }
 
 impl SourceArg {
+    /// The model for whoever names none: rendered hands wear a glove that no person wears.
+    #[must_use]
+    pub fn usual_model(&self) -> ModelSection {
+        match self {
+            Self::Rendered(_) => ModelSection::Rendered,
+            Self::Path(_) => ModelSection::Hands,
+        }
+    }
+
     /// The same as the source of a robot, which starts files again at their end.
     ///
     /// # Errors

@@ -53,7 +53,8 @@ pub struct Args {
     /// Learn so many variations of each image beside it: mirrored or not, rolled by up to 30°, half to twice as bright. 0: none
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=50))]
     augment: u8,
-    /// Feature set: `hog` (histogram of oriented gradients) or `shape` (110 shape descriptors)
+    /// Feature set: `hog` (histogram of oriented gradients), `shape` (110 shape descriptors) or `embedding` (24 values of
+    /// learned eyes)
     #[arg(long, default_value = "hog", value_name = "SET")]
     features: FeatureSet,
     /// Gestures, in this order: `fist,palm` or `0-5` [default: all folders]
@@ -122,7 +123,7 @@ impl Args {
         TrainOptions {
             scaling: match self.features {
                 FeatureSet::Shape => ScalingMethod::PerComponent,
-                FeatureSet::Hog => ScalingMethod::Common,
+                FeatureSet::Hog | FeatureSet::Embedding => ScalingMethod::Common,
             },
             components: match (self.variance, self.components) {
                 (Some(part), _) => Components::Variance(part),

@@ -90,7 +90,9 @@ pub enum ModelSection {
     /// None: the robot relays, and takes part in decisions without voting.
     #[default]
     None,
-    /// The embedded one, trained on synthetic hands, gestures `0` to `5`.
+    /// The one of learned eyes, for bare hands before any camera: gestures `0` to `5`.
+    Hands,
+    /// The one of rendered hands, trained on them: gestures `0` to `5`.
     Rendered,
     /// One that `gestalt train` wrote.
     File(PathBuf),
@@ -99,10 +101,11 @@ pub enum ModelSection {
 impl FromStr for ModelSection {
     type Err = Infallible;
 
-    /// `none`, `rendered`, or else the path of a file (`./rendered` for one of that name).
+    /// `none`, `hands`, `rendered`, or else the path of a file (`./rendered` for one of that name).
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text {
             "none" => Self::None,
+            "hands" => Self::Hands,
             "rendered" => Self::Rendered,
             path => Self::File(path.into()),
         })
@@ -335,6 +338,7 @@ mod tests {
     fn a_model_is_named_or_a_file() {
         let read = |text: &str| text.parse::<ModelSection>().unwrap();
         assert_eq!((read("none"), read("rendered")), (ModelSection::None, ModelSection::Rendered));
+        assert_eq!(read("hands"), ModelSection::Hands);
         assert_eq!(read("./rendered"), ModelSection::File("./rendered".into()));
     }
 

@@ -83,7 +83,7 @@ mod tests {
             ),
             ("camera.model", some(&["footbot", "parrot", "laptop", "custom"])),
             ("camera.model", fields(serde_json::to_value(CameraModel::footbot()).unwrap())),
-            ("model", some(&["none", "rendered", "file"])),
+            ("model", some(&["none", "hands", "rendered", "file"])),
             ("rounds.rule", names(&rules.map(|rule| json!(rule)))),
             ("learning.from", names(&[json!(LearnFrom::Model), json!(LearnFrom::Nothing)])),
             ("learning.samples.selection", names(&SelectionRule::ALL.map(|rule| json!(rule)))),

@@ -28,8 +28,11 @@ pub struct RobotModel {
     pub name: String,
 }
 
-/// The embedded model: what [`train_on_rendered`] gives. `gestalt train --rendered --out FILE` makes it again.
-const EMBEDDED: &[u8] = include_bytes!("../models/rendered.gestalt");
+/// The model of rendered hands: what [`train_on_rendered`] gives. `gestalt train --rendered --out FILE` makes it again.
+const RENDERED: &[u8] = include_bytes!("../models/rendered.gestalt");
+
+/// The model of learned eyes: trained together with their weights, see `peer/training`.
+const HANDS: &[u8] = include_bytes!("../models/hands.gestalt");
 
 /// Why there is no model.
 #[derive(Debug, Error)]
@@ -57,15 +60,23 @@ pub enum ModelError {
 }
 
 /// How many rendered frames the embedded model is trained on.
-const RENDERED_FRAMES: usize = 1500;
+const FRAMES: usize = 1500;
 
 impl RobotModel {
-    /// The embedded model: gestures `0` to `5`, trained on synthetic hands.
+    /// The model of learned eyes: gestures `0` to `5`, of bare hands before any camera.
+    ///
+    /// # Errors
+    /// See [`ModelError`].
+    pub fn hands() -> Result<Self, ModelError> {
+        Self::new(hands()?.classifier, "trained on many hands".to_owned(), PathBuf::from("hands"))
+    }
+
+    /// The model of rendered hands: gestures `0` to `5`, trained on synthetic hands.
     ///
     /// # Errors
     /// See [`ModelError`].
     pub fn rendered() -> Result<Self, ModelError> {
-        Self::new(embedded()?.classifier, "trained on synthetic hands".to_owned(), PathBuf::from("rendered"))
+        Self::new(rendered()?.classifier, "trained on synthetic hands".to_owned(), PathBuf::from("rendered"))
     }
 
     /// The model in a file that `gestalt train` wrote.
@@ -92,15 +103,23 @@ impl RobotModel {
     }
 }
 
-/// The embedded model with the record of its training.
+/// The model of learned eyes, with the record of its training.
 ///
 /// # Errors
 /// See [`ModelFileError`].
-pub fn embedded() -> Result<Model, ModelFileError> {
-    Model::decode(EMBEDDED, Path::new("rendered"))
+pub fn hands() -> Result<Model, ModelFileError> {
+    Model::decode(HANDS, Path::new("hands"))
 }
 
-/// Makes the embedded model: gestures `0` to `5`, rendered for all cameras, from the same seed every time. `progress` is
+/// The model of rendered hands, with the record of its training.
+///
+/// # Errors
+/// See [`ModelFileError`].
+pub fn rendered() -> Result<Model, ModelFileError> {
+    Model::decode(RENDERED, Path::new("rendered"))
+}
+
+/// Makes the model of rendered hands: gestures `0` to `5`, rendered for all cameras, from the same seed every time. `progress` is
 /// told how far it has come, as done and total.
 ///
 /// # Errors
@@ -108,11 +127,11 @@ pub fn embedded() -> Result<Model, ModelFileError> {
 pub fn train_on_rendered(mut progress: impl FnMut(usize, usize)) -> Result<Model, ModelError> {
     const SEED: u64 = 2026;
     let features = FeatureSet::Shape;
-    let samples = rendered_samples(features, SEED, RENDERED_FRAMES, |done| progress(done, RENDERED_FRAMES))?;
+    let samples = rendered_samples(features, SEED, FRAMES, |done| progress(done, FRAMES))?;
     let classifier = learn_fingers(features, &samples, SEED)?;
     let origin = Origin {
         dataset: format!(
-            "{RENDERED_FRAMES} rendered frames, {} of them with a hand found: all camera presets, {:?} gloves, bearing ±{BEARING_DEG}°",
+            "{FRAMES} rendered frames, {} of them with a hand found: all camera presets, {:?} gloves, bearing ±{BEARING_DEG}°",
             samples.len(),
             Glove::default(),
         ),
@@ -184,7 +203,7 @@ mod tests {
 
     use super::*;
 
-    /// Frames that the embedded model was not trained on.
+    /// Frames that the model was not trained on.
     fn fresh_samples() -> Vec<LabelledFeatures> {
         let samples = rendered_samples(FeatureSet::Shape, 4711, 300, |_| ()).unwrap();
         assert!(samples.len() > 250, "a hand in {} of 300 frames", samples.len());
@@ -192,8 +211,16 @@ mod tests {
     }
 
     #[test]
-    fn the_embedded_model_is_made_for_the_perception_of_today() {
-        let model = embedded().unwrap();
+    fn the_model_of_learned_eyes_is_made_for_their_weights() {
+        let model = hands().unwrap();
+        assert_eq!(model.classifier.vocabulary().labels(), ["0", "1", "2", "3", "4", "5"]);
+        model.check_features(FeatureSet::Embedding.name(), FeatureSet::Embedding.length()).unwrap();
+        assert_eq!(RobotModel::hands().unwrap().features, FeatureSet::Embedding);
+    }
+
+    #[test]
+    fn the_model_of_rendered_hands_is_made_for_the_perception_of_today() {
+        let model = rendered().unwrap();
         assert_eq!(model.classifier.vocabulary().labels(), ["0", "1", "2", "3", "4", "5"]);
         model.check_features(FeatureSet::Shape.name(), FeatureSet::Shape.length()).unwrap();
         assert!(model.origin.dataset.starts_with("1500 rendered frames"), "{}", model.origin.dataset);
@@ -203,7 +230,7 @@ mod tests {
     /// When perception or the rendered hands change what they give, this falls: make the model again, with `gestalt train
     /// --rendered --out peer/vision/models/rendered.gestalt`.
     #[test]
-    fn the_embedded_model_reads_hands_it_has_not_seen() {
+    fn the_model_of_rendered_hands_reads_hands_it_has_not_seen() {
         let classifier = RobotModel::rendered().unwrap().classifier;
         let mut evaluation = Evaluation::new(6);
         for sample in fresh_samples() {
@@ -211,15 +238,15 @@ mod tests {
         }
         let accuracy = evaluation.accuracy().unwrap().value;
         // It was .937 when the model was made.
-        assert!(accuracy > 0.9, "accuracy {accuracy:.3}: the embedded model is stale");
+        assert!(accuracy > 0.9, "accuracy {accuracy:.3}: the model is stale");
     }
 
     #[test]
-    fn the_embedded_model_can_be_made_again() {
+    fn the_model_of_rendered_hands_can_be_made_again() {
         if std::env::var_os("GESTALT_LONG").is_none() {
             return;
         }
-        let shipped = embedded().unwrap();
+        let shipped = rendered().unwrap();
         let again = train_on_rendered(|_, _| ()).unwrap();
         assert_eq!(again.origin, shipped.origin);
         assert_eq!(again.classifier, shipped.classifier);

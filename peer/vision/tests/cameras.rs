@@ -1,7 +1,7 @@
 //! One hand, two cameras: what the heterogeneity layer buys, and what each of its stages does.
 //!
 //! `GESTALT_LONG=1 cargo test -p gestalt-vision --test cameras -- --nocapture` measures over 20 seeds and prints the
-//! tables; without it, two seeds.
+//! tables; without it, one.
 
 #![cfg(feature = "opencv")]
 
@@ -25,7 +25,7 @@ fn long() -> bool {
 }
 
 fn seeds() -> u64 {
-    if long() { 20 } else { 2 }
+    if long() { 20 } else { 1 }
 }
 
 fn eyes(layer: LayerConfig, camera: &CameraModel) -> Perception {

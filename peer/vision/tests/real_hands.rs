@@ -13,10 +13,13 @@ use std::path::{Path, PathBuf};
 use gestalt_strategies::{
     Classify, Evaluation, LabelledFeatures, ScalingMethod, TrainOptions, Vocabulary, train,
 };
+use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::dataset::{Dataset, LabelledImage, Naming};
-use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::eyes::{Eyes, MINIMUM};
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::perception::{FeatureSet, HandConfig, LayerConfig, NoObservation, Perception};
 use gestalt_vision::source::read_image;
-use gestalt_vision::survey::Survey;
+use gestalt_vision::survey::{FalseAlarms, Survey};
 use opencv::core::{self, CV_16SC3, Mat, Scalar, Vec3b, Vector, no_array};
 use opencv::imgcodecs::{IMREAD_COLOR, IMWRITE_JPEG_QUALITY, imdecode, imencode};
 use opencv::prelude::*;
@@ -30,6 +33,10 @@ fn main() -> std::process::ExitCode {
         [Works, Data] gradients_tell_ten_signs_of_people_never_seen,
         [Works, Data] shape_tells_six_signs_of_people_never_seen,
         [Works, Data] fingers_before_another_camera_are_told_better_than_by_the_reference,
+        [Works, Data] learned_eyes_take_in_every_picture,
+        [Works, Data] learned_eyes_count_fingers_before_a_camera_that_had_no_part_in_making_them,
+        [Works, Data] faults_of_a_camera_cost_learned_eyes_little,
+        [Works, Data] learned_eyes_seldom_see_a_hand_where_none_is,
     ])
 }
 
@@ -40,7 +47,7 @@ fn data(folder: &str) -> PathBuf {
 fn options(set: FeatureSet) -> TrainOptions {
     let scaling = match set {
         FeatureSet::Shape => ScalingMethod::PerComponent,
-        FeatureSet::Hog => ScalingMethod::Common,
+        FeatureSet::Hog | FeatureSet::Embedding => ScalingMethod::Common,
     };
     TrainOptions { scaling, costs: vec![4.0], gammas: vec![0.25, 0.5], ..TrainOptions::default() }
 }
@@ -133,6 +140,100 @@ fn fingers_before_another_camera_are_told_better_than_by_the_reference() {
     side_by_side::print("webcam, wall known", &evaluation);
     let known = evaluation.accuracy().unwrap().value * evaluation.count() as f64 / images.len() as f64;
     assert!(known >= accuracy - 0.01, "{known} of all images with the wall known, {accuracy} without");
+}
+
+fn learned_eyes_take_in_every_picture() {
+    let mut eyes = Eyes::shipped().unwrap();
+    let set = FeatureSet::Embedding;
+    let mut perception =
+        Perception::for_camera(set, HandConfig::default(), LayerConfig::ALL, &CameraModel::laptop()).unwrap();
+    for folder in ["asl-digits", "webcam-fingers"] {
+        let images = Dataset::list(&data(folder), None).unwrap().images;
+        let (mut seen, mut again, mut all) = (0, 0, 0);
+        for image in images.iter().step_by(30) {
+            let picture = read_image(&image.path).unwrap();
+            all += 1;
+            match eyes.look(&picture, None) {
+                Ok(look) => {
+                    seen += 1;
+                    assert!((MINIMUM..=1.0).contains(&look.confidence), "{look:?}");
+                    assert!(look.embedding.iter().all(|value| value.is_finite()), "{look:?}");
+                    assert!(!look.outline().unwrap().is_empty());
+                    again += u32::from(eyes.look(&picture, Some(look.place)).is_ok());
+                }
+                Err(error) => assert!(matches!(error, NoObservation::NoHand(_)), "{error}"),
+            }
+            if let Ok(observation) = perception.observe(&picture) {
+                assert_eq!(observation.features.len(), set.length());
+                let (region, mask) = (perception.region(), perception.mask());
+                assert!(
+                    region.x + region.width <= picture.cols() && region.y + region.height <= picture.rows()
+                );
+                assert!(mask.cols().max(mask.rows()) == 194 && perception.crop().cols() == 48);
+            }
+        }
+        eprintln!("{folder}: a hand in {seen} of {all} pictures, and still in {again}");
+    }
+}
+
+/// The webcam's fingers: no picture of it had a part in making the weights or their model.
+fn webcam() -> Vec<(LabelledImage, Mat)> {
+    let vocabulary = RobotModel::hands().unwrap().classifier.vocabulary().clone();
+    let images = Dataset::list_known(&data("webcam-fingers"), Naming::Names, &vocabulary).unwrap().images;
+    images.into_iter().map(|image| (image.clone(), read_image(&image.path).unwrap())).collect()
+}
+
+/// What the shipped model makes of pictures, each by itself: an evaluation of those with a hand found, and the share of all
+/// that is right.
+fn shipped(pictures: &[(LabelledImage, Mat)], fault: Fault) -> (Evaluation, f64) {
+    core::set_rng_seed(1).unwrap();
+    let model = RobotModel::hands().unwrap();
+    let mut perception = Perception::new(model.features, HandConfig::default()).unwrap();
+    let mut evaluation = Evaluation::new(6);
+    for (image, picture) in pictures {
+        match perception.observe(&fault.apply(picture)) {
+            Ok(seen) => {
+                evaluation.record(image.class, &model.classifier.probabilities(&seen.features).unwrap());
+            }
+            Err(error) => assert!(matches!(error, NoObservation::NoHand(_)), "{error}"),
+        }
+    }
+    let right = evaluation.accuracy().map_or(0.0, |a| a.value) * evaluation.count() as f64;
+    (evaluation, right / pictures.len() as f64)
+}
+
+fn learned_eyes_count_fingers_before_a_camera_that_had_no_part_in_making_them() {
+    let pictures = webcam();
+    let (evaluation, right) = shipped(&pictures, Fault::None);
+    let error = evaluation.calibration_error().unwrap();
+    eprintln!(
+        "webcam, learned eyes: {right:.3} of all, {} without a hand, calibration error {error:.3}",
+        pictures.len() as u64 - evaluation.count()
+    );
+    assert!(right >= 0.88 && error <= 0.12, "{right} {error}");
+}
+
+fn faults_of_a_camera_cost_learned_eyes_little() {
+    let pictures: Vec<_> = webcam().into_iter().step_by(2).collect();
+    let (_, clean) = shipped(&pictures, Fault::None);
+    for fault in Fault::ALL {
+        let cost = 100.0 * (clean - shipped(&pictures, fault).1);
+        eprintln!("  {fault:?}: costs learned eyes {cost:.1} points");
+        assert!(cost <= 6.0, "{fault:?}: {cost:.1} points");
+    }
+}
+
+/// Of these pictures none had a part in making the weights, of the others in the folder some had.
+fn learned_eyes_seldom_see_a_hand_where_none_is() {
+    let model = RobotModel::hands().unwrap();
+    let dataset =
+        Dataset::list_known(&data("negatives"), Naming::Names, model.classifier.vocabulary()).unwrap();
+    let unknown = |path: &PathBuf| !path.file_name().unwrap().to_string_lossy().starts_with("misc_");
+    let pictures: Vec<PathBuf> = dataset.none.into_iter().filter(unknown).collect();
+    let mut perception = Perception::new(model.features, HandConfig::default()).unwrap();
+    let FalseAlarms { alarms, images } = FalseAlarms::count(&pictures, &mut perception);
+    eprintln!("a hand in {alarms} of {images} pictures without one");
+    assert!(images > 30 && alarms as f64 <= 0.15 * images as f64, "{alarms} of {images}");
 }
 
 /// What a camera may do to a picture.

@@ -35,13 +35,14 @@ pub struct Args {
     /// SVG or PNG file to write [default: SOURCE.look.png in this folder]
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     out: Option<PathBuf>,
-    /// Model file written by `gestalt train` [default: the configuration's, or the embedded model]
-    #[arg(long, value_name = "FILE|rendered")]
+    /// Model file written by `gestalt train`, `hands` (bare hands before any camera) or `rendered` (synthetic hands) [default:
+    /// the configuration's, or hands, or rendered with a rendered source]
+    #[arg(long, value_name = "FILE|hands|rendered")]
     model: Option<ModelSection>,
     /// Camera model [default: the configuration's, or none in particular]
     #[arg(long, value_name = "MODEL", value_parser = super::choice::camera())]
     camera: Option<CameraChoice>,
-    /// Feature set: shape or hog [default: the model's]
+    /// Feature set: shape, hog or embedding [default: the model's]
     #[arg(long, value_name = "SET")]
     features: Option<FeatureSet>,
     /// Configuration file: camera model, heterogeneity layer, pose and model are taken from it
@@ -72,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     gestalt_draw::check(&out)?;
     let config = args.config.as_deref().map(Config::read).transpose()?;
     let section = config.as_ref().map(|config| &config.camera);
-    let model = model(args, config.as_ref().map(|config| &config.model))?;
+    let model = model(args, source, config.as_ref().map(|config| &config.model))?;
     let camera = args.camera.as_ref().map(CameraChoice::properties);
     let camera = camera.or_else(|| section.map(|section| section.model.properties()));
     // What is rendered is rendered for a camera.
@@ -155,10 +156,10 @@ fn skip(mut source: impl Source, index: u64, scene: &Scene) -> Result<Mat, Sourc
     Ok(source.next_frame(Duration::ZERO, scene)?.image)
 }
 
-/// The classifier: of the file named, of the configuration, or the embedded one.
-fn model(args: &Args, section: Option<&ModelSection>) -> Result<RobotModel, Failure> {
+/// The classifier: the one named, that of the configuration, or the one for such a source.
+fn model(args: &Args, source: &SourceArg, section: Option<&ModelSection>) -> Result<RobotModel, Failure> {
     let named = args.model.as_ref().or(section).filter(|section| **section != ModelSection::None);
-    let model = crate::model::load(named.unwrap_or(&ModelSection::Rendered))?;
+    let model = crate::model::load(named.unwrap_or(&source.usual_model()))?;
     model.ok_or_else(|| "a look needs a model: give --model FILE".into())
 }
 

@@ -118,6 +118,10 @@ impl View {
                 };
                 (GROUPS.into_iter().map(group).collect(), (unit.to_owned(), 3.0))
             }
+            FeatureSet::Embedding => {
+                let values = vec![("embedding".to_owned(), observation.features.clone())];
+                (values, ("raw values, each of no meaning by itself".to_owned(), 3.0))
+            }
             FeatureSet::Hog => {
                 let columns = hog_columns(&observation.features);
                 let named = (1..).zip(columns).map(|(i, values): (usize, _)| (format!("column {i}"), values));

@@ -56,8 +56,8 @@ pub struct Args {
     #[arg(long, default_value = "log_pool", value_parser = super::choice::rule())]
     rule: FusionRule,
 
-    /// Model file written by `gestalt train` [default: the embedded model, trained on synthetic hands]
-    #[arg(long, value_name = "FILE|rendered", default_value = "rendered", hide_default_value = true)]
+    /// Model file written by `gestalt train`, `hands` (bare hands before any camera) or `rendered` (synthetic hands)
+    #[arg(long, value_name = "FILE|hands|rendered", default_value = "rendered")]
     model: ModelSection,
 
     /// Let the robots learn, starting from `nothing` (no gesture known) or from the `model`. After each round a scripted

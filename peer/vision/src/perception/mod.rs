@@ -8,21 +8,24 @@
 //! The same hand gives nearly the same features whatever the camera, by the stages of the `layer`: views of a fixed size
 //! make resolutions and distances comparable, colours are judged relative to the background, blur and noise are brought
 //! to one measure, and every feature is a ratio, an angle or a count.
+//!
+//! With [`FeatureSet::Embedding`], learned eyes take the place of all of it: see [`eyes`](crate::eyes).
 
 mod background;
 mod blob;
 mod canonical;
 mod colour;
+mod feature_set;
 mod features;
 mod frame;
 mod hand;
 mod hog;
 mod layer;
+mod learned;
+mod no_observation;
 mod resolution;
 mod ring;
 mod white_balance;
-
-use std::str::FromStr;
 
 use gestalt_strategies::Observation;
 use opencv::core::{Mat, MatTraitConst, Rect, Size, Vector};
@@ -32,14 +35,19 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::camera_model::CameraModel;
+use crate::eyes::EyesError;
 
 use canonical::Canonical;
 use colour::ColourModel;
+pub use feature_set::{FeatureSet, FeatureSetError, embedding_name};
 pub use features::{FEATURES, Feature, GROUPS, features};
 use frame::View;
+pub(crate) use frame::check;
 use hand::HandFinder;
 pub use hog::columns as hog_columns;
 pub use layer::LayerConfig;
+use learned::Learned;
+pub use no_observation::{NoHand, NoObservation};
 use resolution::Resolution;
 
 /// The size of the whole frame at a glance: enough to see where the hand is and which colour it has.
@@ -48,57 +56,6 @@ const GLANCE: Size = Size { width: 160, height: 120 };
 const CANVAS: Size = Size { width: 320, height: 240 };
 /// The size of the close view of the hand: enough for the shape of its fingers.
 const CLOSE: Size = Size { width: 192, height: 192 };
-
-/// Which feature vector perception computes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FeatureSet {
-    /// The 110 hand-crafted features of [`features()`].
-    Shape,
-    /// The histogram of oriented gradients of the canonical crop, 1,764 values.
-    Hog,
-}
-
-impl FeatureSet {
-    /// Both sets.
-    pub const ALL: [Self; 2] = [Self::Shape, Self::Hog];
-
-    /// Names the set and its version: vectors of sets with different names never mix.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shape => "shape-2",
-            Self::Hog => "hog-2",
-        }
-    }
-
-    /// How many values a feature vector of this set has.
-    #[must_use]
-    pub fn length(self) -> usize {
-        match self {
-            Self::Shape => FEATURES,
-            Self::Hog => hog::LENGTH,
-        }
-    }
-}
-
-/// A text that names no feature set.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("'{0}' is no feature set: say 'shape' or 'hog'")]
-pub struct FeatureSetError(String);
-
-impl FromStr for FeatureSet {
-    type Err = FeatureSetError;
-
-    /// Reads `shape` or `hog`, or the full name with its version as [`FeatureSet::name`] gives it.
-    fn from_str(text: &str) -> Result<Self, FeatureSetError> {
-        let bare = |set: Self| set.name().split('-').next().unwrap_or_default();
-        Self::ALL
-            .into_iter()
-            .find(|&set| text == set.name() || text == bare(set))
-            .ok_or_else(|| FeatureSetError(text.to_owned()))
-    }
-}
 
 /// What counts as a hand.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -156,70 +113,12 @@ pub enum PerceptionError {
         /// The largest value allowed.
         high: f32,
     },
+    /// There are no learned eyes.
+    #[error(transparent)]
+    Eyes(#[from] EyesError),
     /// OpenCV failed.
     #[error("OpenCV: {0}")]
     OpenCv(#[from] opencv::Error),
-}
-
-/// Why a frame gave no observation. It never becomes a vote; perception is ready for the next frame.
-#[derive(Debug, Error)]
-pub enum NoObservation {
-    /// The frame has no pixels.
-    #[error("the frame is empty: the source delivered no image")]
-    EmptyFrame,
-    /// The frame is not 8-bit BGR.
-    #[error(
-        "the frame has {channels} channels of OpenCV depth {depth}, not 3 of depth 0: convert it to 8-bit BGR"
-    )]
-    Format {
-        /// Its channels.
-        channels: i32,
-        /// Its depth, as OpenCV numbers them (0 is 8-bit unsigned).
-        depth: i32,
-    },
-    /// The frame is so long and narrow that nothing is left of its shorter side on the canvas.
-    #[error("a frame of {width}×{height} pixels is too narrow to show a hand")]
-    TooNarrow {
-        /// Columns.
-        width: i32,
-        /// Rows.
-        height: i32,
-    },
-    /// The frame shows no hand.
-    #[error("no hand: {0}")]
-    NoHand(#[from] NoHand),
-    /// OpenCV failed.
-    #[error("OpenCV: {0}")]
-    OpenCv(#[from] opencv::Error),
-}
-
-/// Why a frame shows no hand.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
-pub enum NoHand {
-    /// Nothing differs from the background in colour, or what does is not of one colour.
-    #[error("nothing stands out from the background (colour contrast {contrast:.2})")]
-    NothingStandsOut {
-        /// The contrast found, nats.
-        contrast: f32,
-    },
-    /// The largest blob is smaller than [`HandConfig::minimum_pixels`], or next to nothing of the frame.
-    #[error("the largest hand-coloured blob covers {share:.4} of the frame: too small")]
-    TooSmall {
-        /// Its share of the frame, `0.0..=1.0`.
-        share: f32,
-    },
-    /// The largest blob is larger than [`HandConfig::maximum_area`].
-    #[error("the largest hand-coloured blob covers {share:.2} of the frame: too large to be one hand")]
-    TooLarge {
-        /// Its share of the frame, `0.0..=1.0`.
-        share: f32,
-    },
-    /// The blob runs along most of the frame's edge: a hand comes in from one side.
-    #[error("the largest hand-coloured blob covers {share:.2} of the frame's edge: a background, not a hand")]
-    AlongTheEdge {
-        /// The covered share of the frame's edge, `0.0..=1.0`.
-        share: f32,
-    },
 }
 
 /// Sees hands. Owns every buffer it needs, so that a frame allocates next to nothing.
@@ -238,6 +137,8 @@ pub struct Perception {
     canonical: Canonical,
     hog: HOGDescriptor,
     descriptors: Vector<f32>,
+    /// With [`FeatureSet::Embedding`], which needs nothing of the above.
+    learned: Option<Learned>,
 }
 
 impl Perception {
@@ -287,6 +188,7 @@ impl Perception {
             canonical: Canonical::default(),
             hog: hog::descriptor()?,
             descriptors: Vector::new(),
+            learned: (set == FeatureSet::Embedding).then(|| Learned::new(camera.is_some())).transpose()?,
         })
     }
 
@@ -311,7 +213,7 @@ impl Perception {
     }
 
     /// Looks at one frame of a scene that is known without anyone in it: `background`, 8-bit BGR of any size, of the
-    /// frame's aspect. What was there before is no hand, whatever its colour.
+    /// frame's aspect. What was there before is no hand, whatever its colour. Learned eyes do not need it.
     ///
     /// # Errors
     /// As [`Self::observe`].
@@ -320,9 +222,9 @@ impl Perception {
         bgr: &Mat,
         background: Option<&Mat>,
     ) -> Result<Observation, NoObservation> {
-        frame::check(bgr)?;
+        check(bgr)?;
         if let Some(background) = background {
-            frame::check(background)?;
+            check(background)?;
         }
         if self.layer.geometry {
             return self.see(bgr, background, 1.0);
@@ -343,6 +245,11 @@ impl Perception {
     fn see(&mut self, bgr: &Mat, before: Option<&Mat>, scale: f32) -> Result<Observation, NoObservation> {
         let whole = Rect::new(0, 0, bgr.cols(), bgr.rows());
         self.region = whole;
+        if let Some(learned) = &mut self.learned {
+            let observation;
+            (observation, self.region) = learned.observe(bgr, self.layer.geometry)?;
+            return Ok(observation);
+        }
         self.glance.look(bgr, before, whole)?;
         self.colours.learn(&self.glance)?;
         self.colours.mark(&mut self.glance)?;
@@ -355,7 +262,7 @@ impl Perception {
         let hand = self.finder.find(&self.close)?;
         let features = match self.set {
             FeatureSet::Shape => features::measure(&hand)?,
-            FeatureSet::Hog => {
+            FeatureSet::Hog | FeatureSet::Embedding => {
                 self.colours.balance().apply(&self.close.image, &mut self.balanced)?;
                 self.canonical.crop(&self.balanced, &hand)?;
                 hog::compute(&self.hog, self.canonical.image(), &mut self.descriptors)?;
@@ -398,14 +305,14 @@ impl Perception {
     /// margin of one pixel. Empty before the first hand.
     #[must_use]
     pub fn mask(&self) -> &Mat {
-        self.finder.mask()
+        self.learned.as_ref().map_or(self.finder.mask(), Learned::mask)
     }
 
-    /// The canonical crop of the last hand observed: 64×64, 8-bit grey, black off the hand. Empty before the
-    /// first, and with a feature set that does not need it.
+    /// The canonical crop of the last hand observed: 64×64, for learned eyes 48×48, 8-bit grey, black off the hand. Empty
+    /// or black before the first, and with a feature set that does not need it.
     #[must_use]
     pub fn crop(&self) -> &Mat {
-        self.canonical.image()
+        self.learned.as_ref().map_or(self.canonical.image(), Learned::crop)
     }
 }
 

@@ -77,7 +77,7 @@ fn there_are_110_features_each_with_a_name_of_its_own() {
 
 #[test]
 fn a_feature_set_reads_its_short_and_its_full_name() {
-    for (text, set) in [("shape", FeatureSet::Shape), ("hog", FeatureSet::Hog)] {
+    for (text, set) in ["shape", "hog", "embedding"].into_iter().zip(FeatureSet::ALL) {
         assert_eq!(text.parse(), Ok(set));
         assert_eq!(set.name().parse(), Ok(set));
     }

@@ -1,0 +1,93 @@
+//! The counter: what a hand shows, as a vector and as fingers.
+
+use super::convolution::{Convolution, Shape};
+use super::dense::Dense;
+use super::feature_map::FeatureMap;
+use super::pooling::halve_by_maximum;
+use super::tensors::{Tensors, WeightsError};
+
+/// Tensors of its file: weights and biases of 4 + 5 layers.
+const TENSORS: usize = 18;
+
+/// How many values the embedding of a hand has.
+pub const EMBEDDING: usize = 24;
+
+/// What the counter says of a hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Count {
+    /// Where the hand lies among hands: those that show the same are close.
+    pub embedding: [f32; EMBEDDING],
+    /// Logits of 0 to 5 fingers, one of which it is.
+    pub counts: [f32; 6],
+    /// Logits of thumb, index, middle, ring and little finger being out, each by itself.
+    pub fingers: [f32; 5],
+    /// Logit of what is read being a hand at all.
+    pub hand: f32,
+}
+
+/// Reads a hand.
+pub struct Counter {
+    layers: [Convolution; 4],
+    dense: Dense,
+    embedding: Dense,
+    counts: Dense,
+    fingers: Dense,
+    hand: Dense,
+    spare: [FeatureMap; 2],
+    patches: Vec<f32>,
+}
+
+impl Counter {
+    /// Side of the square it looks at, in pixels.
+    pub const SIDE: usize = 48;
+
+    /// With the weights of a file.
+    ///
+    /// # Errors
+    /// See [`WeightsError`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, WeightsError> {
+        let tensors = &mut Tensors::decode(bytes, TENSORS)?;
+        let mut layer = |shape| Convolution::decode(shape, tensors);
+        let layers = [
+            layer(Shape { side: 5, ..Shape::halving(2, 16) })?,
+            layer(Shape::usual(16, 32))?,
+            layer(Shape::usual(32, 48))?,
+            layer(Shape::usual(48, 64))?,
+        ];
+        Ok(Self {
+            layers,
+            dense: Dense::decode((9 * 64, 64), true, tensors)?,
+            embedding: Dense::decode((64, EMBEDDING), false, tensors)?,
+            counts: Dense::decode((EMBEDDING, 6), false, tensors)?,
+            fingers: Dense::decode((EMBEDDING, 5), false, tensors)?,
+            hand: Dense::decode((EMBEDDING, 1), false, tensors)?,
+            spare: Default::default(),
+            patches: Vec::new(),
+        })
+    }
+
+    /// Reads a picture of 48×48 with two channels: the hand's grey, of mean 0 within its pixels, and its pixels, from -1
+    /// (outside) to 1.
+    ///
+    /// # Panics
+    /// When the picture has another shape.
+    pub fn run(&mut self, picture: &FeatureMap) -> Count {
+        assert_eq!(picture.shape(), (2, Self::SIDE, Self::SIDE), "the picture's shape");
+        let Self { layers: [first, second, third, fourth], spare: [a, b], patches, .. } = self;
+        first.run(picture, a, patches);
+        halve_by_maximum(a, b);
+        second.run(b, a, patches);
+        halve_by_maximum(a, b);
+        third.run(b, a, patches);
+        fourth.run(a, b, patches);
+        halve_by_maximum(b, a);
+        let mut hidden = [0.0; 64];
+        self.dense.run(a.values(), &mut hidden);
+        let mut count = Count { embedding: [0.0; EMBEDDING], counts: [0.0; 6], fingers: [0.0; 5], hand: 0.0 };
+        self.embedding.run(&hidden, &mut count.embedding);
+        self.counts.run(&count.embedding, &mut count.counts);
+        self.fingers.run(&count.embedding, &mut count.fingers);
+        self.hand.run(&count.embedding, std::slice::from_mut(&mut count.hand));
+        count
+    }
+}
