@@ -5,7 +5,7 @@ SHELL := /bin/bash
 ifeq ($(shell cargo --version 2>/dev/null),)
 export RUSTUP_TOOLCHAIN := stable
 endif
-.PHONY: demo test bench lint packages test-packages
+.PHONY: demo test bench lint eyes packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
@@ -43,6 +43,13 @@ demo: packages
 test: test-packages
 	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
 	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
+
+# Trains the weights of the learned eyes anew, from the pictures in GESTALT_DATA: about an hour on two cores. Then, what they
+# make of each set when trained without it: EYES="--leave-one-out". See peer/vision/weights/README.md.
+GESTALT_DATA ?= ../shared/data
+eyes: packages
+	mkdir -p out/eyes
+	cargo run --release --manifest-path peer/training/Cargo.toml -- --data $(GESTALT_DATA) --out out/eyes $(EYES)
 
 # Every speed the README states, with its yardstick in the same run.
 bench: packages

@@ -1,0 +1,116 @@
+//! The course that the networks take: each is taught with what those before it get wrong.
+
+use std::error::Error;
+use std::path::Path;
+use std::time::Instant;
+
+use gestalt_vision::model_file::Model;
+
+use crate::networks::encode;
+use crate::photos::Photos;
+use crate::pools::pools;
+use crate::robots::Weights;
+use crate::scenery::{self, Scenery};
+use crate::{frames, mining, model, sheets, train};
+
+/// How to take it.
+#[derive(Clone, Copy)]
+pub struct Course {
+    /// Share of the usual steps and pictures.
+    pub effort: f32,
+    pub seed: u64,
+    pub began: Instant,
+}
+
+/// What comes of it.
+pub struct Taught {
+    /// Weights as they are shipped: of finder, refiner and counter.
+    pub weights: [Vec<u8>; 3],
+    pub model: Model,
+}
+
+impl Course {
+    fn tell(&self, what: &str) {
+        println!("[{:.0} s] {what}", self.began.elapsed().as_secs_f32());
+    }
+
+    fn some(&self, n: usize) -> usize {
+        ((n as f32 * self.effort) as usize).max(64)
+    }
+
+    /// The hands and rooms it is taken with.
+    fn scenery(&self, photos: Photos) -> Scenery {
+        for (set, all) in photos.by_set() {
+            self.tell(&format!("{set}: {} hands", all.len()));
+        }
+        self.tell(&format!("{} faces, {} pictures without hands", photos.faces.len(), photos.empty.len()));
+        let scenery = Scenery::new(photos, scenery::drawn_hands(self.some(12_000), self.seed));
+        self.tell("hands drawn");
+        scenery
+    }
+
+    /// Draws sheets of what the networks would be shown.
+    pub fn show(&self, photos: Photos, out: &Path) -> Result<(), Box<dyn Error>> {
+        let scenery = self.scenery(photos);
+        let frames = frames::frames(&scenery, self.seed + 1, 60);
+        let crops = frames::crops(&scenery, self.seed + 2, 100);
+        sheets::all(out, &scenery, &frames, &crops)
+    }
+
+    pub fn take(&self, photos: Photos) -> Result<Taught, Box<dyn Error>> {
+        let Self { seed, .. } = *self;
+        let images = photos.fingerprints()?;
+        let scenery = self.scenery(photos);
+        let mut frames = frames::frames(&scenery, seed + 1, self.some(12_000));
+        let mut crops = frames::crops(&scenery, seed + 2, self.some(14_000));
+        self.tell(&format!("{} frames and {} crops made", frames.len(), crops.len()));
+        let (finder, refiner) = both(
+            || train::finder(&frames, None, self.some(1900), 4e-3, seed + 3),
+            || train::refiner(&crops, None, self.some(2100), 4e-3, seed + 4),
+        );
+        self.tell("finder and refiner trained");
+        let mut mined = mining::mine(&scenery, &Weights::of(&finder, &refiner), seed + 5, self.some(5000));
+        self.tell(&format!(
+            "close looks at {} hands and {} others; something was taken for a hand in {} frames",
+            mined.hands.len(),
+            mined.others.len(),
+            mined.frames.len(),
+        ));
+        // About half of it is new, the rest a reminder.
+        frames.truncate(self.some(6000));
+        crops.truncate(self.some(6000));
+        frames.extend(std::mem::take(&mut mined.frames));
+        crops.extend(mined.crops());
+        let (finder, refiner) = both(
+            || train::finder(&frames, Some(finder), self.some(1100), 2e-3, seed + 6),
+            || train::refiner(&crops, Some(refiner), self.some(1800), 2.5e-3, seed + 7),
+        );
+        self.tell("finder and refiner trained again");
+        drop((frames, crops));
+        let pools = pools(&scenery, &Weights::of(&finder, &refiner), seed + 8, self.some(6000));
+        for (share, pool) in &pools {
+            self.tell(&format!("{} hands at {share:.2}", pool.len()));
+        }
+        let counter = train::counter(&pools, self.some(4200), 4e-3, seed + 9);
+        self.tell("counter trained");
+        let weights =
+            [finder.weights(), refiner.weights(), counter.weights()].map(|weights| encode(&weights));
+        let name = gestalt_vision::perception::embedding_name(gestalt_vision::network::checksum([
+            &weights[0],
+            &weights[1],
+            &weights[2],
+        ]));
+        let model = model::learn(&counter, &pools, &name, images, self.some(2400), seed + 10)?;
+        self.tell("classifier trained");
+        Ok(Taught { weights, model })
+    }
+}
+
+/// Both at once, a core each.
+fn both<A: Send, B>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B) -> (A, B) {
+    std::thread::scope(|scope| {
+        let a = scope.spawn(a);
+        let b = b();
+        (a.join().expect("training does not panic"), b)
+    })
+}

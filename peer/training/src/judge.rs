@@ -1,0 +1,140 @@
+//! How often eyes are right about a set of pictures: looked at as robots do, with the weights as they are shipped.
+
+use std::error::Error;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use gestalt_protocol::ClassId;
+use gestalt_strategies::{Classify, Evaluation, Proportion};
+use gestalt_vision::eyes::{Eyes, EyesError};
+use gestalt_vision::perception::NoObservation;
+use opencv::imgcodecs::{IMREAD_COLOR, imread};
+use rayon::prelude::*;
+
+use crate::course::Taught;
+
+/// A row for each set.
+#[derive(Default)]
+pub struct Table(Vec<Row>);
+
+struct Row {
+    set: String,
+    images: u64,
+    without_hand: u64,
+    evaluation: Evaluation,
+    /// Pictures without a hand, and those of them in which one is found.
+    empty: u64,
+    alarms: u64,
+}
+
+/// The pictures of a set, and the number of fingers each shows: `None` for no hand. Folders of other gestures do not count.
+fn pictures(folder: &Path) -> Result<Vec<(PathBuf, Option<u8>)>, Box<dyn Error>> {
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let digit = name.bytes().next().filter(|b| (b'0'..=b'5').contains(b)).map(|b| b - b'0');
+        if !path.is_dir() || (digit.is_none() && name != "none") {
+            continue;
+        }
+        for entry in std::fs::read_dir(&path)? {
+            let path = entry?.path();
+            let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+            if ["jpg", "jpeg", "png"].contains(&extension.as_str()) {
+                all.push((path, digit));
+            }
+        }
+    }
+    all.sort();
+    Ok(all)
+}
+
+impl Table {
+    /// Looks at all pictures of a set.
+    pub fn judge(&mut self, taught: &Taught, data: &Path, set: &str) -> Result<(), Box<dyn Error>> {
+        let [finder, refiner, counter] = &taught.weights;
+        let eyes = || Eyes::new(finder, refiner, counter);
+        let pictures = pictures(&data.join(set))?;
+        let looks = pictures
+            .par_iter()
+            .map_init(eyes, |eyes: &mut Result<Eyes, EyesError>, (path, _)| {
+                let eyes = eyes.as_mut().map_err(|error| error.to_string())?;
+                let picture = imread(path, IMREAD_COLOR).map_err(|error| error.to_string())?;
+                match eyes.look(&picture, None) {
+                    Ok(look) => Ok(Some(look)),
+                    Err(NoObservation::NoHand(_)) => Ok(None),
+                    Err(error) => Err(error.to_string()),
+                }
+            })
+            .collect::<Result<Vec<_>, String>>()?;
+        let evaluation = Evaluation::new(6);
+        let mut row =
+            Row { set: set.to_owned(), images: 0, without_hand: 0, evaluation, empty: 0, alarms: 0 };
+        for ((_, count), look) in pictures.iter().zip(looks) {
+            match (count, look) {
+                (None, look) => {
+                    row.empty += 1;
+                    row.alarms += u64::from(look.is_some());
+                }
+                (Some(count), Some(look)) => {
+                    row.images += 1;
+                    let p = taught.model.classifier.probabilities(&look.embedding)?;
+                    row.evaluation.record(ClassId(*count), &p);
+                }
+                (Some(_), None) => {
+                    row.images += 1;
+                    row.without_hand += 1;
+                }
+            }
+        }
+        println!("{row}");
+        self.0.push(row);
+        Ok(())
+    }
+}
+
+impl Row {
+    fn accuracy(&self) -> Option<Proportion> {
+        let right =
+            self.evaluation.accuracy().map_or(0.0, |a| a.value) * (self.images - self.without_hand) as f64;
+        Proportion::wilson(right.round() as u64, self.images)
+    }
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let accuracy = self.accuracy().map_or("-".to_owned(), |a| {
+            format!("{} ({:.1} to {:.1})", percent(a.value), 100.0 * a.low, 100.0 * a.high)
+        });
+        let missed =
+            if self.images > 0 { percent(self.without_hand as f64 / self.images as f64) } else { "-".into() };
+        let error = self.evaluation.calibration_error().map_or("-".to_owned(), |error| format!("{error:.3}"));
+        let alarms =
+            if self.empty > 0 { percent(self.alarms as f64 / self.empty as f64) } else { "-".into() };
+        write!(
+            f,
+            "| {} | {} | {accuracy} | {missed} | {error} | {alarms} |",
+            self.set,
+            self.images + self.empty
+        )
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "| set | pictures | right, of all with a hand | no hand found | calibration error | false alarms |"
+        )?;
+        writeln!(f, "|---|---|---|---|---|---|")?;
+        self.0.iter().try_for_each(|row| writeln!(f, "{row}"))?;
+        let all: Vec<f64> = self.0.iter().filter_map(|row| Some(row.accuracy()?.value)).collect();
+        if all.len() > 1 {
+            let mean = 100.0 * all.iter().sum::<f64>() / all.len() as f64;
+            let least = 100.0 * all.iter().fold(1.0, |a: f64, b| a.min(*b));
+            writeln!(f, "mean {mean:.1} %, least {least:.1} %")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,398 @@
+//! The real pictures: where the hand is in each, which pixels it has, and what it shows.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use gestalt_protocol::ClassId;
+use gestalt_vision::dataset::LabelledImage;
+use gestalt_vision::source::{Scene, Source, SourceError, Video};
+use opencv::core::{CV_8UC1, Mat, Point, Rect, Scalar, Size, Vector};
+use opencv::imgcodecs::{IMREAD_COLOR, imread};
+use opencv::imgproc::{
+    FILLED, GC_BGD, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD, INTER_AREA, INTER_LINEAR, LINE_8,
+    circle, fill_poly_def, grab_cut, line, resize,
+};
+use opencv::prelude::*;
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::image::{Affine, Outside, Pyramid};
+
+const HANDS: &str = include_str!("../truth/hands.csv");
+const FACES: &str = include_str!("../truth/faces.csv");
+
+/// The sets, each under a licence that lets weights be shipped.
+pub const SETS: [&str; 6] =
+    ["asl-digits", "asl_letters", "lowres64_cn", "phone_home", "subhi_hands", "ti1k_outdoor"];
+
+/// Those that show counts.
+pub const COUNTED: [&str; 5] = ["asl-digits", "asl_letters", "lowres64_cn", "phone_home", "subhi_hands"];
+
+/// Side of a mask's picture; it covers [`COVERED`] sides of the hand.
+pub const MASK: usize = 128;
+pub const COVERED: f32 = 1.7;
+
+/// Why a picture cannot be used.
+#[derive(Debug, Error)]
+pub enum PhotoError {
+    #[error("{0}: no picture there: say where the data sets are with --data")]
+    Missing(PathBuf),
+    #[error("line {0} of the truth is damaged")]
+    Truth(usize),
+    #[error(transparent)]
+    Video(#[from] SourceError),
+    #[error(transparent)]
+    OpenCv(#[from] opencv::Error),
+}
+
+/// Where a hand is: its centre and the side of its square in pixels, and which way the fingers point (0 is up, clockwise).
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub x: f32,
+    pub y: f32,
+    pub side: f32,
+    pub up: f32,
+}
+
+impl Place {
+    /// In a picture that is `k` times as large.
+    pub fn scaled(&self, k: f32) -> Self {
+        let at = |v: f32| (v + 0.5) * k - 0.5;
+        Self { x: at(self.x), y: at(self.y), side: self.side * k, up: self.up }
+    }
+
+    /// How much the squares overlap: what both cover of what either does.
+    pub fn overlap(&self, other: &Self) -> f32 {
+        let along = |a: f32, b: f32| {
+            let (low, high) = (
+                (a - self.side / 2.0).max(b - other.side / 2.0),
+                (a + self.side / 2.0).min(b + other.side / 2.0),
+            );
+            (high - low).max(0.0)
+        };
+        let both = along(self.x, other.x) * along(self.y, other.y);
+        both / (self.side * self.side + other.side * other.side - both)
+    }
+}
+
+/// One real picture with one hand.
+pub struct Photo {
+    pub set: String,
+    pub path: String,
+    pub picture: Pyramid,
+    pub place: Place,
+    /// Of the hand alone, around its place, not turned: [`MASK`] pixels are [`COVERED`] sides.
+    pub mask: Pyramid,
+    /// The same of hand and forearm.
+    pub arm: Pyramid,
+    /// The number of its set.
+    pub origin: u32,
+    /// The number of fingers; `None` for other gestures.
+    pub count: Option<u8>,
+    /// Which fingers, thumb first, where the set says it.
+    pub fingers: Option<[bool; 5]>,
+}
+
+pub struct Photos {
+    pub hands: Vec<Photo>,
+    /// Faces, of 96 by 96 pixels each, to be taken for no hand.
+    pub faces: Vec<Pyramid>,
+    /// Pictures without any hand.
+    pub empty: Vec<Pyramid>,
+    files: Vec<PathBuf>,
+}
+
+impl Photos {
+    /// Reads all sets but some. Masks are kept in the folder `cache`, for they take minutes.
+    pub fn read(data: &Path, cache: &Path, left_out: &[String]) -> Result<Self, PhotoError> {
+        let kept = |path: &str| left_out.iter().all(|set| set != set_of(path));
+        let lines: Vec<_> =
+            HANDS.lines().enumerate().filter(|(_, l)| !l.starts_with('#') && kept(l)).collect();
+        let hands = lines
+            .par_iter()
+            .map(|(number, text)| {
+                photo(data, cache, text).map_err(|error| error.unwrap_or(PhotoError::Truth(*number)))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let hands = hands.into_iter().flatten().collect();
+        let mut faces = Vec::new();
+        for (number, text) in FACES.lines().enumerate().filter(|(_, l)| !l.starts_with('#') && kept(l)) {
+            let fields: Vec<&str> = text.split(',').collect();
+            let [x, y, w, h] =
+                numbers(&fields[3..]).and_then(|n| n.try_into().ok()).ok_or(PhotoError::Truth(number))?;
+            let picture = read(&data.join(fields[0]))?;
+            // 96 pixels, the face in the middle 75.
+            let scale = 75.0 / f32::max(w, h);
+            let map = Affine::similar((x + w / 2.0, y + h / 2.0), (48.0, 50.0), 0.0, scale, 1.0, 1.0);
+            faces.push(picture.warp(&map, 96, 96, Outside::Nearest).to_pyramid());
+        }
+        let files = lines.iter().map(|(_, text)| data.join(path_of(text))).collect();
+        let empty = if kept("video") { empty(&data.join("video"))? } else { Vec::new() };
+        Ok(Self { hands, faces, empty, files })
+    }
+
+    /// What tells its pictures from others, ascending: whoever judges with them is to know.
+    pub fn fingerprints(&self) -> std::io::Result<Vec<u64>> {
+        let image = |path: &PathBuf| LabelledImage { path: path.clone(), class: ClassId(0), person: None };
+        let prints: BTreeSet<u64> =
+            self.files.iter().map(|path| image(path).fingerprint()).collect::<Result<_, _>>()?;
+        Ok(prints.into_iter().collect())
+    }
+
+    /// The hands of each set.
+    pub fn by_set(&self) -> BTreeMap<&str, Vec<usize>> {
+        let mut sets = BTreeMap::<_, Vec<usize>>::new();
+        for (i, photo) in self.hands.iter().enumerate() {
+            sets.entry(photo.set.as_str()).or_default().push(i);
+        }
+        sets
+    }
+}
+
+/// Pictures in which no hand is raised: a room in which people come and go, and people before they begin to sign.
+fn empty(folder: &Path) -> Result<Vec<Pyramid>, PhotoError> {
+    let entries = std::fs::read_dir(folder).map_err(|_| PhotoError::Missing(folder.into()))?;
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    let mut all = Vec::new();
+    for path in paths {
+        let frames = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("mkv") => 1,
+            Some("mp4") => usize::MAX,
+            _ => continue,
+        };
+        let mut video = Video::open(&path, false)?;
+        for second in (0..).step_by(10).take(frames) {
+            match video.next_frame(Duration::from_secs(second), &Scene::default()) {
+                Ok(frame) => all.push(pyramid(&frame.image)?),
+                Err(SourceError::Ended(_)) => break,
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+    Ok(all)
+}
+
+fn path_of(line: &str) -> &str {
+    line.split(',').next().unwrap_or_default()
+}
+
+fn set_of(path: &str) -> &str {
+    path.split('/').next().unwrap_or_default()
+}
+
+fn numbers(fields: &[&str]) -> Option<Vec<f32>> {
+    fields.iter().map(|field| field.trim().parse().ok()).collect()
+}
+
+pub fn read(path: &Path) -> Result<Pyramid, PhotoError> {
+    let image = imread(path, IMREAD_COLOR)?;
+    if image.empty() {
+        return Err(PhotoError::Missing(path.into()));
+    }
+    Ok(pyramid(&image)?)
+}
+
+fn pyramid(image: &Mat) -> Result<Pyramid, opencv::Error> {
+    Ok(Pyramid::new(image.cols() as usize, image.rows() as usize, 3, image.data_bytes()?.to_vec()))
+}
+
+/// The place of a hand with these joints.
+pub fn place(joints: &[(f32, f32)]) -> Place {
+    let size = (joints[9].0 - joints[0].0).hypot(joints[9].1 - joints[0].1);
+    let span = |pick: fn(&(f32, f32)) -> f32| {
+        let all = joints.iter().map(pick);
+        (all.clone().fold(f32::MAX, f32::min), all.fold(f32::MIN, f32::max))
+    };
+    let ((x0, x1), (y0, y1)) = (span(|p| p.0), span(|p| p.1));
+    let side = ((x1 - x0).max(y1 - y0) + 0.35 * size) * 1.12;
+    let (dx, dy) = (joints[9].0 - joints[0].0, joints[9].1 - joints[0].1);
+    Place { x: (x0 + x1) / 2.0, y: (y0 + y1) / 2.0, side, up: dx.atan2(-dy) }
+}
+
+/// `None` where no mask can be had; the error `None` stands for a damaged line.
+fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<PhotoError>> {
+    let fields: Vec<&str> = text.split(',').collect();
+    let path = fields[0];
+    let all = numbers(&fields[1..]).filter(|all| all.len() == 44).ok_or(None)?;
+    let joints: Vec<(f32, f32)> =
+        all[2..].chunks(2).map(|p| (p[0] / 1000.0 * all[0], p[1] / 1000.0 * all[1])).collect();
+    let picture = read(&data.join(path)).map_err(Some)?;
+    let place = place(&joints);
+    let kept = cache.join(format!("{:08x}.mask", crc32fast::hash(text.as_bytes())));
+    let masks = match std::fs::read(&kept) {
+        Ok(bytes) if bytes.is_empty() => None,
+        Ok(bytes) if bytes.len() == 2 * MASK * MASK => {
+            let (hand, arm) = bytes.split_at(MASK * MASK);
+            Some([hand, arm].map(|mask| Pyramid::new(MASK, MASK, 1, mask.to_vec())).into())
+        }
+        _ => {
+            let made = masks(&picture, &joints, &place).map_err(|error| Some(error.into()))?;
+            let bytes = made
+                .iter()
+                .flat_map(|(hand, arm)| [hand.pixels(), arm.pixels()].concat())
+                .collect::<Vec<_>>();
+            // Without the copy it takes longer the next time, no more.
+            let _ = std::fs::write(&kept, bytes);
+            made
+        }
+    };
+    let Some((mask, arm)) = masks else {
+        return Ok(None);
+    };
+    let set = set_of(path).to_owned();
+    let folder = path.split('/').nth(1).unwrap_or_default();
+    let (count, fingers) = meaning(&set, folder);
+    let origin = SETS.iter().position(|known| *known == set).unwrap_or(SETS.len()) as u32;
+    Ok(Some(Photo { set, origin, path: path.to_owned(), picture, place, mask, arm, count, fingers }))
+}
+
+/// What a folder of a set shows.
+fn meaning(set: &str, folder: &str) -> (Option<u8>, Option<[bool; 5]>) {
+    let digit = folder.bytes().next().filter(u8::is_ascii_digit).map(|byte| byte - b'0');
+    let fingers = |bits: [u8; 5]| Some(bits.map(|bit| bit == 1));
+    if set == "asl-digits" {
+        let bits = match digit {
+            Some(0) => [0, 0, 0, 0, 0],
+            Some(1) => [0, 1, 0, 0, 0],
+            Some(2) => [0, 1, 1, 0, 0],
+            Some(3) => [1, 1, 1, 0, 0],
+            Some(4) => [0, 1, 1, 1, 1],
+            Some(5) => [1, 1, 1, 1, 1],
+            Some(6) => [0, 1, 1, 1, 0],
+            Some(7) => [0, 1, 1, 0, 1],
+            Some(8) => [0, 1, 0, 1, 1],
+            _ => [0, 0, 1, 1, 1],
+        };
+        return (Some(bits.iter().sum()), fingers(bits));
+    }
+    let known = match folder {
+        "0" | "0_thumb_side" => fingers([0, 0, 0, 0, 0]),
+        "1_little" => fingers([0, 0, 0, 0, 1]),
+        "2_thumb_index" => fingers([1, 1, 0, 0, 0]),
+        "2_together" => fingers([0, 1, 1, 0, 0]),
+        "4_together" => fingers([0, 1, 1, 1, 1]),
+        "5" => fingers([1, 1, 1, 1, 1]),
+        _ => None,
+    };
+    (digit.filter(|digit| *digit < 6), known)
+}
+
+const BONES: [(usize, usize); 23] = [
+    (0, 1),
+    (1, 2),
+    (2, 3),
+    (3, 4),
+    (0, 5),
+    (5, 6),
+    (6, 7),
+    (7, 8),
+    (0, 9),
+    (9, 10),
+    (10, 11),
+    (11, 12),
+    (0, 13),
+    (13, 14),
+    (14, 15),
+    (15, 16),
+    (0, 17),
+    (17, 18),
+    (18, 19),
+    (19, 20),
+    (5, 9),
+    (9, 13),
+    (13, 17),
+];
+
+/// The hand's pixels and those of hand and arm, by GrabCut that starts from the joints.
+fn masks(
+    picture: &Pyramid,
+    joints: &[(f32, f32)],
+    place: &Place,
+) -> Result<Option<(Pyramid, Pyramid)>, opencv::Error> {
+    let scale = MASK as f32 / (COVERED * place.side);
+    let middle = (MASK as f32 - 1.0) / 2.0;
+    let map = Affine::similar((place.x, place.y), (middle, middle), 0.0, scale, 1.0, 1.0);
+    let crop = picture.warp(&map, MASK, MASK, Outside::Nearest);
+    let size = MASK as i32;
+    let mut image = Mat::new_rows_cols_with_default(size, size, opencv::core::CV_8UC3, Scalar::all(0.0))?;
+    image.data_bytes_mut()?.copy_from_slice(&crop.to_bytes());
+    let at: Vec<Point> = joints
+        .iter()
+        .map(|&(x, y)| map.apply(x, y))
+        .map(|(x, y)| Point::new(x.round() as i32, y.round() as i32))
+        .collect();
+    // Of the wrist to the middle finger's root; a hand seen along its axis is judged by its other lengths.
+    let far = |a: usize, b: usize| f64::from((at[a].x - at[b].x).pow(2) + (at[a].y - at[b].y).pow(2)).sqrt();
+    let palm = far(0, 9).max(1.6 * far(5, 17)).max(12.0);
+    let mut seeds = Mat::new_rows_cols_with_default(size, size, CV_8UC1, Scalar::all(f64::from(GC_BGD)))?;
+    let mut paint = |reach: f64, value: i32| -> Result<(), opencv::Error> {
+        let colour = Scalar::all(f64::from(value));
+        let thick = ((reach * palm) as i32).max(1);
+        for (a, b) in BONES {
+            line(&mut seeds, at[a], at[b], colour, thick, LINE_8, 0)?;
+        }
+        let outline: Vector<Point> = [0, 1, 5, 9, 13, 17].into_iter().map(|k| at[k]).collect();
+        if reach < 0.3 {
+            let all: Vector<Vector<Point>> = Vector::from_iter([outline]);
+            fill_poly_def(&mut seeds, &all, colour)?;
+        }
+        for tip in [4, 8, 12, 16, 20] {
+            circle(&mut seeds, at[tip], thick / 2, colour, FILLED, LINE_8, 0)?;
+        }
+        Ok(())
+    };
+    paint(0.95, GC_PR_BGD)?;
+    paint(0.42, GC_PR_FGD)?;
+    paint(0.10, GC_FGD)?;
+    let (mut back, mut front) = (Mat::default(), Mat::default());
+    if grab_cut(&image, &mut seeds, Rect::default(), &mut back, &mut front, 4, GC_INIT_WITH_MASK).is_err() {
+        return Ok(None);
+    }
+    let up = (place.up.sin(), -place.up.cos());
+    let wrist = at[0];
+    let reach = 0.28 * palm as f32;
+    let labels = seeds.data_bytes()?;
+    let mut hand = vec![0_u8; MASK * MASK];
+    let mut arm = vec![0_u8; MASK * MASK];
+    for (i, label) in labels.iter().enumerate() {
+        if i32::from(*label) == GC_FGD || i32::from(*label) == GC_PR_FGD {
+            let (x, y) = ((i % MASK) as f32 - wrist.x as f32, (i / MASK) as f32 - wrist.y as f32);
+            arm[i] = 255;
+            if x * up.0 + y * up.1 > -reach {
+                hand[i] = 255;
+            }
+        }
+    }
+    let share = hand.iter().filter(|v| **v > 0).count() as f32 / (75.3_f32 * 75.3);
+    // Nearly nothing or nearly all of the hand's square is no hand's shape.
+    if !(0.1..0.9).contains(&share) {
+        return Ok(None);
+    }
+    let soft = |mask: Vec<u8>| Pyramid::new(MASK, MASK, 1, mask);
+    Ok(Some((soft(hand), soft(arm))))
+}
+
+/// Writes pictures side by side, for people.
+pub fn sheet(path: &Path, pictures: &[Mat], columns: usize, side: i32) -> Result<(), opencv::Error> {
+    let rows = pictures.len().div_ceil(columns) as i32;
+    let mut all = Mat::new_rows_cols_with_default(
+        rows * side,
+        columns as i32 * side,
+        opencv::core::CV_8UC3,
+        Scalar::all(0.0),
+    )?;
+    for (i, picture) in pictures.iter().enumerate() {
+        let (x, y) = ((i % columns) as i32 * side, (i / columns) as i32 * side);
+        let mut small = Mat::default();
+        let longest = picture.cols().max(picture.rows());
+        let size = Size::new(picture.cols() * side / longest, picture.rows() * side / longest);
+        let how = if longest > side { INTER_AREA } else { INTER_LINEAR };
+        resize(picture, &mut small, size, 0.0, 0.0, how)?;
+        let mut part = Mat::roi_mut(&mut all, Rect::new(x, y, size.width, size.height))?;
+        small.copy_to(&mut part)?;
+    }
+    opencv::imgcodecs::imwrite_def(path, &all)?;
+    Ok(())
+}
