@@ -346,6 +346,13 @@ fn weights_of_another_network_are_refused_by_their_cause() {
 }
 
 #[test]
+fn other_weights_have_another_checksum() {
+    let files = |seed| [file(&random(&FINDER, 1)), file(&random(&REFINER, 2)), file(&random(&COUNTER, seed))];
+    assert_eq!(checksum(files(3)), checksum(files(3)));
+    assert_ne!(checksum(files(3)), checksum(files(4)));
+}
+
+#[test]
 fn the_shipped_weights_fit() {
     Finder::decode(shipped::FINDER).unwrap();
     Refiner::decode(shipped::REFINER).unwrap();
