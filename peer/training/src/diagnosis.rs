@@ -12,7 +12,8 @@ use crate::FILES;
 use crate::counting::{self, Shown};
 use crate::frames::{crop_at, mask_at};
 use crate::look::{Found, corrected, largest, shown};
-use crate::photos::{Photo, Photos, Place};
+use crate::photos::{Photo, Photos};
+use crate::places::overlap;
 use crate::pools::{iou, with_truth};
 use crate::robots::{Robot, Weights};
 
@@ -80,10 +81,8 @@ impl Tally {
         self.photos += 1;
         match eyes.look(&imread(&data.join(&photo.path), IMREAD_COLOR)?, None) {
             Ok(look) => {
-                let place =
-                    Place { x: look.place.x, y: look.place.y, side: look.place.side, up: look.place.up };
-                let near = place.overlap(&photo.place) > NEAR;
-                let turn = (place.up - photo.place.up).to_degrees().rem_euclid(360.0);
+                let near = overlap(&look.place, &photo.place) > NEAR;
+                let turn = (look.place.up - photo.place.up).to_degrees().rem_euclid(360.0);
                 self.found += 1;
                 self.near += usize::from(near);
                 self.turned += usize::from(near && turn.min(360.0 - turn) > TURNED);

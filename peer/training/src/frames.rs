@@ -9,17 +9,13 @@ use rayon::prelude::*;
 use crate::camera::expose;
 use crate::chance::{normal, uniform};
 use crate::image::{Affine, Canvas, Outside};
-use crate::photos::{COVERED, MASK, Place};
+use crate::places::{COVERED, CROP, MASK, Place, ROOM, onto_crop, scaled};
 use crate::scenery::{Scenery, covered, real};
 
 /// The finder's frame and its maps.
 pub const WIDTH: usize = 160;
 pub const HEIGHT: usize = 120;
 pub const CELLS: (usize, usize) = (40, 30);
-/// The refiner's crop, and how many sides of the hand it covers.
-pub const CROP: usize = 64;
-pub const ROOM: f32 = 1.55;
-
 /// Two hands of each tenth frame are all.
 pub const MOST: usize = 2;
 
@@ -131,7 +127,7 @@ impl Scene {
     /// As the finder is shown it.
     pub fn frame(&self) -> Frame {
         let k = WIDTH as f32 / self.canvas.width as f32;
-        let hands = self.hands.iter().map(|hand| hand.place.scaled(k)).collect();
+        let hands = self.hands.iter().map(|hand| scaled(&hand.place, k)).collect();
         if self.canvas.width == WIDTH {
             return Frame { picture: self.canvas.to_bytes(), hands, mask: shrunk_mask(&self.mask) };
         }
@@ -280,17 +276,12 @@ fn crop(scenery: &Scenery, rng: &mut ChaCha8Rng) -> Crop {
 
 /// A crop of a real picture as the refiner is shown it after the finder.
 pub fn crop_at(picture: &crate::image::Pyramid, place: &Place) -> Vec<u8> {
-    let middle = CROP as f32 / 2.0 - 0.5;
-    let scale = CROP as f32 / (ROOM * place.side);
-    let map = Affine::similar((place.x, place.y), (middle, middle), -place.up, scale, 1.0, 1.0);
-    picture.warp(&map, CROP, CROP, Outside::Nearest).to_bytes()
+    picture.warp(&onto_crop(place), CROP, CROP, Outside::Nearest).to_bytes()
 }
 
 /// The truth of a mask, in the same frame as [`crop_at`].
 pub fn mask_at(mask: &crate::image::Pyramid, of: &Place, place: &Place) -> Vec<u8> {
-    let middle = CROP as f32 / 2.0 - 0.5;
-    let scale = CROP as f32 / (ROOM * place.side);
-    let map = Affine::similar((place.x, place.y), (middle, middle), -place.up, scale, 1.0, 1.0);
+    let map = onto_crop(place);
     let centre = (MASK as f32 - 1.0) / 2.0;
     let k = COVERED * of.side / MASK as f32;
     // From the mask's pixels to the picture's to the crop's.

@@ -5,7 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use gestalt_protocol::ClassId;
-use gestalt_strategies::{Classify, Evaluation, Proportion};
+use gestalt_strategies::{Classify, Evaluation, Proportion, Vocabulary};
+use gestalt_vision::dataset::{Dataset, DatasetError, Naming};
 use gestalt_vision::eyes::{Eyes, EyesError};
 use gestalt_vision::perception::NoObservation;
 use opencv::imgcodecs::{IMREAD_COLOR, imread};
@@ -27,26 +28,11 @@ struct Row {
     alarms: u64,
 }
 
-/// The pictures of a set, and the number of fingers each shows: `None` for no hand. Folders of other gestures do not count.
-fn pictures(folder: &Path) -> Result<Vec<(PathBuf, Option<u8>)>, Box<dyn Error>> {
-    let mut all = Vec::new();
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let digit = name.bytes().next().filter(|b| (b'0'..=b'5').contains(b)).map(|b| b - b'0');
-        if !path.is_dir() || (digit.is_none() && name != "none") {
-            continue;
-        }
-        for entry in std::fs::read_dir(&path)? {
-            let path = entry?.path();
-            let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-            if ["jpg", "jpeg", "png"].contains(&extension.as_str()) {
-                all.push((path, digit));
-            }
-        }
-    }
-    all.sort();
-    Ok(all)
+/// The pictures of a set, and the count each shows: `None` for no hand. Folders of other gestures do not count.
+fn pictures(folder: &Path, vocabulary: &Vocabulary) -> Result<Vec<(PathBuf, Option<ClassId>)>, DatasetError> {
+    let Dataset { images, none, .. } = Dataset::list_known(folder, Naming::Counts, vocabulary)?;
+    let counted = images.into_iter().map(|image| (image.path, Some(image.class)));
+    Ok(counted.chain(none.into_iter().map(|path| (path, None))).collect())
 }
 
 impl Table {
@@ -54,7 +40,7 @@ impl Table {
     pub fn judge(&mut self, taught: &Taught, data: &Path, set: &str) -> Result<(), Box<dyn Error>> {
         let [finder, refiner, counter] = &taught.weights;
         let eyes = || Eyes::new(finder, refiner, counter);
-        let pictures = pictures(&data.join(set))?;
+        let pictures = pictures(&data.join(set), taught.model.classifier.vocabulary())?;
         let looks = pictures
             .par_iter()
             .map_init(eyes, |eyes: &mut Result<Eyes, EyesError>, (path, _)| {
@@ -79,7 +65,7 @@ impl Table {
                 (Some(count), Some(look)) => {
                     row.images += 1;
                     let p = taught.model.classifier.probabilities(&look.embedding)?;
-                    row.evaluation.record(ClassId(*count), &p);
+                    row.evaluation.record(*count, &p);
                 }
                 (Some(_), None) => {
                     row.images += 1;

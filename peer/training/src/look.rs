@@ -1,9 +1,9 @@
 //! A look as robots do it, with networks that are being trained: to judge them, and to show each the faults of the one before.
 
 use crate::counting::{Shown, frame};
-use crate::frames::{CELLS, CROP, HEIGHT, ROOM, WIDTH};
+use crate::frames::{CELLS, HEIGHT, WIDTH};
 use crate::image::{Affine, Outside, Pyramid};
-use crate::photos::{COVERED, MASK, Place};
+use crate::places::{CROP, MASK, Place, ROOM, onto_mask};
 use crate::robots::Robot;
 
 /// A place that may be a hand's, and how sure the finder is.
@@ -40,7 +40,7 @@ pub fn letterboxed(picture: &Pyramid) -> (Affine, Vec<u8>) {
 pub fn peaks(maps: &[f32], most: usize) -> Vec<Candidate> {
     let (w, h) = CELLS;
     let n = w * h;
-    let p: Vec<f32> = maps[..n].iter().map(|v| 1.0 / (1.0 + (-v).exp())).collect();
+    let p: Vec<f32> = maps[..n].iter().copied().map(sigmoid).collect();
     let around = |i: usize| {
         let (x, y) = (i % w, i / w);
         let rows = y.saturating_sub(1)..(y + 2).min(h);
@@ -161,15 +161,13 @@ pub fn largest(mut mask: Vec<f32>) -> Vec<f32> {
 
 /// A found hand as the counter is shown it: the picture around it, and the mask laid on it.
 pub fn shown(picture: &Pyramid, found: &Found) -> Option<Shown> {
-    let middle = (MASK as f32 - 1.0) / 2.0;
-    let scale = MASK as f32 / (COVERED * found.place.side);
-    let map = Affine::similar((found.place.x, found.place.y), (middle, middle), 0.0, scale, 1.0, 1.0);
+    let map = onto_mask(&found.place);
     let around = picture.warp(&map, MASK, MASK, Outside::Nearest).to_pyramid();
     let bytes = found.mask.iter().map(|m| (m * 255.0) as u8).collect();
     let mask = Pyramid::new(CROP, CROP, 1, bytes);
     let centre = CROP as f32 / 2.0 - 0.5;
     let (x, y) = map.apply(found.crop.x, found.crop.y);
-    let size = ROOM * found.crop.side / CROP as f32 * scale;
+    let size = ROOM * found.crop.side / CROP as f32 * map.scale();
     let laid = Affine::similar((centre, centre), (x, y), found.crop.up, size, 1.0, 1.0);
     let mask = mask.warp(&laid, MASK, MASK, Outside::Zero).to_pyramid();
     let frame = frame(&mask, found.place.up)?;

@@ -4,10 +4,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::counting::Shown;
-use crate::frames::{CROP, Crop, Frame, Hand, ROOM, Scene, crop_at, generator};
-use crate::image::{Affine, Outside, Pyramid};
+use crate::frames::{Crop, Frame, Hand, Scene, crop_at, generator};
+use crate::image::{Outside, Pyramid};
 use crate::look::{Candidate, Found, candidates, corrected, largest, shown, sigmoid};
-use crate::photos::Place;
+use crate::places::{CROP, Place, ROOM, onto_crop, overlap};
 use crate::robots::{Robot, Weights};
 use crate::scenery::Scenery;
 
@@ -86,7 +86,7 @@ fn close_up(
     mined: &mut Mined,
 ) -> bool {
     let of = |place: &Place| {
-        let each = scene.hands.iter().map(|hand| (hand.place.overlap(place), hand));
+        let each = scene.hands.iter().map(|hand| (overlap(&hand.place, place), hand));
         each.max_by(|a, b| a.0.total_cmp(&b.0))
     };
     let mut place = candidate.place;
@@ -137,9 +137,6 @@ fn teachable(hand: &Hand, place: &Place, mask: &Pyramid, picture: Vec<u8>) -> Op
     if right.abs().max(down.abs()) > 0.4 || larger.abs() > 0.7 {
         return None;
     }
-    let middle = CROP as f32 / 2.0 - 0.5;
-    let scale = CROP as f32 / (ROOM * place.side);
-    let map = Affine::similar((place.x, place.y), (middle, middle), -place.up, scale, 1.0, 1.0);
-    let mask = mask.warp(&map, CROP, CROP, Outside::Zero).to_bytes();
+    let mask = mask.warp(&onto_crop(place), CROP, CROP, Outside::Zero).to_bytes();
     Some(Crop { picture, mask, hand: Some([right, down, larger, hand.place.up - place.up]) })
 }

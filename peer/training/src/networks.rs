@@ -75,9 +75,9 @@ fn enlarged(x: Tensor<4>, rows: usize, columns: usize) -> Tensor<4> {
     if (2 * h, 2 * w) == (rows, columns) { wide } else { wide.slice([0..n, 0..c, 0..rows, 0..columns]) }
 }
 
-/// Where hands are: from a frame to maps of a quarter of its size.
+/// What finder and refiner begin with: a picture in three sizes, the smallest seen with the widest view.
 #[derive(Module, Debug)]
-pub struct Finder {
+pub struct Trunk {
     c1: Block,
     c2: Block,
     c3: Block,
@@ -85,6 +85,43 @@ pub struct Finder {
     c5: Block,
     c6: Block,
     c7: Block,
+}
+
+impl Trunk {
+    /// `second`: the stride of the second layer.
+    fn new([a, b, c, d]: [usize; 4], second: usize, device: &Device) -> Self {
+        let block = |from, to, stride, dilation| Block::new(from, to, 3, stride, dilation, device);
+        Self {
+            c1: block(3, a, 2, 1),
+            c2: block(a, b, second, 1),
+            c3: block(b, c, 2, 1),
+            c4: block(c, c, 1, 1),
+            c5: block(c, d, 2, 1),
+            c6: block(d, d, 1, 1),
+            c7: block(d, d, 1, 2),
+        }
+    }
+
+    fn forward(&self, x: Tensor<4>) -> [Tensor<4>; 3] {
+        let fine = self.c2.forward(self.c1.forward(x));
+        let middle = self.c4.forward(self.c3.forward(fine.clone()));
+        let coarse = self.c5.forward(middle.clone());
+        let coarse = coarse.clone() + self.c6.forward(coarse);
+        let coarse = coarse.clone() + self.c7.forward(coarse);
+        [fine, middle, coarse]
+    }
+
+    fn weights(&self, out: &mut Weights) {
+        for block in [&self.c1, &self.c2, &self.c3, &self.c4, &self.c5, &self.c6, &self.c7] {
+            block.weights(out);
+        }
+    }
+}
+
+/// Where hands are: from a frame to maps of a quarter of its size.
+#[derive(Module, Debug)]
+pub struct Finder {
+    trunk: Trunk,
     l5: Conv2d,
     m4: Block,
     l4: Conv2d,
@@ -95,33 +132,22 @@ pub struct Finder {
 
 impl Finder {
     pub fn new(device: &Device) -> Self {
-        let b = |i, o, s, d| Block::new(i, o, 3, s, d, device);
         let mut h = plain(16, 5, device);
         // Hands are rare: it begins with saying so.
         h.bias = h.bias.map(|bias| bias.map(|_| Tensor::from_floats([-3.5, 0.0, 0.0, 0.0, -2.0], device)));
         Self {
-            c1: b(3, 8, 2, 1),
-            c2: b(8, 16, 2, 1),
-            c3: b(16, 32, 2, 1),
-            c4: b(32, 32, 1, 1),
-            c5: b(32, 48, 2, 1),
-            c6: b(48, 48, 1, 1),
-            c7: b(48, 48, 1, 2),
+            trunk: Trunk::new([8, 16, 32, 48], 2, device),
             l5: plain(48, 32, device),
-            m4: b(32, 32, 1, 1),
+            m4: Block::new(32, 32, 3, 1, 1, device),
             l4: plain(32, 16, device),
             l3: plain(16, 16, device),
-            m3: b(16, 16, 1, 1),
+            m3: Block::new(16, 16, 3, 1, 1, device),
             h,
         }
     }
 
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let x2 = self.c2.forward(self.c1.forward(x));
-        let x3 = self.c4.forward(self.c3.forward(x2.clone()));
-        let x4 = self.c5.forward(x3.clone());
-        let x4 = x4.clone() + self.c6.forward(x4);
-        let x4 = x4.clone() + self.c7.forward(x4);
+        let [x2, x3, x4] = self.trunk.forward(x);
         let [_, _, h3, w3] = x3.dims();
         let [_, _, h2, w2] = x2.dims();
         let y = self.m4.forward(relu(enlarged(self.l5.forward(x4), h3, w3) + x3));
@@ -131,9 +157,7 @@ impl Finder {
 
     pub fn weights(&self) -> Weights {
         let mut out = Weights::new();
-        for block in [&self.c1, &self.c2, &self.c3, &self.c4, &self.c5, &self.c6, &self.c7] {
-            block.weights(&mut out);
-        }
+        self.trunk.weights(&mut out);
         conv_weights(&self.l5, &mut out);
         self.m4.weights(&mut out);
         conv_weights(&self.l4, &mut out);
@@ -147,13 +171,7 @@ impl Finder {
 /// Whether a crop shows a hand, where exactly, and its pixels.
 #[derive(Module, Debug)]
 pub struct Refiner {
-    c1: Block,
-    c2: Block,
-    c3: Block,
-    c4: Block,
-    c5: Block,
-    c6: Block,
-    c7: Block,
+    trunk: Trunk,
     g1: Conv2d,
     g2: Linear,
     g3: Linear,
@@ -166,22 +184,15 @@ pub struct Refiner {
 
 impl Refiner {
     pub fn new(device: &Device) -> Self {
-        let b = |i, o, s, d| Block::new(i, o, 3, s, d, device);
         Self {
-            c1: b(3, 12, 2, 1),
-            c2: b(12, 16, 1, 1),
-            c3: b(16, 28, 2, 1),
-            c4: b(28, 28, 1, 1),
-            c5: b(28, 44, 2, 1),
-            c6: b(44, 44, 1, 1),
-            c7: b(44, 44, 1, 2),
+            trunk: Trunk::new([12, 16, 28, 44], 1, device),
             g1: plain(44, 12, device),
             g2: LinearConfig::new(768, 32).init(device),
             g3: LinearConfig::new(32, 6).init(device),
             l5: plain(44, 28, device),
-            m4: b(28, 24, 1, 1),
+            m4: Block::new(28, 24, 3, 1, 1, device),
             l4: plain(24, 16, device),
-            m3: b(16, 16, 1, 1),
+            m3: Block::new(16, 16, 3, 1, 1, device),
             h: plain(16, 4, device),
         }
     }
@@ -189,11 +200,7 @@ impl Refiner {
     /// Six numbers for each crop, and the mask's logits as four planes of half its size: left and right of the upper row, then of
     /// the lower.
     pub fn forward(&self, x: Tensor<4>) -> (Tensor<2>, Tensor<4>) {
-        let x2 = self.c2.forward(self.c1.forward(x));
-        let x3 = self.c4.forward(self.c3.forward(x2.clone()));
-        let x4 = self.c5.forward(x3.clone());
-        let x4 = x4.clone() + self.c6.forward(x4);
-        let x4 = x4.clone() + self.c7.forward(x4);
+        let [x2, x3, x4] = self.trunk.forward(x);
         let g: Tensor<2> = relu(self.g1.forward(x4.clone())).flatten(1, 3);
         let g = self.g3.forward(relu(self.g2.forward(g)));
         let y = self.m4.forward(relu(enlarged(self.l5.forward(x4), 16, 16) + x3));
@@ -203,9 +210,7 @@ impl Refiner {
 
     pub fn weights(&self) -> Weights {
         let mut out = Weights::new();
-        for block in [&self.c1, &self.c2, &self.c3, &self.c4, &self.c5, &self.c6, &self.c7] {
-            block.weights(&mut out);
-        }
+        self.trunk.weights(&mut out);
         conv_weights(&self.g1, &mut out);
         linear_weights(&self.g2, &mut out);
         linear_weights(&self.g3, &mut out);
@@ -329,9 +334,9 @@ mod tests {
 
     use super::*;
     use crate::counting::{self, Shown};
-    use crate::frames::{CELLS, CROP, Crop, Frame, HEIGHT, WIDTH};
+    use crate::frames::{CELLS, Crop, Frame, HEIGHT, WIDTH};
     use crate::image::Pyramid;
-    use crate::photos::Place;
+    use crate::places::{CROP, Place};
     use crate::train;
 
     fn noise(n: usize) -> Vec<u8> {

@@ -7,17 +7,18 @@ use std::time::Duration;
 use gestalt_protocol::ClassId;
 use gestalt_vision::dataset::LabelledImage;
 use gestalt_vision::source::{Scene, Source, SourceError, Video};
-use opencv::core::{CV_8UC1, Mat, Point, Rect, Scalar, Size, Vector};
+use opencv::core::{CV_8UC1, Mat, Point, Rect, Scalar, Vector};
 use opencv::imgcodecs::{IMREAD_COLOR, imread};
 use opencv::imgproc::{
-    FILLED, GC_BGD, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD, INTER_AREA, INTER_LINEAR, LINE_8,
-    circle, fill_poly_def, grab_cut, line, resize,
+    FILLED, GC_BGD, GC_FGD, GC_INIT_WITH_MASK, GC_PR_BGD, GC_PR_FGD, LINE_8, circle, fill_poly_def, grab_cut,
+    line,
 };
 use opencv::prelude::*;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::image::{Affine, Outside, Pyramid};
+use crate::places::{MASK, Place, onto_mask};
 
 const HANDS: &str = include_str!("../truth/hands.csv");
 const FACES: &str = include_str!("../truth/faces.csv");
@@ -26,12 +27,8 @@ const FACES: &str = include_str!("../truth/faces.csv");
 pub const SETS: [&str; 6] =
     ["asl-digits", "asl_letters", "lowres64_cn", "phone_home", "subhi_hands", "ti1k_outdoor"];
 
-/// Those that show counts.
-pub const COUNTED: [&str; 5] = ["asl-digits", "asl_letters", "lowres64_cn", "phone_home", "subhi_hands"];
-
-/// Side of a mask's picture; it covers [`COVERED`] sides of the hand.
-pub const MASK: usize = 128;
-pub const COVERED: f32 = 1.7;
+/// How many of them, the first ones, show counts of all kinds.
+pub const COUNTED: usize = 5;
 
 /// Why a picture cannot be used.
 #[derive(Debug, Error)]
@@ -44,36 +41,6 @@ pub enum PhotoError {
     Video(#[from] SourceError),
     #[error(transparent)]
     OpenCv(#[from] opencv::Error),
-}
-
-/// Where a hand is: its centre and the side of its square in pixels, and which way the fingers point (0 is up, clockwise).
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    pub x: f32,
-    pub y: f32,
-    pub side: f32,
-    pub up: f32,
-}
-
-impl Place {
-    /// In a picture that is `k` times as large.
-    pub fn scaled(&self, k: f32) -> Self {
-        let at = |v: f32| (v + 0.5) * k - 0.5;
-        Self { x: at(self.x), y: at(self.y), side: self.side * k, up: self.up }
-    }
-
-    /// How much the squares overlap: what both cover of what either does.
-    pub fn overlap(&self, other: &Self) -> f32 {
-        let along = |a: f32, b: f32| {
-            let (low, high) = (
-                (a - self.side / 2.0).max(b - other.side / 2.0),
-                (a + self.side / 2.0).min(b + other.side / 2.0),
-            );
-            (high - low).max(0.0)
-        };
-        let both = along(self.x, other.x) * along(self.y, other.y);
-        both / (self.side * self.side + other.side * other.side - both)
-    }
 }
 
 /// One real picture with one hand.
@@ -311,9 +278,7 @@ fn masks(
     joints: &[(f32, f32)],
     place: &Place,
 ) -> Result<Option<(Pyramid, Pyramid)>, opencv::Error> {
-    let scale = MASK as f32 / (COVERED * place.side);
-    let middle = (MASK as f32 - 1.0) / 2.0;
-    let map = Affine::similar((place.x, place.y), (middle, middle), 0.0, scale, 1.0, 1.0);
+    let map = onto_mask(place);
     let crop = picture.warp(&map, MASK, MASK, Outside::Nearest);
     let size = MASK as i32;
     let mut image = Mat::new_rows_cols_with_default(size, size, opencv::core::CV_8UC3, Scalar::all(0.0))?;
@@ -372,27 +337,4 @@ fn masks(
     }
     let soft = |mask: Vec<u8>| Pyramid::new(MASK, MASK, 1, mask);
     Ok(Some((soft(hand), soft(arm))))
-}
-
-/// Writes pictures side by side, for people.
-pub fn sheet(path: &Path, pictures: &[Mat], columns: usize, side: i32) -> Result<(), opencv::Error> {
-    let rows = pictures.len().div_ceil(columns) as i32;
-    let mut all = Mat::new_rows_cols_with_default(
-        rows * side,
-        columns as i32 * side,
-        opencv::core::CV_8UC3,
-        Scalar::all(0.0),
-    )?;
-    for (i, picture) in pictures.iter().enumerate() {
-        let (x, y) = ((i % columns) as i32 * side, (i / columns) as i32 * side);
-        let mut small = Mat::default();
-        let longest = picture.cols().max(picture.rows());
-        let size = Size::new(picture.cols() * side / longest, picture.rows() * side / longest);
-        let how = if longest > side { INTER_AREA } else { INTER_LINEAR };
-        resize(picture, &mut small, size, 0.0, 0.0, how)?;
-        let mut part = Mat::roi_mut(&mut all, Rect::new(x, y, size.width, size.height))?;
-        small.copy_to(&mut part)?;
-    }
-    opencv::imgcodecs::imwrite_def(path, &all)?;
-    Ok(())
 }

@@ -6,20 +6,19 @@ use rayon::prelude::*;
 
 use crate::chance::normal;
 use crate::counting::{self, Shown};
+use crate::drawn::Drawn;
 use crate::frames;
-use crate::image;
+use crate::image::Outside;
 use crate::look;
 use crate::mining;
-use crate::photos::{self, Photo, Place};
+use crate::photos::Photo;
+use crate::places::{MASK, Place, onto_mask};
 use crate::robots::Weights;
 use crate::scenery::{self, Scenery};
 
 /// A photo with its own mask, as the counter is shown it.
 pub fn with_truth(photo: &Photo) -> Option<Shown> {
-    let middle = (photos::MASK as f32 - 1.0) / 2.0;
-    let scale = photos::MASK as f32 / (photos::COVERED * photo.place.side);
-    let map = image::Affine::similar((photo.place.x, photo.place.y), (middle, middle), 0.0, scale, 1.0, 1.0);
-    let picture = photo.picture.warp(&map, photos::MASK, photos::MASK, image::Outside::Nearest).to_pyramid();
+    let picture = photo.picture.warp(&onto_mask(&photo.place), MASK, MASK, Outside::Nearest).to_pyramid();
     let frame = counting::frame(&photo.mask, photo.place.up)?;
     Some(Shown {
         picture,
@@ -31,6 +30,22 @@ pub fn with_truth(photo: &Photo) -> Option<Shown> {
         origin: photo.origin,
         fingers: photo.fingers,
         drawn: false,
+        seen: false,
+    })
+}
+
+/// A drawn hand, as the counter is shown it.
+pub fn drawn(hand: &Drawn) -> Option<Shown> {
+    Some(Shown {
+        picture: hand.shade.clone(),
+        mask: hand.mask.clone(),
+        arm: hand.arm.clone(),
+        frame: counting::frame(&hand.mask, 0.0)?,
+        count: Some(hand.fingers.iter().filter(|f| **f).count() as u8),
+        fingers: Some(hand.fingers),
+        hand: true,
+        origin: scenery::DRAWN,
+        drawn: true,
         seen: false,
     })
 }
@@ -54,21 +69,7 @@ pub fn pools(scenery: &Scenery, weights: &Weights, seed: u64, scenes: usize) -> 
         let all: Vec<&Photo> = all.iter().map(|&i| &scenery.photos.hands[i]).collect();
         pools.push((1.4 * share, seen(&all, weights, seed)));
     }
-    let drawn = scenery.drawn.iter().filter_map(|hand| {
-        Some(Shown {
-            picture: hand.shade.clone(),
-            mask: hand.mask.clone(),
-            arm: hand.arm.clone(),
-            frame: counting::frame(&hand.mask, 0.0)?,
-            count: Some(hand.fingers.iter().filter(|f| **f).count() as u8),
-            fingers: Some(hand.fingers),
-            hand: true,
-            origin: scenery::DRAWN,
-            drawn: true,
-            seen: false,
-        })
-    });
-    pools.push((1.2, drawn.collect()));
+    pools.push((1.2, scenery.drawn.iter().filter_map(drawn).collect()));
     // Hands in any surroundings, as a look shows them, and what else it takes for hands.
     let mined = mining::mine(scenery, weights, seed + 1, scenes);
     let (hands, wrong): (Vec<_>, Vec<_>) = mined.shown.into_iter().partition(|shown| shown.hand);

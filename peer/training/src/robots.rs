@@ -2,8 +2,10 @@
 
 use gestalt_vision::network::{FeatureMap, Finder, Refiner, WeightsError};
 
-use crate::frames::{CROP, HEIGHT, WIDTH};
+use crate::frames::{HEIGHT, WIDTH};
+use crate::look::sigmoid;
 use crate::networks::{self, encode};
+use crate::places::CROP;
 use crate::train::planes;
 
 /// The weights' files of finder and refiner, for as many robots as are wanted.
@@ -58,6 +60,6 @@ impl Robot {
         self.take(crop, CROP, CROP);
         let (said, logits) = self.refiner.run_with_mask(&self.map);
         let six = [said.hand, said.right, said.down, said.larger, said.sine, said.cosine];
-        (six, logits.iter().map(|logit| 1.0 / (1.0 + (-logit).exp())).collect())
+        (six, logits.iter().copied().map(sigmoid).collect())
     }
 }

@@ -6,7 +6,8 @@ use crate::camera::tone;
 use crate::chance::{chance, log_uniform, normal, sign, uniform};
 use crate::drawn::{Drawn, HAND, SIDE, draw, fingers};
 use crate::image::{Affine, Canvas, Outside, Pyramid};
-use crate::photos::{COVERED, MASK, Photo, Photos, Place};
+use crate::photos::{Photo, Photos};
+use crate::places::{COVERED, MASK, Place};
 use crate::surfaces::{cloth, limb, skin, smooth_noise, texture};
 
 /// How often pictures of each set are taken: by how much there is to see in them.
@@ -237,14 +238,7 @@ impl Scenery {
             origin = DRAWN;
         } else {
             let photo = self.cut(rng);
-            let middle = ((MASK as f32 - 1.0) / 2.0, (MASK as f32 - 1.0) / 2.0);
-            let angle = place.up - photo.place.up * mirror;
-            let from = (photo.place.x, photo.place.y);
-            let map = Affine::similar(from, to, angle, place.side / photo.place.side, mirror, aspect);
-            picture = photo.picture.warp(&map, w, h, Outside::Nearest);
-            let of_mask =
-                Affine::similar(middle, to, angle, place.side * COVERED / MASK as f32, mirror, aspect);
-            mask = photo.mask.warp(&of_mask, w, h, Outside::Zero);
+            (picture, mask) = real(photo, place, w, h, mirror, aspect);
             let (mut sum, mut n) = ([0.0; 3], 0.0);
             for (i, m) in mask.values.iter().enumerate() {
                 if *m > 150.0 {

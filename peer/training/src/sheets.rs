@@ -2,10 +2,14 @@
 
 use std::path::Path;
 
-use crate::counting::{self, Shown};
-use crate::pools::with_truth;
+use opencv::core::{CV_8UC3, Mat, Rect, Scalar, Size};
+use opencv::imgproc::{INTER_AREA, INTER_LINEAR, resize};
+use opencv::prelude::*;
+
+use crate::counting;
+use crate::frames;
+use crate::pools::{drawn, with_truth};
 use crate::scenery::Scenery;
-use crate::{frames, photos};
 
 /// Draws them all into a folder.
 pub fn all(
@@ -14,7 +18,6 @@ pub fn all(
     frames: &[frames::Frame],
     crops: &[frames::Crop],
 ) -> Result<(), Box<dyn std::error::Error>> {
-    use opencv::core::{CV_8UC3, Mat, MatTraitManual, Scalar};
     let mat = |w: usize, h: usize, bytes: &[u8]| -> Result<Mat, opencv::Error> {
         let mut mat = Mat::new_rows_cols_with_default(h as i32, w as i32, CV_8UC3, Scalar::all(0.0))?;
         mat.data_bytes_mut()?.copy_from_slice(bytes);
@@ -39,7 +42,7 @@ pub fn all(
         }
         all.push(mat(160, 120, &picture)?);
     }
-    photos::sheet(&out.join("frames.png"), &all, 10, 160)?;
+    sheet(&out.join("frames.png"), &all, 10, 160)?;
     let mut all = Vec::new();
     for crop in crops.iter().take(100) {
         let picture: Vec<u8> = crop
@@ -50,7 +53,7 @@ pub fn all(
             .collect();
         all.push(mat(64, 64, &picture)?);
     }
-    photos::sheet(&out.join("crops.png"), &all, 20, 64)?;
+    sheet(&out.join("crops.png"), &all, 20, 64)?;
     let mut all = Vec::new();
     for i in 0..100 {
         let photo = &scenery.photos.hands[i * scenery.photos.hands.len() / 100];
@@ -71,23 +74,9 @@ pub fn all(
             .collect();
         all.push(mat(128, 128, &picture)?);
     }
-    photos::sheet(&out.join("truth.png"), &all, 20, 96)?;
-    let pool = vec![(1.0, scenery.photos.hands.iter().filter_map(with_truth).collect::<Vec<_>>())];
-    let drawn = scenery.drawn.iter().take(300).filter_map(|hand| {
-        Some(Shown {
-            picture: hand.shade.clone(),
-            mask: hand.mask.clone(),
-            arm: hand.arm.clone(),
-            frame: counting::frame(&hand.mask, 0.0)?,
-            count: None,
-            fingers: None,
-            hand: true,
-            origin: 0,
-            drawn: true,
-            seen: false,
-        })
-    });
-    let pool = [pool, vec![(1.0, drawn.collect())]].concat_pools();
+    sheet(&out.join("truth.png"), &all, 20, 96)?;
+    let real = scenery.photos.hands.iter().filter_map(with_truth).collect();
+    let pool = [(1.0, real), (1.0, scenery.drawn.iter().take(300).filter_map(drawn).collect())];
     let mut all = Vec::new();
     for (x, _) in counting::batch(&pool, 120, 1, 0) {
         let n = x.len() / 2;
@@ -99,16 +88,25 @@ pub fn all(
             .collect();
         all.push(mat(48, 48, &bytes)?);
     }
-    photos::sheet(&out.join("shown.png"), &all, 20, 72)?;
+    sheet(&out.join("shown.png"), &all, 20, 72)?;
     Ok(())
 }
 
-trait Concat {
-    fn concat_pools(self) -> Vec<(f32, Vec<Shown>)>;
-}
-
-impl Concat for [Vec<(f32, Vec<Shown>)>; 2] {
-    fn concat_pools(self) -> Vec<(f32, Vec<Shown>)> {
-        self.into_iter().flatten().collect()
+/// Writes pictures side by side, for people.
+fn sheet(path: &Path, pictures: &[Mat], columns: usize, side: i32) -> Result<(), opencv::Error> {
+    let rows = pictures.len().div_ceil(columns) as i32;
+    let mut all =
+        Mat::new_rows_cols_with_default(rows * side, columns as i32 * side, CV_8UC3, Scalar::all(0.0))?;
+    for (i, picture) in pictures.iter().enumerate() {
+        let (x, y) = ((i % columns) as i32 * side, (i / columns) as i32 * side);
+        let mut small = Mat::default();
+        let longest = picture.cols().max(picture.rows());
+        let size = Size::new(picture.cols() * side / longest, picture.rows() * side / longest);
+        let how = if longest > side { INTER_AREA } else { INTER_LINEAR };
+        resize(picture, &mut small, size, 0.0, 0.0, how)?;
+        let mut part = Mat::roi_mut(&mut all, Rect::new(x, y, size.width, size.height))?;
+        small.copy_to(&mut part)?;
     }
+    opencv::imgcodecs::imwrite_def(path, &all)?;
+    Ok(())
 }

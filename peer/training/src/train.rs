@@ -12,9 +12,9 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::chance::normal;
 use crate::counting::{self, Shown};
-use crate::frames::{CELLS, CROP, Crop, Frame, HEIGHT, MOST, WIDTH};
+use crate::frames::{CELLS, Crop, Frame, HEIGHT, MOST, WIDTH};
 use crate::networks::{Counter, EMBEDDING, Finder, Refiner, Said};
-use crate::photos::Place;
+use crate::places::{CROP, Place};
 
 fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D], device: &Device) -> Tensor<D> {
     Tensor::from_data(TensorData::new(values, shape), device)
@@ -49,6 +49,17 @@ pub fn planes(picture: &[u8], width: usize, mirror: bool, gains: [f32; 3], out: 
 fn gains(rng: &mut impl Rng) -> [f32; 3] {
     let light = (0.2 * normal(rng)).exp();
     std::array::from_fn(|_| light * (0.13 * normal(rng)).exp())
+}
+
+/// The optimizer of finder and refiner.
+fn clipped() -> AdamWConfig {
+    let config = AdamWConfig::new().with_weight_decay(1e-2).with_epsilon(1e-8);
+    config.with_grad_clipping(Some(GradientClippingConfig::Norm(5.0)))
+}
+
+/// How likely what is true was said to be, in nats: `truth` from 0 to 1, of logits.
+fn log_likelihood<const D: usize>(truth: Tensor<D>, logits: Tensor<D>) -> Tensor<D> {
+    truth.clone() * log_sigmoid(logits.clone()) + (truth * -1.0 + 1.0) * log_sigmoid(logits * -1.0)
 }
 
 /// One-cycle: up to the largest rate in a twentieth of the steps, then down along a cosine.
@@ -99,11 +110,7 @@ pub fn finder(frames: &[Frame], start: Option<Finder>, steps: usize, largest: f6
     const BATCH: usize = 32;
     let device = Device::flex().autodiff();
     let mut net = start.map_or_else(|| Finder::new(&device), Module::train);
-    let mut optimizer = AdamWConfig::new()
-        .with_weight_decay(1e-2)
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(GradientClippingConfig::Norm(5.0)))
-        .init();
+    let mut optimizer = clipped().init();
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let (w, h) = CELLS;
     let (began, mut mean) = (Instant::now(), [0.0_f32; 4]);
@@ -144,10 +151,7 @@ pub fn finder(frames: &[Frame], start: Option<Finder>, steps: usize, largest: f6
         let l_size = ((map(1) - size).abs() * weight.clone()).sum() / weights;
         let l_turn =
             (((map(2) - sin).powi_scalar(2) + (map(3) - cos).powi_scalar(2)) * weight).sum() / weights;
-        let m = map(4);
-        let l_mask = (mask.clone() * log_sigmoid(m.clone()) + (mask * -1.0 + 1.0) * log_sigmoid(m * -1.0))
-            .mean()
-            * -4.0;
+        let l_mask = log_likelihood(mask, map(4)).mean() * -4.0;
         let parts = [&l_centre, &l_size, &l_turn, &l_mask].map(scalar);
         let loss = l_centre + l_size + l_turn * 0.5 + l_mask;
         let grads = GradientsParams::from_grads(loss.backward(), &net);
@@ -178,11 +182,7 @@ pub fn refiner(crops: &[Crop], start: Option<Refiner>, steps: usize, largest: f6
     const BATCH: usize = 48;
     let device = Device::flex().autodiff();
     let mut net = start.map_or_else(|| Refiner::new(&device), Module::train);
-    let mut optimizer = AdamWConfig::new()
-        .with_weight_decay(1e-2)
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(GradientClippingConfig::Norm(5.0)))
-        .init();
+    let mut optimizer = clipped().init();
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let (began, mut mean) = (Instant::now(), [0.0_f32; 4]);
     let half = CROP / 2;
@@ -216,10 +216,7 @@ pub fn refiner(crops: &[Crop], start: Option<Refiner>, steps: usize, largest: f6
         let mask = tensor(mask, [BATCH, 4, half, half], &device);
         let (g, m) = net.forward(tensor(x, [BATCH, 3, CROP, CROP], &device));
         let logit = g.clone().slice([0..BATCH, 0..1]);
-        let l_is = (is.clone() * log_sigmoid(logit.clone())
-            + (is.clone() * -1.0 + 1.0) * log_sigmoid(logit * -1.0))
-        .mean()
-            * -1.0;
+        let l_is = log_likelihood(is.clone(), logit).mean() * -1.0;
         // Smooth L1 with its bend at .05.
         let away = (g.clone().slice([0..BATCH, 1..4]) - place).abs();
         let small = away.clone().lower_elem(0.05).float();
@@ -229,10 +226,7 @@ pub fn refiner(crops: &[Crop], start: Option<Refiner>, steps: usize, largest: f6
         let l_turn =
             ((g.slice([0..BATCH, 4..6]) - turn).powi_scalar(2).sum_dim(1) * is.clone()).sum() / hands;
         let p = sigmoid(m.clone());
-        let cross = (mask.clone() * log_sigmoid(m.clone())
-            + (mask.clone() * -1.0 + 1.0) * log_sigmoid(m * -1.0))
-        .mean()
-            * -1.0;
+        let cross = log_likelihood(mask.clone(), m).mean() * -1.0;
         let sum = |t: Tensor<4>| -> Tensor<2> { t.flatten::<2>(1, 3).sum_dim(1) };
         let dice = (sum(p.clone() * mask.clone()) * 2.0 + 1.0) / (sum(p) + sum(mask) + 1.0) * -1.0 + 1.0;
         let l_mask = cross + (dice * is).mean() * 0.5;
@@ -276,12 +270,9 @@ pub fn counter(pools: &[(f32, Vec<Shown>)], steps: usize, largest: f64, seed: u6
             net.forward(x, Some(tensor(kept, [BATCH, 576], &device)));
         let l_count = (log_softmax(c.clone(), 1) * tensor(count, [BATCH, 6], &device)).sum() / -counted;
         let hand = tensor(hand, [BATCH, 1], &device);
-        let l_hand = (hand.clone() * log_sigmoid(h.clone()) + (hand * -1.0 + 1.0) * log_sigmoid(h * -1.0))
-            .mean()
-            * -1.0;
-        let t = tensor(fingers, [BATCH, 5], &device);
+        let l_hand = log_likelihood(hand, h).mean() * -1.0;
         let known = tensor(known, [BATCH, 1], &device);
-        let each = t.clone() * log_sigmoid(f.clone()) + (t * -1.0 + 1.0) * log_sigmoid(f * -1.0);
+        let each = log_likelihood(tensor(fingers, [BATCH, 5], &device), f);
         let l_fingers = (each.mean_dim(1) * known).sum() / -sure;
         let said: Vec<i32> = c.argmax(1).flatten::<1>(0, 1).into_data().iter::<i32>().collect();
         let hits = said.iter().zip(&right).filter(|(a, b)| Some(**a) == **b).count() as f32 / counted;
