@@ -59,7 +59,7 @@ struct Args {
     /// Share of the usual steps and pictures
     #[arg(long, default_value_t = 1.0)]
     effort: f32,
-    /// Seed of everything
+    /// Seed of every picture, order and variation; the networks' first weights are the training library's own choice
     #[arg(long, default_value_t = 2026)]
     seed: u64,
     /// Only draw sheets of what the networks would be shown
