@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::chance::{normal, uniform};
-use crate::image::{Affine, Canvas, Outside, Pyramid};
+use crate::image::{Affine, Canvas, Joints, Outside, Pyramid};
 use crate::surfaces::smooth_noise;
 
 pub const SIDE: usize = 48;
@@ -22,6 +22,8 @@ pub struct Shown {
     /// `None` for another gesture, or none at all.
     pub count: Option<u8>,
     pub fingers: Option<[bool; 5]>,
+    /// In the picture, where they are known.
+    pub joints: Option<Joints>,
     /// It is a hand; else it was taken for one.
     pub hand: bool,
     /// Whence: of one set, or drawn.
@@ -30,6 +32,14 @@ pub struct Shown {
     pub drawn: bool,
     /// The mask is what the refiner made of it: it has its faults already.
     pub seen: bool,
+}
+
+/// What a hand may look like.
+pub struct Variation {
+    /// Two planes: grey, and the mask.
+    pub picture: Vec<f32>,
+    /// Across and down of each joint, -1 to 1 in the picture.
+    pub joints: Option<[f32; 42]>,
 }
 
 /// The square around a mask's pixels in axes turned by `up`: centre, side, turn.
@@ -96,7 +106,7 @@ pub fn turned(shown: &Shown, degrees: f32, mirror: f32) -> Vec<f32> {
 }
 
 /// In another light, from a little elsewhere, before another wall, through a mask with faults.
-pub fn varied(shown: &Shown, other: &Shown, rng: &mut impl Rng) -> Vec<f32> {
+pub fn varied(shown: &Shown, other: &Shown, rng: &mut impl Rng) -> Variation {
     let chance = |rng: &mut _, share: f32| uniform(rng, 0.0, 1.0) < share;
     let mut angle = shown.frame[3] + normal(rng) * 25.0 * PI / 180.0;
     if chance(rng, 0.06) {
@@ -193,25 +203,32 @@ pub fn varied(shown: &Shown, other: &Shown, rng: &mut impl Rng) -> Vec<f32> {
     image.values.iter_mut().for_each(|v| *v = (*v + noise * normal(rng)).clamp(0.0, 300.0).min(full));
     // The mask's own faults: fat, thin, with holes, with spots, with the forearm left on. What was seen has them already.
     let faults = if shown.seen { 0.35 } else { 1.0 };
-    let fat =
-        Canvas { width: SIDE, height: SIDE, channels: 1, values: mask.clone() }.smoothed(&[1.0 / 3.0; 3]);
+    let fat = |mask: &[f32]| {
+        Canvas { width: SIDE, height: SIDE, channels: 1, values: mask.to_vec() }
+            .smoothed(&[1.0 / 3.0; 3])
+            .values
+    };
     match uniform(rng, 0.0, 1.0 / faults) {
-        k if k < 0.15 => mask = fat.values.iter().map(|v| (v * 2.2).min(1.0)).collect(),
-        k if k < 0.3 => mask = fat.values.iter().map(|v| (v * 2.2 - 1.2).max(0.0)).collect(),
+        k if k < 0.15 => mask = fat(&mask).iter().map(|v| (v * 2.2).min(1.0)).collect(),
+        k if k < 0.3 => mask = fat(&mask).iter().map(|v| (v * 2.2 - 1.2).max(0.0)).collect(),
         _ => {}
     }
-    let blotches = smooth_noise(rng, SIDE, SIDE, 6, 1);
-    match uniform(rng, 0.0, 1.0 / faults) {
-        k if k < 0.15 => mask.iter_mut().zip(&blotches.values).for_each(|(m, b)| *m *= f32::from(*b < 1.1)),
-        k if k < 0.25 => {
-            mask.iter_mut().zip(&blotches.values).for_each(|(m, b)| *m = m.max(f32::from(*b > 1.3)))
+    let blotched = uniform(rng, 0.0, 1.0 / faults);
+    if blotched < 0.25 {
+        let blotches = smooth_noise(rng, SIDE, SIDE, 6, 1);
+        for (m, b) in mask.iter_mut().zip(&blotches.values) {
+            *m = if blotched < 0.15 { *m * f32::from(*b < 1.1) } else { m.max(f32::from(*b > 1.3)) };
         }
-        _ => {}
     }
     if chance(rng, 0.2 * faults) {
         mask.iter_mut().zip(&arm).for_each(|(m, a)| *m = m.max(*a));
     }
-    standardised(&image.values, &mask)
+    let half = (SIDE as f32 - 1.0) / 2.0;
+    let joints = shown.joints.map(|joints| map.joints(&joints)).map(|joints| {
+        let at = |k: usize| if k % 2 == 0 { joints[k / 2].0 } else { joints[k / 2].1 };
+        std::array::from_fn(|k| (at(k) / half - 1.0).clamp(-1.5, 1.5))
+    });
+    Variation { picture: standardised(&image.values, &mask), joints }
 }
 
 /// A batch: hands of each pool by its share, varied. The same seed and number give the same batch.
@@ -220,7 +237,7 @@ pub fn batch<'a>(
     size: usize,
     seed: u64,
     number: u64,
-) -> Vec<(Vec<f32>, &'a Shown)> {
+) -> Vec<(Variation, &'a Shown)> {
     let total: f32 = pools.iter().map(|(share, _)| share).sum();
     (0..size as u64)
         .into_par_iter()

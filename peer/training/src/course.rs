@@ -44,7 +44,7 @@ impl Course {
             self.tell(&format!("{set}: {} hands", all.len()));
         }
         self.tell(&format!("{} faces, {} pictures without hands", photos.faces.len(), photos.empty.len()));
-        let scenery = Scenery::new(photos, scenery::drawn_hands(self.some(12_000), self.seed));
+        let scenery = Scenery::new(photos, scenery::drawn_hands(self.some(14_000), self.seed));
         self.tell("hands drawn");
         scenery
     }
@@ -61,15 +61,15 @@ impl Course {
         let Self { seed, .. } = *self;
         let images = photos.fingerprints()?;
         let scenery = self.scenery(photos);
-        let mut frames = frames::frames(&scenery, seed + 1, self.some(12_000));
-        let mut crops = frames::crops(&scenery, seed + 2, self.some(14_000));
+        let mut frames = frames::frames(&scenery, seed + 1, self.some(16_000));
+        let mut crops = frames::crops(&scenery, seed + 2, self.some(24_000));
         self.tell(&format!("{} frames and {} crops made", frames.len(), crops.len()));
-        let (finder, refiner) = both(
-            || train::finder(&frames, None, self.some(1900), 4e-3, seed + 3),
-            || train::refiner(&crops, None, self.some(2100), 4e-3, seed + 4),
+        let (finder, refiner) = rayon::join(
+            || train::finder(&frames, None, self.some(3400), 4e-3, seed + 3),
+            || train::refiner(&crops, None, self.some(3800), 4e-3, seed + 4),
         );
         self.tell("finder and refiner trained");
-        let mut mined = mining::mine(&scenery, &Weights::of(&finder, &refiner), seed + 5, self.some(5000));
+        let mut mined = mining::mine(&scenery, &Weights::of(&finder, &refiner), seed + 5, self.some(7000));
         self.tell(&format!(
             "close looks at {} hands and {} others; something was taken for a hand in {} frames",
             mined.hands.len(),
@@ -77,21 +77,21 @@ impl Course {
             mined.frames.len(),
         ));
         // About half of it is new, the rest a reminder.
-        frames.truncate(self.some(6000));
-        crops.truncate(self.some(6000));
+        frames.truncate(self.some(8000));
+        crops.truncate(self.some(10_000));
         frames.extend(std::mem::take(&mut mined.frames));
         crops.extend(mined.crops());
-        let (finder, refiner) = both(
-            || train::finder(&frames, Some(finder), self.some(1100), 2e-3, seed + 6),
-            || train::refiner(&crops, Some(refiner), self.some(1800), 2.5e-3, seed + 7),
+        let (finder, refiner) = rayon::join(
+            || train::finder(&frames, Some(finder), self.some(3000), 2e-3, seed + 6),
+            || train::refiner(&crops, Some(refiner), self.some(3800), 2.5e-3, seed + 7),
         );
         self.tell("finder and refiner trained again");
         drop((frames, crops));
-        let pools = pools(&scenery, &Weights::of(&finder, &refiner), seed + 8, self.some(6000));
+        let pools = pools(&scenery, &Weights::of(&finder, &refiner), seed + 8, self.some(8000));
         for (share, pool) in &pools {
             self.tell(&format!("{} hands at {share:.2}", pool.len()));
         }
-        let counter = train::counter(&pools, self.some(4200), 4e-3, seed + 9);
+        let mut counter = rayon::scope(|_| train::counter(&pools, self.some(12_000), 4e-3, seed + 9));
         self.tell("counter trained");
         let weights =
             [finder.weights(), refiner.weights(), counter.weights()].map(|weights| encode(&weights));
@@ -100,17 +100,8 @@ impl Course {
             &weights[1],
             &weights[2],
         ]));
-        let model = model::learn(&counter, &pools, &name, images, self.some(2400), seed + 10)?;
+        let model = model::learn(&mut counter, &pools, &name, images, self.some(2400), seed + 10)?;
         self.tell("classifier trained");
         Ok(Taught { weights, model })
     }
-}
-
-/// Both at once, a core each.
-fn both<A: Send, B>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B) -> (A, B) {
-    std::thread::scope(|scope| {
-        let a = scope.spawn(a);
-        let b = b();
-        (a.join().expect("training does not panic"), b)
-    })
 }

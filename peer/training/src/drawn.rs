@@ -5,7 +5,7 @@
 use rand::{Rng, RngExt};
 
 use crate::chance::normal;
-use crate::image::{Canvas, Pyramid};
+use crate::image::{Canvas, Joints, Pyramid};
 
 /// Side of a drawn picture; the hand's square is [`HAND`] of it.
 pub const SIDE: usize = 112;
@@ -19,6 +19,7 @@ pub struct Drawn {
     pub shade: Pyramid,
     pub mask: Pyramid,
     pub arm: Pyramid,
+    pub joints: Joints,
     /// Raised fingers, thumb first.
     pub fingers: [bool; 5],
 }
@@ -98,7 +99,9 @@ enum Part {
     Arm,
 }
 
-fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
+/// Its bones, and its joints in the order of [`Joints`].
+fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> (Vec<Bone>, [V; 21]) {
+    let mut joints = [[0.0; 3]; 21];
     let mut bones = Vec::with_capacity(32);
     let mut bone = |from: V, to: V, from_radius: f32, to_radius: f32, part: Part| {
         bones.push(Bone { from, to, from_radius, to_radius, part });
@@ -131,6 +134,7 @@ fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
         };
         let aside = if up { lean } else { 0.3 * lean };
         let (mut at, mut bend) = (knuckles[i], 0.0_f32);
+        joints[4 * i + 5] = at;
         for j in 0..3 {
             bend += bends[j] * degrees;
             let along = [-aside.sin() * bend.cos(), aside.cos() * bend.cos(), bend.sin()];
@@ -138,9 +142,11 @@ fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
             let (thick, thin) = (1.0 - 0.07 * j as f32, 0.93 - 0.07 * j as f32);
             bone(at, next, radii[i] * thick, radii[i] * thin, Part::Finger);
             at = next;
+            joints[4 * i + 6 + j] = at;
         }
     }
     let root = [-0.24, 0.18, 0.08];
+    joints[1] = root;
     if raised[0] {
         let away = rng.random_range(25.0..75.0) * degrees;
         let out = rng.random_range(-25.0..25.0) * degrees;
@@ -152,6 +158,7 @@ fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
             let next = plus(at, along, [0.42, 0.34, 0.27][j] * length);
             bone(at, next, [0.15, 0.12, 0.11][j] * slim, [0.12, 0.11, 0.09][j] * slim, Part::Finger);
             at = next;
+            joints[2 + j] = at;
         }
     } else {
         let mut u = |low: f32, high: f32| rng.random_range(low..high);
@@ -167,6 +174,7 @@ fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
         bone(root, knuckle, 0.15 * slim, 0.125 * slim, Part::Finger);
         bone(knuckle, joint, 0.125 * slim, 0.11 * slim, Part::Finger);
         bone(joint, tip, 0.11 * slim, 0.09 * slim, Part::Finger);
+        (joints[2], joints[3], joints[4]) = (knuckle, joint, tip);
     }
     let elbow = [0.25 * normal(rng), -2.8, 0.4 * normal(rng)];
     // Thinner than the hand is thick, or it would hide the palm.
@@ -177,12 +185,12 @@ fn skeleton(raised: [bool; 5], rng: &mut impl Rng) -> Vec<Bone> {
         rng.random_range(0.22..0.4),
         Part::Arm,
     );
-    bones
+    (bones, joints)
 }
 
 /// A hand of some person, raising these fingers, from any side.
 pub fn draw(raised: [bool; 5], rng: &mut impl Rng) -> Drawn {
-    let mut bones = skeleton(raised, rng);
+    let (mut bones, joints) = skeleton(raised, rng);
     let back = if rng.random::<f32>() < 0.45 { std::f32::consts::PI } else { 0.0 };
     // Now and then the hand is tilted far: fingers towards the camera, or away.
     let tilt = if rng.random::<f32>() < 0.15 { 0.7 } else { 0.3 };
@@ -215,7 +223,12 @@ pub fn draw(raised: [bool; 5], rng: &mut impl Rng) -> Drawn {
             paper.fill(bone, centre, scale);
         }
     }
-    paper.light(scale, raised, rng)
+    let joints = joints.map(|joint| {
+        let joint = times(&view, joint);
+        let half = SIDE as f32 / 2.0;
+        ((joint[0] - centre[0]) * scale + half, half - (joint[1] - centre[1]) * scale)
+    });
+    paper.light(scale, raised, joints, rng)
 }
 
 struct Paper {
@@ -266,7 +279,7 @@ impl Paper {
         }
     }
 
-    fn light(&self, scale: f32, fingers: [bool; 5], rng: &mut impl Rng) -> Drawn {
+    fn light(&self, scale: f32, fingers: [bool; 5], joints: Joints, rng: &mut impl Rng) -> Drawn {
         let mut towards = [0.9 * normal(rng), -0.6 * normal(rng).abs(), rng.random_range(0.3..1.0)];
         let length = towards.iter().map(|v| v * v).sum::<f32>().sqrt();
         towards.iter_mut().for_each(|v| *v /= length);
@@ -302,6 +315,7 @@ impl Paper {
             shade: Pyramid::new(SIDE, SIDE, 1, shade),
             mask: Pyramid::new(SIDE, SIDE, 1, mask),
             arm: Pyramid::new(SIDE, SIDE, 1, arm),
+            joints,
             fingers,
         }
     }

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::camera::expose;
 use crate::chance::{normal, uniform};
-use crate::image::{Affine, Canvas, Outside};
+use crate::image::{Affine, Canvas, Joints, Outside};
 use crate::places::{COVERED, CROP, MASK, Place, ROOM, onto_crop, scaled};
-use crate::scenery::{Scenery, covered, real};
+use crate::scenery::{Scenery, covered, onto, real};
 
 /// The finder's frame and its maps.
 pub const WIDTH: usize = 160;
@@ -54,6 +54,7 @@ pub struct Hand {
     pub place: Place,
     pub count: Option<u8>,
     pub fingers: Option<[bool; 5]>,
+    pub joints: Option<Joints>,
     pub origin: u32,
 }
 
@@ -105,7 +106,7 @@ impl Scene {
                             *all = all.max(*one);
                         }
                         let (count, fingers, origin) = (pasted.count, pasted.fingers, pasted.origin);
-                        hands.push(Hand { place, count, fingers, origin });
+                        hands.push(Hand { place, count, fingers, joints: Some(pasted.joints), origin });
                         break;
                     }
                 }
@@ -151,7 +152,8 @@ impl Scene {
         // A finer look is not for hands that fill it.
         let hands = self.hands.iter().filter(|hand| hand.place.side < 0.9 * WIDTH as f32).map(|hand| {
             let place = Place { x: hand.place.x - x as f32, y: hand.place.y - y as f32, ..hand.place };
-            Hand { place, ..*hand }
+            let joints = hand.joints.map(|joints| joints.map(|(jx, jy)| (jx - x as f32, jy - y as f32)));
+            Hand { place, joints, ..*hand }
         });
         let part = Self { canvas: part(&self.canvas), mask: part(&self.mask), hands: hands.collect() };
         (part.without_strays(), (x as f32, y as f32))
@@ -229,7 +231,8 @@ fn real_frame(scenery: &Scenery, rng: &mut ChaCha8Rng, times: usize) -> (Canvas,
         share = share.blurred(uniform(rng, 0.5, 3.0));
     }
     canvas.blend(&picture, &share.values);
-    (canvas, mask, Hand { place, count: photo.count, fingers: photo.fingers, origin: photo.origin })
+    let joints = Some(onto(photo, &place, mirror, 1.0).joints(&photo.joints));
+    (canvas, mask, Hand { place, count: photo.count, fingers: photo.fingers, joints, origin: photo.origin })
 }
 
 fn crop(scenery: &Scenery, rng: &mut ChaCha8Rng) -> Crop {

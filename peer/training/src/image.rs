@@ -90,11 +90,33 @@ impl Level {
         Self { width, height, values }
     }
 
+    /// Between a pixel and those right of it and below.
+    fn between<const C: usize>(&self, at: usize, fx: f32, fy: f32) -> [f32; C] {
+        let row = self.width * C;
+        let upper = &self.values[at * C..][..row + 2 * C];
+        std::array::from_fn(|c| {
+            let value = |i: usize| f32::from(upper[i + c]);
+            let (above, below) =
+                (value(0) + fx * (value(C) - value(0)), value(row) + fx * (value(row + C) - value(row)));
+            above + fy * (below - above)
+        })
+    }
+
     fn sample(&self, x: f32, y: f32, outside: Outside, out: &mut [f32]) {
         let (w, h) = (self.width as i64, self.height as i64);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
         let (x0, y0) = (x0 as i64, y0 as i64);
+        // All four within: no need to look at each, which is most of the time that pictures take.
+        if x0 >= 0 && y0 >= 0 && x0 + 1 < w && y0 + 1 < h {
+            let at = (y0 * w + x0) as usize;
+            match out {
+                [one] => [*one] = self.between::<1>(at, fx, fy),
+                [b, g, r] => [*b, *g, *r] = self.between::<3>(at, fx, fy),
+                _ => unreachable!("pictures have one channel or three"),
+            }
+            return;
+        }
         out.fill(0.0);
         for (dy, wy) in [(0, 1.0 - fy), (1, fy)] {
             for (dx, wx) in [(0, 1.0 - fx), (1, fx)] {
@@ -128,6 +150,9 @@ fn mirrored(at: i64, size: i64) -> i64 {
     if around < size { around } else { 2 * size - 1 - around }
 }
 
+/// Across and down: the wrist, and four joints of each finger from its root to its tip, thumb first.
+pub type Joints = [(f32, f32); 21];
+
 /// `out = m · in + t`.
 #[derive(Clone, Copy, Debug)]
 pub struct Affine {
@@ -154,6 +179,11 @@ impl Affine {
 
     pub fn apply(&self, x: f32, y: f32) -> (f32, f32) {
         (self.m[0][0] * x + self.m[0][1] * y + self.t[0], self.m[1][0] * x + self.m[1][1] * y + self.t[1])
+    }
+
+    /// The same of joints.
+    pub fn joints(&self, joints: &Joints) -> Joints {
+        joints.map(|(x, y)| self.apply(x, y))
     }
 
     pub fn determinant(&self) -> f32 {

@@ -3,6 +3,7 @@
 use crate::counting::{Shown, frame};
 use crate::frames::{CELLS, HEIGHT, WIDTH};
 use crate::image::{Affine, Outside, Pyramid};
+use crate::losses::sigmoid;
 use crate::places::{CROP, MASK, Place, ROOM, onto_mask};
 use crate::robots::Robot;
 
@@ -108,10 +109,6 @@ pub struct Found {
     pub mask: Vec<f32>,
 }
 
-pub fn sigmoid(v: f32) -> f32 {
-    1.0 / (1.0 + (-v).exp())
-}
-
 /// The mask without what is not joined to its largest part.
 pub fn largest(mut mask: Vec<f32>) -> Vec<f32> {
     let mut part = vec![0_usize; mask.len()];
@@ -179,6 +176,7 @@ pub fn shown(picture: &Pyramid, found: &Found) -> Option<Shown> {
         frame,
         count: None,
         fingers: None,
+        joints: None,
         hand: true,
         origin: 0,
         drawn: false,

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use crate::counting::Shown;
 use crate::frames::{Crop, Frame, Hand, Scene, crop_at, generator};
 use crate::image::{Outside, Pyramid};
-use crate::look::{Candidate, Found, candidates, corrected, largest, shown, sigmoid};
-use crate::places::{CROP, Place, ROOM, onto_crop, overlap};
+use crate::look::{Candidate, Found, candidates, corrected, largest, shown};
+use crate::losses::sigmoid;
+use crate::places::{CROP, Place, ROOM, onto_crop, onto_mask, overlap};
 use crate::robots::{Robot, Weights};
 use crate::scenery::Scenery;
 
@@ -111,10 +112,13 @@ fn close_up(
         } else if let Some((_, hand)) = near.filter(|_| overlap > SAME) {
             mined.hands.extend(teachable(hand, &place, mask, crop));
             if pass == 1 {
-                let taken = shown(picture, &found()).filter(|_| hand.count.is_none_or(|count| count < 6));
+                let found = found();
+                let onto = onto_mask(&found.place);
+                let taken = shown(picture, &found).filter(|_| hand.count.is_none_or(|count| count < 6));
                 mined.shown.extend(taken.map(|taken| Shown {
                     count: hand.count,
                     fingers: hand.fingers,
+                    joints: hand.joints.map(|joints| onto.joints(&joints)),
                     origin: hand.origin,
                     ..taken
                 }));

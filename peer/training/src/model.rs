@@ -20,7 +20,7 @@ const DRAWN_PARTS: u32 = 2;
 /// Learns the counts from hands of these pools, varied as those that the counter was trained on. `images`: fingerprints of the
 /// pictures they are of.
 pub fn learn(
-    counter: &Counter,
+    counter: &mut Counter,
     pools: &[(f32, Vec<Shown>)],
     feature_set: &str,
     images: Vec<u64>,
@@ -30,7 +30,7 @@ pub fn learn(
     let hands = counting::batch(pools, samples, seed, 0);
     let counted: Vec<_> =
         hands.into_iter().filter(|(_, shown)| shown.hand && shown.count.is_some()).collect();
-    let inputs: Vec<&[f32]> = counted.iter().map(|(input, _)| input.as_slice()).collect();
+    let inputs: Vec<&[f32]> = counted.iter().map(|(variation, _)| variation.picture.as_slice()).collect();
     let embeddings = embed(counter, &inputs);
     let samples: Vec<LabelledFeatures> = (0..)
         .zip(counted.iter().zip(embeddings))

@@ -1,297 +1,356 @@
 //! The three networks as they are trained, and their weights as they are shipped.
 
-use burn::module::Module;
-use burn::nn::conv::{Conv2d, Conv2dConfig};
-use burn::nn::pool::{MaxPool2d, MaxPool2dConfig};
-use burn::nn::{BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d};
-use burn::tensor::activation::relu;
-use burn::tensor::{Device, Tensor};
+use crate::learning::{Graph, Id, Normalised, Parameter, Parameters, Planes, Shape};
+use crate::places::CROP;
 
 /// The weights of a network, in the order in which its layers stand, normalisation folded in.
 pub type Weights = Vec<Vec<f32>>;
 
-fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    tensor.into_data().try_to_vec::<f32>().expect("weights are 32-bit floats")
+/// A convolution with a bias, or a layer in which everything depends on everything: that is one of single pixels.
+#[derive(Clone, Copy, Debug)]
+struct Plain {
+    weight: Parameter,
+    bias: Parameter,
+    shape: Shape,
+}
+
+impl Plain {
+    fn new(from: usize, to: usize, parameters: &mut Parameters) -> Self {
+        let shape = Shape::point(from, to);
+        let weight = parameters.weights(from * to, from);
+        Self { weight, bias: parameters.constant(to, 0.0), shape }
+    }
+
+    fn forward(self, graph: &mut Graph, from: Id) -> Id {
+        graph.convolution(from, self.weight, Some(self.bias), self.shape, 0)
+    }
+
+    fn weights(self, parameters: &Parameters, out: &mut Weights) {
+        out.extend([self.weight, self.bias].map(|parameter| parameters.get(parameter).to_vec()));
+    }
 }
 
 /// Convolution, normalisation, rectifier.
-#[derive(Module, Debug)]
-pub struct Block {
-    conv: Conv2d,
-    norm: BatchNorm,
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    weight: Parameter,
+    norm: Normalised,
+    shape: Shape,
+    /// Zeros around what it makes.
+    border: usize,
 }
 
 impl Block {
-    fn new(i: usize, o: usize, kernel: usize, stride: usize, dilation: usize, device: &Device) -> Self {
-        let pad = dilation * (kernel / 2);
-        let conv = Conv2dConfig::new([i, o], [kernel, kernel])
-            .with_stride([stride, stride])
-            .with_dilation([dilation, dilation])
-            .with_padding(PaddingConfig2d::Explicit(pad, pad, pad, pad))
-            .with_bias(false)
-            .init(device);
-        Self { conv, norm: BatchNormConfig::new(o).init(device) }
+    fn new(shape: Shape, border: usize, parameters: &mut Parameters) -> Self {
+        let to = shape.channels.1;
+        let weight = parameters.weights(to * shape.inputs(), shape.inputs());
+        let norm = Normalised {
+            factor: parameters.constant(to, 1.0),
+            shift: parameters.constant(to, 0.0),
+            mean: parameters.constant(to, 0.0),
+            variance: parameters.constant(to, 1.0),
+        };
+        Self { weight, norm, shape, border }
     }
 
-    fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        relu(self.norm.forward(self.conv.forward(x)))
+    fn forward(self, graph: &mut Graph, from: Id) -> Id {
+        let made = graph.convolution(from, self.weight, None, self.shape, self.border);
+        graph.normal(made, self.norm)
     }
 
-    fn weights(&self, out: &mut Weights) {
-        let weight = values(self.conv.weight.val());
-        let (gamma, beta) = (values(self.norm.gamma.val()), values(self.norm.beta.val()));
-        let (mean, variance) =
-            (values(self.norm.running_mean.value()), values(self.norm.running_var.value()));
-        let each = weight.len() / gamma.len();
-        let factor: Vec<f32> =
-            gamma.iter().zip(&variance).map(|(g, v)| g / (v + self.norm.epsilon as f32).sqrt()).collect();
-        out.push(weight.iter().enumerate().map(|(i, w)| w * factor[i / each]).collect());
-        out.push((0..gamma.len()).map(|o| beta[o] - mean[o] * factor[o]).collect());
+    fn weights(self, parameters: &Parameters, out: &mut Weights) {
+        let [weight, factor, shift, mean, variance] =
+            [self.weight, self.norm.factor, self.norm.shift, self.norm.mean, self.norm.variance]
+                .map(|parameter| parameters.get(parameter));
+        let inputs = self.shape.inputs();
+        let slope: Vec<f32> =
+            factor.iter().zip(variance).map(|(f, v)| f / (v + Normalised::LEAST).sqrt()).collect();
+        out.push(weight.iter().enumerate().map(|(i, w)| w * slope[i / inputs]).collect());
+        out.push((0..slope.len()).map(|o| shift[o] - mean[o] * slope[o]).collect());
     }
 }
 
-fn plain(i: usize, o: usize, device: &Device) -> Conv2d {
-    Conv2dConfig::new([i, o], [1, 1]).init(device)
-}
-
-fn conv_weights(conv: &Conv2d, out: &mut Weights) {
-    out.push(values(conv.weight.val()));
-    out.push(conv.bias.as_ref().map(|bias| values(bias.val())).unwrap_or_default());
-}
-
-fn linear_weights(linear: &Linear, out: &mut Weights) {
-    // Kept as [in][out] here, shipped as [out][in].
-    let [i, o] = linear.weight.dims();
-    let weight = values(linear.weight.val());
-    out.push((0..o).flat_map(|b| (0..i).map(move |a| (a, b))).map(|(a, b)| weight[a * o + b]).collect());
-    out.push(linear.bias.as_ref().map(|bias| values(bias.val())).unwrap_or_default());
-}
-
-/// Twice as large, each value four times; cut to `rows` and `columns`.
-fn enlarged(x: Tensor<4>, rows: usize, columns: usize) -> Tensor<4> {
-    let [n, c, h, w] = x.dims();
-    let wide: Tensor<6> = x.reshape([n, c, h, 1, w, 1]).expand([n, c, h, 2, w, 2]);
-    let wide: Tensor<4> = wide.reshape([n, c, 2 * h, 2 * w]);
-    if (2 * h, 2 * w) == (rows, columns) { wide } else { wide.slice([0..n, 0..c, 0..rows, 0..columns]) }
-}
+/// Zeros around the coarse maps: they are looked at in wide steps.
+const COARSE: usize = 2;
 
 /// What finder and refiner begin with: a picture in three sizes, the smallest seen with the widest view.
-#[derive(Module, Debug)]
-pub struct Trunk {
-    c1: Block,
-    c2: Block,
-    c3: Block,
-    c4: Block,
-    c5: Block,
-    c6: Block,
-    c7: Block,
-}
+#[derive(Clone, Debug)]
+struct Trunk([Block; 7]);
 
 impl Trunk {
     /// `second`: the stride of the second layer.
-    fn new([a, b, c, d]: [usize; 4], second: usize, device: &Device) -> Self {
-        let block = |from, to, stride, dilation| Block::new(from, to, 3, stride, dilation, device);
-        Self {
-            c1: block(3, a, 2, 1),
-            c2: block(a, b, second, 1),
-            c3: block(b, c, 2, 1),
-            c4: block(c, c, 1, 1),
-            c5: block(c, d, 2, 1),
-            c6: block(d, d, 1, 1),
-            c7: block(d, d, 1, 2),
-        }
+    fn new([a, b, c, d]: [usize; 4], second: usize, parameters: &mut Parameters) -> Self {
+        let mut block = |from, to, stride, dilation, border| {
+            Block::new(Shape { stride, dilation, ..Shape::usual(from, to) }, border, parameters)
+        };
+        Self([
+            block(3, a, 2, 1, 1),
+            block(a, b, second, 1, 1),
+            block(b, c, 2, 1, 1),
+            block(c, c, 1, 1, 1),
+            block(c, d, 2, 1, COARSE),
+            block(d, d, 1, 1, COARSE),
+            block(d, d, 1, 2, COARSE),
+        ])
     }
 
-    fn forward(&self, x: Tensor<4>) -> [Tensor<4>; 3] {
-        let fine = self.c2.forward(self.c1.forward(x));
-        let middle = self.c4.forward(self.c3.forward(fine.clone()));
-        let coarse = self.c5.forward(middle.clone());
-        let coarse = coarse.clone() + self.c6.forward(coarse);
-        let coarse = coarse.clone() + self.c7.forward(coarse);
+    fn forward(&self, graph: &mut Graph, x: Id) -> [Id; 3] {
+        let [c1, c2, c3, c4, c5, c6, c7] = self.0;
+        let first = c1.forward(graph, x);
+        let fine = c2.forward(graph, first);
+        let third = c3.forward(graph, fine);
+        let middle = c4.forward(graph, third);
+        let mut coarse = c5.forward(graph, middle);
+        for residual in [c6, c7] {
+            let more = residual.forward(graph, coarse);
+            coarse = graph.sum([coarse, more], false);
+        }
         [fine, middle, coarse]
     }
 
-    fn weights(&self, out: &mut Weights) {
-        for block in [&self.c1, &self.c2, &self.c3, &self.c4, &self.c5, &self.c6, &self.c7] {
-            block.weights(out);
-        }
+    fn weights(&self, parameters: &Parameters, out: &mut Weights) {
+        self.0.iter().for_each(|block| block.weights(parameters, out));
     }
 }
 
 /// Where hands are: from a frame to maps of a quarter of its size.
-#[derive(Module, Debug)]
+#[derive(Clone, Debug)]
 pub struct Finder {
+    pub parameters: Parameters,
+    layers: FinderLayers,
+}
+
+#[derive(Clone, Debug)]
+struct FinderLayers {
     trunk: Trunk,
-    l5: Conv2d,
+    l5: Plain,
     m4: Block,
-    l4: Conv2d,
-    l3: Conv2d,
+    l4: Plain,
+    l3: Plain,
     m3: Block,
-    h: Conv2d,
+    h: Plain,
 }
 
 impl Finder {
-    pub fn new(device: &Device) -> Self {
-        let mut h = plain(16, 5, device);
-        // Hands are rare: it begins with saying so.
-        h.bias = h.bias.map(|bias| bias.map(|_| Tensor::from_floats([-3.5, 0.0, 0.0, 0.0, -2.0], device)));
-        Self {
-            trunk: Trunk::new([8, 16, 32, 48], 2, device),
-            l5: plain(48, 32, device),
-            m4: Block::new(32, 32, 3, 1, 1, device),
-            l4: plain(32, 16, device),
-            l3: plain(16, 16, device),
-            m3: Block::new(16, 16, 3, 1, 1, device),
-            h,
-        }
+    /// What its maps begin with: hands are rare.
+    const FIRST: [f32; 5] = [-3.5, 0.0, 0.0, 0.0, -2.0];
+
+    pub fn new(seed: u64) -> Self {
+        let mut all = Parameters::new(seed);
+        let p = &mut all;
+        let layers = FinderLayers {
+            trunk: Trunk::new([8, 16, 32, 48], 2, p),
+            l5: Plain::new(48, 32, p),
+            m4: Block::new(Shape::usual(32, 32), 1, p),
+            l4: Plain::new(32, 16, p),
+            l3: Plain::new(16, 16, p),
+            m3: Block::new(Shape::usual(16, 16), 1, p),
+            h: Plain::new(16, Self::FIRST.len(), p),
+        };
+        p.get_mut(layers.h.bias).copy_from_slice(&Self::FIRST);
+        Self { parameters: all, layers }
     }
 
-    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let [x2, x3, x4] = self.trunk.forward(x);
-        let [_, _, h3, w3] = x3.dims();
-        let [_, _, h2, w2] = x2.dims();
-        let y = self.m4.forward(relu(enlarged(self.l5.forward(x4), h3, w3) + x3));
-        let y = self.m3.forward(relu(enlarged(self.l4.forward(y), h2, w2) + self.l3.forward(x2)));
-        self.h.forward(y)
+    /// Steps from a frame to its five maps.
+    pub fn forward(&mut self, x: Planes, training: bool) -> (Graph<'_>, Id) {
+        let mut graph = Graph::new(&mut self.parameters, training);
+        let (g, l) = (&mut graph, &self.layers);
+        let x = g.give(x);
+        let [fine, middle, coarse] = l.trunk.forward(g, x);
+        let y = l.l5.forward(g, coarse);
+        let y = g.enlarged(y, middle);
+        let y = g.sum([y, middle], true);
+        let y = l.m4.forward(g, y);
+        let y = l.l4.forward(g, y);
+        let y = g.enlarged(y, fine);
+        let known = l.l3.forward(g, fine);
+        let y = g.sum([y, known], true);
+        let y = l.m3.forward(g, y);
+        let maps = l.h.forward(g, y);
+        (graph, maps)
     }
 
     pub fn weights(&self) -> Weights {
-        let mut out = Weights::new();
-        self.trunk.weights(&mut out);
-        conv_weights(&self.l5, &mut out);
-        self.m4.weights(&mut out);
-        conv_weights(&self.l4, &mut out);
-        conv_weights(&self.l3, &mut out);
-        self.m3.weights(&mut out);
-        conv_weights(&self.h, &mut out);
+        let (mut out, p, l) = (Weights::new(), &self.parameters, &self.layers);
+        l.trunk.weights(p, &mut out);
+        l.l5.weights(p, &mut out);
+        l.m4.weights(p, &mut out);
+        l.l4.weights(p, &mut out);
+        l.l3.weights(p, &mut out);
+        l.m3.weights(p, &mut out);
+        l.h.weights(p, &mut out);
         out
     }
 }
 
 /// Whether a crop shows a hand, where exactly, and its pixels.
-#[derive(Module, Debug)]
+#[derive(Clone, Debug)]
 pub struct Refiner {
+    pub parameters: Parameters,
+    layers: RefinerLayers,
+}
+
+#[derive(Clone, Debug)]
+struct RefinerLayers {
     trunk: Trunk,
-    g1: Conv2d,
-    g2: Linear,
-    g3: Linear,
-    l5: Conv2d,
+    g1: Plain,
+    g2: Plain,
+    g3: Plain,
+    l5: Plain,
     m4: Block,
-    l4: Conv2d,
+    l4: Plain,
     m3: Block,
-    h: Conv2d,
+    h: Plain,
 }
 
 impl Refiner {
-    pub fn new(device: &Device) -> Self {
-        Self {
-            trunk: Trunk::new([12, 16, 28, 44], 1, device),
-            g1: plain(44, 12, device),
-            g2: LinearConfig::new(768, 32).init(device),
-            g3: LinearConfig::new(32, 6).init(device),
-            l5: plain(44, 28, device),
-            m4: Block::new(28, 24, 3, 1, 1, device),
-            l4: plain(24, 16, device),
-            m3: Block::new(16, 16, 3, 1, 1, device),
-            h: plain(16, 4, device),
-        }
+    pub fn new(seed: u64) -> Self {
+        let mut all = Parameters::new(seed);
+        let p = &mut all;
+        let layers = RefinerLayers {
+            trunk: Trunk::new([12, 16, 28, 44], 1, p),
+            g1: Plain::new(44, 12, p),
+            g2: Plain::new(12 * (CROP / 8).pow(2), 32, p),
+            g3: Plain::new(32, 6, p),
+            l5: Plain::new(44, 28, p),
+            m4: Block::new(Shape::usual(28, 24), 1, p),
+            l4: Plain::new(24, 16, p),
+            m3: Block::new(Shape::usual(16, 16), 1, p),
+            h: Plain::new(16, 4, p),
+        };
+        Self { parameters: all, layers }
     }
 
-    /// Six numbers for each crop, and the mask's logits as four planes of half its size: left and right of the upper row, then of
-    /// the lower.
-    pub fn forward(&self, x: Tensor<4>) -> (Tensor<2>, Tensor<4>) {
-        let [x2, x3, x4] = self.trunk.forward(x);
-        let g: Tensor<2> = relu(self.g1.forward(x4.clone())).flatten(1, 3);
-        let g = self.g3.forward(relu(self.g2.forward(g)));
-        let y = self.m4.forward(relu(enlarged(self.l5.forward(x4), 16, 16) + x3));
-        let y = self.m3.forward(relu(enlarged(self.l4.forward(y), 32, 32) + x2));
-        (g, self.h.forward(y))
+    /// Steps to six numbers for each crop, and to the mask's logits as four planes of half its size: left and right of the upper row,
+    /// then of the lower.
+    pub fn forward(&mut self, x: Planes, training: bool) -> (Graph<'_>, Id, Id) {
+        let mut graph = Graph::new(&mut self.parameters, training);
+        let (g, l) = (&mut graph, &self.layers);
+        let x = g.give(x);
+        let [fine, middle, coarse] = l.trunk.forward(g, x);
+        let said = l.g1.forward(g, coarse);
+        let said = g.rectified(said);
+        let said = g.flat(said);
+        let said = l.g2.forward(g, said);
+        let said = g.rectified(said);
+        let said = l.g3.forward(g, said);
+        let y = l.l5.forward(g, coarse);
+        let y = g.enlarged(y, middle);
+        let y = g.sum([y, middle], true);
+        let y = l.m4.forward(g, y);
+        let y = l.l4.forward(g, y);
+        let y = g.enlarged(y, fine);
+        let y = g.sum([y, fine], true);
+        let y = l.m3.forward(g, y);
+        let mask = l.h.forward(g, y);
+        (graph, said, mask)
     }
 
     pub fn weights(&self) -> Weights {
-        let mut out = Weights::new();
-        self.trunk.weights(&mut out);
-        conv_weights(&self.g1, &mut out);
-        linear_weights(&self.g2, &mut out);
-        linear_weights(&self.g3, &mut out);
-        conv_weights(&self.l5, &mut out);
-        self.m4.weights(&mut out);
-        conv_weights(&self.l4, &mut out);
-        self.m3.weights(&mut out);
-        conv_weights(&self.h, &mut out);
+        let (mut out, p, l) = (Weights::new(), &self.parameters, &self.layers);
+        l.trunk.weights(p, &mut out);
+        [l.g1, l.g2, l.g3, l.l5].iter().for_each(|plain| plain.weights(p, &mut out));
+        l.m4.weights(p, &mut out);
+        l.l4.weights(p, &mut out);
+        l.m3.weights(p, &mut out);
+        l.h.weights(p, &mut out);
         out
     }
 }
 
 /// What a hand shows: 24 numbers, of which the count and the fingers follow.
-#[derive(Module, Debug)]
+#[derive(Clone, Debug)]
 pub struct Counter {
-    c1: Block,
-    c2: Block,
-    c3: Block,
-    c4: Block,
-    pool: MaxPool2d,
-    d1: Linear,
-    d2: Linear,
-    count: Linear,
-    fingers: Linear,
-    hand: Linear,
+    pub parameters: Parameters,
+    layers: CounterLayers,
 }
 
-/// What the counter says of hands: a row each.
+#[derive(Clone, Debug)]
+struct CounterLayers {
+    convolutions: [Block; 4],
+    d1: Plain,
+    d2: Plain,
+    count: Plain,
+    fingers: Plain,
+    hand: Plain,
+    /// Only for training: who knows where the joints are has understood the hand.
+    joints: Plain,
+}
+
+/// What the counter says of hands.
+#[derive(Clone, Copy, Debug)]
 pub struct Said {
-    pub embedding: Tensor<2>,
+    pub embedding: Id,
     /// Logits of the counts.
-    pub count: Tensor<2>,
+    pub count: Id,
     /// Of each finger, thumb first.
-    pub fingers: Tensor<2>,
+    pub fingers: Id,
     /// Of being a hand at all.
-    pub hand: Tensor<2>,
+    pub hand: Id,
+    /// Across and down of each joint, -1 to 1.
+    pub joints: Id,
 }
 
 pub const EMBEDDING: usize = 24;
 
+/// Values between the pictures and the layers in which everything depends on everything.
+pub const FEATURES: usize = 9 * 96;
+
 impl Counter {
-    pub fn new(device: &Device) -> Self {
-        Self {
-            c1: Block::new(2, 16, 5, 2, 1, device),
-            c2: Block::new(16, 32, 3, 1, 1, device),
-            c3: Block::new(32, 48, 3, 1, 1, device),
-            c4: Block::new(48, 64, 3, 1, 1, device),
-            pool: MaxPool2dConfig::new([2, 2]).with_strides([2, 2]).init(),
-            d1: LinearConfig::new(576, 64).init(device),
-            d2: LinearConfig::new(64, EMBEDDING).init(device),
-            count: LinearConfig::new(EMBEDDING, 6).init(device),
-            fingers: LinearConfig::new(EMBEDDING, 5).init(device),
-            hand: LinearConfig::new(EMBEDDING, 1).init(device),
-        }
+    pub fn new(seed: u64) -> Self {
+        let mut all = Parameters::new(seed);
+        let p = &mut all;
+        let mut block = |shape| Block::new(shape, 1, p);
+        let convolutions = [
+            block(Shape { side: 5, stride: 2, ..Shape::usual(2, 24) }),
+            block(Shape::usual(24, 40)),
+            block(Shape::usual(40, 64)),
+            block(Shape::usual(64, 96)),
+        ];
+        let layers = CounterLayers {
+            convolutions,
+            d1: Plain::new(FEATURES, 96, p),
+            d2: Plain::new(96, EMBEDDING, p),
+            count: Plain::new(EMBEDDING, 6, p),
+            fingers: Plain::new(EMBEDDING, 5, p),
+            hand: Plain::new(EMBEDDING, 1, p),
+            joints: Plain::new(96, 42, p),
+        };
+        Self { parameters: all, layers }
     }
 
-    pub fn forward(&self, x: Tensor<4>, drop: Option<Tensor<2>>) -> Said {
-        let x = self.pool.forward(self.c1.forward(x));
-        let x = self.pool.forward(self.c2.forward(x));
-        let x = self.pool.forward(self.c4.forward(self.c3.forward(x)));
-        let mut x: Tensor<2> = x.flatten(1, 3);
-        if let Some(kept) = drop {
-            x = x * kept;
+    /// `drop`: a factor for each of the [`FEATURES`] of each picture, in the order `[feature][picture]`.
+    pub fn forward(&mut self, x: Planes, drop: Option<Vec<f32>>) -> (Graph<'_>, Said) {
+        let mut graph = Graph::new(&mut self.parameters, drop.is_some());
+        let (g, l) = (&mut graph, &self.layers);
+        let mut x = g.give(x);
+        for (i, block) in l.convolutions.iter().enumerate() {
+            x = block.forward(g, x);
+            if i != 2 {
+                x = g.halved(x, 1);
+            }
         }
-        let e = self.d2.forward(relu(self.d1.forward(x)));
-        Said {
-            count: self.count.forward(e.clone()),
-            fingers: self.fingers.forward(e.clone()),
-            hand: self.hand.forward(e.clone()),
-            embedding: e,
+        x = g.flat(x);
+        if let Some(by) = drop {
+            x = g.scaled(x, by);
         }
+        let hidden = l.d1.forward(g, x);
+        let hidden = g.rectified(hidden);
+        let embedding = l.d2.forward(g, hidden);
+        let said = Said {
+            embedding,
+            count: l.count.forward(g, embedding),
+            fingers: l.fingers.forward(g, embedding),
+            hand: l.hand.forward(g, embedding),
+            joints: l.joints.forward(g, hidden),
+        };
+        (graph, said)
     }
 
     pub fn weights(&self) -> Weights {
-        let mut out = Weights::new();
-        for block in [&self.c1, &self.c2, &self.c3, &self.c4] {
-            block.weights(&mut out);
-        }
-        for linear in [&self.d1, &self.d2, &self.count, &self.fingers, &self.hand] {
-            linear_weights(linear, &mut out);
-        }
+        let (mut out, p, l) = (Weights::new(), &self.parameters, &self.layers);
+        l.convolutions.iter().for_each(|block| block.weights(p, &mut out));
+        [l.d1, l.d2, l.count, l.fingers, l.hand].iter().for_each(|plain| plain.weights(p, &mut out));
         out
     }
 }
@@ -329,14 +388,13 @@ fn half(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use burn::tensor::TensorData;
     use gestalt_vision::network as robots;
 
     use super::*;
     use crate::counting::{self, Shown};
     use crate::frames::{CELLS, Crop, Frame, HEIGHT, WIDTH};
     use crate::image::Pyramid;
-    use crate::places::{CROP, Place};
+    use crate::places::Place;
     use crate::train;
 
     fn noise(n: usize) -> Vec<u8> {
@@ -353,10 +411,6 @@ mod tests {
         map
     }
 
-    fn input(values: &[f32], [c, h, w]: [usize; 3]) -> Tensor<4> {
-        Tensor::from_data(TensorData::new(values.to_vec(), [1, c, h, w]), &Device::flex())
-    }
-
     /// Weights are shipped in 16 bits: a thousandth of each.
     #[track_caller]
     fn assert_near(robots: &[f32], trained: &[f32]) {
@@ -367,18 +421,28 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_finder_of_robots_says_what_it_was_trained_to_say() {
-        let frame = Frame {
+    fn frame() -> Frame {
+        Frame {
             picture: noise(3 * WIDTH * HEIGHT),
             hands: vec![Place { x: 70.0, y: 50.0, side: 40.0, up: 0.3 }],
             mask: vec![90; CELLS.0 * CELLS.1],
-        };
-        let finder = train::finder(&[frame], None, 3, 1e-2, 1);
+        }
+    }
+
+    #[test]
+    fn the_finder_of_robots_says_what_it_was_trained_to_say() {
+        let mut finder = train::finder(&[frame()], None, 3, 1e-2, 1);
         let x = numbers(3 * WIDTH * HEIGHT);
         let mut theirs = robots::Finder::decode(&encode(&finder.weights())).unwrap();
-        let maps = values(finder.forward(input(&x, [3, HEIGHT, WIDTH])));
-        assert_near(theirs.run(&map(3, [HEIGHT, WIDTH], &x)).values(), &maps);
+        let (graph, out) = finder.forward(Planes::of(&x, 3, (HEIGHT, WIDTH), 0), false);
+        assert_near(theirs.run(&map(3, [HEIGHT, WIDTH], &x)).values(), &graph.value(out).to_values());
+    }
+
+    #[test]
+    fn the_same_seed_trains_the_same_weights() {
+        let weights = |seed| encode(&train::finder(&[frame()], None, 2, 1e-2, seed).weights());
+        assert_eq!(weights(1), weights(1));
+        assert_ne!(weights(1), weights(2));
     }
 
     #[test]
@@ -388,17 +452,18 @@ mod tests {
             mask: noise(CROP * CROP),
             hand: Some([0.1, 0.0, 0.2, -0.5]),
         };
-        let refiner = train::refiner(&[crop], None, 3, 1e-2, 1);
+        let mut refiner = train::refiner(&[crop], None, 3, 1e-2, 1);
         let x = numbers(3 * CROP * CROP);
-        let (six, quarters) = refiner.forward(input(&x, [3, CROP, CROP]));
         let mut theirs = robots::Refiner::decode(&encode(&refiner.weights())).unwrap();
+        let (graph, six, mask) = refiner.forward(Planes::of(&x, 3, (CROP, CROP), 0), false);
         let (said, logits) = theirs.run_with_mask(&map(3, [CROP, CROP], &x));
-        assert_near(&[said.hand, said.right, said.down, said.larger, said.sine, said.cosine], &values(six));
-        let quarters = values(quarters);
+        let six = graph.value(six).to_values();
+        assert_near(&[said.hand, said.right, said.down, said.larger, said.sine, said.cosine], &six);
+        let quarters = graph.value(mask).to_values();
         let half = CROP / 2;
         let logit = |i: usize| {
             let (x, y) = (i % CROP, i / CROP);
-            quarters[(y % 2 * 2 + x % 2) * half * half + y / 2 * half + x / 2]
+            quarters[((2 * (y % 2) + x % 2) * half + y / 2) * half + x / 2]
         };
         assert_near(logits, &(0..CROP * CROP).map(logit).collect::<Vec<_>>());
     }
@@ -413,15 +478,17 @@ mod tests {
             mask,
             count: Some(3),
             fingers: Some([false, true, true, true, false]),
+            joints: Some([(30.0, 20.0); 21]),
             hand: true,
             origin: 0,
             drawn: false,
             seen: false,
         };
-        let counter = train::counter(&[(1.0, vec![shown])], 3, 1e-2, 1);
+        let mut counter = train::counter(&[(1.0, vec![shown])], 3, 1e-2, 1);
         let x = numbers(2 * 48 * 48);
-        let said = counter.forward(input(&x, [2, 48, 48]), None);
         let mut theirs = robots::Counter::decode(&encode(&counter.weights())).unwrap();
+        let (graph, said) = counter.forward(Planes::of(&x, 2, (48, 48), 0), None);
+        let values = |id| graph.value(id).to_values();
         let count = theirs.run(&map(2, [48, 48], &x));
         assert_near(&count.embedding, &values(said.embedding));
         assert_near(&count.counts, &values(said.count));

@@ -17,7 +17,7 @@ use opencv::prelude::*;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::image::{Affine, Outside, Pyramid};
+use crate::image::{Affine, Joints, Outside, Pyramid};
 use crate::places::{MASK, Place, onto_mask};
 
 const HANDS: &str = include_str!("../truth/hands.csv");
@@ -49,6 +49,7 @@ pub struct Photo {
     pub path: String,
     pub picture: Pyramid,
     pub place: Place,
+    pub joints: Joints,
     /// Of the hand alone, around its place, not turned: [`MASK`] pixels are [`COVERED`] sides.
     pub mask: Pyramid,
     /// The same of hand and forearm.
@@ -183,8 +184,8 @@ fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<
     let fields: Vec<&str> = text.split(',').collect();
     let path = fields[0];
     let all = numbers(&fields[1..]).filter(|all| all.len() == 44).ok_or(None)?;
-    let joints: Vec<(f32, f32)> =
-        all[2..].chunks(2).map(|p| (p[0] / 1000.0 * all[0], p[1] / 1000.0 * all[1])).collect();
+    let joint = |k: usize| (all[2 + 2 * k] / 1000.0 * all[0], all[3 + 2 * k] / 1000.0 * all[1]);
+    let joints: Joints = std::array::from_fn(joint);
     let picture = read(&data.join(path)).map_err(Some)?;
     let place = place(&joints);
     let kept = cache.join(format!("{:08x}.mask", crc32fast::hash(text.as_bytes())));
@@ -212,7 +213,7 @@ fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<
     let folder = path.split('/').nth(1).unwrap_or_default();
     let (count, fingers) = meaning(&set, folder);
     let origin = SETS.iter().position(|known| *known == set).unwrap_or(SETS.len()) as u32;
-    Ok(Some(Photo { set, origin, path: path.to_owned(), picture, place, mask, arm, count, fingers }))
+    Ok(Some(Photo { set, origin, path: path.to_owned(), picture, place, joints, mask, arm, count, fingers }))
 }
 
 /// What a folder of a set shows.

@@ -18,7 +18,8 @@ use crate::scenery::{self, Scenery};
 
 /// A photo with its own mask, as the counter is shown it.
 pub fn with_truth(photo: &Photo) -> Option<Shown> {
-    let picture = photo.picture.warp(&onto_mask(&photo.place), MASK, MASK, Outside::Nearest).to_pyramid();
+    let map = onto_mask(&photo.place);
+    let picture = photo.picture.warp(&map, MASK, MASK, Outside::Nearest).to_pyramid();
     let frame = counting::frame(&photo.mask, photo.place.up)?;
     Some(Shown {
         picture,
@@ -29,6 +30,7 @@ pub fn with_truth(photo: &Photo) -> Option<Shown> {
         hand: true,
         origin: photo.origin,
         fingers: photo.fingers,
+        joints: Some(map.joints(&photo.joints)),
         drawn: false,
         seen: false,
     })
@@ -43,6 +45,7 @@ pub fn drawn(hand: &Drawn) -> Option<Shown> {
         frame: counting::frame(&hand.mask, 0.0)?,
         count: Some(hand.fingers.iter().filter(|f| **f).count() as u8),
         fingers: Some(hand.fingers),
+        joints: Some(hand.joints),
         hand: true,
         origin: scenery::DRAWN,
         drawn: true,
@@ -118,6 +121,7 @@ fn seen(photos: &[&Photo], weights: &Weights, seed: u64) -> Vec<Shown> {
                 all.extend(look::shown(&photo.picture, &found).map(|shown| Shown {
                     count: photo.count,
                     fingers: photo.fingers,
+                    joints: Some(onto_mask(&found.place).joints(&photo.joints)),
                     origin: photo.origin,
                     ..shown
                 }));

@@ -3,7 +3,7 @@
 use gestalt_vision::network::{FeatureMap, Finder, Refiner, WeightsError};
 
 use crate::frames::{HEIGHT, WIDTH};
-use crate::look::sigmoid;
+use crate::losses::sigmoid;
 use crate::networks::{self, encode};
 use crate::places::CROP;
 use crate::train::planes;

@@ -5,13 +5,14 @@ use rand::{Rng, RngExt};
 use crate::camera::tone;
 use crate::chance::{chance, log_uniform, normal, sign, uniform};
 use crate::drawn::{Drawn, HAND, SIDE, draw, fingers};
-use crate::image::{Affine, Canvas, Outside, Pyramid};
+use crate::image::{Affine, Canvas, Joints, Outside, Pyramid};
 use crate::photos::{Photo, Photos};
 use crate::places::{COVERED, MASK, Place};
 use crate::surfaces::{cloth, limb, skin, smooth_noise, texture};
 
 /// How often pictures of each set are taken: by how much there is to see in them.
-const SHARES: [(&str, f32); 5] = [
+const SHARES: [(&str, f32); 6] = [
+    ("asl-digits", 0.12),
     ("subhi_hands", 0.44),
     ("phone_home", 0.26),
     ("asl_letters", 0.2),
@@ -36,6 +37,7 @@ pub struct Pasted {
     pub mask: Canvas,
     pub count: Option<u8>,
     pub fingers: Option<[bool; 5]>,
+    pub joints: Joints,
     pub origin: u32,
 }
 
@@ -210,7 +212,7 @@ impl Scenery {
         let (mirror, aspect) = (sign(rng), (0.06 * normal(rng)).exp());
         let to = (place.x, place.y);
         let up = (place.up.sin(), -place.up.cos());
-        let (mut picture, mask, arm, count, fingers, origin);
+        let (mut picture, mask, arm, count, fingers, joints, origin);
         if drawn {
             let hand = &self.drawn[rng.random_range(0..self.drawn.len())];
             let middle = (SIDE as f32 / 2.0 - 0.5, SIDE as f32 / 2.0 - 0.5);
@@ -235,6 +237,7 @@ impl Scenery {
             arm = chance(rng, 0.85).then_some(whole);
             count = Some(hand.fingers.iter().filter(|f| **f).count() as u8);
             fingers = Some(hand.fingers);
+            joints = map.joints(&hand.joints);
             origin = DRAWN;
         } else {
             let photo = self.cut(rng);
@@ -268,6 +271,7 @@ impl Scenery {
             }
             count = photo.count;
             fingers = photo.fingers;
+            joints = onto(photo, place, mirror, aspect).joints(&photo.joints);
             origin = photo.origin;
         }
         if chance(rng, 0.5) {
@@ -282,7 +286,7 @@ impl Scenery {
         }
         let soft = if place.side < 40.0 { mask.clone() } else { mask.smoothed(&[0.25, 0.5, 0.25]) };
         canvas.blend(&picture, &soft.values.iter().map(|v| v / 255.0).collect::<Vec<_>>());
-        Pasted { mask, count, fingers, origin }
+        Pasted { mask, count, fingers, joints, origin }
     }
 }
 
@@ -301,12 +305,18 @@ pub fn drawn_hands(count: usize, seed: u64) -> Vec<Drawn> {
         .collect()
 }
 
+/// From a hand's picture to one in which the hand is at `place`.
+pub fn onto(photo: &Photo, place: &Place, mirror: f32, aspect: f32) -> Affine {
+    let angle = place.up - photo.place.up * mirror;
+    let from = (photo.place.x, photo.place.y);
+    Affine::similar(from, (place.x, place.y), angle, place.side / photo.place.side, mirror, aspect)
+}
+
 /// A hand's picture in which the hand is at `place` on a canvas of that size.
 pub fn real(photo: &Photo, place: &Place, w: usize, h: usize, mirror: f32, aspect: f32) -> (Canvas, Canvas) {
     let to = (place.x, place.y);
     let angle = place.up - photo.place.up * mirror;
-    let from = (photo.place.x, photo.place.y);
-    let map = Affine::similar(from, to, angle, place.side / photo.place.side, mirror, aspect);
+    let map = onto(photo, place, mirror, aspect);
     let middle = ((MASK as f32 - 1.0) / 2.0, (MASK as f32 - 1.0) / 2.0);
     let of_mask = Affine::similar(middle, to, angle, place.side * COVERED / MASK as f32, mirror, aspect);
     (photo.picture.warp(&map, w, h, Outside::Nearest), photo.mask.warp(&of_mask, w, h, Outside::Zero))

@@ -79,11 +79,11 @@ pub fn all(
     let pool = [(1.0, real), (1.0, scenery.drawn.iter().take(300).filter_map(drawn).collect())];
     let mut all = Vec::new();
     for (x, _) in counting::batch(&pool, 120, 1, 0) {
-        let n = x.len() / 2;
+        let n = x.picture.len() / 2;
         let bytes: Vec<u8> = (0..n)
             .flat_map(|i| {
-                let g = ((x[i] + 3.0) * 42.0) as u8;
-                [g, if x[n + i] > 0.0 { g.saturating_add(40) } else { g }, g]
+                let g = ((x.picture[i] + 3.0) * 42.0) as u8;
+                [g, if x.picture[n + i] > 0.0 { g.saturating_add(40) } else { g }, g]
             })
             .collect();
         all.push(mat(48, 48, &bytes)?);

@@ -2,27 +2,17 @@
 
 use std::time::Instant;
 
-use burn::grad_clipping::GradientClippingConfig;
-use burn::module::Module;
-use burn::optim::{AdamWConfig, GradientsParams};
-use burn::tensor::activation::{log_sigmoid, log_softmax, sigmoid};
-use burn::tensor::{Device, Tensor, TensorData};
-use rand::{Rng, RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use crate::chance::normal;
-use crate::counting::{self, Shown};
-use crate::frames::{CELLS, Crop, Frame, HEIGHT, MOST, WIDTH};
-use crate::networks::{Counter, EMBEDDING, Finder, Refiner, Said};
+use crate::counting::{self, Shown, Variation};
+use crate::frames::{CELLS, Crop, Frame, HEIGHT, MOST, WIDTH, generator};
+use crate::learning::{Descent, Planes};
+use crate::losses::{Loss, absolute, bent, focal, likelihood, overlap, softmax, squared};
+use crate::networks::{Counter, EMBEDDING, FEATURES, Finder, Refiner};
 use crate::places::{CROP, Place};
-
-fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D], device: &Device) -> Tensor<D> {
-    Tensor::from_data(TensorData::new(values, shape), device)
-}
-
-fn scalar(tensor: &Tensor<1>) -> f32 {
-    tensor.clone().into_scalar::<f32>()
-}
 
 /// Planes of a picture of blue, green, red, less its mean and over its deviation, after each channel was multiplied by its gain and
 /// clipped; `mirror` turns left to right.
@@ -46,29 +36,22 @@ pub fn planes(picture: &[u8], width: usize, mirror: bool, gains: [f32; 3], out: 
 }
 
 /// What lamps and cameras make of white.
-fn gains(rng: &mut impl Rng) -> [f32; 3] {
-    let light = (0.2 * normal(rng)).exp();
-    std::array::from_fn(|_| light * (0.13 * normal(rng)).exp())
+fn gains(rng: &mut ChaCha8Rng) -> [f32; 3] {
+    let light = (0.27 * normal(rng)).exp();
+    std::array::from_fn(|_| light * (0.17 * normal(rng)).exp())
 }
 
-/// The optimizer of finder and refiner.
-fn clipped() -> AdamWConfig {
-    let config = AdamWConfig::new().with_weight_decay(1e-2).with_epsilon(1e-8);
-    config.with_grad_clipping(Some(GradientClippingConfig::Norm(5.0)))
-}
-
-/// How likely what is true was said to be, in nats: `truth` from 0 to 1, of logits.
-fn log_likelihood<const D: usize>(truth: Tensor<D>, logits: Tensor<D>) -> Tensor<D> {
-    truth.clone() * log_sigmoid(logits.clone()) + (truth * -1.0 + 1.0) * log_sigmoid(logits * -1.0)
-}
+/// How finder and refiner go downhill.
+const STEEP: Descent = Descent { decay: 1e-2, longest: 5.0 };
 
 /// One-cycle: up to the largest rate in a twentieth of the steps, then down along a cosine.
-fn rate(step: usize, steps: usize, largest: f64) -> f64 {
+fn rate(step: usize, steps: usize, largest: f64) -> f32 {
     let done = step as f64 / steps as f64;
-    largest * (done / 0.05 + 0.02).min(1.0) * (0.5 + 0.5 * (std::f64::consts::PI * done).cos()) + 1e-5
+    (largest * (done / 0.05 + 0.02).min(1.0) * (0.5 + 0.5 * (std::f64::consts::PI * done).cos()) + 1e-5)
+        as f32
 }
 
-/// What a finder's maps should be.
+/// What a finder's maps should be, cell by cell.
 struct Maps {
     centre: Vec<f32>,
     weight: Vec<f32>,
@@ -106,59 +89,65 @@ fn maps(hands: &[Place], mirror: bool) -> Maps {
     maps
 }
 
+/// Examples made side by side, each from randomness of its own, in order.
+fn batch<T: Send>(size: usize, seed: u64, step: usize, make: impl Fn(&mut ChaCha8Rng) -> T + Sync) -> Vec<T> {
+    let first = (step * size) as u64;
+    (0..size as u64).into_par_iter().map(|i| make(&mut generator(seed, first + i))).collect()
+}
+
+/// A row turned left to right, or as it is.
+fn row<T: Copy>(row: &[T], mirror: bool) -> impl Iterator<Item = T> {
+    (0..row.len()).map(move |x| row[if mirror { row.len() - 1 - x } else { x }])
+}
+
 pub fn finder(frames: &[Frame], start: Option<Finder>, steps: usize, largest: f64, seed: u64) -> Finder {
     const BATCH: usize = 32;
-    let device = Device::flex().autodiff();
-    let mut net = start.map_or_else(|| Finder::new(&device), Module::train);
-    let mut optimizer = clipped().init();
-    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let mut net = start.unwrap_or_else(|| Finder::new(seed));
+    net.parameters.rest();
     let (w, h) = CELLS;
+    let n = w * h;
     let (began, mut mean) = (Instant::now(), [0.0_f32; 4]);
     for step in 0..steps {
-        let mut x = Vec::with_capacity(BATCH * 3 * WIDTH * HEIGHT);
-        let mut all = [const { Vec::new() }; 6];
-        for _ in 0..BATCH {
+        let examples = batch(BATCH, seed, step, |rng| {
             let frame = &frames[rng.random_range(0..frames.len())];
             let mirror: bool = rng.random();
+            let mut x = Vec::with_capacity(3 * WIDTH * HEIGHT);
             planes(&frame.picture, WIDTH, mirror, gains(rng), &mut x);
-            let maps = maps(&frame.hands, mirror);
-            for (to, from) in all.iter_mut().zip([maps.centre, maps.weight, maps.size, maps.sin, maps.cos]) {
-                to.extend(from);
-            }
-            for row in frame.mask.chunks_exact(w) {
-                let value = |x: usize| f32::from(row[x]) / 255.0;
-                if mirror {
-                    all[5].extend((0..w).rev().map(value));
-                } else {
-                    all[5].extend((0..w).map(value));
+            let mask = frame.mask.chunks_exact(w).flat_map(|cells| row(cells, mirror));
+            (x, maps(&frame.hands, mirror), mask.map(|share| f32::from(share) / 255.0).collect::<Vec<f32>>())
+        });
+        let x: Vec<f32> = examples.iter().flat_map(|(x, _, _)| x).copied().collect();
+        let (graph, out) = net.forward(Planes::of(&x, 3, (HEIGHT, WIDTH), 0), true);
+        let said = graph.value(out).to_values();
+        let hands = examples.iter().flat_map(|(_, maps, _)| &maps.centre).filter(|v| **v > 0.99).count();
+        let weights: f32 = examples.iter().flat_map(|(_, maps, _)| &maps.weight).sum();
+        let (per_hand, per_weight) = (1.0 / hands.max(1) as f32, 1.0 / weights.max(1.0));
+        let mut back = vec![0.0; said.len()];
+        let mut parts = [0.0; 4];
+        for ((_, maps, mask), (said, back)) in
+            examples.iter().zip(said.chunks_exact(5 * n).zip(back.chunks_exact_mut(5 * n)))
+        {
+            for i in 0..n {
+                let mut take =
+                    |part: usize, map: usize, Loss { value, slope }: Loss, share: f32, weight: f32| {
+                        parts[part] += value * share;
+                        back[map * n + i] += slope * share * weight;
+                    };
+                take(0, 0, focal(maps.centre[i], said[i]), per_hand, 1.0);
+                take(3, 4, likelihood(mask[i], said[4 * n + i]), 4.0 / (BATCH * n) as f32, 1.0);
+                let share = maps.weight[i] * per_weight;
+                if share > 0.0 {
+                    take(1, 1, absolute(maps.size[i], said[n + i]), share, 1.0);
+                    take(2, 2, squared(maps.sin[i], said[2 * n + i]), share, 0.5);
+                    take(2, 3, squared(maps.cos[i], said[3 * n + i]), share, 0.5);
                 }
             }
         }
-        let hands = all[0].iter().filter(|v| **v > 0.99).count().max(1) as f32;
-        let weights = all[1].iter().sum::<f32>().max(1.0);
-        let [centre, weight, size, sin, cos, mask] = all.map(|v| tensor(v, [BATCH, 1, h, w], &device));
-        let out = net.forward(tensor(x, [BATCH, 3, HEIGHT, WIDTH], &device));
-        let map = |k: usize| out.clone().slice([0..BATCH, k..k + 1, 0..h, 0..w]);
-        let p = map(0);
-        let s = sigmoid(p.clone());
-        let positive = centre.clone().greater_elem(0.99).float();
-        let miss = positive.clone() * (s.clone() * -1.0 + 1.0).powi_scalar(2) * log_sigmoid(p.clone());
-        let alarm = (positive * -1.0 + 1.0)
-            * (centre * -1.0 + 1.0).powi_scalar(4)
-            * s.powi_scalar(2)
-            * log_sigmoid(p * -1.0);
-        let l_centre = (miss + alarm).sum() / -hands;
-        let l_size = ((map(1) - size).abs() * weight.clone()).sum() / weights;
-        let l_turn =
-            (((map(2) - sin).powi_scalar(2) + (map(3) - cos).powi_scalar(2)) * weight).sum() / weights;
-        let l_mask = log_likelihood(mask, map(4)).mean() * -4.0;
-        let parts = [&l_centre, &l_size, &l_turn, &l_mask].map(scalar);
-        let loss = l_centre + l_size + l_turn * 0.5 + l_mask;
-        let grads = GradientsParams::from_grads(loss.backward(), &net);
-        net = optimizer.step(rate(step, steps, largest), net, grads);
+        let gradient = graph.backward(vec![(out, Planes::of(&back, 5, (h, w), 1))]);
+        STEEP.step(&mut net.parameters, &gradient, rate(step, steps, largest));
         report("finder", step, steps, began, &mut mean, parts);
     }
-    net.valid()
+    net
 }
 
 fn report<const N: usize>(
@@ -178,121 +167,170 @@ fn report<const N: usize>(
     }
 }
 
+/// How much a pixel of a mask counts: most where the hand ends, for there lie the fingers.
+fn edges(mask: &[u8]) -> Vec<f32> {
+    const REACH: i32 = 2;
+    let side = CROP as i32;
+    let inside = |x: i32, y: i32| mask[(y.clamp(0, side - 1) * side + x.clamp(0, side - 1)) as usize] > 127;
+    (0..side * side)
+        .map(|i| {
+            let (x, y) = (i % side, i / side);
+            let here = inside(x, y);
+            let near = [(REACH, 0), (-REACH, 0), (0, REACH), (0, -REACH)];
+            if near.iter().any(|(dx, dy)| inside(x + dx, y + dy) != here) { 2.5 } else { 0.6 }
+        })
+        .collect()
+}
+
 pub fn refiner(crops: &[Crop], start: Option<Refiner>, steps: usize, largest: f64, seed: u64) -> Refiner {
     const BATCH: usize = 48;
-    let device = Device::flex().autodiff();
-    let mut net = start.map_or_else(|| Refiner::new(&device), Module::train);
-    let mut optimizer = clipped().init();
-    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    const HALF: usize = CROP / 2;
+    const N: usize = CROP * CROP;
+    let mut net = start.unwrap_or_else(|| Refiner::new(seed));
+    net.parameters.rest();
     let (began, mut mean) = (Instant::now(), [0.0_f32; 4]);
-    let half = CROP / 2;
     for step in 0..steps {
-        let mut x = Vec::with_capacity(BATCH * 3 * CROP * CROP);
-        let (mut is, mut place, mut turn, mut mask) = (vec![], vec![], vec![], vec![]);
-        for _ in 0..BATCH {
+        let examples = batch(BATCH, seed, step, |rng| {
             let crop = &crops[rng.random_range(0..crops.len())];
             let mirror: bool = rng.random();
+            let mut x = Vec::with_capacity(3 * N);
             planes(&crop.picture, CROP, mirror, gains(rng), &mut x);
+            let mask: Vec<u8> = crop.mask.chunks_exact(CROP).flat_map(|pixels| row(pixels, mirror)).collect();
             let sign = if mirror { -1.0 } else { 1.0 };
-            let [dx, dy, size, up] = crop.hand.unwrap_or_default();
-            is.push(f32::from(crop.hand.is_some()));
-            place.extend([sign * dx, dy, size]);
-            let (s, c) = (sign * up).sin_cos();
-            turn.extend([s, c]);
-            for quarter in 0..4 {
-                for i in 0..half * half {
-                    let (y, mut px) = (2 * (i / half) + quarter / 2, 2 * (i % half) + quarter % 2);
-                    if mirror {
-                        px = CROP - 1 - px;
-                    }
-                    mask.push(f32::from(crop.mask[y * CROP + px]) / 255.0);
+            let hand = crop.hand.map(|[dx, dy, size, up]| [sign * dx, dy, size, sign * up]);
+            let edges = edges(&mask);
+            // As the network says it: four planes of half the size.
+            let quarters = |i: usize| {
+                let (quarter, i) = (i / (HALF * HALF), i % (HALF * HALF));
+                (2 * (i / HALF) + quarter / 2) * CROP + 2 * (i % HALF) + quarter % 2
+            };
+            let mask: Vec<(f32, f32)> =
+                (0..N).map(quarters).map(|i| (f32::from(mask[i]) / 255.0, edges[i])).collect();
+            (x, hand, mask)
+        });
+        let x: Vec<f32> = examples.iter().flat_map(|(x, _, _)| x).copied().collect();
+        let (graph, six, mask) = net.forward(Planes::of(&x, 3, (CROP, CROP), 0), true);
+        let (said, logits) = (graph.value(six).to_values(), graph.value(mask).to_values());
+        let hands = examples.iter().filter(|(_, hand, _)| hand.is_some()).count().max(1) as f32;
+        let (mut back, mut back_mask) = (vec![0.0; said.len()], vec![0.0; logits.len()]);
+        let mut parts = [0.0; 4];
+        for (e, (_, hand, mask)) in examples.iter().enumerate() {
+            let (said, back) = (&said[6 * e..6 * e + 6], &mut back[6 * e..6 * e + 6]);
+            let mut take = |part: usize, k: usize, Loss { value, slope }: Loss, share: f32, weight: f32| {
+                parts[part] += value * share;
+                back[k] += slope * share * weight;
+            };
+            take(0, 0, likelihood(f32::from(hand.is_some()), said[0]), 1.0 / BATCH as f32, 1.0);
+            if let Some([dx, dy, size, up]) = hand {
+                for (k, truth) in [dx, dy, size].into_iter().enumerate() {
+                    take(1, 1 + k, bent(*truth, said[1 + k]), 1.0 / hands, 2.0);
                 }
+                let (sin, cos) = up.sin_cos();
+                take(2, 4, squared(sin, said[4]), 1.0 / hands, 0.7);
+                take(2, 5, squared(cos, said[5]), 1.0 / hands, 0.7);
+            }
+            let (logits, back) = (&logits[N * e..N * (e + 1)], &mut back_mask[N * e..N * (e + 1)]);
+            let share = 1.0 / (BATCH * N) as f32;
+            for ((back, logit), (truth, weight)) in back.iter_mut().zip(logits).zip(mask) {
+                let Loss { value, slope } = likelihood(*truth, *logit);
+                parts[3] += value * weight * share;
+                *back = slope * weight * share * 2.0;
+            }
+            if hand.is_some() {
+                parts[3] +=
+                    overlap(mask.iter().map(|(truth, _)| *truth), logits, back, 1.0 / BATCH as f32) * 0.5;
             }
         }
-        let hands = is.iter().sum::<f32>().max(1.0);
-        let is = tensor(is, [BATCH, 1], &device);
-        let place = tensor(place, [BATCH, 3], &device);
-        let turn = tensor(turn, [BATCH, 2], &device);
-        let mask = tensor(mask, [BATCH, 4, half, half], &device);
-        let (g, m) = net.forward(tensor(x, [BATCH, 3, CROP, CROP], &device));
-        let logit = g.clone().slice([0..BATCH, 0..1]);
-        let l_is = log_likelihood(is.clone(), logit).mean() * -1.0;
-        // Smooth L1 with its bend at .05.
-        let away = (g.clone().slice([0..BATCH, 1..4]) - place).abs();
-        let small = away.clone().lower_elem(0.05).float();
-        let smooth =
-            small.clone() * away.clone().powi_scalar(2) * 10.0 + (small * -1.0 + 1.0) * (away - 0.025);
-        let l_place = (smooth.sum_dim(1) * is.clone()).sum() / hands;
-        let l_turn =
-            ((g.slice([0..BATCH, 4..6]) - turn).powi_scalar(2).sum_dim(1) * is.clone()).sum() / hands;
-        let p = sigmoid(m.clone());
-        let cross = log_likelihood(mask.clone(), m).mean() * -1.0;
-        let sum = |t: Tensor<4>| -> Tensor<2> { t.flatten::<2>(1, 3).sum_dim(1) };
-        let dice = (sum(p.clone() * mask.clone()) * 2.0 + 1.0) / (sum(p) + sum(mask) + 1.0) * -1.0 + 1.0;
-        let l_mask = cross + (dice * is).mean() * 0.5;
-        let parts = [&l_is, &l_place, &l_turn, &l_mask].map(scalar);
-        let loss = l_is + l_place * 2.0 + l_turn * 0.7 + l_mask * 2.0;
-        let grads = GradientsParams::from_grads(loss.backward(), &net);
-        net = optimizer.step(rate(step, steps, largest), net, grads);
+        let back = Planes::of(&back, 6, (1, 1), 0);
+        let back_mask = Planes::of(&back_mask, 4, (HALF, HALF), 1);
+        let gradient = graph.backward(vec![(six, back), (mask, back_mask)]);
+        STEEP.step(&mut net.parameters, &gradient, rate(step, steps, largest));
         report("refiner", step, steps, began, &mut mean, parts);
     }
-    net.valid()
+    net
 }
 
 pub fn counter(pools: &[(f32, Vec<Shown>)], steps: usize, largest: f64, seed: u64) -> Counter {
     const BATCH: usize = 128;
     const SMOOTHING: f32 = 0.05;
-    let device = Device::flex().autodiff();
-    let mut net = Counter::new(&device);
-    let mut optimizer = AdamWConfig::new().with_weight_decay(2e-2).with_epsilon(1e-8).init();
-    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-    let (began, mut mean) = (Instant::now(), [0.0_f32; 4]);
+    let mut net = Counter::new(seed);
+    let descent = Descent { decay: 2e-2, longest: f32::INFINITY };
+    let (began, mut mean) = (Instant::now(), [0.0_f32; 5]);
+    let batch = |step: usize| counting::batch(pools, BATCH, seed, step as u64);
+    let mut next = batch(0);
     for step in 0..steps {
-        let batch = counting::batch(pools, BATCH, seed, step as u64);
-        let mut x = Vec::with_capacity(BATCH * 2 * counting::SIDE * counting::SIDE);
-        let (mut count, mut fingers, mut known, mut right, mut hand) =
-            (vec![], vec![], vec![], vec![], vec![]);
-        for (picture, shown) in &batch {
-            x.extend(picture);
-            right.push(shown.count.map(i32::from));
-            let all = shown.count.map_or(0.0, |_| SMOOTHING / 6.0);
-            count.extend((0..6).map(|c| if Some(c) == shown.count { 1.0 - SMOOTHING } else { 0.0 } + all));
-            fingers.extend(shown.fingers.unwrap_or_default().map(f32::from));
-            known.push(f32::from(shown.fingers.is_some()));
-            hand.push(f32::from(shown.hand));
-        }
-        let sure = known.iter().sum::<f32>().max(1.0);
-        let counted = right.iter().flatten().count().max(1) as f32;
-        let kept =
-            (0..BATCH * 576).map(|_| if rng.random::<f32>() < 0.1 { 0.0 } else { 1.0 / 0.9 }).collect();
-        let x = tensor(x, [BATCH, 2, counting::SIDE, counting::SIDE], &device);
-        let Said { embedding: e, count: c, fingers: f, hand: h } =
-            net.forward(x, Some(tensor(kept, [BATCH, 576], &device)));
-        let l_count = (log_softmax(c.clone(), 1) * tensor(count, [BATCH, 6], &device)).sum() / -counted;
-        let hand = tensor(hand, [BATCH, 1], &device);
-        let l_hand = log_likelihood(hand, h).mean() * -1.0;
-        let known = tensor(known, [BATCH, 1], &device);
-        let each = log_likelihood(tensor(fingers, [BATCH, 5], &device), f);
-        let l_fingers = (each.mean_dim(1) * known).sum() / -sure;
-        let said: Vec<i32> = c.argmax(1).flatten::<1>(0, 1).into_data().iter::<i32>().collect();
-        let hits = said.iter().zip(&right).filter(|(a, b)| Some(**a) == **b).count() as f32 / counted;
-        let parts = [scalar(&l_count), scalar(&l_fingers), scalar(&l_hand), hits];
-        let loss = l_count + l_fingers * 0.5 + l_hand * 0.5 + e.powi_scalar(2).mean() * 1e-3;
-        let grads = GradientsParams::from_grads(loss.backward(), &net);
-        net = optimizer.step(rate(step, steps, largest), net, grads);
+        let examples = next;
+        let learn = || {
+            let x: Vec<f32> =
+                examples.iter().flat_map(|(variation, _)| &variation.picture).copied().collect();
+            let rng = &mut generator(seed, u64::MAX - step as u64);
+            let kept = (0..FEATURES * BATCH).map(|_| if rng.random::<f32>() < 0.1 { 0.0 } else { 1.0 / 0.9 });
+            let side = counting::SIDE;
+            let (graph, said) = net.forward(Planes::of(&x, 2, (side, side), 0), Some(kept.collect()));
+            let values = [said.count, said.fingers, said.hand, said.joints, said.embedding]
+                .map(|id| graph.value(id).to_values());
+            let mut back = values.each_ref().map(|values| vec![0.0; values.len()]);
+            let counted = examples.iter().filter(|(_, shown)| shown.count.is_some()).count().max(1) as f32;
+            let sure = examples.iter().filter(|(_, shown)| shown.fingers.is_some()).count().max(1) as f32;
+            let posed =
+                examples.iter().filter(|(variation, _)| variation.joints.is_some()).count().max(1) as f32;
+            let mut parts = [0.0; 5];
+            for (e, (Variation { joints, .. }, shown)) in examples.iter().enumerate() {
+                let mut take =
+                    |part: usize, at: usize, Loss { value, slope }: Loss, share: f32, weight: f32| {
+                        parts[part] += value * share;
+                        back[part][at] += slope * share * weight;
+                    };
+                if let Some(count) = shown.count.map(usize::from) {
+                    let logits: &[f32; 6] = values[0][6 * e..][..6].try_into().expect("six");
+                    let rest = SMOOTHING / 6.0;
+                    let truth =
+                        std::array::from_fn(|c| if c == count { 1.0 - SMOOTHING + rest } else { rest });
+                    let (value, slopes) = softmax(&truth, logits);
+                    take(0, 6 * e, Loss { value, slope: 0.0 }, 1.0 / counted, 1.0);
+                    for (c, slope) in slopes.into_iter().enumerate() {
+                        take(0, 6 * e + c, Loss { value: 0.0, slope }, 1.0 / counted, 1.0);
+                    }
+                    let right = logits.iter().all(|logit| *logit <= logits[count]);
+                    take(4, 0, Loss { value: f32::from(right), slope: 0.0 }, 1.0 / counted, 0.0);
+                }
+                for (finger, out) in shown.fingers.iter().flatten().enumerate() {
+                    let at = 5 * e + finger;
+                    take(1, at, likelihood(f32::from(*out), values[1][at]), 0.2 / sure, 0.5);
+                }
+                take(2, e, likelihood(f32::from(shown.hand), values[2][e]), 1.0 / BATCH as f32, 0.5);
+                for (k, truth) in joints.iter().flatten().enumerate() {
+                    let at = 42 * e + k;
+                    take(3, at, absolute(*truth, values[3][at]), 1.0 / 42.0 / posed, 2.0);
+                }
+            }
+            // Numbers that stay near zero keep their meaning in eight bits.
+            let share = 2e-3 / values[4].len() as f32;
+            back[4].iter_mut().zip(&values[4]).for_each(|(back, value)| *back = value * share);
+            let ids = [said.count, said.fingers, said.hand, said.joints, said.embedding];
+            let back = ids
+                .into_iter()
+                .zip(back)
+                .map(|(id, back)| (id, Planes::of(&back, back.len() / BATCH, (1, 1), 0)));
+            let gradient = graph.backward(back.collect());
+            descent.step(&mut net.parameters, &gradient, rate(step, steps, largest));
+            parts
+        };
+        // One core learns, the other makes the next examples.
+        let parts;
+        (parts, next) = rayon::join(learn, || batch(step + 1));
         report("counter", step, steps, began, &mut mean, parts);
     }
-    net.valid()
+    net
 }
 
 /// Where hands lie that are shown like this: their embeddings.
-pub fn embed(net: &Counter, inputs: &[&[f32]]) -> Vec<Vec<f32>> {
-    let device = Device::flex();
+pub fn embed(net: &mut Counter, inputs: &[&[f32]]) -> Vec<Vec<f32>> {
     let mut out = Vec::with_capacity(inputs.len());
     for part in inputs.chunks(64) {
-        let x = tensor(part.concat(), [part.len(), 2, counting::SIDE, counting::SIDE], &device);
-        let e = net.forward(x, None).embedding.into_data().try_to_vec::<f32>().expect("floats");
-        out.extend(e.chunks(EMBEDDING).map(<[f32]>::to_vec));
+        let x = Planes::of(&part.concat(), 2, (counting::SIDE, counting::SIDE), 0);
+        let (graph, said) = net.forward(x, None);
+        out.extend(graph.value(said.embedding).to_values().chunks(EMBEDDING).map(<[f32]>::to_vec));
     }
     out
 }

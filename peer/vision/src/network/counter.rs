@@ -49,15 +49,15 @@ impl Counter {
         let tensors = &mut Tensors::decode(bytes, TENSORS)?;
         let mut layer = |shape| Convolution::decode(shape, tensors);
         let layers = [
-            layer(Shape { side: 5, ..Shape::halving(2, 16) })?,
-            layer(Shape::usual(16, 32))?,
-            layer(Shape::usual(32, 48))?,
-            layer(Shape::usual(48, 64))?,
+            layer(Shape { side: 5, ..Shape::halving(2, 24) })?,
+            layer(Shape::usual(24, 40))?,
+            layer(Shape::usual(40, 64))?,
+            layer(Shape::usual(64, 96))?,
         ];
         Ok(Self {
             layers,
-            dense: Dense::decode((9 * 64, 64), true, tensors)?,
-            embedding: Dense::decode((64, EMBEDDING), false, tensors)?,
+            dense: Dense::decode((9 * 96, 96), true, tensors)?,
+            embedding: Dense::decode((96, EMBEDDING), false, tensors)?,
             counts: Dense::decode((EMBEDDING, 6), false, tensors)?,
             fingers: Dense::decode((EMBEDDING, 5), false, tensors)?,
             hand: Dense::decode((EMBEDDING, 1), false, tensors)?,
@@ -81,7 +81,7 @@ impl Counter {
         third.run(b, a, patches);
         fourth.run(a, b, patches);
         halve_by_maximum(b, a);
-        let mut hidden = [0.0; 64];
+        let mut hidden = [0.0; 96];
         self.dense.run(a.values(), &mut hidden);
         let mut count = Count { embedding: [0.0; EMBEDDING], counts: [0.0; 6], fingers: [0.0; 5], hand: 0.0 };
         self.embedding.run(&hidden, &mut count.embedding);
