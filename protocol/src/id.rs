@@ -17,7 +17,7 @@ pub enum IdError {
     #[error("'{0}' is no instructor name: 1 to 32 of the characters A-Z a-z 0-9 _ -")]
     NotAName(String),
     /// A round that is not written as it is displayed.
-    #[error("'{0}' is no round: write its counter and its opener, like 5@2")]
+    #[error("'{0}' is no round: write its counter, its opener and the opener's life, like 5@2-3f9a01c7")]
     NotARound(String),
 }
 
@@ -96,30 +96,36 @@ impl fmt::Display for ClassId {
     }
 }
 
-/// One showing of a gesture: the count of rounds so far, and the robot that opened it.
+/// One showing of a gesture: the count of rounds so far, the robot that opened it, and that robot's life.
 ///
-/// Robots that open at the same time choose the same counter; such rounds merge on the smaller opener.
+/// No other showing ever has this name, though all robots were switched off meanwhile, disks were lost and clocks were wrong: counts
+/// may begin anew, lives are drawn at random. Robots that open at the same time choose the same counter; such rounds merge on the
+/// smallest name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct RoundId {
     /// Highest counter seen, plus one.
     pub counter: u32,
     /// Who opened it.
     pub opener: RobotId,
+    /// A number that the opener drew at random when it started.
+    pub life: u32,
 }
 
 impl fmt::Display for RoundId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}@{}", self.counter, self.opener)
+        write!(f, "{}@{}-{:08x}", self.counter, self.opener, self.life)
     }
 }
 
 impl FromStr for RoundId {
     type Err = IdError;
 
-    /// Reads what is displayed: `5@2`.
+    /// Reads what is displayed: `5@2-3f9a01c7`.
     fn from_str(text: &str) -> Result<Self, IdError> {
-        let parts = text.split_once('@').and_then(|(counter, opener)| {
-            Some(Self { counter: counter.parse().ok()?, opener: opener.parse().ok()? })
+        let parts = text.split_once('@').and_then(|(counter, rest)| {
+            let (opener, life) = rest.split_once('-')?;
+            let life = u32::from_str_radix(life, 16).ok()?;
+            Some(Self { counter: counter.parse().ok()?, opener: opener.parse().ok()?, life })
         });
         parts.ok_or_else(|| IdError::NotARound(text.chars().take(40).collect()))
     }
@@ -185,9 +191,10 @@ mod tests {
 
     #[test]
     fn a_round_is_read_as_it_is_displayed() {
-        let round = RoundId { counter: 5, opener: RobotId(2) };
+        let round = RoundId { counter: 5, opener: RobotId(2), life: 0xA1 };
+        assert_eq!(round.to_string(), "5@2-000000a1");
         assert_eq!(round.to_string().parse(), Ok(round));
-        for bad in ["", "5", "@2", "5@", "5@x", "5@2@3"] {
+        for bad in ["", "5", "@2", "5@", "5@x", "5@2@3", "5@2", "5@2-", "5@2-g", "5@-1"] {
             assert!(bad.parse::<RoundId>().is_err(), "{bad}");
         }
     }

@@ -10,11 +10,11 @@ use crate::id::{ClassId, RobotId, RoundId};
 ///
 /// ```json
 /// {"say": "open"}
-/// {"say": "was", "round": {"counter": 5, "opener": 2}, "class": 3}
-/// {"say": "was", "round": {"counter": 5, "opener": 2}, "class": "three"}
-/// {"say": "right", "round": {"counter": 5, "opener": 2}}
-/// {"say": "wrong", "round": {"counter": 5, "opener": 2}}
-/// {"say": "retract", "round": {"counter": 5, "opener": 2}}
+/// {"say": "was", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "class": 3}
+/// {"say": "was", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "class": "three"}
+/// {"say": "right", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
+/// {"say": "wrong", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
+/// {"say": "retract", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
 /// ```
 ///
 /// The round is named as in the [`Decision`](crate::Decision) it is about. A later word of the same instructor on the

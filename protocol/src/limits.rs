@@ -1,7 +1,7 @@
 //! What is accepted at most, whoever says it, and of which version.
 
 /// The version byte in front of every envelope. Another version is refused, not guessed at.
-pub const PROTOCOL_VERSION: u8 = 2;
+pub const PROTOCOL_VERSION: u8 = 3;
 
 /// The longest envelope accepted, in bytes.
 pub const MAX_MESSAGE: usize = 512 * 1024;

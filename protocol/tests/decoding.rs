@@ -9,7 +9,11 @@ use gestalt_protocol::{
 use proptest::prelude::*;
 
 fn round() -> impl Strategy<Value = RoundId> {
-    (any::<u32>(), any::<u32>()).prop_map(|(counter, opener)| RoundId { counter, opener: RobotId(opener) })
+    any::<(u32, u32, u32)>().prop_map(|(counter, opener, life)| RoundId {
+        counter,
+        opener: RobotId(opener),
+        life,
+    })
 }
 
 fn stamp() -> impl Strategy<Value = Stamp> {
@@ -207,7 +211,7 @@ proptest! {
 }
 
 fn vote_of(evidence: Vec<f32>) -> Vote {
-    let round = RoundId { counter: 1, opener: RobotId(1) };
+    let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
     Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0 }
 }
 
@@ -219,7 +223,7 @@ fn read(message: Message) -> Result<Envelope, DecodeError> {
 #[test]
 fn no_bytes_too_many_bytes_and_another_version_are_told_apart() {
     assert_eq!(Envelope::decode(&[]), Err(DecodeError::Empty));
-    assert_eq!(Envelope::decode(&[PROTOCOL_VERSION + 1, 1, 2]), Err(DecodeError::Version { found: 3 }));
+    assert_eq!(Envelope::decode(&[PROTOCOL_VERSION + 1, 1, 2]), Err(DecodeError::Version { found: 4 }));
     let long = vec![PROTOCOL_VERSION; MAX_MESSAGE + 1];
     assert_eq!(
         Envelope::decode(&long),
@@ -266,7 +270,7 @@ fn a_sample_says_only_what_a_robot_can_have_seen() {
     let sample = |vector| SharedSample {
         id: SampleId { author: RobotId(1), number: 1 },
         class: ClassId(0),
-        round: RoundId { counter: 1, opener: RobotId(1) },
+        round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
         vector,
     };
     let sound = sample(Vector::F32(vec![0.0; MAX_COMPONENTS]));
@@ -316,7 +320,7 @@ fn a_decision_that_contradicts_itself_is_refused() {
         weight: 1.0,
     };
     let sound = Decision {
-        round: RoundId { counter: 1, opener: RobotId(1) },
+        round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
         class: Some(ClassId(1)),
         confidence: 0.75,
         author: RobotId(1),
@@ -360,7 +364,7 @@ fn no_message_takes_more_memory_than_promised() {
     // no element is larger in memory than the promised factor makes of its smallest encoding.
     let factor = MAX_ALLOCATION / MAX_MESSAGE;
     let null = Vote {
-        round: RoundId { counter: 0, opener: RobotId(0) },
+        round: RoundId { counter: 0, opener: RobotId(0), life: 0 },
         vocabulary: VocabularyId(0),
         evidence: vec![],
         looks: 0.0,

@@ -23,17 +23,17 @@ fn hex(bytes: &[u8]) -> String {
 #[test]
 fn a_frames_header() {
     // version, nonce, sequence, age (varints), encoding, f32 in little-endian order, name with its length
-    let bytes = "02 ac02 07 e05d 00 0000f041 06 706172726f74".replace(' ', "");
+    let bytes = "03 ac02 07 e05d 00 0000f041 06 706172726f74".replace(' ', "");
     assert_eq!(hex(&header().encode()), bytes);
     assert_eq!(FrameHeader::decode(&header().encode()), Ok(header()));
 }
 
 #[test]
 fn an_acknowledgement() {
-    let round = Some(RoundId { counter: 300, opener: RobotId(2) });
+    let round = Some(RoundId { counter: 300, opener: RobotId(2), life: 0xA1 });
     for (taken, bytes) in [
-        (FrameTaken { nonce: 300, sequence: 7, round }, "02 ac02 07 01 ac02 02"),
-        (FrameTaken { nonce: 300, sequence: 7, round: None }, "02 ac02 07 00"),
+        (FrameTaken { nonce: 300, sequence: 7, round }, "03 ac02 07 01 ac02 02 a101"),
+        (FrameTaken { nonce: 300, sequence: 7, round: None }, "03 ac02 07 00"),
     ] {
         assert_eq!(hex(&taken.encode()), bytes.replace(' ', ""));
         assert_eq!(FrameTaken::decode(&taken.encode()), Ok(taken));

@@ -7,7 +7,7 @@ use gestalt_protocol::{
     RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
-const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2) };
+const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
 
 fn vote() -> Vote {
     Vote { round: ROUND, vocabulary: VocabularyId(0x0102_0304), evidence: vec![1.5, -1.5], looks: 2.0 }
@@ -50,18 +50,21 @@ fn travels_as(message: Message, expected: &str) {
 }
 
 // version, author, boot, sequence (varint), variant
-const HEAD: &str = "02 07 01 8201";
+const HEAD: &str = "03 07 01 8201";
 
 #[test]
 fn a_vote() {
     // round, vocabulary (varint), two f32 in little-endian order, looks
-    travels_as(Message::Vote(vote()), &format!("{HEAD} 00 ac0202 84868808 02 0000c03f 0000c0bf 00000040"));
+    travels_as(
+        Message::Vote(vote()),
+        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040"),
+    );
 }
 
 #[test]
 fn a_null_vote() {
     let null = Vote { evidence: vec![], looks: 0.0, ..vote() };
-    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202 84868808 00 00000000"));
+    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000"));
 }
 
 #[test]
@@ -77,7 +80,7 @@ fn what_a_robot_has() {
     // samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202 01 01 01 000000000000e83f 04 01 07 01 09 01ac0201 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 000000000000e83f 04 01 07 01 09 01ac0201 01"),
     );
     let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
     travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
@@ -86,9 +89,9 @@ fn what_a_robot_has() {
 #[test]
 fn what_a_robot_gives() {
     let held = HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote() };
-    let decided = "01 ac0202 0101 000000000000e83f 04 84868808 02 02 000000000000d03f 000000000000e83f \
+    let decided = "01 ac0202a101 0101 000000000000e83f 04 84868808 02 02 000000000000d03f 000000000000e83f \
                    01 07 01 09 01 0000803f e209";
-    let votes = "01 03 02 05 ac0202 84868808 02 0000c03f 0000c0bf 00000040";
+    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040";
     travels_as(
         Message::Give(Give { decision: Some(decision()), votes: vec![held] }),
         &format!("{HEAD} 02 {decided} {votes}").replace("\n", ""),
@@ -112,8 +115,8 @@ fn shared_samples() {
     travels_as(
         Message::Samples(Samples { space, samples: samples.map(sample).to_vec() }),
         &format!(
-            "{HEAD} 03 8202 03 07c80103ac0202 00 02 0000c03f0000c0bf 07c80103ac0202 01 04 003e00be \
-             07c80103ac0202 02 02 7f80"
+            "{HEAD} 03 8202 03 07c80103ac0202a101 00 02 0000c03f0000c0bf 07c80103ac0202a101 01 04 003e00be \
+             07c80103ac0202a101 02 02 7f80"
         )
         .replace("\n", ""),
     );
@@ -125,7 +128,7 @@ fn a_sample_of_24_components_takes_at_most_64_bytes() {
     let sample = SharedSample {
         id: SampleId { author: RobotId(4096), number: 1_000_000 },
         class: ClassId(63),
-        round: RoundId { counter: 1_000_000, opener: RobotId(4096) },
+        round: RoundId { counter: 1_000_000, opener: RobotId(4096), life: u32::MAX },
         vector: Vector::I8(vec![-128; 24]),
     };
     let samples = Samples { space: FeatureSpaceId(u64::MAX), samples: vec![sample] };
@@ -142,7 +145,10 @@ fn what_a_robot_knows() {
         digest: Digest { samples: 300, lessons: 1 },
         answer: true,
     };
-    travels_as(Message::Know(know), &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202 05 ac0201 01"));
+    travels_as(
+        Message::Know(know),
+        &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01"),
+    );
 }
 
 #[test]
@@ -151,13 +157,15 @@ fn what_instructors_said() {
     let lessons = vec![said(Word::Was(ClassId(3))), said(Word::Not(ClassId(4))), said(Word::Retracted)];
     travels_as(
         Message::Lessons(Lessons { lessons }),
-        &format!("{HEAD} 05 03 ac0202 03616461 01 0003 ac0202 03616461 01 0104 ac0202 03616461 01 02"),
+        &format!(
+            "{HEAD} 05 03 ac0202a101 03616461 01 0003 ac0202a101 03616461 01 0104 ac0202a101 03616461 01 02"
+        ),
     );
 }
 
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2},"class":1,"confidence":0.75,"author":4,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0}],"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0}],"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
     let none = Decision { class: None, ..decision() };
@@ -171,11 +179,14 @@ fn instructions_as_people_write_them() {
     let by_label = Instruction::Was { round, class: Gesture::Label("three".to_owned()) };
     for (json, instruction) in [
         (r#" {"say": "open"} "#, Instruction::Open),
-        (r#"{"say":"was","round":{"counter":300,"opener":2},"class":3}"#, by_class),
-        (r#"{"say":"was","round":{"counter":300,"opener":2},"class":"three"}"#, by_label),
-        (r#"{"round":{"counter":300,"opener":2},"say":"right"}"#, Instruction::Right { round }),
-        (r#"{"say":"wrong","round":{"counter":300,"opener":2}}"#, Instruction::Wrong { round }),
-        (r#"{"say":"retract","round":{"counter":300,"opener":2}}"#, Instruction::Retract { round }),
+        (r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":3}"#, by_class),
+        (r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":"three"}"#, by_label),
+        (r#"{"round":{"counter":300,"opener":2,"life":161},"say":"right"}"#, Instruction::Right { round }),
+        (r#"{"say":"wrong","round":{"counter":300,"opener":2,"life":161}}"#, Instruction::Wrong { round }),
+        (
+            r#"{"say":"retract","round":{"counter":300,"opener":2,"life":161}}"#,
+            Instruction::Retract { round },
+        ),
     ] {
         assert_eq!(decode_json::<Instruction>(json.as_bytes()), Ok(instruction.clone()), "{json}");
         let written = serde_json::to_string(&instruction).unwrap();
@@ -188,8 +199,8 @@ fn instructions_as_people_write_them() {
         "[]",
         "open",
         r#"{"say":"right"}"#,
-        r#"{"say":"was","round":{"counter":300,"opener":2}}"#,
-        r#"{"say":"was","round":{"counter":300,"opener":2},"class":300}"#,
+        r#"{"say":"was","round":{"counter":300,"opener":2,"life":161}}"#,
+        r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":300}"#,
     ] {
         assert!(decode_json::<Instruction>(wrong.as_bytes()).is_err(), "{wrong}");
     }
@@ -205,7 +216,7 @@ fn an_answer_for_instructors() {
         class: Some(ClassId(3)),
         samples: 0,
     };
-    let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2}},"outcome":"nothing_seen","class":3,"samples":0}"#;
+    let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2,"life":161}},"outcome":"nothing_seen","class":3,"samples":0}"#;
     assert_eq!(serde_json::to_string(&answer).unwrap(), json);
     assert_eq!(decode_json::<Answer>(json.as_bytes()), Ok(answer));
 }

@@ -19,7 +19,7 @@ use rand_chacha::rand_core::SeedableRng;
 const SIZES: [usize; 3] = [100, 1_000, 10_000];
 const COMPONENTS: usize = 40;
 const CLASS: ClassId = ClassId(0);
-const ROUND: RoundId = RoundId { counter: 1, opener: RobotId(1) };
+const ROUND: RoundId = RoundId { counter: 1, opener: RobotId(1), life: 0 };
 
 fn main() {
     divan::main();

@@ -105,7 +105,19 @@ impl LessonBook {
     /// each other the latest word counts alone.
     #[must_use]
     pub fn verdict(&self, round: RoundId, classes: usize) -> Verdict {
-        let Some(words) = self.rounds.get(&round) else { return Verdict::Unsaid };
+        self.verdict_by_names([round], classes)
+    }
+
+    /// The same of a round that has several names: of what an instructor said under any of them, the latest counts.
+    #[must_use]
+    pub fn verdict_by_names(&self, names: impl IntoIterator<Item = RoundId>, classes: usize) -> Verdict {
+        let mut words: BTreeMap<&InstructorId, (u64, Word)> = BTreeMap::new();
+        for (instructor, said) in names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten() {
+            words.entry(instructor).and_modify(|known| *known = *said.max(known)).or_insert(*said);
+        }
+        if words.is_empty() {
+            return Verdict::Unsaid;
+        }
         let valid = words.values().filter(|(_, word)| *word != Word::Retracted);
         let Some((_, latest)) = valid.clone().max() else { return Verdict::Retracted };
         let all = Candidates::all(classes);
@@ -174,7 +186,7 @@ impl LessonBook {
     pub fn digest_of(&self, round: RoundId) -> u64 {
         let Some(words) = self.rounds.get(&round) else { return 0 };
         let mut fnv = Fnv1a::default();
-        fnv.add(round.counter.to_le_bytes().into_iter().chain(round.opener.0.to_le_bytes()));
+        fnv.add([round.counter, round.opener.0, round.life].into_iter().flat_map(u32::to_le_bytes));
         for (instructor, (at, word)) in words {
             let (kind, class) = match word {
                 Word::Was(class) => (1, class.0),
@@ -195,7 +207,7 @@ mod tests {
     use super::*;
 
     fn lesson(counter: u32, who: &str, at: u64, word: Word) -> Lesson {
-        let round = RoundId { counter, opener: RobotId(1) };
+        let round = RoundId { counter, opener: RobotId(1), life: 0 };
         Lesson { round, instructor: who.parse().unwrap(), at, word }
     }
 
@@ -212,7 +224,7 @@ mod tests {
         for (who, at, word) in words {
             book.hear(&lesson(1, who, *at, *word));
         }
-        book.verdict(RoundId { counter: 1, opener: RobotId(1) }, 6)
+        book.verdict(RoundId { counter: 1, opener: RobotId(1), life: 0 }, 6)
     }
 
     #[test]

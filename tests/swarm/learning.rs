@@ -184,7 +184,7 @@ pub async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained
     let sample = |author, number, class, vector| SharedSample {
         id: SampleId { author, number },
         class: ClassId(class),
-        round: RoundId { counter: 1, opener: RobotId(9) },
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector,
     };
     let sound = Vector::F32(vec![0.5; 8]);
@@ -262,7 +262,7 @@ async fn decides_while_training() -> bool {
     let mut sample = |number| SharedSample {
         id: SampleId { author: RobotId(9), number },
         class: ClassId((rng.next_u32() % 6) as u8),
-        round: RoundId { counter: 1, opener: RobotId(9) },
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::I8((0..8).map(|_| (rng.next_u32() % 200) as i8).collect()),
     };
     let all: Vec<SharedSample> = (1..=SAMPLES).map(&mut sample).collect();

@@ -117,7 +117,7 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     agreed(&mut robots, 1, PATIENCE).await;
     let liar = attach(&locators).await;
     let keys = Keys::new(&swarm).unwrap();
-    let (nine, round) = (RobotId(9), RoundId { counter: 2, opener: RobotId(0) });
+    let (nine, round) = (RobotId(9), RoundId { counter: 2, opener: RobotId(0), life: 0 });
     let vocabulary = Fixed::default().vocabulary().id();
     let vote = |evidence: Vec<f32>| Message::Vote(Vote { round, vocabulary, evidence, looks: 1.0 });
     let say = async |topic: Topic, author, message| {

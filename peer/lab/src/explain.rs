@@ -25,7 +25,7 @@ const SHARED: usize = 8;
 /// How many samples are forgotten.
 const FORGOTTEN: usize = 12;
 const ME: RobotId = RobotId(1);
-const ROUND: RoundId = RoundId { counter: 1, opener: ME };
+const ROUND: RoundId = RoundId { counter: 1, opener: ME, life: 0 };
 
 /// Which rules to explain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -90,7 +90,7 @@ async fn session(listen: &[String], connect: &[String]) -> Session {
 /// A vote that suffices, over six classes; each for a round of its own.
 fn vote(counter: u32) -> Vec<u8> {
     let vote = Vote {
-        round: RoundId { counter, opener: RobotId(0) },
+        round: RoundId { counter, opener: RobotId(0), life: 0 },
         vocabulary: VocabularyId(1),
         evidence: vec![6.0, -1.2, -1.2, -1.2, -1.2, -1.2],
         looks: 3.0,

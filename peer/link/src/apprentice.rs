@@ -17,6 +17,7 @@ use tokio::sync::mpsc;
 use crate::account::Account;
 use crate::boot::boot_number;
 use crate::error::LinkError;
+use crate::identity;
 use crate::inbox::Inbox;
 use crate::memory::{Assignment, FilePlace, Found, Place, Records, Scribe, Store, StoreError, Told};
 use crate::supervisor::Supervisor;
@@ -159,7 +160,7 @@ impl RobotLearning {
             let key = "learning.memory".to_owned();
             return Err(LinkError::Config { key, cause: failure.to_string() });
         }
-        Mind::new(robot, prepared.boot, mind.clone())?.learning(prepared.setup(robot))?;
+        Mind::new(robot, identity::life(prepared.boot, 0), mind.clone())?.learning(prepared.setup(robot))?;
         Ok(())
     }
 }

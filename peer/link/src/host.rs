@@ -15,6 +15,7 @@ use crate::apprentice::Apprentice;
 use crate::event::Event;
 use crate::guard::Sight;
 use crate::guests::Guests;
+use crate::identity::{self, fresh_nonce};
 use crate::inbox::Inbox;
 use crate::memory::Found;
 use crate::mind::new_mind;
@@ -132,7 +133,9 @@ impl Host {
         let Some(apprentice) = &self.apprentice else { return };
         let Found { memory, classifier, boot } = found;
         let learning = apprentice.learning().clone();
-        let mind = new_mind(self.me, boot, self.mind.config().clone(), self.fusion.clone())
+        // Its rounds are counted anew from what is remembered: another life, by name too.
+        let life = identity::life(boot, fresh_nonce());
+        let mind = new_mind(self.me, life, self.mind.config().clone(), self.fusion.clone())
             .map_err(|error| error.to_string())
             .and_then(|mind| {
                 mind.learning(learning.setup(self.me, boot, Some(memory))).map_err(|error| error.to_string())
@@ -213,7 +216,7 @@ impl Host {
                 self.tell(Event::Opened(round));
             }
             Output::Closed(round) => {
-                // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
+                // Under the name it ended with: it may have merged with one of a smaller name meanwhile.
                 let mut status = self.account.lock();
                 (status.round, status.open) = (Some(round), false);
                 drop(status);

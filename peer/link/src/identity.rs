@@ -7,6 +7,7 @@ use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 
 use gestalt_protocol::RobotId;
+use gestalt_strategies::Life;
 use zenoh::session::ZenohId;
 
 const HIGHEST: u64 = 1 << 63;
@@ -16,6 +17,11 @@ const HIGHEST: u64 = 1 << 63;
 #[must_use]
 pub fn fresh_nonce() -> u64 {
     RandomState::new().build_hasher().finish()
+}
+
+/// The life of a robot that starts with that boot number and that nonce.
+pub(super) fn life(boot: u32, nonce: u64) -> Life {
+    Life { boot, nonce: (nonce >> 32 ^ nonce) as u32 }
 }
 
 /// The checksum that stands for a swarm's name in a Zenoh id.

@@ -20,7 +20,7 @@ use crate::failure::{Failure, Part};
 use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::host::Host;
-use crate::identity::swarm_checksum;
+use crate::identity::{self, swarm_checksum};
 use crate::inbox::Inbox;
 use crate::keeper::Keeper;
 use crate::mind::new_mind;
@@ -91,7 +91,7 @@ impl Robot {
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
         let rounds = mind;
-        let mut mind = new_mind(id, boot, rounds.clone(), fusion.clone())?;
+        let mut mind = new_mind(id, identity::life(boot, nonce), rounds.clone(), fusion.clone())?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
         }

@@ -118,7 +118,7 @@ pub(super) fn announced(announcement: &Announcement, names: &Names) -> String {
 }
 
 /// `round 18 (opened by robot 1)`.
-pub(super) fn opened(RoundId { counter, opener }: RoundId) -> String {
+pub(super) fn opened(RoundId { counter, opener, .. }: RoundId) -> String {
     format!("round {counter} (opened by robot {opener})")
 }
 
@@ -152,7 +152,7 @@ mod tests {
             weight: 1.0,
         };
         Decision {
-            round: RoundId { counter: 18, opener: RobotId(1) },
+            round: RoundId { counter: 18, opener: RobotId(1), life: 0 },
             class: class.map(ClassId),
             confidence: 0.9996,
             author: RobotId(2),

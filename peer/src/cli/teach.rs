@@ -19,7 +19,7 @@ use gestalt_link::{Client, News};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt teach open -e tcp/192.168.1.5:7447
-  gestalt teach was three --round 5@2")]
+  gestalt teach was three --round 5@2-3f9a01c7")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(value_name = "COMMAND")]
     words: Vec<String>,
 
-    /// Round the feedback is about, such as `5@2` (counter@opener) [default: the last one decided]
+    /// Round the feedback is about, such as `5@2-3f9a01c7` (counter@opener-life) [default: the last one decided]
     #[arg(long)]
     round: Option<RoundId>,
 

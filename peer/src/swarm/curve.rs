@@ -89,7 +89,7 @@ mod tests {
 
     fn decision(class: Option<ClassId>) -> Decision {
         Decision {
-            round: RoundId { counter: 1, opener: RobotId(1) },
+            round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
             class,
             confidence: 1.0,
             author: RobotId(1),

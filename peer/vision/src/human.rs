@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     fn round(counter: u32, opener: u32) -> RoundId {
-        RoundId { counter, opener: RobotId(opener) }
+        RoundId { counter, opener: RobotId(opener), life: 0 }
     }
 
     #[test]

@@ -140,7 +140,7 @@ mod tests {
             weight: 1.0,
         };
         Decision {
-            round: RoundId { counter: 1, opener: RobotId(1) },
+            round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
             class: class.map(ClassId),
             confidence,
             author: RobotId(author),

@@ -153,7 +153,7 @@ mod tests {
 
     fn vote(evidence: &[f32]) -> Vote {
         Vote {
-            round: RoundId { counter: 1, opener: RobotId(1) },
+            round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
             vocabulary: SCALE.vocabulary,
             evidence: evidence.to_vec(),
             looks: 1.0,

@@ -19,7 +19,7 @@ use crate::fusion::{self, Fusion};
 ///
 /// use gestalt_protocol::{ClassId, FusionRule, RobotId};
 /// use gestalt_rounds::fusion::Fusion;
-/// use gestalt_rounds::{Fuse, Rounds, RoundsConfig};
+/// use gestalt_rounds::{Fuse, Life, Rounds, RoundsConfig};
 ///
 /// /// Each robot has one vote for every class that it does not think unlikely.
 /// #[derive(Debug)]
@@ -45,7 +45,8 @@ use crate::fusion::{self, Fusion};
 ///     }
 /// }
 ///
-/// let rounds = Rounds::new(RobotId(1), 1, RoundsConfig::default())?.fused_by(Arc::new(Approval));
+/// let life = Life { boot: 1, nonce: 0x3F9A_01C7 };
+/// let rounds = Rounds::new(RobotId(1), life, RoundsConfig::default())?.fused_by(Arc::new(Approval));
 /// assert_eq!(rounds.config().rule.name(), "approval");
 /// # Ok::<(), gestalt_rounds::RoundsConfigError>(())
 /// ```

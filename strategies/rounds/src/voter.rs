@@ -109,6 +109,7 @@ mod tests {
 
     use super::*;
     use crate::classify::ClassifyError;
+    use crate::life::Life;
     use crate::machine::{Input, Output, Rounds};
     use crate::vocabulary::Vocabulary;
 
@@ -139,7 +140,7 @@ mod tests {
     }
 
     fn round(counter: u32) -> RoundId {
-        RoundId { counter, opener: RobotId(1) }
+        RoundId { counter, opener: RobotId(1), life: 0 }
     }
 
     fn vote(envelope: &Envelope) -> &Vote {
@@ -157,7 +158,7 @@ mod tests {
 
     #[test]
     fn its_votes_are_those_of_a_mind_that_sees_the_same() {
-        let mut mind = Rounds::new(RobotId(7), 3, RoundsConfig::default()).unwrap();
+        let mut mind = Rounds::new(RobotId(7), Life { boot: 3, nonce: 7 }, RoundsConfig::default()).unwrap();
         mind.handle(ms(0), Input::Learned(echo(["a", "b"])));
         // Somebody who sees nothing keeps the round open.
         mind.handle(ms(0), Input::Alive([RobotId(1)].into()));
@@ -214,7 +215,7 @@ mod tests {
         let first = voter.speak(ms(20)).unwrap();
         assert_eq!((vote(&first).round, vote(&first).looks), (round(2), 0.0));
         voter.observed(ms(30), &seen(0.9));
-        voter.opened(ms(40), RoundId { counter: 2, opener: RobotId(0) });
+        voter.opened(ms(40), RoundId { counter: 2, opener: RobotId(0), life: 0 });
         assert_eq!(vote(&voter.speak(ms(500)).unwrap()).looks, 1.0, "the same round under another opener");
     }
 

@@ -7,7 +7,7 @@ use gestalt_protocol::{
     ClassId, Decision, Envelope, FusionRule, Message, RobotId, RoundId, Stamp, Vote, decode_json,
 };
 use gestalt_rounds::fusion::Fusion;
-use gestalt_rounds::{Classify, ClassifyError, Fuse, Input, Output, Rounds, RoundsConfig, Vocabulary};
+use gestalt_rounds::{Classify, ClassifyError, Fuse, Input, Life, Output, Rounds, RoundsConfig, Vocabulary};
 
 fn vocabulary() -> Vocabulary {
     Vocabulary::new(["left", "right"]).unwrap()
@@ -63,7 +63,7 @@ impl Fuse for Nonsense {
 }
 
 fn rounds(me: u32, rule: Option<Arc<dyn Fuse>>) -> Rounds {
-    let rounds = Rounds::new(RobotId(me), 1, RoundsConfig::default()).unwrap();
+    let rounds = Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap();
     let mut rounds = match rule {
         Some(rule) => rounds.fused_by(rule),
         None => rounds,
@@ -74,7 +74,7 @@ fn rounds(me: u32, rule: Option<Arc<dyn Fuse>>) -> Rounds {
 }
 
 fn vote(author: u32, evidence: [f32; 2]) -> Input {
-    let round = RoundId { counter: 1, opener: RobotId(1) };
+    let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
     let vote = Vote { round, vocabulary: vocabulary().id(), evidence: evidence.to_vec(), looks: 1.0 };
     let stamp = Stamp { boot: 1, sequence: 1 };
     Input::Received(Envelope { author: RobotId(author), stamp, message: Message::Vote(vote) })

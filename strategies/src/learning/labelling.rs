@@ -15,11 +15,14 @@ impl Learning {
     /// Does to all samples of a round what instructors said of it: nothing but that decides, so that robots that heard
     /// it in another order come to the same.
     pub(super) fn apply_to_round(&mut self, round: RoundId) {
+        let names = self.recent.names(round);
         match self.verdict(round) {
             Verdict::Class(class) => {
-                let changes = self.set.relabel(round, class);
-                self.absorb(changes);
-                for (number, aside) in self.aside.take(|aside| aside.round == round) {
+                for name in &names {
+                    let changes = self.set.relabel(*name, class);
+                    self.absorb(changes);
+                }
+                for (number, aside) in self.aside.take(|aside| names.contains(&aside.round)) {
                     self.note_not_aside(number, &aside);
                     self.take_back(aside, class);
                 }
@@ -28,7 +31,7 @@ impl Learning {
                 }
             }
             verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
-                for change in self.set.retract(round) {
+                for change in names.iter().flat_map(|name| self.set.retract(*name)).collect::<Vec<_>>() {
                     if let SetChange::Removed(sample) = &change {
                         let HeldSample { part, id, class, round, vector, .. } = sample.clone();
                         let shared = id.map(|id| (id, class));
@@ -38,7 +41,7 @@ impl Learning {
                 }
                 let possible =
                     |class| matches!(verdict, Verdict::Among(candidates) if candidates.contains(class));
-                let of_round = self.aside.iter().filter(|(_, aside)| aside.round == round);
+                let of_round = self.aside.iter().filter(|(_, aside)| names.contains(&aside.round));
                 let refuted = of_round.filter(|(_, aside)| aside.guess.is_some_and(|guess| !possible(guess)));
                 let refuted: Vec<u64> = refuted.map(|(number, _)| number).collect();
                 refuted.into_iter().for_each(|number| self.guess(number, None));
@@ -100,9 +103,8 @@ impl Learning {
 
     /// Trains on own samples of which several gestures are possible and the classifier is sure of one.
     pub fn settle_aside(&mut self, classifier: &dyn Classify) {
-        let classes = self.vocabulary.classes();
         let sure = |aside: &UnresolvedSample| {
-            let Verdict::Among(candidates) = self.lessons.verdict(aside.round, classes) else { return None };
+            let Verdict::Among(candidates) = self.verdict(aside.round) else { return None };
             let p = classifier.probabilities_in_space(&aside.vector)?;
             likeliest(&p, candidates).filter(|(_, p)| *p >= self.config.sure).map(|(class, _)| class)
         };

@@ -58,7 +58,7 @@ pub enum MemoryError {
 }
 
 /// The layout of the records; another layout gets another number.
-const LAYOUT: u8 = 1;
+const LAYOUT: u8 = 2;
 
 /// Whose memory it is, and of what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -121,7 +121,8 @@ impl Item {
             Self::Sample(key) => [&[2][..], &key.to_be_bytes()].concat(),
             Self::Seen(author) => [&[3][..], &author.0.to_be_bytes()].concat(),
             Self::Lessons(round) => {
-                [&[4][..], &round.counter.to_be_bytes(), &round.opener.0.to_be_bytes()].concat()
+                let parts = [round.counter, round.opener.0, round.life].map(u32::to_be_bytes);
+                [&[4][..], parts.as_flattened()].concat()
             }
             Self::Aside(number) => [&[5][..], &number.to_be_bytes()].concat(),
         }
@@ -137,8 +138,11 @@ impl Item {
             2 => long(number).map(Self::Sample),
             3 => word(number).map(|author| Self::Seen(RobotId(author))),
             4 => {
-                let (counter, opener) = number.split_at_checked(4)?;
-                Some(Self::Lessons(RoundId { counter: word(counter)?, opener: RobotId(word(opener)?) }))
+                let (counter, rest) = number.split_at_checked(4)?;
+                let (opener, life) = rest.split_at_checked(4)?;
+                let round =
+                    RoundId { counter: word(counter)?, opener: RobotId(word(opener)?), life: word(life)? };
+                Some(Self::Lessons(round))
             }
             5 => long(number).map(Self::Aside),
             _ => None,
@@ -254,6 +258,13 @@ impl RobotMemory {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.owner.is_none()
+    }
+
+    /// The highest count of a round that anything is remembered of.
+    pub(crate) fn newest_counter(&self) -> Option<u32> {
+        let rounds = self.samples.iter().map(|sample| sample.round);
+        let rounds = rounds.chain(self.lessons.iter().map(|lesson| lesson.round));
+        rounds.chain(self.aside.iter().map(|(_, aside)| aside.round)).map(|round| round.counter).max()
     }
 
     pub(super) fn check(&self, owner: Owner, components: usize, classes: usize) -> Result<(), MemoryError> {

@@ -3,17 +3,19 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, RobotId, RoundId};
+use gestalt_protocol::{ClassId, RoundId};
 
 /// How many rounds are remembered: feedback that comes later than that labels nothing new.
 const MAX_ROUNDS: usize = 32;
 
+/// How many names of one round are remembered, the smallest: more robots than that do not open one at once.
+const MAX_NAMES: usize = 1024;
+
 /// One round.
 #[derive(Clone, Debug)]
 struct RecentRound {
-    counter: u32,
-    /// All openers it was known under: robots that open at once merge their rounds on the smallest.
-    openers: BTreeSet<RobotId>,
+    /// All names it was known under: robots that open at once merge their rounds on the smallest.
+    names: BTreeSet<RoundId>,
     last_look: Option<Duration>,
     looks: usize,
     /// What was seen and has no label yet.
@@ -26,25 +28,31 @@ struct RecentRound {
 pub(super) struct RecentRounds(VecDeque<RecentRound>);
 
 impl RecentRounds {
-    /// Notes a round, or another name of one; says whether it was news.
+    /// Notes a round; says whether it was news.
     pub fn enter(&mut self, round: RoundId) -> bool {
-        match self.0.iter_mut().find(|life| life.counter == round.counter) {
-            Some(life) => life.openers.insert(round.opener),
-            None => {
-                self.0.push_back(RecentRound {
-                    counter: round.counter,
-                    openers: [round.opener].into(),
-                    last_look: None,
-                    looks: 0,
-                    unlabelled: Vec::new(),
-                    decision: None,
-                });
-                if self.0.len() > MAX_ROUNDS {
-                    self.0.pop_front();
-                }
-                true
-            }
+        if self.contains(round) {
+            return false;
         }
+        self.0.push_back(RecentRound {
+            names: [round].into(),
+            last_look: None,
+            looks: 0,
+            unlabelled: Vec::new(),
+            decision: None,
+        });
+        if self.0.len() > MAX_ROUNDS {
+            self.0.pop_front();
+        }
+        true
+    }
+
+    /// Notes another name of a round; says whether it was news.
+    pub fn merge(&mut self, round: RoundId, other: RoundId) -> bool {
+        self.enter(round);
+        let Some(life) = self.find_mut(round) else { return false };
+        let new = life.names.insert(other);
+        let dropped = (life.names.len() > MAX_NAMES).then(|| life.names.pop_last()).flatten();
+        new && dropped != Some(other)
     }
 
     /// Keeps what was seen, up to `keep` times a round, at least `spacing` apart. Says whether it did.
@@ -91,15 +99,19 @@ impl RecentRounds {
     }
 
     pub fn newest(&self) -> Option<RoundId> {
-        let life = self.0.back()?;
-        Some(RoundId { counter: life.counter, opener: *life.openers.first()? })
+        self.0.back()?.names.first().copied()
+    }
+
+    /// All names of the round that has this one.
+    pub fn names(&self, round: RoundId) -> BTreeSet<RoundId> {
+        self.find(round).map_or_else(|| [round].into(), |life| life.names.clone())
     }
 
     fn find(&self, round: RoundId) -> Option<&RecentRound> {
-        self.0.iter().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
+        self.0.iter().find(|life| life.names.contains(&round))
     }
 
     fn find_mut(&mut self, round: RoundId) -> Option<&mut RecentRound> {
-        self.0.iter_mut().find(|life| life.counter == round.counter && life.openers.contains(&round.opener))
+        self.0.iter_mut().find(|life| life.names.contains(&round))
     }
 }

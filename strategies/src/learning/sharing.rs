@@ -44,7 +44,7 @@ impl Learning {
         let sample = SharedSample {
             id: SampleId { author: self.me, number: self.set.next_number().saturating_add(64) },
             class: ClassId(0),
-            round: self.recent.newest().unwrap_or(RoundId { counter: 1, opener: self.me }),
+            round: self.recent.newest().unwrap_or(RoundId { counter: 1, opener: self.me, life: u32::MAX }),
             vector: self.config.precision.encode(&vector, &self.space),
         };
         let length = |samples: Vec<SharedSample>| {

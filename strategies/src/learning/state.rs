@@ -152,7 +152,7 @@ impl Learning {
     }
 
     pub fn verdict(&self, round: RoundId) -> Verdict {
-        self.lessons.verdict(round, self.vocabulary.classes())
+        self.lessons.verdict_by_names(self.recent.names(round), self.vocabulary.classes())
     }
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
@@ -310,6 +310,12 @@ impl Learning {
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
         if self.recent.enter(round) {
+            self.apply_to_round(round);
+        }
+    }
+
+    fn merged(&mut self, round: RoundId, other: RoundId) {
+        if self.recent.merge(round, other) {
             self.apply_to_round(round);
         }
     }

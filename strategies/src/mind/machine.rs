@@ -4,12 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message, RobotId};
-use gestalt_rounds::{Classify, Follow, Fuse, Input as AboutRounds, Rounds, RoundsConfig, RoundsConfigError};
+use gestalt_rounds::{
+    Classify, Follow, Fuse, Input as AboutRounds, Life, Rounds, RoundsConfig, RoundsConfigError,
+};
 
 use super::answers::Answers;
 use super::input::{Concern, Input};
 use super::output::Output;
-use crate::learning::{Learning, LearningError, LearningSetup};
+use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
 ///
@@ -23,7 +25,7 @@ use crate::learning::{Learning, LearningError, LearningSetup};
 /// use std::time::Duration;
 ///
 /// use gestalt_protocol::{ClassId, RobotId};
-/// use gestalt_strategies::{Classify, ClassifyError, Input, Mind, MindConfig, Observation, Output, Vocabulary};
+/// use gestalt_strategies::{Classify, ClassifyError, Input, Life, Mind, MindConfig, Observation, Output, Vocabulary};
 ///
 /// #[derive(Debug)]
 /// struct Verbatim(Vocabulary);
@@ -38,7 +40,7 @@ use crate::learning::{Learning, LearningError, LearningSetup};
 ///     }
 /// }
 ///
-/// let mut mind = Mind::new(RobotId(7), 1, MindConfig::default())?;
+/// let mut mind = Mind::new(RobotId(7), Life { boot: 1, nonce: 0x3F9A_01C7 }, MindConfig::default())?;
 /// let ms = Duration::from_millis;
 /// mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(Vocabulary::new(["left", "right"])?))));
 /// mind.handle(ms(0), Input::Open);
@@ -58,16 +60,14 @@ pub struct Mind {
 }
 
 impl Mind {
-    /// The mind of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
-    /// taken for old ones. A robot that learns takes it from a clock, in tenths of a second or finer, so that it grows also
-    /// when all that was on the disk is lost, and faster than samples are made: their numbers begin there. It has no
-    /// classifier until [`Input::Learned`]: until then it relays, fuses and decides,
-    /// but gives no evidence.
+    /// The mind of robot `me` in one of its lives. A robot that learns takes the life's `boot` from a clock, in tenths of a second or
+    /// finer, so that it grows also when all that was on the disk is lost, and faster than samples are made: their numbers begin
+    /// there. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides, but gives no evidence.
     ///
     /// # Errors
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
-    pub fn new(me: RobotId, boot: u32, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
-        Ok(Self { rounds: Rounds::new(me, boot, config)?, learning: None, answers: Answers::default() })
+    pub fn new(me: RobotId, life: Life, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
+        Ok(Self { rounds: Rounds::new(me, life, config)?, learning: None, answers: Answers::default() })
     }
 
     /// The same mind, in which votes are fused by the user's rule, see [`Rounds::fused_by`].
@@ -82,7 +82,9 @@ impl Mind {
     /// # Errors
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
+        let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
         self.learning = Some(Learning::new(self.me(), self.rounds.boot(), setup)?);
+        self.rounds = self.rounds.counting_from(counter);
         Ok(self)
     }
 

@@ -34,7 +34,7 @@ use crate::sample::{HeldSample, HeldSamples};
 /// let mut rng = ChaCha8Rng::seed_from_u64(1);
 /// let mut set = TrainingSet::new(RobotId(1), 100, Box::new(Newest), ForgettingRule::default().build());
 /// for counter in 1..=3 {
-///     let round = RoundId { counter, opener: RobotId(1) };
+///     let round = RoundId { counter, opener: RobotId(1), life: 0 };
 ///     set.keep(ClassId(0), round, vec![counter as f32], &mut rng);
 /// }
 /// set.share(1, None, &|vector| vector.to_vec(), &mut rng);

@@ -18,7 +18,7 @@ pub fn generator(seed: u64) -> ChaCha8Rng {
 }
 
 pub fn round(counter: u32) -> RoundId {
-    RoundId { counter, opener: RobotId(1) }
+    RoundId { counter, opener: RobotId(1), life: 0 }
 }
 
 pub fn id(author: u32, number: u32) -> SampleId {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
 use gestalt_strategies::{
-    Classifier, Learner, LearningConfig, LearningSetup, Mind, MindConfig, OwnRules, RecordChange,
+    Classifier, Learner, LearningConfig, LearningSetup, Life, Mind, MindConfig, OwnRules, RecordChange,
     RobotMemory, TrainingChange,
 };
 use rand_chacha::ChaCha8Rng;
@@ -28,7 +28,7 @@ impl Pupil {
     /// The mind of this robot, with what its disk holds.
     pub fn start(
         &mut self,
-        (me, boot): (RobotId, u32),
+        (me, life): (RobotId, Life),
         mind: MindConfig,
         school: &School,
         (config, rules): (&LearningConfig, &OwnRules),
@@ -47,7 +47,7 @@ impl Pupil {
             memory: Some(memory),
             rules: rules.clone(),
         };
-        Mind::new(me, boot, mind)
+        Mind::new(me, life, mind)
             .expect("the scenario was validated")
             .learning(setup)
             .expect("the scenario was validated, and the memory is this robot's own")

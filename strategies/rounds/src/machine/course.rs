@@ -19,7 +19,7 @@ impl Rounds {
             return;
         }
         match self.highest.map_or(Some(1), |highest| highest.checked_add(1)) {
-            Some(counter) => self.join(RoundId { counter, opener: self.me }, effects),
+            Some(counter) => self.join(RoundId { counter, opener: self.me, life: self.nonce }, effects),
             None => self.refusals.add(Refusal::CountersUsedUp),
         }
     }
@@ -106,7 +106,7 @@ impl Rounds {
         if self.looking.take().is_some()
             && let Some(round) = &self.round
         {
-            // Under the name it ended with: it may have merged with one of a smaller opener meanwhile.
+            // Under the name it ended with: it may have merged with one of a smaller name meanwhile.
             effects.out.push(Output::Closed(round.id));
         }
     }

@@ -7,9 +7,14 @@ use gestalt_protocol::{ClassId, Digest, RoundId};
 /// `()` follows nothing: a robot that decides and does not learn. Calls come in the order in which things happen, within
 /// [`Rounds::handle_with`](crate::Rounds::handle_with).
 pub trait Follow {
-    /// This robot knows of a round, or of another name for one: robots that open at once merge their rounds.
+    /// This robot knows of a round that it did not know of.
     fn entered(&mut self, round: RoundId) {
         let _ = round;
+    }
+
+    /// A round that it knows of has another name: robots that open at once merge their rounds.
+    fn merged(&mut self, round: RoundId, other: RoundId) {
+        let _ = (round, other);
     }
 
     /// This robot holds a decision for that round; `None` is "no decision". A later one replaces it.

@@ -7,6 +7,7 @@ use gestalt_protocol::{Decision, Envelope, Message, RobotId, RoundId, Stamp, Vot
 use super::rounds::{Effects, Rounds};
 use crate::ballot::{Cast, Scale};
 use crate::refusal::Refusal;
+use crate::round::Round;
 
 /// A round this many counters ahead of the newest known is refused: nobody shows a million gestures unnoticed.
 const MAX_LEAP: u32 = 1_000_000;
@@ -39,28 +40,42 @@ impl Rounds {
     }
 
     pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
-        let (counter, class) = (decision.round.counter, decision.class);
+        let (id, class) = (decision.round, decision.class);
         self.hear_decision(None, decision, effects);
-        if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == counter) {
+        if self.is_this_round(id)
+            && let Some(round) = &mut self.round
+        {
             round.agreement.note_announced(self.now, class);
         }
     }
 
-    /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Equal counters
-    /// merge here, on the smaller opener.
+    /// Whether that is a name of the newest round known: its own, or that of a round that was opened at the same time, as far as
+    /// can be told. Equal counters alone do not say so: where memories were lost or the swarm was cut, they belong to other showings.
+    pub(super) fn is_this_round(&self, id: RoundId) -> bool {
+        let opened_at_once = |round: &Round| {
+            round.id.counter == id.counter && self.now <= round.since.saturating_add(self.config.deadline)
+        };
+        self.round.as_ref().is_some_and(|round| round.id == id || opened_at_once(round))
+    }
+
+    /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Rounds opened at the same time
+    /// merge here, on the smaller name; of others with equal counters, the greater name is the newer, for all alike.
     pub(super) fn place(&mut self, id: RoundId, effects: &mut Effects<'_>) -> Option<Ordering> {
         if self.highest.is_some_and(|highest| id.counter > highest.saturating_add(MAX_LEAP)) {
             self.refusals.add(Refusal::FarAhead);
             return None;
         }
         self.highest = self.highest.max(Some(id.counter));
+        let this = self.is_this_round(id);
         let Some(round) = &mut self.round else { return Some(Ordering::Greater) };
-        let order = id.counter.cmp(&round.id.counter);
-        if order.is_eq() {
-            round.id.opener = round.id.opener.min(id.opener);
-            effects.follower.entered(id);
+        if !this {
+            return Some(id.cmp(&round.id));
         }
-        Some(order)
+        if round.id != id {
+            effects.follower.merged(round.id, id);
+            round.id = round.id.min(id);
+        }
+        Some(Ordering::Equal)
     }
 
     /// Counts a robot's vote, by whichever way it came. Says whether it was news.

@@ -61,12 +61,11 @@ impl Rounds {
 
     /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
     pub(super) fn on_give(&mut self, from: RobotId, give: Give, effects: &mut Effects<'_>) {
-        let counter = self.round().map(|id| id.counter);
         let mut news = Give { decision: None, votes: Vec::new() };
         if let Some(decision) = give.decision {
-            let id = decision.round;
+            let missed = !self.is_this_round(decision.round);
             if self.hear_decision(Some(from), decision.clone(), effects) {
-                if !self.is_open() && counter.is_none_or(|counter| id.counter > counter) {
+                if !self.is_open() && missed {
                     self.note_missed_announcement();
                 }
                 news.decision = Some(decision);

@@ -13,6 +13,7 @@ use super::partners::Partners;
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
 use crate::fuse::Fuse;
+use crate::life::Life;
 use crate::refusal::Refusals;
 use crate::round::Round;
 
@@ -28,7 +29,7 @@ use crate::round::Round;
 /// use std::time::Duration;
 ///
 /// use gestalt_protocol::{ClassId, RobotId};
-/// use gestalt_rounds::{Classify, ClassifyError, Input, Observation, Output, Rounds, RoundsConfig, Vocabulary};
+/// use gestalt_rounds::{Classify, ClassifyError, Input, Life, Observation, Output, Rounds, RoundsConfig, Vocabulary};
 ///
 /// /// Takes the features for the probabilities.
 /// #[derive(Debug)]
@@ -48,7 +49,8 @@ use crate::round::Round;
 /// let robots = [RobotId(0), RobotId(1)];
 /// let mut swarm: Vec<Rounds> = Vec::new();
 /// for robot in robots {
-///     let mut rounds = Rounds::new(robot, 1, RoundsConfig::default())?;
+///     let life = Life { boot: 1, nonce: 0x3F9A_01C7 };
+///     let mut rounds = Rounds::new(robot, life, RoundsConfig::default())?;
 ///     let vocabulary = Vocabulary::new(["left", "right"])?;
 ///     rounds.handle(now, Input::Learned(Arc::new(Verbatim(vocabulary))));
 ///     rounds.handle(now, Input::Alive(robots.into()));
@@ -84,6 +86,8 @@ use crate::round::Round;
 #[derive(Debug)]
 pub struct Rounds {
     pub(super) me: RobotId,
+    /// Of this life, in the names of the rounds that it opens.
+    pub(super) nonce: u32,
     pub(super) config: RoundsConfig,
     pub(super) fusion: Arc<dyn Fuse>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
@@ -116,18 +120,18 @@ pub(super) struct Effects<'a> {
 }
 
 impl Rounds {
-    /// The rounds of robot `me` in its `boot`th life; `boot` must grow with each restart, or the robot's votes are
-    /// taken for old ones. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides,
-    /// but gives no evidence.
+    /// The rounds of robot `me` in one of its lives. It has no classifier until [`Input::Learned`]: until then it relays, fuses and
+    /// decides, but gives no evidence.
     ///
     /// # Errors
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
-    pub fn new(me: RobotId, boot: u32, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
+    pub fn new(me: RobotId, life: Life, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
         config.validate()?;
         Ok(Self {
             me,
+            nonce: life.nonce,
             classifier: None,
-            stamp: Stamp { boot, sequence: 0 },
+            stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
             round: None,
             highest: None,
@@ -143,6 +147,13 @@ impl Rounds {
             shown: None,
             blind: false,
         })
+    }
+
+    /// The same rounds, that go on counting from there: from the newest that an earlier life knew of.
+    #[must_use]
+    pub fn counting_from(mut self, counter: Option<u32>) -> Self {
+        self.highest = self.highest.max(counter);
+        self
     }
 
     /// The same rounds, in which votes are fused by the user's rule; the configuration's `rule` then names it. All

@@ -71,7 +71,7 @@ fn right_and_wrong_are_about_the_decision() {
 fn every_word_is_answered_once() {
     let mut swarm = Swarm::new(3, config(2, 1.0), 9);
     let round = swarm.show(1);
-    let unknown = RoundId { counter: 77, opener: RobotId(1) };
+    let unknown = RoundId { counter: 77, opener: RobotId(1), life: 0 };
     let was = |round, class: &str| Instruction::Was { round, class: Gesture::Label(class.to_owned()) };
     for (instruction, outcome) in [
         (was(round, "1"), Outcome::Learned),
@@ -89,8 +89,8 @@ fn every_word_is_answered_once() {
 
 #[test]
 fn who_does_not_learn_says_so() {
-    let mut mind = Mind::new(RobotId(1), 1, RoundsConfig::default()).unwrap();
-    let instruction = Instruction::Right { round: RoundId { counter: 1, opener: RobotId(1) } };
+    let mut mind = Mind::new(RobotId(1), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap();
+    let instruction = Instruction::Right { round: RoundId { counter: 1, opener: RobotId(1), life: 0 } };
     mind.handle(
         Duration::ZERO,
         Input::Instructed(Instructed { by: "ada".parse().unwrap(), at: 1, instruction }),

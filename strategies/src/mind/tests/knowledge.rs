@@ -38,6 +38,97 @@ fn a_restarted_robot_has_all_and_shares_nothing_twice() {
     swarm.check();
 }
 
+/// That every sample has the class that somebody gave its round.
+fn check_labels(swarm: &Swarm, told: &BTreeMap<RoundId, ClassId>) {
+    for mind in &swarm.minds {
+        for sample in mind.training_set().unwrap().iter() {
+            assert_eq!(told.get(&sample.round), Some(&sample.class), "of round {}", sample.round);
+        }
+    }
+}
+
+#[test]
+fn what_was_said_in_another_life_labels_nothing_whoever_forgot_what() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 11);
+    let mut told = BTreeMap::new();
+    let mut shown = BTreeSet::new();
+    for life in 0..100 {
+        // Other gestures in another order than before, and not all of them are named.
+        for showing in 0..2 {
+            let class = (life * 5 + life / 6 + 3 * showing) as u8 % CLASSES;
+            let round = swarm.show(class);
+            assert!(shown.insert(round), "round {round} is another showing's name");
+            check_labels(&swarm, &told);
+            let before: Vec<_> = swarm.minds.iter().map(|mind| mind.training_set().unwrap().len()).collect();
+            if (life + showing) % 3 > 0 {
+                told.insert(round, ClassId(class));
+                swarm.was(round, class);
+                check_labels(&swarm, &told);
+                let after = swarm.minds.iter().map(|mind| mind.training_set().unwrap().len());
+                assert!(
+                    after.zip(before).all(|(after, before)| after > before),
+                    "all learned of round {round}"
+                );
+            }
+        }
+        match life % 10 {
+            3 => swarm.disks[life / 10 % 3].clear(),
+            7 => swarm.disks.iter_mut().for_each(BTreeMap::clear),
+            _ => {}
+        }
+        swarm.restart_all();
+        check_labels(&swarm, &told);
+    }
+    let ids: BTreeSet<SampleId> = swarm.said.iter().map(|sample| sample.id).collect();
+    assert_eq!(ids.len(), swarm.said.len(), "no number twice");
+}
+
+#[test]
+fn rounds_are_counted_on_after_all_were_off() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 12);
+    let first = swarm.show(1);
+    swarm.was(first, 1);
+    swarm.restart_all();
+    assert_eq!(swarm.show(2).counter, first.counter + 1);
+}
+
+#[test]
+fn what_is_said_of_a_round_holds_for_all_its_names() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 13);
+    // All open at once, before they hear of each other.
+    swarm.loss = 1.0;
+    (0..3).for_each(|i| swarm.input(i, Input::Open));
+    swarm.loss = 0.0;
+    let alias = swarm.minds[2].round().unwrap();
+    swarm.pass(Duration::from_millis(1200));
+    let round = swarm.minds[2].round().unwrap();
+    assert_eq!((round.opener, alias.opener), (RobotId(1), RobotId(3)), "they merged");
+    // The word comes before they have seen it often enough, and under one name; its correction comes under another.
+    let look = |swarm: &mut Swarm| {
+        for i in 0..3 {
+            let mut features = vec![0.1; 8];
+            features[0] += 4.0;
+            swarm.input(i, Input::Observed(Observation { features, quality: 1.0 }));
+        }
+        swarm.pass(Duration::from_millis(450));
+    };
+    look(&mut swarm);
+    swarm.was(alias, 4);
+    for _ in 0..3 {
+        look(&mut swarm);
+    }
+    let count = |swarm: &Swarm, class| {
+        let of = |mind: &Mind| mind.training_set().unwrap().class_count(ClassId(class));
+        swarm.minds.iter().map(of).collect::<Vec<_>>()
+    };
+    let learned = count(&swarm, 4);
+    assert!(learned.iter().all(|n| *n > 3), "what was seen after the word is labelled too: {learned:?}");
+    swarm.was(round, 5);
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!(count(&swarm, 4), [0; 3]);
+    assert!(count(&swarm, 5).iter().all(|n| *n > 3));
+}
+
 #[test]
 fn a_robot_that_lost_its_disk_gets_its_own_samples_back_and_goes_on_counting() {
     let mut swarm = Swarm::new(3, config(3, 1.0), 5);

@@ -13,7 +13,7 @@ use gestalt_protocol::{
     ClassId, Envelope, FeatureSpaceId, Gesture, Instruction, Lesson, Message, Outcome, RobotId, RoundId,
     SampleId, Samples, SharedSample, Stamp, Vector, Word,
 };
-use gestalt_rounds::{Classify, ClassifyError, Observation, Refusal, RoundsConfig, Vocabulary};
+use gestalt_rounds::{Classify, ClassifyError, Life, Observation, Refusal, RoundsConfig, Vocabulary};
 use gestalt_svm::{Components, FeatureSpace, ScalingMethod};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -121,7 +121,8 @@ impl Swarm {
             rules: self.rules.clone(),
         };
         self.trained[i].clear();
-        Mind::new(id, boot, config).unwrap().learning(setup).unwrap()
+        let life = Life { boot, nonce: boot.wrapping_mul(7919) };
+        Mind::new(id, life, config).unwrap().learning(setup).unwrap()
     }
 
     fn introduce(&mut self, i: usize) {
@@ -135,6 +136,15 @@ impl Swarm {
         let mind = self.waken(i);
         self.minds[i] = mind;
         self.introduce(i);
+    }
+
+    /// All are switched off and on: none finds another that goes on.
+    fn restart_all(&mut self) {
+        self.pass(Duration::from_secs(1));
+        for i in 0..self.minds.len() {
+            self.minds[i] = self.waken(i);
+        }
+        (0..self.minds.len()).for_each(|i| self.introduce(i));
     }
 
     fn input(&mut self, i: usize, input: Input) {

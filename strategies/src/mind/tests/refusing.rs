@@ -9,7 +9,7 @@ fn a_sample_that_is_none_is_refused_and_counted() {
     let sample = |number, class, vector| SharedSample {
         id: SampleId { author: RobotId(9), number },
         class: ClassId(class),
-        round: RoundId { counter: 1, opener: RobotId(9) },
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector,
     };
     let sound = Vector::F32(vec![0.5; 4]);

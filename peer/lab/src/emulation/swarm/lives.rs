@@ -6,7 +6,7 @@ use gestalt_protocol::RobotId;
 use gestalt_strategies::{Classify, Input, Mind, MindConfig};
 
 use super::Swarm;
-use super::seed::{learning, stream};
+use super::seed::{learning, life, stream};
 use crate::emulation::network::Presence;
 
 impl Swarm<'_> {
@@ -15,19 +15,20 @@ impl Swarm<'_> {
         let robot = &mut self.robots[i];
         robot.boot += 1;
         robot.looking = false;
+        let life = life(self.seed, i, robot.boot);
         robot.knows = Default::default();
         let config: MindConfig = self.scenario.mind.clone();
         let classifier: Option<Arc<dyn Classify>> =
             match (&mut robot.pupil, &self.school, &self.scenario.learning) {
                 (Some(pupil), Some(school), Some(teaching)) => {
                     let rng = stream(self.seed, learning(i, robot.boot));
-                    let me = (robot.id, robot.boot);
+                    let me = (robot.id, life);
                     robot.mind =
                         Some(pupil.start(me, config, school, (&teaching.robots, &self.rules.learning), rng));
                     pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>)
                 }
                 _ => {
-                    robot.mind = Mind::new(robot.id, robot.boot, config).ok();
+                    robot.mind = Mind::new(robot.id, life, config).ok();
                     robot.observer.classifier()
                 }
             };

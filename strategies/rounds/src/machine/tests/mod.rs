@@ -20,6 +20,7 @@ use gestalt_protocol::{
 use super::{Input, Output, Rounds};
 use crate::classify::{Classify, ClassifyError};
 use crate::config::RoundsConfig;
+use crate::life::Life;
 use crate::observation::Observation;
 use crate::refusal::{Refusal, Refusals};
 use crate::vocabulary::Vocabulary;
@@ -51,7 +52,7 @@ fn ms(ms: u64) -> Duration {
 
 /// A mind whose camera shows nothing, so that it waits for no frame of its own; it takes those it is given all the same.
 fn mind_with(me: u32, config: RoundsConfig) -> Rounds {
-    let mut mind = Rounds::new(RobotId(me), 1, config).unwrap();
+    let mut mind = Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, config).unwrap();
     mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(vocabulary()))));
     mind.handle(ms(0), Input::Blind(true));
     mind
@@ -62,7 +63,7 @@ fn mind(me: u32) -> Rounds {
 }
 
 fn blind(me: u32) -> Rounds {
-    Rounds::new(RobotId(me), 1, RoundsConfig::default()).unwrap()
+    Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap()
 }
 
 fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
@@ -70,7 +71,7 @@ fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
 }
 
 fn round(counter: u32, opener: u32) -> RoundId {
-    RoundId { counter, opener: RobotId(opener) }
+    RoundId { counter, opener: RobotId(opener), life: 7 }
 }
 
 fn saw(probabilities: [f32; 3]) -> Input {

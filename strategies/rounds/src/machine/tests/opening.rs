@@ -86,3 +86,21 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
     mind.handle(ms(2000), Input::Open);
     assert_eq!(mind.round().unwrap().counter, 13, "the counter heard of is taken");
 }
+
+#[test]
+fn equal_counters_of_rounds_opened_at_other_times_are_two_rounds() {
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(10), Input::Heard(RobotId(9), decision(1, Some(0), 2, 9)));
+    assert_eq!(mind.round(), Some(round(1, 1)), "heard while it is shown: another name of it");
+    // Somebody who was cut off, or lost what it knew, shows another gesture under the same count.
+    mind.handle(ms(9000), votes(3, 1, Vote { round: round(1, 0), ..vote(1, 1, LEANING) }));
+    assert_eq!(
+        (mind.round(), mind.is_open()),
+        (Some(round(1, 7)), false),
+        "the lesser name is the older for all"
+    );
+    mind.handle(ms(9100), votes(9, 1, Vote { round: round(1, 9), ..vote(1, 1, LEANING) }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "the greater one is joined");
+    assert!(mind.held().is_none(), "what was decided of the other is not decided of this");
+}
