@@ -12,12 +12,13 @@ use crate::id::{ClassId, RobotId, RoundId};
 /// {"say": "open"}
 /// {"say": "was", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "class": 3}
 /// {"say": "was", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "class": "three"}
-/// {"say": "right", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
-/// {"say": "wrong", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
+/// {"say": "right", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "of": 3}
+/// {"say": "wrong", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "of": "three"}
 /// {"say": "retract", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
 /// ```
 ///
-/// The round is named as in the [`Decision`](crate::Decision) it is about. A later word of the same instructor on the
+/// The round is named as in the [`Decision`](crate::Decision) it is about, and "right" and "wrong" name the gesture that they confirm or deny:
+/// robots that held another decision at that moment understand the same. A later word of the same instructor on the
 /// same round replaces the earlier one; each word but `open` is answered, see [`Answer`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "say", rename_all = "snake_case", from = "Read")]
@@ -36,11 +37,15 @@ pub enum Instruction {
     Right {
         /// The round.
         round: RoundId,
+        /// The gesture that was decided.
+        of: Gesture,
     },
     /// "Wrong": the gesture was any but the one decided. Partial feedback.
     Wrong {
         /// The round.
         round: RoundId,
+        /// The gesture that was decided.
+        of: Gesture,
     },
     /// "I said nothing": takes back what this instructor said of the round.
     Retract {
@@ -75,8 +80,8 @@ impl fmt::Display for Gesture {
 enum Read {
     Open {},
     Was { round: RoundId, class: Gesture },
-    Right { round: RoundId },
-    Wrong { round: RoundId },
+    Right { round: RoundId, of: Gesture },
+    Wrong { round: RoundId, of: Gesture },
     Retract { round: RoundId },
 }
 
@@ -85,8 +90,8 @@ impl From<Read> for Instruction {
         match read {
             Read::Open {} => Self::Open,
             Read::Was { round, class } => Self::Was { round, class },
-            Read::Right { round } => Self::Right { round },
-            Read::Wrong { round } => Self::Wrong { round },
+            Read::Right { round, of } => Self::Right { round, of },
+            Read::Wrong { round, of } => Self::Wrong { round, of },
             Read::Retract { round } => Self::Retract { round },
         }
     }
@@ -99,8 +104,8 @@ impl Instruction {
         match self {
             Self::Open => None,
             Self::Was { round, .. }
-            | Self::Right { round }
-            | Self::Wrong { round }
+            | Self::Right { round, .. }
+            | Self::Wrong { round, .. }
             | Self::Retract { round } => Some(*round),
         }
     }
@@ -136,8 +141,6 @@ pub enum Outcome {
     NothingSeen,
     /// No such round is known, or it is too long ago.
     UnknownRound,
-    /// "Right" and "wrong" need a decision, and that round ended without one.
-    NoDecision,
     /// The vocabulary has no such gesture.
     UnknownGesture,
     /// The robots have no memory for samples: learning is not configured.
@@ -153,7 +156,6 @@ impl Outcome {
             Self::Known => "known already; nothing changed",
             Self::NothingSeen => "noted, but nothing seen in that round is held",
             Self::UnknownRound => "no such round is known, or it is too long ago",
-            Self::NoDecision => "that round ended without a decision: say which gesture it was",
             Self::UnknownGesture => "the vocabulary has no such gesture",
             Self::NotLearning => "the robots are not set up to learn",
         }

@@ -175,14 +175,21 @@ fn a_decision_for_clients() {
 #[test]
 fn instructions_as_people_write_them() {
     let round = ROUND;
+    let of = Gesture::Class(ClassId(3));
     let by_class = Instruction::Was { round, class: Gesture::Class(ClassId(3)) };
     let by_label = Instruction::Was { round, class: Gesture::Label("three".to_owned()) };
     for (json, instruction) in [
         (r#" {"say": "open"} "#, Instruction::Open),
         (r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":3}"#, by_class),
         (r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":"three"}"#, by_label),
-        (r#"{"round":{"counter":300,"opener":2,"life":161},"say":"right"}"#, Instruction::Right { round }),
-        (r#"{"say":"wrong","round":{"counter":300,"opener":2,"life":161}}"#, Instruction::Wrong { round }),
+        (
+            r#"{"round":{"counter":300,"opener":2,"life":161},"say":"right","of":3}"#,
+            Instruction::Right { round, of: of.clone() },
+        ),
+        (
+            r#"{"say":"wrong","round":{"counter":300,"opener":2,"life":161},"of":3}"#,
+            Instruction::Wrong { round, of },
+        ),
         (
             r#"{"say":"retract","round":{"counter":300,"opener":2,"life":161}}"#,
             Instruction::Retract { round },
@@ -199,6 +206,7 @@ fn instructions_as_people_write_them() {
         "[]",
         "open",
         r#"{"say":"right"}"#,
+        r#"{"say":"right","round":{"counter":300,"opener":2,"life":161}}"#,
         r#"{"say":"was","round":{"counter":300,"opener":2,"life":161}}"#,
         r#"{"say":"was","round":{"counter":300,"opener":2,"life":161},"class":300}"#,
     ] {
@@ -211,12 +219,12 @@ fn an_answer_for_instructors() {
     let answer = Answer {
         robot: RobotId(1),
         at: 7,
-        to: Instruction::Right { round: ROUND },
+        to: Instruction::Right { round: ROUND, of: Gesture::Class(ClassId(3)) },
         outcome: Outcome::NothingSeen,
         class: Some(ClassId(3)),
         samples: 0,
     };
-    let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2,"life":161}},"outcome":"nothing_seen","class":3,"samples":0}"#;
+    let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2,"life":161},"of":3},"outcome":"nothing_seen","class":3,"samples":0}"#;
     assert_eq!(serde_json::to_string(&answer).unwrap(), json);
     assert_eq!(decode_json::<Answer>(json.as_bytes()), Ok(answer));
 }

@@ -165,7 +165,7 @@ pub async fn a_correction_and_an_undo_reach_every_robot() {
     school.client.teach(&school.ada, &undo, PATIENCE).await.unwrap().unwrap();
     assert!(school.all(counts(4, 0)).await, "taken back everywhere");
     let unknown = RoundId { counter: 999, ..round };
-    let right = Instruction::Right { round: unknown };
+    let right = Instruction::Right { round: unknown, of: Gesture::Class(ClassId(1)) };
     let answer = school.client.teach(&school.ada, &right, PATIENCE).await.unwrap().unwrap();
     assert_eq!(answer.outcome, Outcome::UnknownRound, "never lost in silence");
     school.end().await;

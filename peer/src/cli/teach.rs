@@ -78,14 +78,20 @@ impl Word {
         }
     }
 
-    fn about(self, round: RoundId) -> Option<Instruction> {
-        match self {
+    /// The word about a round, of which that gesture was decided.
+    fn about(self, round: RoundId, decided: Option<ClassId>) -> Result<Option<Instruction>, String> {
+        let of = || {
+            decided.map(Gesture::Class).ok_or_else(|| {
+                format!("no decision of round {round} is known here to be right or wrong: say 'was GESTURE'")
+            })
+        };
+        Ok(match self {
             Self::Was(class) => Some(Instruction::Was { round, class }),
-            Self::Right => Some(Instruction::Right { round }),
-            Self::Wrong => Some(Instruction::Wrong { round }),
+            Self::Right => Some(Instruction::Right { round, of: of()? }),
+            Self::Wrong => Some(Instruction::Wrong { round, of: of()? }),
             Self::Undo => Some(Instruction::Retract { round }),
             Self::Open | Self::Quit => None,
-        }
+        })
     }
 }
 
@@ -100,8 +106,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let client = Client::open(&swarm, &link).await?;
         let news = client.news().await?;
-        let last = client.last_decision(super::ANSWER).await?.map(|last| last.decision.round);
-        let mut lesson = Lesson { args, client, news, last: args.round.or(last), names: Names::default() };
+        let last =
+            client.last_decision(super::ANSWER).await?.map(|last| (last.decision.round, last.decision.class));
+        let last = match args.round {
+            Some(round) => Some((round, last.filter(|last| last.0 == round).and_then(|last| last.1))),
+            None => last,
+        };
+        let mut lesson = Lesson { args, client, news, last, names: Names::default() };
         let said = match word {
             Some(word) => lesson.say(word).await,
             None => lesson.converse().await,
@@ -115,8 +126,8 @@ struct Lesson<'a> {
     args: &'a Args,
     client: Client,
     news: News,
-    /// The round that words are about.
-    last: Option<RoundId>,
+    /// The round that words are about, and what was decided of it.
+    last: Option<(RoundId, Option<ClassId>)>,
     names: Names,
 }
 
@@ -160,10 +171,10 @@ impl Lesson<'_> {
         if word == Word::Open {
             return self.open().await;
         }
-        let round = self
+        let (round, decided) = self
             .last
             .ok_or("no round has been decided yet: open one with 'open', or name one with --round")?;
-        let Some(instruction) = word.about(round) else { return Ok(()) };
+        let Some(instruction) = word.about(round, decided)? else { return Ok(()) };
         let timeout = self.args.timeout;
         let answer = self.client.teach(&self.args.instructor, &instruction, timeout).await?;
         let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
@@ -180,13 +191,13 @@ impl Lesson<'_> {
     }
 
     async fn open(&mut self) -> Result<(), Failure> {
-        let before = self.news.newest().max(self.last.map(|round| round.counter));
+        let before = self.news.newest().max(self.last.map(|(round, _)| round.counter));
         let (instructor, timeout) = (&self.args.instructor, self.args.timeout);
         let decided = super::open_round(&self.client, &mut self.news, instructor, before, timeout).await?;
         let decided = decided.ok_or_else(|| {
             format!("no decision within {timeout:?}: is a robot running? (gestalt watch --status)")
         })?;
-        self.last = Some(decided.decision.round);
+        self.last = Some((decided.decision.round, decided.decision.class));
         if !self.args.json && !self.names.cover(&decided.decision) {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }
@@ -201,6 +212,14 @@ impl Lesson<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn right_and_wrong_name_what_was_decided() {
+        let round: RoundId = "5@2-3f9a01c7".parse().unwrap();
+        let of = Gesture::Class(ClassId(3));
+        assert_eq!(Word::Wrong.about(round, Some(ClassId(3))), Ok(Some(Instruction::Wrong { round, of })));
+        assert!(Word::Right.about(round, None).unwrap_err().contains("was GESTURE"));
+    }
 
     #[test]
     fn words_are_read_as_people_type_them() {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, RoundId};
+use gestalt_protocol::RoundId;
 
 /// How many rounds are remembered: feedback that comes later than that labels nothing new.
 const MAX_ROUNDS: usize = 32;
@@ -20,7 +20,6 @@ struct RecentRound {
     looks: usize,
     /// What was seen and has no label yet.
     unlabelled: Vec<Vec<f32>>,
-    decision: Option<ClassId>,
 }
 
 /// The latest rounds, oldest first.
@@ -38,7 +37,6 @@ impl RecentRounds {
             last_look: None,
             looks: 0,
             unlabelled: Vec::new(),
-            decision: None,
         });
         if self.0.len() > MAX_ROUNDS {
             self.0.pop_front();
@@ -76,17 +74,6 @@ impl RecentRounds {
 
     pub fn looks(&self, round: RoundId) -> usize {
         self.find(round).map_or(0, |life| life.looks)
-    }
-
-    pub fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
-        self.enter(round);
-        if let Some(life) = self.find_mut(round) {
-            life.decision = class;
-        }
-    }
-
-    pub fn decision(&self, round: RoundId) -> Option<ClassId> {
-        self.find(round)?.decision
     }
 
     pub fn contains(&self, round: RoundId) -> bool {

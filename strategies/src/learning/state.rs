@@ -124,11 +124,6 @@ impl Learning {
         }
     }
 
-    /// What was decided in a round that this robot remembers.
-    pub fn decision(&self, round: RoundId) -> Option<ClassId> {
-        self.recent.decision(round)
-    }
-
     /// Whether this robot knows anything of a round.
     pub fn knows(&self, round: RoundId) -> bool {
         self.recent.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
@@ -318,10 +313,6 @@ impl Follow for Learning {
         if self.recent.merge(round, other) {
             self.apply_to_round(round);
         }
-    }
-
-    fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
-        self.recent.decided(round, class);
     }
 
     fn wants_more(&self, round: RoundId) -> bool {

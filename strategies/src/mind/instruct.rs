@@ -32,26 +32,22 @@ impl Mind {
         if !learning.knows(round) {
             return Outcome::UnknownRound;
         }
+        let class = |gesture: &Gesture| {
+            let class = match gesture {
+                Gesture::Class(class) => Some(*class),
+                Gesture::Label(label) => learning.vocabulary().class(label),
+            };
+            class.filter(|class| class.index() < learning.vocabulary().classes())
+        };
         let word = match &instructed.instruction {
             Instruction::Open => return Outcome::UnknownRound,
-            Instruction::Retract { .. } => Word::Retracted,
-            Instruction::Right { .. } | Instruction::Wrong { .. } => {
-                let Some(decided) = learning.decision(round) else { return Outcome::NoDecision };
-                let right = matches!(instructed.instruction, Instruction::Right { .. });
-                if right { Word::Was(decided) } else { Word::Not(decided) }
+            Instruction::Retract { .. } => Some(Word::Retracted),
+            Instruction::Was { class: gesture, .. } | Instruction::Right { of: gesture, .. } => {
+                class(gesture).map(Word::Was)
             }
-            Instruction::Was { class, .. } => {
-                let class = match class {
-                    Gesture::Class(class) => Some(*class),
-                    Gesture::Label(label) => learning.vocabulary().class(label),
-                };
-                let classes = learning.vocabulary().classes();
-                match class.filter(|class| class.index() < classes) {
-                    Some(class) => Word::Was(class),
-                    None => return Outcome::UnknownGesture,
-                }
-            }
+            Instruction::Wrong { of, .. } => class(of).map(Word::Not),
         };
+        let Some(word) = word else { return Outcome::UnknownGesture };
         let again = learning.lessons().word(round, &instructed.by) == Some(word);
         let lesson = Lesson { round, instructor: instructed.by.clone(), at: instructed.at, word };
         match learning.hear(&lesson) {
@@ -73,9 +69,7 @@ impl Mind {
         let wait = match outcome {
             Outcome::Learned | Outcome::Known => Duration::ZERO,
             Outcome::NothingSeen => SAW_NOTHING,
-            Outcome::UnknownRound | Outcome::NoDecision | Outcome::UnknownGesture | Outcome::NotLearning => {
-                KNOWS_NOTHING
-            }
+            Outcome::UnknownRound | Outcome::UnknownGesture | Outcome::NotLearning => KNOWS_NOTHING,
         };
         let (mut class, mut samples, mut revision) = (None, 0, 0);
         if let (Some(learning), Some(round)) = (&self.learning, instruction.round()) {

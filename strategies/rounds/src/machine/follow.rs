@@ -1,6 +1,6 @@
 //! What goes along with the rounds of a robot without deciding any of them: its learning.
 
-use gestalt_protocol::{ClassId, Digest, RoundId};
+use gestalt_protocol::{Digest, RoundId};
 
 /// Follows the rounds that a robot lives through: is told of them, and asked for the little they need to know of it.
 ///
@@ -15,11 +15,6 @@ pub trait Follow {
     /// A round that it knows of has another name: robots that open at once merge their rounds.
     fn merged(&mut self, round: RoundId, other: RoundId) {
         let _ = (round, other);
-    }
-
-    /// This robot holds a decision for that round; `None` is "no decision". A later one replaces it.
-    fn decided(&mut self, round: RoundId, class: Option<ClassId>) {
-        let _ = (round, class);
     }
 
     /// Whether it wants to see more of a round that is decided. The robot then goes on looking until the round's deadline

@@ -42,7 +42,6 @@ impl Rounds {
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
-            effects.follower.decided(decision.round, decision.class);
             effects.out.push(Output::Hold(decision.clone()));
         }
     }

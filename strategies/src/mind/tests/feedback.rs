@@ -47,11 +47,11 @@ fn what_is_taken_back_is_forgotten_and_what_is_said_then_counts() {
 fn right_and_wrong_are_about_the_decision() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 8);
     let round = swarm.show(3);
-    let at = swarm.say("ada", Instruction::Right { round });
+    let at = swarm.say("ada", Instruction::Right { round, of: Gesture::Class(ClassId(3)) });
     assert_eq!(swarm.outcome(at), Outcome::Learned);
     assert_eq!(swarm.minds[1].training_set().unwrap().class_count(ClassId(3)), 4);
     let round = swarm.show(2);
-    let at = swarm.say("ada", Instruction::Wrong { round });
+    let at = swarm.say("ada", Instruction::Wrong { round, of: Gesture::Label("2".to_owned()) });
     assert_eq!(swarm.outcome(at), Outcome::NothingSeen, "nothing of it can be trained on yet");
     assert_eq!(swarm.minds[0].training_set().unwrap().class_count(ClassId(2)), 0);
     assert_eq!(swarm.minds[0].learned().unwrap().aside, 2);
@@ -78,7 +78,7 @@ fn every_word_is_answered_once() {
         (was(round, "1"), Outcome::Known),
         (was(round, "seven"), Outcome::UnknownGesture),
         (was(unknown, "1"), Outcome::UnknownRound),
-        (Instruction::Right { round: unknown }, Outcome::UnknownRound),
+        (Instruction::Right { round: unknown, of: Gesture::Class(ClassId(1)) }, Outcome::UnknownRound),
     ] {
         let at = swarm.say("ada", instruction.clone());
         assert_eq!(swarm.outcome(at), outcome, "{instruction:?}");
@@ -90,7 +90,8 @@ fn every_word_is_answered_once() {
 #[test]
 fn who_does_not_learn_says_so() {
     let mut mind = Mind::new(RobotId(1), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap();
-    let instruction = Instruction::Right { round: RoundId { counter: 1, opener: RobotId(1), life: 0 } };
+    let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
+    let instruction = Instruction::Right { round, of: Gesture::Class(ClassId(0)) };
     mind.handle(
         Duration::ZERO,
         Input::Instructed(Instructed { by: "ada".parse().unwrap(), at: 1, instruction }),

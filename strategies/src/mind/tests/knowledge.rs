@@ -224,7 +224,7 @@ proptest! {
                     swarm.say("ada", Instruction::Retract { round });
                 }
                 3 => {
-                    swarm.say("bob", Instruction::Wrong { round });
+                    swarm.say("bob", Instruction::Wrong { round, of: Gesture::Class(ClassId(class)) });
                 }
                 _ => {
                     swarm.was(round, class);

@@ -95,8 +95,14 @@ impl Swarm<'_> {
         let Some((mind, round)) = mind.and_then(|mind| Some((mind, mind.round()?))) else { return };
         let instruction = match (teaching.feedback, mind.held().and_then(|held| held.class)) {
             (Feedback::Full, _) => Instruction::Was { round, class: Gesture::Class(self.shown) },
-            (Feedback::Partial, Some(decided)) if decided == self.shown => Instruction::Right { round },
-            (Feedback::Partial, Some(_)) => Instruction::Wrong { round },
+            (Feedback::Partial, Some(decided)) => {
+                let of = Gesture::Class(decided);
+                if decided == self.shown {
+                    Instruction::Right { round, of }
+                } else {
+                    Instruction::Wrong { round, of }
+                }
+            }
             (Feedback::Partial, None) | (Feedback::None, _) => return,
         };
         let robot = self.robots[i].id;
