@@ -49,6 +49,7 @@ test: test-packages
 GESTALT_DATA ?= ../shared/data
 eyes: packages
 	mkdir -p out/eyes
+	RUSTFLAGS="-C target-cpu=native" \
 	cargo run --release --manifest-path peer/training/Cargo.toml -- --data $(GESTALT_DATA) --out out/eyes $(EYES)
 
 # Every speed the README states, with its yardstick in the same run.

@@ -61,7 +61,7 @@ struct Args {
     /// Share of the usual steps and pictures
     #[arg(long, default_value_t = 1.0)]
     effort: f32,
-    /// Seed of every picture, order and variation; the networks' first weights are the training library's own choice
+    /// Seed of all chance: on one machine, the same seed gives the same weights
     #[arg(long, default_value_t = 2026)]
     seed: u64,
     /// Only draw sheets of what the networks would be shown

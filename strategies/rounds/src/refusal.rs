@@ -7,8 +7,10 @@ pub enum Refusal {
     DuplicateId,
     /// A round so far ahead of all rounds known that its counter is taken for a mistake or a lie.
     FarAhead,
-    /// A vote over another vocabulary, or with another number of classes, than this robot's classifier has.
+    /// A vote or decision over another vocabulary, or with another number of classes, than this robot's classifier has.
     Vocabulary,
+    /// A decision that is none by this robot's own rule, quorum and alpha: all robots need the same.
+    Unfounded,
     /// A vote or decision with a value that no robot may say.
     Impossible,
     /// A vote of one robot more than a ballot can hold.
@@ -31,10 +33,11 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::Vocabulary,
+        Self::Unfounded,
         Self::Impossible,
         Self::BallotFull,
         Self::NoClassifier,
@@ -53,6 +56,7 @@ impl Refusal {
             Self::DuplicateId => "refused_duplicate_id",
             Self::FarAhead => "refused_round_far_ahead",
             Self::Vocabulary => "refused_other_vocabulary",
+            Self::Unfounded => "refused_unfounded_decision",
             Self::Impossible => "refused_impossible_value",
             Self::BallotFull => "refused_ballot_full",
             Self::NoClassifier => "refused_no_classifier",

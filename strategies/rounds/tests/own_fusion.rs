@@ -7,7 +7,9 @@ use gestalt_protocol::{
     ClassId, Decision, Envelope, FusionRule, Message, RobotId, RoundId, Stamp, Vote, decode_json,
 };
 use gestalt_rounds::fusion::Fusion;
-use gestalt_rounds::{Classify, ClassifyError, Fuse, Input, Life, Output, Rounds, RoundsConfig, Vocabulary};
+use gestalt_rounds::{
+    Classify, ClassifyError, Fuse, Input, Life, Output, Refusal, Rounds, RoundsConfig, Vocabulary,
+};
 
 fn vocabulary() -> Vocabulary {
     Vocabulary::new(["left", "right"]).unwrap()
@@ -108,16 +110,19 @@ fn a_rule_of_ones_own_decides_and_signs() {
 }
 
 #[test]
-fn a_robot_without_the_rule_takes_the_decision_for_what_it_is() {
+fn a_decision_is_adopted_by_who_has_the_rule_and_by_nobody_else() {
     let decision = decided(&mut rounds(7, Some(Arc::new(First)))).remove(0);
     // As robots and clients hear it.
     let json = serde_json::to_vec(&decision).unwrap();
     let heard: Decision = decode_json(&json).unwrap();
     assert_eq!(heard, decision);
+    let mut same = rounds(8, Some(Arc::new(First)));
+    same.handle(Duration::ZERO, Input::Heard(RobotId(7), heard.clone()));
+    assert_eq!(same.held(), Some(&decision));
     let mut other = rounds(9, None);
-    let out = other.handle(Duration::ZERO, Input::Heard(RobotId(7), heard));
-    assert!(out.contains(&Output::Hold(decision.clone())));
-    assert_eq!(other.held(), Some(&decision));
+    other.handle(Duration::ZERO, Input::Heard(RobotId(7), heard));
+    assert_eq!(other.held(), None);
+    assert_eq!(other.refusals().count(Refusal::Unfounded), 1);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use gestalt_protocol::{Decision, Envelope, Message, RobotId, RoundId, Stamp, Vote};
+use gestalt_protocol::{Certificate, Decision, Envelope, Message, RobotId, RoundId, Stamp, Vote};
 
 use super::rounds::{Effects, Rounds};
 use crate::ballot::{Cast, Scale};
@@ -129,6 +129,10 @@ impl Rounds {
             self.refusals.add(Refusal::Impossible);
             return false;
         }
+        if let Err(refusal) = self.would_decide(&decision) {
+            self.refusals.add(refusal);
+            return false;
+        }
         match self.place(decision.round, effects) {
             None | Some(Ordering::Less) => return false,
             // What is decided elsewhere needs no looking; unless it cannot be believed on one robot's word.
@@ -138,6 +142,25 @@ impl Rounds {
         }
         let Some(round) = self.round.as_mut() else { return false };
         round.agreement.hear(holder, decision, self.config.liars)
+    }
+
+    /// Whether this robot would decide so itself, by what the decision says that it rests on.
+    fn would_decide(&self, decision: &Decision) -> Result<(), Refusal> {
+        /// What a sum may lose on the way through text.
+        const TOLERANCE: f64 = 1e-9;
+        let Some(class) = decision.class else { return Ok(()) };
+        let Certificate { vocabulary, rule, probabilities, votes, .. } = &decision.certificate;
+        let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
+        if self.own_scale().is_some_and(|own| own != scale) {
+            return Err(Refusal::Vocabulary);
+        }
+        let p = probabilities.get(class.index()).copied().unwrap_or_default();
+        let founded = *rule == self.config.rule
+            && votes.len() >= self.config.quorum as usize
+            && (p - decision.confidence).abs() <= TOLERANCE
+            && p + TOLERANCE >= 1.0 - self.config.alpha
+            && probabilities.iter().all(|other| *other <= p);
+        if founded { Ok(()) } else { Err(Refusal::Unfounded) }
     }
 
     fn meet_duplicate(&mut self, stamp: Stamp) {

@@ -84,3 +84,35 @@ fn a_changed_class_is_announced_again_and_the_same_class_is_not() {
     mind.handle(ms(1000), Input::Heard(RobotId(5), decision(1, Some(1), 5, 5)));
     assert_eq!(announces(&mind.handle(ms(1200), Input::Tick)), 1);
 }
+
+#[test]
+fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
+    let sound = decision(1, Some(1), 3, 5);
+    let changed = |change: &dyn Fn(&mut Decision)| {
+        let mut decision = sound.clone();
+        change(&mut decision);
+        decision
+    };
+    let config = RoundsConfig { quorum: 3, ..RoundsConfig::default() };
+    for (lie, refusal) in [
+        (changed(&|d| d.certificate.vocabulary = VocabularyId(77)), Refusal::Vocabulary),
+        (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Vocabulary),
+        (changed(&|d| d.certificate.rule = FusionRule::Majority), Refusal::Unfounded),
+        (changed(&|d| d.certificate.votes.truncate(2)), Refusal::Unfounded),
+        (changed(&|d| d.class = Some(ClassId(0))), Refusal::Unfounded),
+        (changed(&|d| d.confidence = 0.999), Refusal::Unfounded),
+        (
+            changed(&|d| {
+                d.confidence = 0.6;
+                d.certificate.probabilities = vec![0.2, 0.6, 0.2];
+            }),
+            Refusal::Unfounded,
+        ),
+    ] {
+        let mut mind = mind_with(7, config.clone());
+        mind.handle(ms(0), Input::Heard(RobotId(5), lie.clone()));
+        assert_eq!((mind.held(), mind.refusals().count(refusal)), (None, 1), "{lie:?}");
+        mind.handle(ms(1), Input::Heard(RobotId(5), sound.clone()));
+        assert_eq!(mind.held(), Some(&sound));
+    }
+}
