@@ -149,9 +149,9 @@ pub fn varied(shown: &Shown, other: &Shown, rng: &mut impl Rng) -> Variation {
         kernel[4] += 1.0;
         let sum = kernel.iter().sum::<f32>().max(0.5);
         let source = hand.clone();
-        for i in 0..n {
+        for (i, value) in hand.iter_mut().enumerate() {
             let (x, y) = ((i % SIDE) as i64, (i / SIDE) as i64);
-            hand[i] = (0..9)
+            *value = (0..9)
                 .map(|k| {
                     let px = (x + k as i64 % 3 - 1).clamp(0, SIDE as i64 - 1) as usize;
                     let py = (y + k as i64 / 3 - 1).clamp(0, SIDE as i64 - 1) as usize;
@@ -225,19 +225,14 @@ pub fn varied(shown: &Shown, other: &Shown, rng: &mut impl Rng) -> Variation {
     }
     let half = (SIDE as f32 - 1.0) / 2.0;
     let joints = shown.joints.map(|joints| map.joints(&joints)).map(|joints| {
-        let at = |k: usize| if k % 2 == 0 { joints[k / 2].0 } else { joints[k / 2].1 };
+        let at = |k: usize| [joints[k / 2].0, joints[k / 2].1][k % 2];
         std::array::from_fn(|k| (at(k) / half - 1.0).clamp(-1.5, 1.5))
     });
     Variation { picture: standardised(&image.values, &mask), joints }
 }
 
 /// A batch: hands of each pool by its share, varied. The same seed and number give the same batch.
-pub fn batch<'a>(
-    pools: &'a [(f32, Vec<Shown>)],
-    size: usize,
-    seed: u64,
-    number: u64,
-) -> Vec<(Variation, &'a Shown)> {
+pub fn batch(pools: &[(f32, Vec<Shown>)], size: usize, seed: u64, number: u64) -> Vec<(Variation, &Shown)> {
     let total: f32 = pools.iter().map(|(share, _)| share).sum();
     (0..size as u64)
         .into_par_iter()

@@ -79,7 +79,7 @@ impl Tally {
     ) -> Result<(), Box<dyn Error>> {
         let right = |said: Option<u8>| usize::from(said == photo.count);
         self.photos += 1;
-        match eyes.look(&imread(&data.join(&photo.path), IMREAD_COLOR)?, None) {
+        match eyes.look(&imread(data.join(&photo.path), IMREAD_COLOR)?, None) {
             Ok(look) => {
                 let near = overlap(&look.place, &photo.place) > NEAR;
                 let turn = (look.place.up - photo.place.up).to_degrees().rem_euclid(360.0);

@@ -230,8 +230,8 @@ impl Scenery {
                 let bare = mask.values[i] > 127.0;
                 let colour = if bare { tone } else { sleeve.unwrap_or(tone) };
                 let gloss = (light - 1.1).clamp(0.0, 1.0) * shine;
-                for c in 0..3 {
-                    picture.values[3 * i + c] = (light * colour[c] + gloss).clamp(0.0, 255.0);
+                for (value, colour) in picture.pixel(i).iter_mut().zip(colour) {
+                    *value = (light * colour + gloss).clamp(0.0, 255.0);
                 }
             }
             arm = chance(rng, 0.85).then_some(whole);

@@ -99,7 +99,8 @@ pub fn texture(rng: &mut impl Rng, w: usize, h: usize) -> Canvas {
     let (tinted, lit) = (uniform(rng, 3.0, 25.0), uniform(rng, 3.0, 40.0));
     let cells = rng.random_range(6..30);
     let (fine, strength) = (smooth_noise(rng, w, h, cells, 1), uniform(rng, 3.0, 40.0));
-    let (angle, pitch, phase) = (uniform(rng, 0.0, 3.14), uniform(rng, 0.1, 1.2), uniform(rng, 0.0, 6.0));
+    let (angle, pitch, phase) =
+        (uniform(rng, 0.0, std::f32::consts::PI), uniform(rng, 0.1, 1.2), uniform(rng, 0.0, 6.0));
     let (edge, stripe): (f32, [f32; 3]) =
         (uniform(rng, -0.5, 0.9), std::array::from_fn(|_| 40.0 * normal(rng)));
     let grain = uniform(rng, 5.0, 40.0);

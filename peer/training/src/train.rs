@@ -161,7 +161,7 @@ fn report<const N: usize>(
     for (mean, now) in mean.iter_mut().zip(now) {
         *mean = if step == 0 { now } else { 0.98 * *mean + 0.02 * now };
     }
-    if (step + 1) % 200 == 0 || step + 1 == steps {
+    if (step + 1).is_multiple_of(200) || step + 1 == steps {
         let shown: Vec<String> = mean.iter().map(|v| format!("{v:.3}")).collect();
         println!("{name} {}/{steps} {:.0} s {}", step + 1, began.elapsed().as_secs_f32(), shown.join(" "));
     }
