@@ -44,12 +44,12 @@ const REFINER: [(usize, usize, usize); 15] = [
     (16, 4, 1),
 ];
 const COUNTER: [(usize, usize, usize); 9] = [
-    (2, 16, 5),
-    (16, 32, 3),
-    (32, 48, 3),
-    (48, 64, 3),
-    (576, 64, 1),
-    (64, 24, 1),
+    (2, 24, 5),
+    (24, 40, 3),
+    (40, 64, 3),
+    (64, 96, 3),
+    (864, 96, 1),
+    (96, 24, 1),
     (24, 6, 1),
     (24, 5, 1),
     (24, 1, 1),
@@ -314,11 +314,11 @@ fn the_counter_is_its_definition() {
     for seed in 0..2 {
         let picture = picture(2, 48, 48, seed);
         let mut plain = Plain(tensors.iter());
-        let y = halved(&plain.convolve(Shape { side: 5, ..Shape::halving(2, 16) }, &picture));
-        let y = halved(&plain.convolve(Shape::usual(16, 32), &y));
-        let y = plain.convolve(Shape::usual(32, 48), &y);
-        let y = halved(&plain.convolve(Shape::usual(48, 64), &y));
-        let hidden = plain.dense(64, true, y.values());
+        let y = halved(&plain.convolve(Shape { side: 5, ..Shape::halving(2, 24) }, &picture));
+        let y = halved(&plain.convolve(Shape::usual(24, 40), &y));
+        let y = plain.convolve(Shape::usual(40, 64), &y);
+        let y = halved(&plain.convolve(Shape::usual(64, 96), &y));
+        let hidden = plain.dense(96, true, y.values());
         let embedding = plain.dense(24, false, &hidden);
         let count = counter.run(&picture);
         assert_near(&count.embedding, &embedding);
