@@ -113,6 +113,64 @@ impl Trunk {
     }
 }
 
+/// Climbs back up a [`Trunk`]: from many channels of few pixels to maps as large as its finest result.
+#[derive(Clone, Debug)]
+struct Decoder {
+    l5: Plain,
+    m4: Block,
+    l4: Plain,
+    /// What the trunk has there, before it is mixed; `None` where it is taken as it is.
+    l3: Option<Plain>,
+    m3: Block,
+    h: Plain,
+}
+
+impl Decoder {
+    /// Channels of the finest maps.
+    const FINE: usize = 16;
+
+    /// `coarse`, `middle`: channels of the trunk; `mixed`: channels of its middle once mixed; `matched`: whether its finest result is
+    /// matched first; `maps`: channels of the result.
+    fn new(
+        [coarse, middle, mixed]: [usize; 3],
+        matched: bool,
+        maps: usize,
+        parameters: &mut Parameters,
+    ) -> Self {
+        let p = parameters;
+        Self {
+            l5: Plain::new(coarse, middle, p),
+            m4: Block::new(Shape::usual(middle, mixed), 1, p),
+            l4: Plain::new(mixed, Self::FINE, p),
+            l3: matched.then(|| Plain::new(Self::FINE, Self::FINE, p)),
+            m3: Block::new(Shape::usual(Self::FINE, Self::FINE), 1, p),
+            h: Plain::new(Self::FINE, maps, p),
+        }
+    }
+
+    fn forward(&self, g: &mut Graph, [fine, middle, coarse]: [Id; 3]) -> Id {
+        let y = self.l5.forward(g, coarse);
+        let y = g.enlarged(y, middle);
+        let y = g.sum([y, middle], true);
+        let y = self.m4.forward(g, y);
+        let y = self.l4.forward(g, y);
+        let y = g.enlarged(y, fine);
+        let known = self.l3.map_or(fine, |l3| l3.forward(g, fine));
+        let y = g.sum([y, known], true);
+        let y = self.m3.forward(g, y);
+        self.h.forward(g, y)
+    }
+
+    fn weights(&self, p: &Parameters, out: &mut Weights) {
+        self.l5.weights(p, out);
+        self.m4.weights(p, out);
+        self.l4.weights(p, out);
+        self.l3.iter().for_each(|l3| l3.weights(p, out));
+        self.m3.weights(p, out);
+        self.h.weights(p, out);
+    }
+}
+
 /// Where hands are: from a frame to maps of a quarter of its size.
 #[derive(Clone, Debug)]
 pub struct Finder {
@@ -123,12 +181,7 @@ pub struct Finder {
 #[derive(Clone, Debug)]
 struct FinderLayers {
     trunk: Trunk,
-    l5: Plain,
-    m4: Block,
-    l4: Plain,
-    l3: Plain,
-    m3: Block,
-    h: Plain,
+    decoder: Decoder,
 }
 
 impl Finder {
@@ -140,14 +193,9 @@ impl Finder {
         let p = &mut all;
         let layers = FinderLayers {
             trunk: Trunk::new([8, 16, 32, 48], 2, p),
-            l5: Plain::new(48, 32, p),
-            m4: Block::new(Shape::usual(32, 32), 1, p),
-            l4: Plain::new(32, 16, p),
-            l3: Plain::new(16, 16, p),
-            m3: Block::new(Shape::usual(16, 16), 1, p),
-            h: Plain::new(16, Self::FIRST.len(), p),
+            decoder: Decoder::new([48, 32, 32], true, Self::FIRST.len(), p),
         };
-        p.get_mut(layers.h.bias).copy_from_slice(&Self::FIRST);
+        p.get_mut(layers.decoder.h.bias).copy_from_slice(&Self::FIRST);
         Self { parameters: all, layers }
     }
 
@@ -156,29 +204,15 @@ impl Finder {
         let mut graph = Graph::new(&mut self.parameters, training);
         let (g, l) = (&mut graph, &self.layers);
         let x = g.give(x);
-        let [fine, middle, coarse] = l.trunk.forward(g, x);
-        let y = l.l5.forward(g, coarse);
-        let y = g.enlarged(y, middle);
-        let y = g.sum([y, middle], true);
-        let y = l.m4.forward(g, y);
-        let y = l.l4.forward(g, y);
-        let y = g.enlarged(y, fine);
-        let known = l.l3.forward(g, fine);
-        let y = g.sum([y, known], true);
-        let y = l.m3.forward(g, y);
-        let maps = l.h.forward(g, y);
+        let seen = l.trunk.forward(g, x);
+        let maps = l.decoder.forward(g, seen);
         (graph, maps)
     }
 
     pub fn weights(&self) -> Weights {
         let (mut out, p, l) = (Weights::new(), &self.parameters, &self.layers);
         l.trunk.weights(p, &mut out);
-        l.l5.weights(p, &mut out);
-        l.m4.weights(p, &mut out);
-        l.l4.weights(p, &mut out);
-        l.l3.weights(p, &mut out);
-        l.m3.weights(p, &mut out);
-        l.h.weights(p, &mut out);
+        l.decoder.weights(p, &mut out);
         out
     }
 }
@@ -196,11 +230,7 @@ struct RefinerLayers {
     g1: Plain,
     g2: Plain,
     g3: Plain,
-    l5: Plain,
-    m4: Block,
-    l4: Plain,
-    m3: Block,
-    h: Plain,
+    decoder: Decoder,
 }
 
 impl Refiner {
@@ -212,11 +242,7 @@ impl Refiner {
             g1: Plain::new(44, 12, p),
             g2: Plain::new(12 * (CROP / 8).pow(2), 32, p),
             g3: Plain::new(32, 6, p),
-            l5: Plain::new(44, 28, p),
-            m4: Block::new(Shape::usual(28, 24), 1, p),
-            l4: Plain::new(24, 16, p),
-            m3: Block::new(Shape::usual(16, 16), 1, p),
-            h: Plain::new(16, 4, p),
+            decoder: Decoder::new([44, 28, 24], false, 4, p),
         };
         Self { parameters: all, layers }
     }
@@ -227,33 +253,23 @@ impl Refiner {
         let mut graph = Graph::new(&mut self.parameters, training);
         let (g, l) = (&mut graph, &self.layers);
         let x = g.give(x);
-        let [fine, middle, coarse] = l.trunk.forward(g, x);
+        let seen = l.trunk.forward(g, x);
+        let [_, _, coarse] = seen;
         let said = l.g1.forward(g, coarse);
         let said = g.rectified(said);
         let said = g.flat(said);
         let said = l.g2.forward(g, said);
         let said = g.rectified(said);
         let said = l.g3.forward(g, said);
-        let y = l.l5.forward(g, coarse);
-        let y = g.enlarged(y, middle);
-        let y = g.sum([y, middle], true);
-        let y = l.m4.forward(g, y);
-        let y = l.l4.forward(g, y);
-        let y = g.enlarged(y, fine);
-        let y = g.sum([y, fine], true);
-        let y = l.m3.forward(g, y);
-        let mask = l.h.forward(g, y);
+        let mask = l.decoder.forward(g, seen);
         (graph, said, mask)
     }
 
     pub fn weights(&self) -> Weights {
         let (mut out, p, l) = (Weights::new(), &self.parameters, &self.layers);
         l.trunk.weights(p, &mut out);
-        [l.g1, l.g2, l.g3, l.l5].iter().for_each(|plain| plain.weights(p, &mut out));
-        l.m4.weights(p, &mut out);
-        l.l4.weights(p, &mut out);
-        l.m3.weights(p, &mut out);
-        l.h.weights(p, &mut out);
+        [l.g1, l.g2, l.g3].iter().for_each(|plain| plain.weights(p, &mut out));
+        l.decoder.weights(p, &mut out);
         out
     }
 }

@@ -276,24 +276,23 @@ pub fn counter(pools: &[(f32, Vec<Shown>)], steps: usize, largest: f64, seed: u6
                 examples.iter().filter(|(variation, _)| variation.joints.is_some()).count().max(1) as f32;
             let mut parts = [0.0; 5];
             for (e, (Variation { joints, .. }, shown)) in examples.iter().enumerate() {
-                let mut take =
-                    |part: usize, at: usize, Loss { value, slope }: Loss, share: f32, weight: f32| {
-                        parts[part] += value * share;
-                        back[part][at] += slope * share * weight;
-                    };
                 if let Some(count) = shown.count.map(usize::from) {
                     let logits: &[f32; 6] = values[0][6 * e..][..6].try_into().expect("six");
                     let rest = SMOOTHING / 6.0;
                     let truth =
                         std::array::from_fn(|c| if c == count { 1.0 - SMOOTHING + rest } else { rest });
                     let (value, slopes) = softmax(&truth, logits);
-                    take(0, 6 * e, Loss { value, slope: 0.0 }, 1.0 / counted, 1.0);
-                    for (c, slope) in slopes.into_iter().enumerate() {
-                        take(0, 6 * e + c, Loss { value: 0.0, slope }, 1.0 / counted, 1.0);
+                    parts[0] += value / counted;
+                    for (back, slope) in back[0][6 * e..].iter_mut().zip(slopes) {
+                        *back = slope / counted;
                     }
-                    let right = logits.iter().all(|logit| *logit <= logits[count]);
-                    take(4, 0, Loss { value: f32::from(right), slope: 0.0 }, 1.0 / counted, 0.0);
+                    parts[4] += f32::from(logits.iter().all(|logit| *logit <= logits[count])) / counted;
                 }
+                let mut take =
+                    |part: usize, at: usize, Loss { value, slope }: Loss, share: f32, weight: f32| {
+                        parts[part] += value * share;
+                        back[part][at] += slope * share * weight;
+                    };
                 for (finger, out) in shown.fingers.iter().flatten().enumerate() {
                     let at = 5 * e + finger;
                     take(1, at, likelihood(f32::from(*out), values[1][at]), 0.2 / sure, 0.5);

@@ -6,6 +6,7 @@
 mod convolution;
 mod graph;
 mod parameters;
+mod phases;
 mod planes;
 
 pub use graph::{Graph, Id, Normalised, Shape};
