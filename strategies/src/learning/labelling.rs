@@ -1,5 +1,7 @@
 //! What becomes of samples by what instructors say of their round: into the training set, out of it, aside.
 
+use std::collections::BTreeSet;
+
 use gestalt_protocol::{ClassId, RoundId};
 use gestalt_rounds::Classify;
 
@@ -15,7 +17,7 @@ impl Learning {
     /// Does to all samples of a round what instructors said of it: nothing but that decides, so that robots that heard
     /// it in another order come to the same.
     pub(super) fn apply_to_round(&mut self, round: RoundId) {
-        let names = self.recent.names(round);
+        let names: BTreeSet<RoundId> = self.recent.names(round).collect();
         match self.verdict(round) {
             Verdict::Class(class) => {
                 for name in &names {

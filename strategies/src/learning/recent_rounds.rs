@@ -47,9 +47,9 @@ impl RecentRounds {
     /// Notes another name of a round; says whether it was news.
     pub fn merge(&mut self, round: RoundId, other: RoundId) -> bool {
         self.enter(round);
-        let Some(life) = self.find_mut(round) else { return false };
-        let new = life.names.insert(other);
-        let dropped = (life.names.len() > MAX_NAMES).then(|| life.names.pop_last()).flatten();
+        let Some(known) = self.find_mut(round) else { return false };
+        let new = known.names.insert(other);
+        let dropped = (known.names.len() > MAX_NAMES).then(|| known.names.pop_last()).flatten();
         new && dropped != Some(other)
     }
 
@@ -63,17 +63,17 @@ impl RecentRounds {
         spacing: Duration,
     ) -> bool {
         self.enter(round);
-        let Some(life) = self.find_mut(round) else { return false };
-        if life.looks >= keep || life.last_look.is_some_and(|last| now < last + spacing) {
+        let Some(known) = self.find_mut(round) else { return false };
+        if known.looks >= keep || known.last_look.is_some_and(|last| now < last + spacing) {
             return false;
         }
-        (life.last_look, life.looks) = (Some(now), life.looks + 1);
-        life.unlabelled.push(vector);
+        (known.last_look, known.looks) = (Some(now), known.looks + 1);
+        known.unlabelled.push(vector);
         true
     }
 
     pub fn looks(&self, round: RoundId) -> usize {
-        self.find(round).map_or(0, |life| life.looks)
+        self.find(round).map_or(0, |known| known.looks)
     }
 
     pub fn contains(&self, round: RoundId) -> bool {
@@ -82,7 +82,7 @@ impl RecentRounds {
 
     /// What was seen in that round and has no label yet; from now on it has.
     pub fn take_unlabelled(&mut self, round: RoundId) -> Vec<Vec<f32>> {
-        self.find_mut(round).map(|life| std::mem::take(&mut life.unlabelled)).unwrap_or_default()
+        self.find_mut(round).map(|known| std::mem::take(&mut known.unlabelled)).unwrap_or_default()
     }
 
     pub fn newest(&self) -> Option<RoundId> {
@@ -90,15 +90,17 @@ impl RecentRounds {
     }
 
     /// All names of the round that has this one.
-    pub fn names(&self, round: RoundId) -> BTreeSet<RoundId> {
-        self.find(round).map_or_else(|| [round].into(), |life| life.names.clone())
+    pub fn names(&self, round: RoundId) -> impl Iterator<Item = RoundId> + '_ {
+        let known = self.find(round);
+        let unknown = known.is_none().then_some(round);
+        known.into_iter().flat_map(|known| &known.names).copied().chain(unknown)
     }
 
     fn find(&self, round: RoundId) -> Option<&RecentRound> {
-        self.0.iter().find(|life| life.names.contains(&round))
+        self.0.iter().find(|known| known.names.contains(&round))
     }
 
     fn find_mut(&mut self, round: RoundId) -> Option<&mut RecentRound> {
-        self.0.iter_mut().find(|life| life.names.contains(&round))
+        self.0.iter_mut().find(|known| known.names.contains(&round))
     }
 }

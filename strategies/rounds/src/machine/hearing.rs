@@ -98,7 +98,7 @@ impl Rounds {
             return false;
         }
         let scale = Scale { vocabulary: vote.vocabulary, classes: vote.evidence.len() };
-        if !vote.evidence.is_empty() && self.own_scale().is_some_and(|own| own != scale) {
+        if !vote.evidence.is_empty() && self.is_foreign(scale) {
             self.refusals.add(Refusal::Vocabulary);
             return false;
         }
@@ -144,6 +144,11 @@ impl Rounds {
         round.agreement.hear(holder, decision, self.config.liars)
     }
 
+    /// Whether that is another scale than this robot's own, if it has one.
+    fn is_foreign(&self, scale: Scale) -> bool {
+        self.own_scale().is_some_and(|own| own != scale)
+    }
+
     /// Whether this robot would decide so itself, by what the decision says that it rests on.
     fn would_decide(&self, decision: &Decision) -> Result<(), Refusal> {
         /// What a sum may lose on the way through text.
@@ -151,7 +156,7 @@ impl Rounds {
         let Some(class) = decision.class else { return Ok(()) };
         let Certificate { vocabulary, rule, probabilities, votes, .. } = &decision.certificate;
         let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
-        if self.own_scale().is_some_and(|own| own != scale) {
+        if self.is_foreign(scale) {
             return Err(Refusal::Vocabulary);
         }
         let p = probabilities.get(class.index()).copied().unwrap_or_default();
