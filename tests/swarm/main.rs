@@ -26,7 +26,7 @@ fn main() -> std::process::ExitCode {
         [Waits] in_process::twenty_robots_agree_in_each_of_fifty_rounds.await,
         [Waits, Namespaces] churn::a_grid_under_churn_never_ends_a_round_differently_and_agrees_in_calm,
         [Works] motion::gestures_start_rounds_and_all_robots_decide_them_alike.await,
-        [Waits, Namespaces] ring::a_round_in_which_a_relay_freezes_ends_the_same_everywhere,
+        [Alone, Namespaces] ring::a_round_in_which_a_relay_freezes_ends_the_same_everywhere,
         [Waits, Namespaces] knowledge::under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge,
         [Waits] memory::killed_at_any_moment_it_remembers_and_shares_nothing_twice.await,
         [Works, Namespaces] center::a_stream_cut_and_a_centre_killed_come_back_to_a_centre_that_decides,

@@ -21,6 +21,7 @@ use opencv::prelude::*;
 fn main() -> std::process::ExitCode {
     gestalt_trials::run(gestalt_trials::trials![
         [Works] by_the_clock_each_gesture_is_shown_once_and_leaves_once_to_cameras_of_any_rate,
+        [Works] a_hand_that_sways_before_a_slow_camera_is_shown_once,
         [Works, Data] every_visit_opens_rounds_and_the_empty_room_none,
         [Works, Data] at_two_frames_per_second_no_visit_is_missed,
         [Works, Data] signs_are_moving_and_what_is_before_and_after_them_still,
@@ -233,5 +234,28 @@ fn by_the_clock_each_gesture_is_shown_once_and_leaves_once_to_cameras_of_any_rat
             // One frame may pass before the first that shows it in place.
             assert!(most <= published + period.mul_f64(1.3), "{most:?} {published:?}");
         }
+    }
+}
+
+/// A hand near a camera of 2 frames per second sways over many pixels between two of them.
+fn a_hand_that_sways_before_a_slow_camera_is_shown_once() {
+    const SHOWINGS: u32 = 100;
+    let schedule = Schedule { period: Duration::from_secs(6), still: Duration::from_millis(2500) };
+    for (seed, bearing_deg) in [(1, -18.0), (2, 6.0), (3, 30.0), (4, 6.0)] {
+        let pose = Pose { bearing_deg, elevation_deg: 0.0, distance_m: 0.9 };
+        let rendered = RenderedSource::new(CameraModel::footbot(), pose, Glove::default(), seed).unwrap();
+        let mut source = ScheduledSource::new(rendered, Human::new(5), schedule, Duration::ZERO);
+        let mut detector = MotionDetector::new(MotionConfig::watching()).unwrap();
+        let mut shown = vec![0; SHOWINGS as usize];
+        // A little slower than twice a second, so that frames fall on all parts of the showings.
+        let frames = (1..).map(|frame| frame * Duration::from_millis(501));
+        for at in frames.take_while(|at| *at < SHOWINGS * schedule.period) {
+            let image = source.next_frame(at, &Scene::default()).unwrap().image;
+            if let Some(Change::Shown { .. }) = detector.watch(&image, at).unwrap() {
+                shown[(at.as_secs_f64() / 6.0) as usize] += 1;
+            }
+        }
+        let other: Vec<_> = (0..).zip(&shown).filter(|(_, times)| **times != 1).collect();
+        assert!(other.is_empty(), "{seed}: showings and how often they were shown: {other:?}");
     }
 }

@@ -41,8 +41,11 @@ const FINE: i32 = 1;
 /// Between frames that lie further apart than this, somebody who holds still sways as much as they ever do.
 const SWAY: Duration = Duration::from_millis(250);
 
-/// How much more of the picture must change between such frames.
+/// How much more of the picture must change between such frames,
 const SLOW: f64 = 3.0;
+
+/// and how much of what somebody covers of it: near hands sway over more pixels than far ones.
+const SWAYS: f64 = 1.0 / 16.0;
 
 /// Why a frame could not be watched, or a detector not be made.
 #[derive(Debug, Error)]
@@ -91,6 +94,8 @@ pub struct MotionDetector {
     began: Option<Duration>,
     /// Whether a hand was said to be shown that has not left.
     shown: bool,
+    /// The share of the picture that differed from the empty scene when last compared; 0 before.
+    covered: f64,
 }
 
 impl MotionDetector {
@@ -108,6 +113,7 @@ impl MotionDetector {
             since: Duration::ZERO,
             began: None,
             shown: false,
+            covered: 0.0,
             config,
         })
     }
@@ -135,7 +141,7 @@ impl MotionDetector {
         // A movement goes on with less than it takes to begin one. Between the frames of a slow camera, though, somebody
         // who holds still sways as far as they ever do, and a hand that moves leaves its place altogether.
         let (reach, area) = match (at.saturating_sub(reference.at) > SWAY, moving) {
-            (true, _) => (COARSE, SLOW * self.config.area),
+            (true, _) => (COARSE, (SLOW * self.config.area).max(SWAYS * self.covered)),
             (false, false) => (COARSE, self.config.area),
             (false, true) => (FINE, self.config.area / 2.0),
         };
@@ -263,6 +269,7 @@ impl MotionDetector {
         empty.allow(FINE)?;
         let differs = self.difference.share(self.energy.view(), empty, self.config.noise)?;
         self.background.was_compared(self.energy.view().at);
+        self.covered = differs;
         Ok(differs > self.config.presence)
     }
 
