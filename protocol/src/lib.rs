@@ -17,6 +17,7 @@ mod envelope;
 mod fnv;
 mod frame;
 mod fusion_rule;
+pub mod hex;
 mod id;
 mod instruction;
 mod key;
@@ -24,6 +25,7 @@ mod lesson;
 mod limits;
 mod message;
 mod sample;
+mod signature;
 mod status;
 
 pub use decision::{Certificate, CountedVote, Decision, Rank};
@@ -43,4 +45,5 @@ pub use message::{Give, Have, HeldVote, Message, Vote};
 pub use sample::{
     Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
+pub use signature::Signature;
 pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
