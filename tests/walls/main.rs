@@ -45,6 +45,13 @@ fn the_mind_knows_no_host() {
 }
 
 #[test]
+fn trust_is_judged_without_a_network_and_without_a_mind() {
+    let minds = ["gestalt-strategies", "gestalt-rounds", "gestalt-svm"];
+    knows_none("gestalt-trust", &minds);
+    knows_none("gestalt-trust", &["nalgebra", "linfa", "ndarray", "zenoh", "tokio", "opencv", "clap", "redb"]);
+}
+
+#[test]
 fn a_controller_links_without_opencv_and_without_a_command_line() {
     knows_none("gestalt-link", &["linfa", "opencv", "clap"]);
     knows_none("gestalt-examples", &["linfa", "opencv", "clap"]);

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 /// Every package and the folder of its sources, seen from the root.
-pub const CRATES: [(&str, &str); 12] = [
+pub const CRATES: [(&str, &str); 13] = [
     ("gestalt-protocol", "protocol/src"),
     ("gestalt-rounds", "strategies/rounds/src"),
     ("gestalt-svm", "strategies/svm/src"),
     ("gestalt-strategies", "strategies/src"),
     ("gestalt-link", "peer/link/src"),
+    ("gestalt-trust", "peer/trust/src"),
     ("gestalt-vision", "peer/vision/src"),
     ("gestalt-draw", "peer/draw/src"),
     ("gestalt-lab", "peer/lab/src"),

@@ -1,0 +1,141 @@
+//! A secret key on disk.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use gestalt_protocol::hex::{self, HexError};
+use thiserror::Error;
+use zeroize::Zeroizing;
+
+use crate::identity::Identity;
+
+/// A key file that cannot be used, or not be made. None of them repeats what is in the file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum KeyFileError {
+    /// It is there already; it was left as it is.
+    #[error("{path}: a file is there already and is never overwritten: move it away, or choose another path")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It could not be written; what had been written of it is gone.
+    #[error("{path}: the key could not be written: make sure its folder exists and can be written to")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// It could not be read.
+    #[error(
+        "{path}: the key could not be read: check the path, and that the file belongs to who runs the robot"
+    )]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A folder, a pipe, a device.
+    #[error("{path}: no ordinary file: name the file that holds the key")]
+    NoFile {
+        /// What is there instead.
+        path: PathBuf,
+    },
+    /// Others on this computer can read or change it, so the key may not be secret any more.
+    #[error(
+        "{path}: other users can use this key (mode {mode:04o}): make a new key; if nobody else was ever on this \
+         computer, chmod 600 {path}"
+    )]
+    Exposed {
+        /// The file.
+        path: PathBuf,
+        /// Its permission bits.
+        mode: u32,
+    },
+    /// Not 64 hexadecimal digits and a line break.
+    #[error(
+        "{path}: no key file, which is one line of 64 hexadecimal digits ({reason}): restore it, or make a new key"
+    )]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its text.
+        reason: HexError,
+    },
+}
+
+/// The longest key file looked into: the digits, and line breaks of any system.
+const MAX_KEY_FILE: u64 = 128;
+
+impl Identity {
+    /// Writes the secret to a new file that only its owner can read and write (mode 0600): 64 hexadecimal digits and a line
+    /// break. It is on disk when this returns.
+    ///
+    /// # Errors
+    /// [`KeyFileError::Exists`] and [`KeyFileError::Write`].
+    pub fn write(&self, path: &Path) -> Result<(), KeyFileError> {
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let mut file = options.open(path).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => KeyFileError::Exists { path: path.to_owned() },
+            _ => KeyFileError::Write { path: path.to_owned(), source },
+        })?;
+        let written = file.write_all(self.text().as_ref()).and_then(|()| file.sync_all());
+        written.map_err(|source| {
+            // Half a key would stand in the way of the next attempt.
+            let _ = fs::remove_file(path);
+            KeyFileError::Write { path: path.to_owned(), source }
+        })
+    }
+
+    /// Reads what [`Identity::write`] wrote.
+    ///
+    /// # Errors
+    /// Every other [`KeyFileError`]; a file that other users can use is refused, unread.
+    pub fn read(path: &Path) -> Result<Self, KeyFileError> {
+        let unreadable = |source| KeyFileError::Read { path: path.to_owned(), source };
+        // Looked at before it is opened: opening a pipe would wait for somebody to write to it.
+        if !fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(KeyFileError::NoFile { path: path.to_owned() });
+        }
+        let file = File::open(path).map_err(unreadable)?;
+        refuse_exposed(path, &file)?;
+        // Room for all of it from the start: growing would leave copies of the secret behind.
+        let mut text = Zeroizing::new(Vec::with_capacity(2 * MAX_KEY_FILE as usize));
+        file.take(MAX_KEY_FILE).read_to_end(&mut text).map_err(unreadable)?;
+        let text = str::from_utf8(text.trim_ascii_end())
+            .map_err(|error| HexError::Digit { position: error.valid_up_to() + 1 });
+        let bytes = text
+            .and_then(hex::parse)
+            .map_err(|reason| KeyFileError::Malformed { path: path.to_owned(), reason })?;
+        Ok(Self::from_bytes(&Zeroizing::new(bytes)))
+    }
+
+    /// The key file's content.
+    fn text(&self) -> Zeroizing<[u8; 65]> {
+        let digit = |value: u8| b"0123456789abcdef"[usize::from(value)];
+        let mut text = Zeroizing::new([b'\n'; 65]);
+        for (place, byte) in self.to_bytes().iter().enumerate() {
+            text[2 * place] = digit(byte >> 4);
+            text[2 * place + 1] = digit(byte & 15);
+        }
+        text
+    }
+}
+
+#[cfg(unix)]
+fn refuse_exposed(path: &Path, file: &File) -> Result<(), KeyFileError> {
+    let metadata = file.metadata().map_err(|source| KeyFileError::Read { path: path.to_owned(), source })?;
+    let mode = std::os::unix::fs::MetadataExt::mode(&metadata) & 0o777;
+    if mode & 0o077 == 0 { Ok(()) } else { Err(KeyFileError::Exposed { path: path.to_owned(), mode }) }
+}
+
+#[cfg(not(unix))]
+fn refuse_exposed(_: &Path, _: &File) -> Result<(), KeyFileError> {
+    Ok(())
+}

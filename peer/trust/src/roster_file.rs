@@ -1,0 +1,39 @@
+//! A roster on disk.
+
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::path::Path;
+
+use crate::roster::Roster;
+use crate::roster_error::RosterError;
+use crate::scheme::Scheme;
+
+impl<S: Scheme> Roster<S> {
+    /// Reads and checks a roster file.
+    ///
+    /// # Errors
+    /// [`RosterError::File`], and those of [`Roster::parse`].
+    pub fn read(path: &Path) -> Result<Self, RosterError> {
+        let unreadable = |source| RosterError::File { path: path.to_owned(), verb: "read", source };
+        let file = File::open(path).map_err(unreadable)?;
+        let mut json = Vec::new();
+        file.take(Self::MAX_LENGTH as u64 + 1).read_to_end(&mut json).map_err(unreadable)?;
+        Self::parse(&json)
+    }
+
+    /// Writes a roster file in place of the one that is there: whoever reads meanwhile, or after a power cut, finds the whole old
+    /// one or the whole new one.
+    ///
+    /// # Errors
+    /// [`RosterError::File`].
+    pub fn write(&self, path: &Path) -> Result<(), RosterError> {
+        let mut beside = path.as_os_str().to_owned();
+        beside.push(".new");
+        let written = File::create(&beside).and_then(|mut file| {
+            file.write_all(self.to_json().as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&beside, path)
+        });
+        written.map_err(|source| RosterError::File { path: path.to_owned(), verb: "written", source })
+    }
+}

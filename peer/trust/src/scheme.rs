@@ -1,0 +1,120 @@
+//! How signatures are made and checked.
+
+use std::fmt::Debug;
+
+use ed25519_dalek::{Signer, SigningKey, VerifyingKey};
+use gestalt_protocol::Signature;
+use zeroize::Zeroizing;
+
+use crate::public_key::PublicKey;
+
+/// A way to sign. There is one that robots use, [`Ed25519`], which every type of this crate takes by default; and one for
+/// emulated swarms, behind the feature `fake`. Nobody else can add one.
+pub trait Scheme: sealed::Sealed + Clone + Debug + PartialEq + Eq + 'static {
+    /// What an author keeps to itself; wiped from memory when dropped.
+    type Secret: Send + Sync;
+    /// A public key as it is ready to check signatures with.
+    type Key: Clone + Debug + PartialEq + Send + Sync;
+
+    /// The secret made of these 32 bytes.
+    fn secret(bytes: &[u8; 32]) -> Self::Secret;
+
+    /// The 32 bytes that make this secret.
+    fn secret_bytes(secret: &Self::Secret) -> Zeroizing<[u8; 32]>;
+
+    /// The public key that belongs to a secret.
+    fn public(secret: &Self::Secret) -> PublicKey;
+
+    /// The key to check with; `None` for bytes that are no key, or one that nobody should trust.
+    fn key(public: &PublicKey) -> Option<Self::Key>;
+
+    /// The signature under a message: always the same for the same secret and message.
+    fn sign(secret: &Self::Secret, message: &[u8]) -> Signature;
+
+    /// Whether that is the key's signature under that message.
+    fn verify(key: &Self::Key, message: &[u8], signature: &Signature) -> bool;
+}
+
+/// Ed25519 (RFC 8032) by its strict rule, one signature at a time.
+///
+/// The strict rule leaves no choice: it refuses keys and points of small order, and every second spelling of a point or number.
+/// Checking many signatures as one batch is not done, though it would cost half as much: a batch is checked up to the cofactor,
+/// so it accepts signatures that the strict rule refuses, and two robots would count different votes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Ed25519 {}
+
+impl Scheme for Ed25519 {
+    type Secret = SigningKey;
+    type Key = VerifyingKey;
+
+    fn secret(bytes: &[u8; 32]) -> SigningKey {
+        SigningKey::from_bytes(bytes)
+    }
+
+    fn secret_bytes(secret: &SigningKey) -> Zeroizing<[u8; 32]> {
+        Zeroizing::new(secret.to_bytes())
+    }
+
+    fn public(secret: &SigningKey) -> PublicKey {
+        PublicKey::from_bytes(secret.verifying_key().to_bytes())
+    }
+
+    fn key(public: &PublicKey) -> Option<VerifyingKey> {
+        let key = VerifyingKey::from_bytes(public.as_bytes()).ok()?;
+        // A point has few spellings besides its shortest; with them one robot would have two keys.
+        let shortest = key.to_edwards().compress().to_bytes() == *public.as_bytes();
+        (shortest && !key.is_weak()).then_some(key)
+    }
+
+    fn sign(secret: &SigningKey, message: &[u8]) -> Signature {
+        Signature::from_bytes(secret.sign(message).to_bytes())
+    }
+
+    fn verify(key: &VerifyingKey, message: &[u8], signature: &Signature) -> bool {
+        key.verify_strict(message, &ed25519_dalek::Signature::from_bytes(signature.as_bytes())).is_ok()
+    }
+}
+
+pub(crate) mod sealed {
+    /// Keeps [`Scheme`](super::Scheme) to this crate.
+    pub trait Sealed {}
+
+    impl Sealed for super::Ed25519 {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// RFC 8032, 7.1, test 2.
+    #[test]
+    fn it_is_the_standard_signature() {
+        let secret =
+            gestalt_protocol::hex::parse("4ccd089b28ff96da9db6c346ec114e0f5b8a319f35aba624da8cf6ed4fb8a6fb");
+        let secret = Ed25519::secret(&secret.unwrap());
+        let public = "3d4017c3e843895a92b70aa74d1b7ebc9c982ccf2ec4968cc0cd55f12af4660c";
+        assert_eq!(Ed25519::public(&secret).to_string(), public);
+        let signature = "92a009a9f0d4cab8720e820b5f642540a2b27b5416503f8fb3762223ebdb69da\
+                         085ac1e43e15996e458f3613d0f11d8c387b2eaeb4302aeeb00d291612bb0c00";
+        assert_eq!(Ed25519::sign(&secret, &[0x72]).to_string(), signature);
+    }
+
+    #[test]
+    fn a_weak_or_misspelt_key_is_no_key() {
+        let mut neutral = [0; 32];
+        neutral[0] = 1;
+        // y = p + 3, a second spelling of y = 3, which is on the curve or not; y = p is one of 0, of order 4.
+        let mut misspelt = [0xff; 32];
+        (misspelt[0], misspelt[31]) = (0xed, 0x7f);
+        let mut other_sign_of_zero = neutral;
+        other_sign_of_zero[31] = 0x80;
+        for bytes in [[0; 32], neutral, misspelt, other_sign_of_zero, [2; 32]] {
+            assert_eq!(Ed25519::key(&PublicKey::from_bytes(bytes)), None, "{bytes:?}");
+        }
+        // The 19 values from p up are second spellings, whatever their order.
+        for least in 0xed..=0xff {
+            misspelt[0] = least;
+            assert_eq!(Ed25519::key(&PublicKey::from_bytes(misspelt)), None, "{least}");
+        }
+    }
+}

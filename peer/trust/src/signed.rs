@@ -1,0 +1,72 @@
+//! One half of evidence.
+
+use gestalt_protocol::Signature;
+use serde::{Deserialize, Serialize};
+
+/// The longest statement that can be one half of evidence, in bytes. A vote has at most 400.
+pub const MAX_EVIDENT: usize = 32 * 1024;
+
+/// A statement with its author's signature.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Signed {
+    #[serde(with = "bytes")]
+    pub(crate) statement: Vec<u8>,
+    pub(crate) signature: Signature,
+}
+
+/// A statement of at most [`MAX_EVIDENT`] bytes; in formats that humans read, hexadecimal digits.
+mod bytes {
+    use std::fmt;
+
+    use gestalt_protocol::hex::{self, Hex};
+    use serde::de::{Deserializer, Error, Visitor};
+    use serde::ser::Serializer;
+
+    use super::MAX_EVIDENT;
+
+    pub(crate) fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+        if serializer.is_human_readable() {
+            serializer.collect_str(&Hex(bytes))
+        } else {
+            serializer.serialize_bytes(bytes)
+        }
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
+        struct Statement;
+
+        impl Visitor<'_> for Statement {
+            type Value = Vec<u8>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "at most {MAX_EVIDENT} bytes")
+            }
+
+            fn visit_str<E: Error>(self, text: &str) -> Result<Vec<u8>, E> {
+                if text.len() > 2 * MAX_EVIDENT {
+                    return Err(E::invalid_length(text.len() / 2, &self));
+                }
+                let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+                let digits =
+                    |pair: &[u8; 2]| str::from_utf8(pair).ok().and_then(|pair| hex::parse::<1>(pair).ok());
+                let bytes: Option<Vec<u8>> =
+                    pairs.iter().map(|pair| digits(pair).map(|[byte]| byte)).collect();
+                bytes.filter(|_| rest.is_empty()).ok_or_else(|| E::custom("no hexadecimal digits"))
+            }
+
+            fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
+                if bytes.len() > MAX_EVIDENT {
+                    return Err(E::invalid_length(bytes.len(), &self));
+                }
+                Ok(bytes.to_vec())
+            }
+        }
+
+        if deserializer.is_human_readable() {
+            deserializer.deserialize_str(Statement)
+        } else {
+            deserializer.deserialize_bytes(Statement)
+        }
+    }
+}
