@@ -123,3 +123,83 @@ impl Evidence {
         Ok(Conviction { robot, key, stamp })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{authority, members, robot, roster, vote};
+
+    fn signed(statement: Vec<u8>, by: u32) -> Signed {
+        let signature = statement::sign(&robot(by), &roster(1).swarm_id(), &statement);
+        Signed { statement, signature }
+    }
+
+    fn lie() -> Evidence {
+        Evidence::new(signed(vote(2, 5, 1.0), 2), signed(vote(2, 5, -1.0), 2))
+    }
+
+    #[test]
+    fn it_convicts_the_key_that_lied() {
+        let stamp = Stamp { boot: 1, sequence: 5 };
+        let key = robot(2).public_key();
+        assert_eq!(lie().check(&roster(1)), Ok(Conviction { robot: RobotId(2), key, stamp }));
+        // After the robot was enrolled anew, it proves nothing against the new key.
+        let mut later = members(2);
+        later.robots.insert(RobotId(2), robot(22).public_key());
+        assert_eq!(lie().check(&later.sign(&authority()).unwrap()), Err(EvidenceError::Forged(RobotId(2))));
+        let mut gone = members(2);
+        gone.robots.remove(&RobotId(2));
+        assert_eq!(lie().check(&gone.sign(&authority()).unwrap()), Err(EvidenceError::Stranger(RobotId(2))));
+    }
+
+    #[test]
+    fn nobody_can_make_an_honest_robot_look_like_a_liar() {
+        let said = signed(vote(2, 5, 1.0), 2);
+        let check = |other| Evidence::new(said.clone(), other).check(&roster(1));
+        assert_eq!(check(said.clone()), Err(EvidenceError::Repeated));
+        assert_eq!(check(signed(vote(2, 6, -1.0), 2)), Err(EvidenceError::Unrelated));
+        assert_eq!(check(signed(vote(3, 5, -1.0), 3)), Err(EvidenceError::Unrelated));
+        assert_eq!(check(signed(vote(2, 5, -1.0), 3)), Err(EvidenceError::Forged(RobotId(2))));
+        // A second valid signature under the same statement is no second statement.
+        let again = Signed { signature: Signature::from_bytes([1; 64]), ..said.clone() };
+        assert_eq!(check(again), Err(EvidenceError::Repeated));
+        let junk = Signed { statement: vec![1, 2, 3], ..said.clone() };
+        assert!(matches!(check(junk), Err(EvidenceError::Malformed(_))));
+        // Said in another swarm under the same stamp.
+        let elsewhere = gestalt_protocol::Envelope::decode(&vote(2, 5, -1.0)).unwrap().encode();
+        let swarm = statement::SwarmId::new(&authority().public_key(), "other");
+        let signature = statement::sign(&robot(2), &swarm, &elsewhere);
+        let elsewhere = Signed { statement: elsewhere, signature };
+        assert_eq!(check(elsewhere), Err(EvidenceError::Forged(RobotId(2))));
+    }
+
+    #[test]
+    fn it_travels_in_bytes_and_in_text() {
+        let bytes = lie().encode();
+        assert_eq!(Evidence::decode(&bytes), Ok(lie()));
+        assert_eq!(bytes.len(), 1 + 2 * (1 + vote(2, 5, 1.0).len() + 64));
+        let json = serde_json::to_string(&lie()).unwrap();
+        assert_eq!(serde_json::from_str::<Evidence>(&json).unwrap(), lie());
+        assert!(serde_json::from_str::<Evidence>(&json.replace("\"03", "\"3")).is_err());
+        for cut in 0..bytes.len() {
+            assert!(Evidence::decode(&bytes[..cut]).is_err(), "{cut}");
+        }
+        assert_eq!(Evidence::decode(&[bytes.as_slice(), &[0]].concat()), Err(DecodeError::Trailing(1)));
+        assert!(matches!(Evidence::decode(&[2]), Err(DecodeError::Impossible(_))));
+    }
+
+    #[test]
+    fn it_is_bounded() {
+        let mut statement = vote(2, 5, 1.0);
+        statement.resize(MAX_EVIDENT, 0);
+        let largest = Evidence::new(signed(statement.clone(), 2), signed(statement.clone(), 2));
+        assert_eq!(largest.encode().len(), Evidence::MAX_LENGTH);
+        assert_eq!(Evidence::decode(&largest.encode()), Ok(largest));
+        statement.push(0);
+        let larger = Evidence::new(signed(statement, 2), signed(vote(2, 5, 1.0), 2));
+        assert!(Evidence::decode(&larger.encode()).is_err());
+        assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&larger).unwrap()).is_err());
+        let long = vec![VERSION; Evidence::MAX_LENGTH + 1];
+        assert!(matches!(Evidence::decode(&long), Err(DecodeError::TooLong { .. })));
+    }
+}

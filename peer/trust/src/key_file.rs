@@ -139,3 +139,80 @@ fn refuse_exposed(path: &Path, file: &File) -> Result<(), KeyFileError> {
 fn refuse_exposed(_: &Path, _: &File) -> Result<(), KeyFileError> {
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use tempfile::TempDir;
+
+    use super::*;
+
+    fn folder() -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("robot.key");
+        (folder, path)
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let (_folder, path) = folder();
+        let identity = Identity::from_bytes(&[0x1f; 32]);
+        identity.write(&path).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "1f".repeat(32) + "\n");
+        assert_eq!(Identity::read(&path).unwrap().to_bytes(), identity.to_bytes());
+    }
+
+    #[test]
+    fn a_key_is_never_overwritten() {
+        let (_folder, path) = folder();
+        Identity::from_bytes(&[1; 32]).write(&path).unwrap();
+        let error = Identity::from_bytes(&[2; 32]).write(&path).unwrap_err();
+        assert!(matches!(error, KeyFileError::Exists { .. }), "{error}");
+        assert_eq!(*Identity::read(&path).unwrap().to_bytes(), [1; 32]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_key_that_others_can_use_is_refused() {
+        use std::os::unix::fs::PermissionsExt;
+        let (_folder, path) = folder();
+        Identity::from_bytes(&[1; 32]).write(&path).unwrap();
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        for mode in [0o644, 0o640, 0o602, 0o601] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            let error = Identity::read(&path).unwrap_err();
+            assert!(matches!(error, KeyFileError::Exposed { mode: found, .. } if found == mode), "{error}");
+        }
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o400)).unwrap();
+        assert!(Identity::read(&path).is_ok());
+    }
+
+    #[test]
+    fn what_is_no_key_file_is_named_and_not_repeated() {
+        let (folder, path) = folder();
+        let missing = Identity::read(&path).unwrap_err();
+        assert!(matches!(missing, KeyFileError::Read { .. }), "{missing}");
+        let no_file = Identity::read(folder.path()).unwrap_err();
+        assert!(matches!(no_file, KeyFileError::NoFile { .. }), "{no_file}");
+        let nowhere = Identity::from_bytes(&[1; 32]).write(&folder.path().join("no/such.key")).unwrap_err();
+        assert!(matches!(nowhere, KeyFileError::Write { .. }), "{nowhere}");
+
+        let digits = "5e".repeat(32);
+        let bad: [Vec<u8>; 6] = [
+            Vec::new(),
+            digits.as_bytes()[..63].to_vec(),
+            format!("{digits}5").into(),
+            format!("{digits}\n{digits}").into(),
+            digits.to_uppercase().into(),
+            vec![0xff; 64],
+        ];
+        for text in bad {
+            Identity::from_bytes(&[1; 32]).write(&path).unwrap();
+            fs::write(&path, text).unwrap();
+            let error = Identity::read(&path).unwrap_err();
+            assert!(matches!(error, KeyFileError::Malformed { .. }), "{error}");
+            let shown = format!("{error} {error:?}");
+            assert!(shown.contains("robot.key") && !shown.to_lowercase().contains("5e5e"), "{shown}");
+            fs::remove_file(&path).unwrap();
+        }
+    }
+}

@@ -73,6 +73,8 @@ mod roster_file;
 mod scheme;
 mod signed;
 pub mod statement;
+#[cfg(test)]
+mod testing;
 mod verify;
 mod witness;
 

@@ -141,3 +141,166 @@ impl<S: Scheme> Roster<S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::MAX_ROBOTS;
+
+    use super::*;
+    use crate::membership::MAX_INSTRUCTORS;
+    use crate::testing::{authority, members, robot, roster, vote};
+
+    #[track_caller]
+    fn refused(members: Membership) -> RosterError {
+        members.sign(&authority()).expect_err("members that do not go together")
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let mut members = members(3);
+        members.instructors.insert("ada".parse().unwrap(), robot(90).public_key());
+        members.expelled.insert(RobotId(2), robot(91).public_key());
+        let roster = members.sign(&authority()).unwrap();
+        let json = roster.to_json();
+        assert_eq!(Roster::parse(json.as_bytes()).unwrap(), roster);
+        assert!(json.contains(&format!("\"2\": \"{}\"", robot(2).public_key())), "{json}");
+        assert!(json.starts_with("{\n  \"swarm\": \"demo\",\n  \"authority\": "), "{json}");
+    }
+
+    #[test]
+    fn the_signature_never_changes() {
+        // Of the domain, the authority and the members in postcard, by another program.
+        assert_eq!(
+            roster(1).signature.to_string(),
+            "5c6d5164a3de04aab8bbba16d0b16e20c9837503360bb9f9663ea5ba0348c5632dff749378c0423c7160877618db88ed04201c196ed06b5d860446d2d3bef401"
+        );
+    }
+
+    #[test]
+    fn every_change_after_signing_is_found() {
+        let json = roster(3).to_json();
+        let (one, other) = (robot(1).public_key().to_string(), robot(9).public_key().to_string());
+        for (from, to) in [("\"demo\"", "\"demo2\""), ("\"epoch\": 3", "\"epoch\": 4"), (&one, &other)] {
+            assert!(json.contains(from));
+            let error = Roster::<Ed25519>::parse(json.replace(from, to).as_bytes()).unwrap_err();
+            assert!(matches!(error, RosterError::Forged), "{error}");
+        }
+        let other = json.replace(&authority().public_key().to_string(), &robot(9).public_key().to_string());
+        assert!(matches!(Roster::<Ed25519>::parse(other.as_bytes()), Err(RosterError::Forged)));
+    }
+
+    #[test]
+    fn a_key_is_one_members() {
+        let mut twice = members(1);
+        twice.robots.insert(RobotId(9), robot(1).public_key());
+        assert!(matches!(refused(twice), RosterError::SharedKey { .. }));
+        let mut robot_teaches = members(1);
+        robot_teaches.instructors.insert("ada".parse().unwrap(), robot(1).public_key());
+        assert!(matches!(refused(robot_teaches), RosterError::SharedKey { .. }));
+        let mut back = members(1);
+        back.expelled.insert(RobotId(77), robot(1).public_key());
+        assert!(matches!(
+            refused(back),
+            RosterError::ExpelledKey { member: Member::Robot(RobotId(1)), robot: RobotId(77) }
+        ));
+    }
+
+    #[test]
+    fn a_key_that_nobody_should_trust_is_named() {
+        for bad in [PublicKey::from_bytes([0; 32]), PublicKey::from_bytes([2; 32])] {
+            let mut weak = members(1);
+            weak.robots.insert(RobotId(2), bad);
+            let error = refused(weak);
+            assert!(error.to_string().contains("robot 2"), "{error}");
+            let mut weak = members(1);
+            weak.instructors.insert("ada".parse().unwrap(), bad);
+            let error = refused(weak);
+            assert!(error.to_string().contains("instructor ada"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_roster_is_refused() {
+        let json = roster(1).to_json();
+        let robot_1 = format!("\"1\": \"{}\"", robot(1).public_key());
+        for bad in [
+            String::new(),
+            "{}".to_owned(),
+            json.replace("\"epoch\": 1", "\"epoch\": -1"),
+            json.replace("\"epoch\": 1", "\"epoch\": 1, \"epoch\": 1"),
+            json.replace("\"epoch\"", "\"more\": 1, \"epoch\""),
+            // A second key for robot 1, and a second spelling of it.
+            json.replace(&robot_1, &format!("{robot_1}, {robot_1}")),
+            json.replace("\"1\":", "\"01\":"),
+            json.replace("\"1\":", "\"+1\":"),
+            json.replace("\"1\":", "\"4294967296\":"),
+            json.clone() + "{}",
+        ] {
+            assert!(
+                matches!(Roster::<Ed25519>::parse(bad.as_bytes()), Err(RosterError::Malformed(_))),
+                "{bad}"
+            );
+        }
+        assert!(matches!(
+            refused(Membership { swarm: "a/b".to_owned(), ..members(1) }),
+            RosterError::Name(_)
+        ));
+    }
+
+    #[test]
+    fn a_roster_has_bounds() {
+        let key = |number: usize| {
+            let mut bytes = [1; 32];
+            bytes[..8].copy_from_slice(&number.to_le_bytes());
+            PublicKey::from_bytes(bytes)
+        };
+        let robots = |count: usize| (0..count).map(|n| (RobotId(n as u32), key(n))).collect();
+        let many = Membership { robots: robots(MAX_ROBOTS + 1), ..members(1) };
+        assert!(matches!(refused(many.clone()), RosterError::TooMany { what: "robots", .. }));
+        let json =
+            serde_json::to_string(&Document::new(&many, key(0), Signature::from_bytes([0; 64]))).unwrap();
+        assert!(matches!(Roster::<Ed25519>::parse(json.as_bytes()), Err(RosterError::Malformed(_))));
+        let many = Membership { expelled: robots(MAX_ROBOTS + 1), ..members(1) };
+        assert!(matches!(refused(many), RosterError::TooMany { what: "expelled robots", .. }));
+        let instructors = (0..=MAX_INSTRUCTORS).map(|n| (format!("i{n}").parse().unwrap(), key(n))).collect();
+        let many = Membership { instructors, ..members(1) };
+        assert!(matches!(refused(many), RosterError::TooMany { what: "instructors", .. }));
+        let long = vec![b' '; Roster::<Ed25519>::MAX_LENGTH + 1];
+        assert!(matches!(Roster::<Ed25519>::parse(&long), Err(RosterError::TooLong { .. })));
+    }
+
+    #[test]
+    fn the_largest_swarm_finds_room() {
+        use crate::fake::Fake;
+        let robots = (0..MAX_ROBOTS as u32)
+            .map(|n| (RobotId(u32::MAX - n), Identity::<Fake>::fake(n.into()).public_key()))
+            .collect();
+        let members = Membership { robots, ..members(u64::MAX) };
+        let roster = members.sign(&Identity::<Fake>::fake(u64::MAX)).unwrap();
+        assert!(Roster::<Fake>::parse(roster.to_json().as_bytes()).is_ok());
+    }
+
+    #[test]
+    fn only_a_higher_epoch_of_the_same_swarm_is_newer() {
+        let (first, second) = (roster(1), roster(2));
+        assert!(second.newer_than(&first));
+        assert!(!first.newer_than(&second) && !first.newer_than(&first));
+        let usurper = members(9).sign(&robot(7)).unwrap();
+        assert!(!usurper.newer_than(&first));
+        let renamed = Membership { swarm: "other".to_owned(), ..members(9) };
+        assert!(!renamed.sign(&authority()).unwrap().newer_than(&first));
+    }
+
+    #[test]
+    fn a_statement_counts_in_its_swarm_alone() {
+        let roster = roster(1);
+        let other = Membership { swarm: "other".to_owned(), ..members(1) }.sign(&authority()).unwrap();
+        let said = vote(2, 1, 1.0);
+        let signature = statement::sign(&robot(2), &roster.swarm_id(), &said);
+        assert_eq!(roster.check(&said, &signature), Ok(statement::heading(&said).unwrap()));
+        assert_eq!(other.check(&said, &signature), Err(Distrust::Forged));
+        // The same bytes signed for another purpose.
+        let signature = robot(2).sign(&said);
+        assert_eq!(roster.check(&said, &signature), Err(Distrust::Forged));
+    }
+}

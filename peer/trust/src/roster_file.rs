@@ -37,3 +37,34 @@ impl<S: Scheme> Roster<S> {
         written.map_err(|source| RosterError::File { path: path.to_owned(), verb: "written", source })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::roster;
+
+    #[test]
+    fn the_newest_roster_takes_the_place_of_the_old_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("roster.json");
+        for epoch in 1..=2 {
+            roster(epoch).write(&path).unwrap();
+            let read: Roster = Roster::read(&path).unwrap();
+            assert_eq!(read, roster(epoch));
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+    }
+
+    #[test]
+    fn a_file_that_is_no_roster_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("roster.json");
+        let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
+        assert!(matches!(error, RosterError::File { verb: "read", .. }), "{error}");
+        let error = roster(1).write(&folder.path().join("no/roster.json")).unwrap_err();
+        assert!(matches!(error, RosterError::File { verb: "written", .. }), "{error}");
+        fs::write(&missing, vec![b' '; Roster::<crate::Ed25519>::MAX_LENGTH + 1]).unwrap();
+        let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
+        assert!(matches!(error, RosterError::TooLong { .. }), "{error}");
+    }
+}

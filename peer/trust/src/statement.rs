@@ -112,3 +112,62 @@ pub fn sign<S: Scheme>(identity: &Identity<S>, swarm: &SwarmId, statement: &[u8]
 pub fn is_signed<S: Scheme>(key: &S::Key, swarm: &SwarmId, statement: &[u8], signature: &Signature) -> bool {
     S::verify(key, &signed_bytes(swarm, statement), signature)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{have, robot, vote};
+
+    #[test]
+    fn the_signed_bytes_are_domain_swarm_and_statement() {
+        let swarm = SwarmId::new(&PublicKey::from_bytes([7; 32]), "demo");
+        let bytes = signed_bytes(&swarm, b"said");
+        assert_eq!(bytes, [b"gestalt-statement-1\0".as_slice(), swarm.as_bytes(), b"said"].concat());
+        // sha256 of the text, 32 bytes of 7 and the name, by another program: what is signed never changes.
+        assert_eq!(swarm.to_string(), "676f09d996cb08995de9910895303efa50eea6cd9765a4f5282f2338c24593b7");
+        assert_eq!(
+            sign(&robot(0), &swarm, b"said").to_string(),
+            "1b4d354010ba0cae21cd67098c2515ed9e5dc988b686e4dd09b784e3123604b49bd19ecf557a25995d1e24fae0eadd3048f6fe9f614518a8f70ec096ed600d0d"
+        );
+    }
+
+    #[test]
+    fn a_swarm_is_its_authority_and_its_name() {
+        let id = |key, name| SwarmId::new(&PublicKey::from_bytes([key; 32]), name);
+        assert_eq!(id(1, "demo"), id(1, "demo"));
+        assert_ne!(id(1, "demo"), id(2, "demo"));
+        assert_ne!(id(1, "demo"), id(1, "demo2"));
+    }
+
+    #[test]
+    fn the_heading_is_that_of_the_envelope() {
+        for statement in [vote(3, 5, 1.0), have(u32::MAX, u32::MAX)] {
+            let envelope = read(&statement).unwrap();
+            let expected = Heading { author: envelope.author, stamp: envelope.stamp };
+            assert_eq!(heading(&statement), Ok(expected));
+        }
+    }
+
+    #[test]
+    fn a_statement_has_one_spelling() {
+        let vote = vote(3, 5, 1.0);
+        // 3 in two bytes reads the same, but is not what a robot that passes it on would send.
+        let longer = [&vote[..1], &[0x83, 0x00], &vote[2..]].concat();
+        assert_eq!(Envelope::decode(&longer), Envelope::decode(&vote));
+        assert_eq!(heading(&longer), Err(MISSPELT));
+        assert_eq!(read(&longer), Err(MISSPELT));
+        // The vocabulary, behind the heading, in two bytes.
+        let place = vote.iter().position(|byte| *byte == 9).unwrap();
+        let longer = [&vote[..place], &[0x89, 0x00], &vote[place + 1..]].concat();
+        assert_eq!(Envelope::decode(&longer), Envelope::decode(&vote));
+        assert_eq!(read(&longer), Err(MISSPELT));
+    }
+
+    #[test]
+    fn junk_has_no_heading() {
+        let long = vec![PROTOCOL_VERSION; MAX_MESSAGE + 1];
+        for junk in [&[][..], &[2], &[PROTOCOL_VERSION], &[PROTOCOL_VERSION, 0xff, 0xff], &long] {
+            assert!(heading(junk).is_err());
+        }
+    }
+}

@@ -92,3 +92,78 @@ impl Heard {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{have, robot, roster, vote};
+
+    fn observe(witness: &mut Witness, statement: &[u8], by: u32) -> Option<Evidence> {
+        witness.observe(statement, &statement::sign(&robot(by), &roster(1).swarm_id(), statement))
+    }
+
+    #[test]
+    fn two_statements_under_one_stamp_are_evidence_of_whatever_kind() {
+        for other in [vote(2, 5, -1.0), have(2, 5)] {
+            let mut witness = Witness::new(4);
+            assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
+            let evidence = observe(&mut witness, &other, 2).unwrap();
+            assert_eq!(evidence.check(&roster(1)).unwrap().robot, RobotId(2));
+            // In the other order it is the same evidence.
+            let mut witness = Witness::new(4);
+            observe(&mut witness, &other, 2);
+            assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), Some(evidence));
+        }
+    }
+
+    #[test]
+    fn repeating_oneself_is_no_lie() {
+        let mut witness = Witness::new(4);
+        for _ in 0..100 {
+            assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
+            assert_eq!(observe(&mut witness, &vote(3, 5, 2.0), 3), None, "another author");
+            assert_eq!(observe(&mut witness, &vote(2, 6, 2.0), 2), None, "another stamp");
+        }
+    }
+
+    #[test]
+    fn the_last_64_statements_are_remembered_and_no_more() {
+        let lie_after = |others: u32| {
+            let mut witness = Witness::new(4);
+            observe(&mut witness, &vote(2, 1000, 1.0), 2);
+            (0..others)
+                .for_each(|sequence| assert_eq!(observe(&mut witness, &vote(2, sequence, 1.0), 2), None));
+            observe(&mut witness, &vote(2, 1000, -1.0), 2)
+        };
+        assert!(lie_after(63).is_some());
+        assert!(lie_after(64).is_none());
+    }
+
+    #[test]
+    fn memory_is_bounded_whoever_speaks() {
+        // Signatures are not looked into here.
+        let signature = Signature::from_bytes([0; 64]);
+        let long = |author: u32, sequence: u32, length: usize| {
+            let mut statement = have(author, sequence);
+            statement.resize(length, 0);
+            statement
+        };
+        let mut witness = Witness::new(4);
+        for sequence in 0..200 {
+            witness.observe(&long(1, sequence, MAX_EVIDENT), &signature);
+            assert!(witness.bytes() <= AUTHOR_BYTES);
+        }
+        witness.observe(&long(2, 0, MAX_EVIDENT + 1), &signature);
+        assert_eq!(witness.bytes(), AUTHOR_BYTES, "too long to be remembered");
+        let mut witness = Witness::new(MAX_ROBOTS);
+        for author in 0..2 * MAX_ROBOTS as u32 {
+            (0..3).for_each(|sequence| {
+                witness.observe(&long(author, sequence, 2000), &signature);
+            });
+        }
+        assert_eq!(witness.bytes(), MAX_ROBOTS * 2 * 2000);
+        assert!(witness.bytes() <= TOTAL_BYTES);
+        witness.keep(2, |robot| robot.0 < 2);
+        assert_eq!(witness.bytes(), 2 * 2 * 2000);
+    }
+}

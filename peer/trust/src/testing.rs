@@ -1,0 +1,47 @@
+//! A small swarm for tests.
+
+use gestalt_protocol::{Envelope, Have, Message, RobotId, RoundId, Stamp, VocabularyId, Vote};
+
+use crate::identity::Identity;
+use crate::membership::Membership;
+use crate::roster::Roster;
+
+/// Who enrols the robots.
+pub(crate) fn authority() -> Identity {
+    Identity::from_bytes(&[0xff; 32])
+}
+
+/// The identity that robot is enrolled with.
+pub(crate) fn robot(number: u32) -> Identity {
+    let mut secret = [1; 32];
+    secret[..4].copy_from_slice(&number.to_le_bytes());
+    Identity::from_bytes(&secret)
+}
+
+/// Robots 0 to 3 of the swarm `demo`.
+pub(crate) fn members(epoch: u64) -> Membership {
+    let robots = (0..4).map(|number| (RobotId(number), robot(number).public_key())).collect();
+    Membership { swarm: "demo".to_owned(), epoch, robots, ..Membership::default() }
+}
+
+/// Those, enrolled.
+pub(crate) fn roster(epoch: u64) -> Roster {
+    members(epoch).sign(&authority()).expect("members that go together")
+}
+
+/// A vote of that robot.
+pub(crate) fn vote(author: u32, sequence: u32, evidence: f32) -> Vec<u8> {
+    let round = RoundId { counter: 1, opener: RobotId(0), life: 7 };
+    let evidence = vec![evidence, -evidence];
+    said(author, sequence, Message::Vote(Vote { round, vocabulary: VocabularyId(9), evidence, looks: 1.0 }))
+}
+
+/// Another kind of message of that robot.
+pub(crate) fn have(author: u32, sequence: u32) -> Vec<u8> {
+    let have = Have { round: None, decision: None, votes: Vec::new(), knowledge: None, answer: false };
+    said(author, sequence, Message::Have(have))
+}
+
+fn said(author: u32, sequence: u32, message: Message) -> Vec<u8> {
+    Envelope { author: RobotId(author), stamp: Stamp { boot: 1, sequence }, message }.encode()
+}
