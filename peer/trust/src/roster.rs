@@ -1,5 +1,6 @@
 //! Who belongs to the swarm, by the word of its authority.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{RobotId, Signature};
@@ -75,13 +76,59 @@ impl<S: Scheme> Roster<S> {
     /// # Errors
     /// [`RosterError`] for what is no roster, was not signed by the authority it names, or has members that exclude each other.
     pub fn parse(json: &[u8]) -> Result<Self, RosterError> {
+        let (members, authority, signature) = Self::unchecked(json)?;
+        Self::checked(members, authority, signature)
+    }
+
+    /// Reads the JSON of a roster that came from anywhere, if it is to take the place of this one; `None` for this one again.
+    ///
+    /// What is of another swarm, or older, is told apart before any signature or key is looked at, so repeating it and making it up
+    /// costs a robot little.
+    ///
+    /// # Errors
+    /// [`RosterError::OtherSwarm`], [`RosterError::Older`], [`RosterError::Contradiction`], and those of [`Roster::parse`].
+    pub fn successor(&self, json: &[u8]) -> Result<Option<Self>, RosterError> {
+        let (members, authority, signature) = Self::unchecked(json)?;
+        let swarm = SwarmId::new(&authority, &members.swarm);
+        if !self.precedes(swarm, &members, None)? {
+            return Ok(None);
+        }
+        let offered = Self::checked(members, authority, signature)?;
+        Ok(self.is_succeeded_by(&offered)?.then_some(offered))
+    }
+
+    /// Whether that roster is to take the place of this one; not if it is this one again.
+    pub(crate) fn is_succeeded_by(&self, offered: &Self) -> Result<bool, RosterError> {
+        let contradiction = RosterError::Contradiction { epoch: offered.members.epoch };
+        self.precedes(offered.swarm, &offered.members, Some(contradiction))
+    }
+
+    /// The same of members that may not be signed yet: until they are, two versions of one epoch contradict nobody.
+    fn precedes(
+        &self,
+        swarm: SwarmId,
+        members: &Membership,
+        contradiction: Option<RosterError>,
+    ) -> Result<bool, RosterError> {
+        let (held, offered) = (self.members.epoch, members.epoch);
+        if swarm != self.swarm {
+            return Err(RosterError::OtherSwarm);
+        }
+        match offered.cmp(&held) {
+            Ordering::Less => Err(RosterError::Older { held, offered }),
+            Ordering::Greater => Ok(true),
+            Ordering::Equal if *members == self.members => Ok(false),
+            Ordering::Equal => contradiction.map_or(Ok(true), Err),
+        }
+    }
+
+    fn unchecked(json: &[u8]) -> Result<(Membership, PublicKey, Signature), RosterError> {
         if json.len() > Self::MAX_LENGTH {
             return Err(RosterError::TooLong { length: json.len(), limit: Self::MAX_LENGTH });
         }
         let document: Document =
             serde_json::from_slice(json).map_err(|error| RosterError::Malformed(error.to_string()))?;
-        let (members, authority, signature) = document.into_parts();
-        Self::checked(members, authority, signature)
+        Ok(document.into_parts())
     }
 
     /// The roster as JSON, one member a line.
@@ -289,6 +336,28 @@ mod tests {
         assert!(!usurper.newer_than(&first));
         let renamed = Membership { swarm: "other".to_owned(), ..members(9) };
         assert!(!renamed.sign(&authority()).unwrap().newer_than(&first));
+    }
+
+    #[test]
+    fn a_roster_from_anywhere_takes_the_place_only_of_what_it_follows() {
+        let held = roster(5);
+        let offer = |members: Membership, by: &Identity| {
+            let json = members.sign(by).unwrap().to_json();
+            held.successor(json.as_bytes())
+        };
+        assert_eq!(offer(members(6), &authority()).unwrap(), Some(roster(6)));
+        assert_eq!(offer(members(5), &authority()).unwrap(), None);
+        assert!(matches!(offer(members(4), &authority()), Err(RosterError::Older { held: 5, offered: 4 })));
+        assert!(matches!(offer(members(6), &robot(1)), Err(RosterError::OtherSwarm)));
+        let mut other = members(5);
+        other.robots.remove(&RobotId(0));
+        assert!(matches!(offer(other, &authority()), Err(RosterError::Contradiction { epoch: 5 })));
+        // A contradiction that the authority never signed is none.
+        let unsigned = held
+            .to_json()
+            .replace("\"robots\": {", "\"robots\": { \"9\": \"00\",")
+            .replace("\"00\"", &format!("\"{}\"", robot(9).public_key()));
+        assert!(matches!(held.successor(unsigned.as_bytes()), Err(RosterError::Forged)));
     }
 
     #[test]

@@ -1,6 +1,11 @@
 //! One half of evidence.
 
+use std::fmt;
+
 use gestalt_protocol::Signature;
+use gestalt_protocol::hex::{self, Hex};
+use serde::de::{Deserializer, Error, Visitor};
+use serde::ser::Serializer;
 use serde::{Deserialize, Serialize};
 
 /// The longest statement that can be one half of evidence, in bytes. A vote has at most 400.
@@ -10,63 +15,53 @@ pub const MAX_EVIDENT: usize = 32 * 1024;
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Signed {
-    #[serde(with = "bytes")]
+    #[serde(serialize_with = "write", deserialize_with = "read")]
     pub(crate) statement: Vec<u8>,
     pub(crate) signature: Signature,
 }
 
-/// A statement of at most [`MAX_EVIDENT`] bytes; in formats that humans read, hexadecimal digits.
-mod bytes {
-    use std::fmt;
+/// In formats that humans read, hexadecimal digits.
+fn write<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    if serializer.is_human_readable() {
+        serializer.collect_str(&Hex(bytes))
+    } else {
+        serializer.serialize_bytes(bytes)
+    }
+}
 
-    use gestalt_protocol::hex::{self, Hex};
-    use serde::de::{Deserializer, Error, Visitor};
-    use serde::ser::Serializer;
+/// At most [`MAX_EVIDENT`] bytes, looked at before anything is allocated for them.
+fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
+    struct Statement;
 
-    use super::MAX_EVIDENT;
+    impl Visitor<'_> for Statement {
+        type Value = Vec<u8>;
 
-    pub(crate) fn serialize<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
-        if serializer.is_human_readable() {
-            serializer.collect_str(&Hex(bytes))
-        } else {
-            serializer.serialize_bytes(bytes)
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "at most {MAX_EVIDENT} bytes")
+        }
+
+        fn visit_str<E: Error>(self, text: &str) -> Result<Vec<u8>, E> {
+            if text.len() > 2 * MAX_EVIDENT {
+                return Err(E::invalid_length(text.len() / 2, &self));
+            }
+            let (pairs, rest) = text.as_bytes().as_chunks::<2>();
+            let digits =
+                |pair: &[u8; 2]| str::from_utf8(pair).ok().and_then(|pair| hex::parse::<1>(pair).ok());
+            let bytes: Option<Vec<u8>> = pairs.iter().map(|pair| digits(pair).map(|[byte]| byte)).collect();
+            bytes.filter(|_| rest.is_empty()).ok_or_else(|| E::custom("no hexadecimal digits"))
+        }
+
+        fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
+            if bytes.len() > MAX_EVIDENT {
+                return Err(E::invalid_length(bytes.len(), &self));
+            }
+            Ok(bytes.to_vec())
         }
     }
 
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
-        struct Statement;
-
-        impl Visitor<'_> for Statement {
-            type Value = Vec<u8>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "at most {MAX_EVIDENT} bytes")
-            }
-
-            fn visit_str<E: Error>(self, text: &str) -> Result<Vec<u8>, E> {
-                if text.len() > 2 * MAX_EVIDENT {
-                    return Err(E::invalid_length(text.len() / 2, &self));
-                }
-                let (pairs, rest) = text.as_bytes().as_chunks::<2>();
-                let digits =
-                    |pair: &[u8; 2]| str::from_utf8(pair).ok().and_then(|pair| hex::parse::<1>(pair).ok());
-                let bytes: Option<Vec<u8>> =
-                    pairs.iter().map(|pair| digits(pair).map(|[byte]| byte)).collect();
-                bytes.filter(|_| rest.is_empty()).ok_or_else(|| E::custom("no hexadecimal digits"))
-            }
-
-            fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
-                if bytes.len() > MAX_EVIDENT {
-                    return Err(E::invalid_length(bytes.len(), &self));
-                }
-                Ok(bytes.to_vec())
-            }
-        }
-
-        if deserializer.is_human_readable() {
-            deserializer.deserialize_str(Statement)
-        } else {
-            deserializer.deserialize_bytes(Statement)
-        }
+    if deserializer.is_human_readable() {
+        deserializer.deserialize_str(Statement)
+    } else {
+        deserializer.deserialize_bytes(Statement)
     }
 }

@@ -120,16 +120,8 @@ impl<S: Scheme> Verifier<S> {
     /// # Errors
     /// [`RosterError::OtherSwarm`], [`RosterError::Older`] and [`RosterError::Contradiction`]; the roster held stays.
     pub fn adopt(&mut self, roster: Roster<S>) -> Result<bool, RosterError> {
-        let (held, offered) = (self.roster.members().epoch, roster.members().epoch);
-        if roster.swarm_id() != self.roster.swarm_id() {
-            return Err(RosterError::OtherSwarm);
-        }
-        if offered < held {
-            return Err(RosterError::Older { held, offered });
-        }
-        if !roster.newer_than(&self.roster) {
-            let same = roster.members() == self.roster.members();
-            return if same { Ok(false) } else { Err(RosterError::Contradiction { epoch: held }) };
+        if !self.roster.is_succeeded_by(&roster)? {
+            return Ok(false);
         }
         let (before, after) = (&self.roster.members().robots, &roster.members().robots);
         let stays = |robot: &RobotId| after.contains_key(robot) && after.get(robot) == before.get(robot);
