@@ -12,7 +12,14 @@ use crate::scheme::{Scheme, sealed};
 /// same paths through the code as with [`Ed25519`](crate::Ed25519), the same bytes on every run.
 ///
 /// **Everybody can make everybody's.** No robot takes one by mistake: the feature `fake` is off by default, and with it on a
-/// `Verifier`, `Roster` or `Identity` without further words is still one of Ed25519, a different type.
+/// `Verifier`, `Roster` or `Identity` without further words is still one of Ed25519, a different type:
+///
+/// ```compile_fail,E0308
+/// use gestalt_trust::{Budget, Identity, Membership, Verifier};
+///
+/// let roster = Membership::default().sign(&Identity::fake(1)).unwrap();
+/// let a_robots_own: Verifier = Verifier::new(roster, Budget::default());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Fake {}
 

@@ -87,7 +87,7 @@ pub use identity::Identity;
 pub use key_file::KeyFileError;
 pub use membership::{MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
 pub use public_key::PublicKey;
-pub use roster::Roster;
+pub use roster::{MAX_ROSTER, Roster};
 pub use roster_error::{Member, RosterError};
 pub use scheme::{Ed25519, Scheme};
 pub use signed::MAX_EVIDENT;

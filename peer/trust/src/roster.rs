@@ -14,6 +14,10 @@ use crate::roster_error::{Member, RosterError};
 use crate::scheme::{Ed25519, Scheme};
 use crate::statement::{self, Heading, SwarmId};
 
+/// The longest roster accepted, in bytes of JSON: 512 KiB, in which [`MAX_ROBOTS`](gestalt_protocol::MAX_ROBOTS) robots find
+/// room.
+pub const MAX_ROSTER: usize = 512 * 1024;
+
 impl Membership {
     /// The roster of these members, by that authority.
     ///
@@ -23,8 +27,8 @@ impl Membership {
         let signature = authority.sign(&self.signed_bytes(&authority.public_key()));
         let roster = Roster::checked(self, authority.public_key(), signature)?;
         let length = roster.to_json().len();
-        if length > Roster::<S>::MAX_LENGTH {
-            return Err(RosterError::TooLong { length, limit: Roster::<S>::MAX_LENGTH });
+        if length > MAX_ROSTER {
+            return Err(RosterError::TooLong { length, limit: MAX_ROSTER });
         }
         Ok(roster)
     }
@@ -45,9 +49,6 @@ pub struct Roster<S: Scheme = Ed25519> {
 }
 
 impl<S: Scheme> Roster<S> {
-    /// The longest roster accepted, in bytes of JSON: 512 KiB, in which [`MAX_ROBOTS`](gestalt_protocol::MAX_ROBOTS) robots find room.
-    pub const MAX_LENGTH: usize = 512 * 1024;
-
     pub(crate) fn checked(
         members: Membership,
         authority: PublicKey,
@@ -71,7 +72,7 @@ impl<S: Scheme> Roster<S> {
         Ok(Self { members, authority, signature, swarm, keys })
     }
 
-    /// Reads the JSON of a roster, of at most [`Roster::MAX_LENGTH`] bytes, and checks all of it.
+    /// Reads the JSON of a roster, of at most [`MAX_ROSTER`] bytes, and checks all of it.
     ///
     /// # Errors
     /// [`RosterError`] for what is no roster, was not signed by the authority it names, or has members that exclude each other.
@@ -123,8 +124,8 @@ impl<S: Scheme> Roster<S> {
     }
 
     fn unchecked(json: &[u8]) -> Result<(Membership, PublicKey, Signature), RosterError> {
-        if json.len() > Self::MAX_LENGTH {
-            return Err(RosterError::TooLong { length: json.len(), limit: Self::MAX_LENGTH });
+        if json.len() > MAX_ROSTER {
+            return Err(RosterError::TooLong { length: json.len(), limit: MAX_ROSTER });
         }
         let document: Document =
             serde_json::from_slice(json).map_err(|error| RosterError::Malformed(error.to_string()))?;
@@ -176,6 +177,12 @@ impl<S: Scheme> Roster<S> {
         } else {
             Err(Distrust::Forged)
         }
+    }
+
+    /// Whether that robot is on this roster with the key that it had before.
+    pub(crate) fn keeps_key(&self, before: &Self, robot: RobotId) -> bool {
+        let key = self.members.robots.get(&robot);
+        key.is_some() && key == before.members.robots.get(&robot)
     }
 
     /// Whose statement it claims to be, and the key that it must be signed with.
@@ -312,7 +319,7 @@ mod tests {
         let instructors = (0..=MAX_INSTRUCTORS).map(|n| (format!("i{n}").parse().unwrap(), key(n))).collect();
         let many = Membership { instructors, ..members(1) };
         assert!(matches!(refused(many), RosterError::TooMany { what: "instructors", .. }));
-        let long = vec![b' '; Roster::<Ed25519>::MAX_LENGTH + 1];
+        let long = vec![b' '; MAX_ROSTER + 1];
         assert!(matches!(Roster::<Ed25519>::parse(&long), Err(RosterError::TooLong { .. })));
     }
 

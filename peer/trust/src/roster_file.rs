@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::Path;
 
-use crate::roster::Roster;
+use crate::roster::{MAX_ROSTER, Roster};
 use crate::roster_error::RosterError;
 use crate::scheme::Scheme;
 
@@ -17,7 +17,7 @@ impl<S: Scheme> Roster<S> {
         let unreadable = |source| RosterError::File { path: path.to_owned(), verb: "read", source };
         let file = File::open(path).map_err(unreadable)?;
         let mut json = Vec::new();
-        file.take(Self::MAX_LENGTH as u64 + 1).read_to_end(&mut json).map_err(unreadable)?;
+        file.take(MAX_ROSTER as u64 + 1).read_to_end(&mut json).map_err(unreadable)?;
         Self::parse(&json)
     }
 
@@ -63,7 +63,7 @@ mod tests {
         assert!(matches!(error, RosterError::File { verb: "read", .. }), "{error}");
         let error = roster(1).write(&folder.path().join("no/roster.json")).unwrap_err();
         assert!(matches!(error, RosterError::File { verb: "written", .. }), "{error}");
-        fs::write(&missing, vec![b' '; Roster::<crate::Ed25519>::MAX_LENGTH + 1]).unwrap();
+        fs::write(&missing, vec![b' '; MAX_ROSTER + 1]).unwrap();
         let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
         assert!(matches!(error, RosterError::TooLong { .. }), "{error}");
     }

@@ -75,7 +75,8 @@ impl<S: Scheme> Verifier<S> {
     /// Whether to believe a statement, the bytes of `Envelope::encode`, that arrived with that signature. Repeated bytes are
     /// believed again, at no cost: votes repeat by design.
     ///
-    /// A statement that is believed is its author's word, nothing more: it may be old, and it may be a lie.
+    /// A statement that is believed is its author's word, nothing more: it may be old, and it may be a lie. What it says, and whether
+    /// it can be passed on, [`statement::read`] finds.
     ///
     /// # Errors
     /// The [`Distrust`] that it meets.
@@ -123,16 +124,15 @@ impl<S: Scheme> Verifier<S> {
         if !self.roster.is_succeeded_by(&roster)? {
             return Ok(false);
         }
-        let (before, after) = (&self.roster.members().robots, &roster.members().robots);
-        let stays = |robot: &RobotId| after.contains_key(robot) && after.get(robot) == before.get(robot);
-        self.authors.retain(|robot, _| stays(robot));
-        self.convicted.retain(stays);
+        let keeps_key = |robot: &RobotId| roster.keeps_key(&self.roster, *robot);
+        self.authors.retain(|robot, _| keeps_key(robot));
+        self.convicted.retain(keeps_key);
         self.roster = roster;
         Ok(true)
     }
 
     /// Stops believing a robot that the evidence convicts, until a roster gives it a new key. Evidence has a budget of its own, as
-    /// large as the one for statements.
+    /// large as the one for statements. Who starts again hands in again what evidence it kept.
     ///
     /// # Errors
     /// [`EvidenceError`] for evidence that proves nothing against any robot on the roster.
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn who_was_caught_in_a_lie_is_not_believed_until_it_has_a_new_key() {
         let mut verifier = verifier();
-        let mut witness = Witness::new(4);
+        let mut witness = Witness::new(&roster(5));
         let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
         let found = both.each_ref().map(|said| witness.observe(said, &sign(1, said)));
         let evidence = found[1].clone().unwrap();
@@ -319,7 +319,7 @@ mod tests {
     #[test]
     fn false_evidence_has_a_budget_of_its_own() {
         let mut verifier = verifier();
-        let mut witness = Witness::new(4);
+        let mut witness = Witness::new(&roster(5));
         let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
         let forged = both.each_ref().map(|said| witness.observe(said, &sign(99, said)))[1].clone().unwrap();
         let answers: Vec<_> = (0..100).map(|_| verifier.convict(NOW, &forged)).collect();

@@ -5,21 +5,23 @@ use std::collections::{BTreeMap, VecDeque};
 use gestalt_protocol::{MAX_ROBOTS, RobotId, Signature, Stamp};
 
 use crate::evidence::Evidence;
+use crate::roster::Roster;
+use crate::scheme::Scheme;
 use crate::signed::{MAX_EVIDENT, Signed};
 use crate::statement;
 
 /// How many statements of one author are remembered at most.
 const STATEMENTS: usize = 64;
 
-/// How many bytes of one author's statements are remembered at most.
+/// How many bytes of memory one author's statements take at most.
 const AUTHOR_BYTES: usize = 64 * 1024;
 
-/// How many bytes of all authors' statements together.
+/// How many bytes those of all authors take together.
 const TOTAL_BYTES: usize = 16 * 1024 * 1024;
 
-/// Remembers the statements of every author, the last 64 or 64 KiB of each, and finds two different ones under one stamp.
+/// Remembers the last statements of every author, up to 64 or 64 KiB of each, and finds two different ones under one stamp.
 ///
-/// A lie is found if its halves come here with fewer statements of that author between them. All authors together fill at most
+/// A lie is found if its halves come here with fewer statements of that author between them. All authors together take at most
 /// 16 MiB: in a swarm of more than 256 robots, each has its share of those. A statement longer than that share or than
 /// [`MAX_EVIDENT`] is not remembered.
 #[derive(Clone, Debug)]
@@ -37,18 +39,22 @@ struct Heard {
 }
 
 impl Witness {
-    /// One that listens to that many robots, from 1 to [`MAX_ROBOTS`].
+    /// One that listens to the robots on that roster.
     #[must_use]
-    pub fn new(robots: usize) -> Self {
+    pub fn new<S: Scheme>(roster: &Roster<S>) -> Self {
+        Self::of(roster.members().robots.len())
+    }
+
+    fn of(robots: usize) -> Self {
         let mut witness = Self { share: 0, authors: BTreeMap::new() };
         witness.resize(robots);
         witness
     }
 
-    /// Listens to that many robots from now on, and forgets those that do not belong to the swarm any more, or that have a new key.
-    pub fn keep(&mut self, robots: usize, stays: impl Fn(RobotId) -> bool) {
-        self.authors.retain(|robot, _| stays(*robot));
-        self.resize(robots);
+    /// Listens to the robots on the roster that follows, and forgets who is not on it or has another key there.
+    pub fn follow<S: Scheme>(&mut self, before: &Roster<S>, after: &Roster<S>) {
+        self.authors.retain(|robot, _| after.keeps_key(before, *robot));
+        self.resize(after.members().robots.len());
     }
 
     fn resize(&mut self, robots: usize) {
@@ -62,22 +68,22 @@ impl Witness {
     pub fn observe(&mut self, statement: &[u8], signature: &Signature) -> Option<Evidence> {
         let heading = statement::heading(statement).ok()?;
         let full = self.authors.len() >= MAX_ROBOTS && !self.authors.contains_key(&heading.author);
-        if full || statement.len() > self.share.min(MAX_EVIDENT) {
+        let new = Signed { statement: statement.to_vec(), signature: *signature };
+        if full || statement.len() > MAX_EVIDENT || cost(&new) > self.share {
             return None;
         }
-        let new = Signed { statement: statement.to_vec(), signature: *signature };
         let heard = self.authors.entry(heading.author).or_default();
         if let Some((_, held)) = heard.statements.iter().find(|(stamp, _)| *stamp == heading.stamp) {
             let differs = held.statement != new.statement;
             return differs.then(|| Evidence::new(held.clone(), new));
         }
-        heard.shrink_to(STATEMENTS - 1, self.share - statement.len());
-        heard.bytes += statement.len();
+        heard.shrink_to(STATEMENTS - 1, self.share - cost(&new));
+        heard.bytes += cost(&new);
         heard.statements.push_back((heading.stamp, new));
         None
     }
 
-    /// How many bytes of statements are remembered.
+    /// How many bytes of memory the statements take.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.authors.values().map(|heard| heard.bytes).sum()
@@ -88,15 +94,22 @@ impl Heard {
     fn shrink_to(&mut self, statements: usize, bytes: usize) {
         while self.statements.len() > statements || self.bytes > bytes {
             let Some((_, gone)) = self.statements.pop_front() else { return };
-            self.bytes -= gone.statement.len();
+            self.bytes -= cost(&gone);
         }
     }
 }
 
+/// How much memory a remembered statement takes.
+fn cost(signed: &Signed) -> usize {
+    size_of::<(Stamp, Signed)>() + signed.statement.len()
+}
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
-    use crate::testing::{have, robot, roster, vote};
+    use crate::testing::{authority, have, members, robot, roster, vote};
 
     fn observe(witness: &mut Witness, statement: &[u8], by: u32) -> Option<Evidence> {
         witness.observe(statement, &statement::sign(&robot(by), &roster(1).swarm_id(), statement))
@@ -105,12 +118,12 @@ mod tests {
     #[test]
     fn two_statements_under_one_stamp_are_evidence_of_whatever_kind() {
         for other in [vote(2, 5, -1.0), have(2, 5)] {
-            let mut witness = Witness::new(4);
+            let mut witness = Witness::new(&roster(1));
             assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
             let evidence = observe(&mut witness, &other, 2).unwrap();
             assert_eq!(evidence.check(&roster(1)).unwrap().robot, RobotId(2));
             // In the other order it is the same evidence.
-            let mut witness = Witness::new(4);
+            let mut witness = Witness::new(&roster(1));
             observe(&mut witness, &other, 2);
             assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), Some(evidence));
         }
@@ -118,7 +131,7 @@ mod tests {
 
     #[test]
     fn repeating_oneself_is_no_lie() {
-        let mut witness = Witness::new(4);
+        let mut witness = Witness::new(&roster(1));
         for _ in 0..100 {
             assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
             assert_eq!(observe(&mut witness, &vote(3, 5, 2.0), 3), None, "another author");
@@ -129,7 +142,7 @@ mod tests {
     #[test]
     fn the_last_64_statements_are_remembered_and_no_more() {
         let lie_after = |others: u32| {
-            let mut witness = Witness::new(4);
+            let mut witness = Witness::new(&roster(1));
             observe(&mut witness, &vote(2, 1000, 1.0), 2);
             (0..others)
                 .for_each(|sequence| assert_eq!(observe(&mut witness, &vote(2, sequence, 1.0), 2), None));
@@ -148,22 +161,68 @@ mod tests {
             statement.resize(length, 0);
             statement
         };
-        let mut witness = Witness::new(4);
+        let mut witness = Witness::of(4);
         for sequence in 0..200 {
-            witness.observe(&long(1, sequence, MAX_EVIDENT), &signature);
+            witness.observe(&long(1, sequence, 1000 + sequence as usize), &signature);
             assert!(witness.bytes() <= AUTHOR_BYTES);
         }
-        witness.observe(&long(2, 0, MAX_EVIDENT + 1), &signature);
-        assert_eq!(witness.bytes(), AUTHOR_BYTES, "too long to be remembered");
-        let mut witness = Witness::new(MAX_ROBOTS);
-        for author in 0..2 * MAX_ROBOTS as u32 {
-            (0..3).for_each(|sequence| {
-                witness.observe(&long(author, sequence, 2000), &signature);
-            });
+        assert!(witness.bytes() > AUTHOR_BYTES - 1300, "no room for another one");
+        for length in [MAX_EVIDENT, MAX_EVIDENT + 1] {
+            witness.observe(&long(2, length as u32, length), &signature);
         }
-        assert_eq!(witness.bytes(), MAX_ROBOTS * 2 * 2000);
+        assert_eq!(witness.authors[&RobotId(2)].statements.len(), 1, "the other is too long");
+        let mut witness = Witness::of(MAX_ROBOTS);
+        for author in 0..2 * MAX_ROBOTS as u32 {
+            for sequence in 0..3 {
+                witness.observe(&long(author, sequence, 1900), &signature);
+            }
+        }
         assert!(witness.bytes() <= TOTAL_BYTES);
-        witness.keep(2, |robot| robot.0 < 2);
-        assert_eq!(witness.bytes(), 2 * 2 * 2000);
+        assert_eq!(
+            witness.authors.values().map(|heard| heard.statements.len()).sum::<usize>(),
+            2 * MAX_ROBOTS
+        );
+    }
+
+    #[test]
+    fn who_left_or_has_a_new_key_is_forgotten() {
+        let mut witness = Witness::new(&roster(1));
+        (0..4).for_each(|author| assert_eq!(observe(&mut witness, &vote(author, 1, 1.0), author), None));
+        let mut after = members(2);
+        after.robots.remove(&RobotId(0));
+        after.robots.insert(RobotId(1), robot(11).public_key());
+        witness.follow(&roster(1), &after.sign(&authority()).unwrap());
+        let found = (0..4).map(|author| observe(&mut witness, &vote(author, 1, -1.0), author).is_some());
+        assert_eq!(found.collect::<Vec<_>>(), [false, false, true, true]);
+    }
+
+    proptest! {
+        /// Whatever is lost, repeated or overtaken on the way.
+        #[test]
+        fn an_honest_robot_is_never_accused(heard in prop::collection::vec((0..4_u32, 0..90_u32), 0..300)) {
+            let mut witness = Witness::of(4);
+            let signature = Signature::from_bytes([0; 64]);
+            for (author, sequence) in heard {
+                let said = vote(author, sequence, (7 * author + sequence) as f32);
+                prop_assert_eq!(witness.observe(&said, &signature), None);
+            }
+        }
+
+        #[test]
+        fn a_liar_is_found_wherever_its_lie_stands_among_the_last_statements(
+            honest in prop::collection::vec(0..1000_u32, 0..63), place in any::<prop::sample::Index>(),
+        ) {
+            let mut witness = Witness::of(4);
+            let signature = Signature::from_bytes([0; 64]);
+            let place = place.index(honest.len() + 1);
+            for (number, sequence) in honest.iter().enumerate() {
+                if number == place {
+                    witness.observe(&vote(1, 5000, 1.0), &signature);
+                }
+                witness.observe(&vote(1, *sequence, 1.0), &signature);
+            }
+            witness.observe(&vote(1, 5000, 1.0), &signature);
+            prop_assert!(witness.observe(&vote(1, 5000, -1.0), &signature).is_some());
+        }
     }
 }

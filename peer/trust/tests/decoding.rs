@@ -43,7 +43,7 @@ proptest! {
         }
         let mut verifier = Verifier::new(roster(), Budget::default());
         prop_assert!(verifier.check(Duration::ZERO, &bytes, Some(&signature)).is_err());
-        let mut witness = Witness::new(usize::MAX);
+        let mut witness = Witness::new(&roster());
         prop_assert_eq!(witness.observe(&bytes, &signature), None);
     }
 

@@ -23,8 +23,8 @@ fn a_fake_swarm_believes_doubts_and_convicts() {
     assert!(Roster::<gestalt_trust::Ed25519>::parse(roster.to_json().as_bytes()).is_err());
 
     let swarm = roster.swarm_id();
+    let mut witness = Witness::new(&roster);
     let mut verifier = Verifier::new(roster, Budget::default());
-    let mut witness = Witness::new(3);
     let liar = Identity::<Fake>::fake(1);
     let both = [said(1, false), said(1, true)];
     let found = both.each_ref().map(|said| {
