@@ -99,6 +99,20 @@ mod tests {
         assert_eq!(Ed25519::sign(&secret, &[0x72]).to_string(), signature);
     }
 
+    /// R is the neutral point and S = H(R ‖ A ‖ M)·a: OpenSSL accepts it, made by the author itself, and so would the lax rule.
+    #[test]
+    fn a_point_of_small_order_is_refused_where_others_let_it_pass() {
+        let robot = crate::testing::robot(1);
+        let key = Ed25519::key(&robot.public_key()).unwrap();
+        let signature: Signature = "0100000000000000000000000000000000000000000000000000000000000000\
+                                    0e3c5f3cb322f04669d74f3c07b21d648a6d7e3f419fbb8f0b99008cd9bfde06"
+            .parse()
+            .unwrap();
+        let lax = ed25519_dalek::Signature::from_bytes(signature.as_bytes());
+        assert!(ed25519_dalek::Verifier::verify(&key, b"said", &lax).is_ok());
+        assert!(!Ed25519::verify(&key, b"said", &signature));
+    }
+
     #[test]
     fn a_weak_or_misspelt_key_is_no_key() {
         let mut neutral = [0; 32];
