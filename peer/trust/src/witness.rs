@@ -136,6 +136,7 @@ mod tests {
             assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
             assert_eq!(observe(&mut witness, &vote(3, 5, 2.0), 3), None, "another author");
             assert_eq!(observe(&mut witness, &vote(2, 6, 2.0), 2), None, "another stamp");
+            assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 3), None, "another signature alone");
         }
     }
 
