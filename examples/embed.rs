@@ -41,6 +41,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         vocabulary: None,
         learning: None,
         nonce: fresh_nonce(),
+        seal: None,
     })
     .await?;
     robot.learned(Arc::new(SmallOrLarge(Vocabulary::new(["small", "large"])?)), "a threshold");

@@ -45,6 +45,7 @@ async fn robot(id: u32, connect: &[String]) -> Robot {
         vocabulary: None,
         learning: None,
         nonce: fresh_nonce(),
+        seal: None,
     };
     let robot = Robot::start(config).await.expect("a free port of this machine");
     let vocabulary = Vocabulary::new(["rock", "paper", "scissors"]).expect("three labels");

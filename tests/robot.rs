@@ -54,7 +54,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let boot = orders["boot"].as_u64().and_then(|boot| u32::try_from(boot).ok()).unwrap_or(1);
     let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
     let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
-    let quorum = orders["quorum"].as_u64().and_then(|quorum| u32::try_from(quorum).ok()).unwrap_or(1);
+    let quorum = serde_json::from_value(orders["quorum"].clone()).unwrap_or(MindConfig::default().quorum);
     // {"learn": {"keep": 3, "share": 0.5, "memory": "FILE"}}: learns what it is shown and told.
     let learning = orders["learn"]["keep"].as_u64().map(|keep| {
         let keep = usize::try_from(keep).expect("\"keep\": a number");

@@ -19,6 +19,7 @@ use gestalt_peer::center::Center;
 use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, SourceSection};
 use gestalt_peer::stream::{Feed, Sender, SenderConfig};
 use gestalt_protocol::{RobotId, Status};
+use gestalt_strategies::Quorum;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::config::{LayerConfig, MotionConfig};
 use gestalt_vision::model::RobotModel;
@@ -200,7 +201,7 @@ async fn run(parrots: u32, model: &RobotModel, pictures: &Path, time: Duration) 
     config.links.scouting.enabled = false;
     config.center.max_robots = 256;
     // A round that goes on as long as the measurement.
-    config.rounds.quorum = 4096;
+    config.rounds.quorum = Quorum::Evidence(4096);
     config.rounds.deadline = Duration::from_secs(3600);
     config.zenoh.insert("listen".to_owned(), serde_json::json!({"endpoints": ["tcp/127.0.0.1:0"]}));
     let boot = boot_number(std::time::SystemTime::now());

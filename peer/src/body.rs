@@ -85,6 +85,7 @@ impl Body {
                 vocabulary: None,
                 learning: learning.clone(),
                 nonce: fresh_nonce(),
+                seal: config.trust.seal(config.robot.id)?,
             })
             .await?,
         );

@@ -28,6 +28,7 @@ pub mod model;
 pub mod opinion;
 #[cfg(feature = "opencv")]
 pub mod picture;
+pub mod proof;
 #[cfg(feature = "opencv")]
 pub mod stream;
 #[cfg(feature = "opencv")]

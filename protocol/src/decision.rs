@@ -8,6 +8,11 @@ use crate::bounded;
 use crate::fusion_rule::FusionRule;
 use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::message::{HeldVote, Vote};
+use crate::signature::Signature;
+
+/// More looks than this of one robot make no decision fresher.
+const MAX_LOOKS: f32 = 16.0;
 
 /// The outcome of a round in the eyes of one robot.
 ///
@@ -22,11 +27,15 @@ pub struct Decision {
     pub confidence: f64,
     /// The robot that drew the conclusion.
     pub author: RobotId,
+    /// Where it is announced: whether as many robots as its quorum are known to hold this gesture. What is final stands whatever else is
+    /// decided in a part that was cut off. `false` between robots.
+    #[serde(rename = "final")]
+    pub is_final: bool,
     /// What it was drawn from.
     pub certificate: Certificate,
 }
 
-/// What a decision was drawn from: enough to draw it again from the votes, or to doubt it.
+/// What a decision was drawn from: the votes themselves. Whoever reads it can draw it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
     /// The list of gestures the probabilities stand for.
@@ -39,12 +48,27 @@ pub struct Certificate {
     /// The votes counted, by robot.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<CountedVote>,
+    /// The votes of those who took part and are not counted, by robot: they had seen nothing, or judge by another list of gestures.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub others: Vec<HeldVote>,
+    /// n: how many robots its author had heard lately, itself included.
+    pub robots: u32,
+    /// q: how many it needed.
+    pub quorum: u32,
     /// Milliseconds from the opening of the round, as its author saw it, to the decision.
     pub elapsed_ms: u32,
 }
 
+impl Certificate {
+    /// How many robots took part, whether or not their votes are counted.
+    #[must_use]
+    pub fn reached(&self) -> usize {
+        self.votes.len() + self.others.len()
+    }
+}
+
 /// One vote in a certificate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CountedVote {
     /// Whose vote.
     pub robot: RobotId,
@@ -54,20 +78,49 @@ pub struct CountedVote {
     pub class: ClassId,
     /// What that vote weighed in the fusion, `0.0..`.
     pub weight: f32,
+    /// The vote, as its author said it.
+    pub vote: Vote,
+    /// The author's signature under the [`Envelope`](crate::Envelope) that it came in.
+    pub signature: Option<Signature>,
 }
 
-/// The place of a decision among the decisions of its round: any class before none, then the robots counted,
-/// then the confidence, then the smaller author. The greatest wins.
+impl CountedVote {
+    /// The vote alone.
+    #[must_use]
+    pub fn held(&self) -> HeldVote {
+        let Self { robot, stamp, vote, signature, .. } = self;
+        HeldVote { robot: *robot, stamp: *stamp, vote: vote.clone(), signature: *signature }
+    }
+}
+
+/// The place of a decision among the decisions of its round: any class before none, then the robots counted, then how much these
+/// had seen, then the confidence, then the smaller author. The greatest wins.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Rank {
     /// Whether it names a gesture at all.
     pub decided: bool,
     /// How many robots' votes it rests on.
     pub robots: u32,
+    /// The looks behind these votes, of no robot more than 16: votes are sums, so a later one has more.
+    pub looks: f32,
     /// The fused probability of its top class.
-    pub confidence: f64,
+    pub confidence: f32,
     /// Who drew it.
     pub author: RobotId,
+}
+
+/// Which decision a robot holds, in short, in JSON: the decision itself is for those who lack it, and ask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Holding {
+    /// The round it ends.
+    pub round: RoundId,
+    /// The gesture.
+    pub class: Option<ClassId>,
+    /// Its place among the decisions of the round.
+    pub rank: Rank,
+    /// The robots that see and vote through this one, and leave deciding to it: they hold what it holds.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub guests: Vec<RobotId>,
 }
 
 impl Ord for Rank {
@@ -75,6 +128,7 @@ impl Ord for Rank {
         self.decided
             .cmp(&other.decided)
             .then(self.robots.cmp(&other.robots))
+            .then(self.looks.total_cmp(&other.looks))
             .then(self.confidence.total_cmp(&other.confidence))
             .then(other.author.cmp(&self.author))
     }
@@ -101,8 +155,15 @@ impl Decision {
         Rank {
             decided: self.class.is_some(),
             robots: self.certificate.votes.len().try_into().unwrap_or(u32::MAX),
-            confidence: self.confidence,
+            looks: self.certificate.votes.iter().map(|counted| counted.vote.looks.min(MAX_LOOKS)).sum(),
+            confidence: self.confidence as f32,
             author: self.author,
         }
+    }
+
+    /// What a robot that holds it, for itself and for its guests, says of it to all.
+    #[must_use]
+    pub fn holding(&self, guests: Vec<RobotId>) -> Holding {
+        Holding { round: self.round, class: self.class, rank: self.rank(), guests }
     }
 }

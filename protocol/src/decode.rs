@@ -1,6 +1,7 @@
 //! What bytes from outside may be, if not a message.
 
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::limits::{MAX_JSON, PROTOCOL_VERSION};
@@ -50,4 +51,34 @@ pub fn decode_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DecodeError> 
         return Err(DecodeError::TooLong { length: bytes.len(), limit: MAX_JSON });
     }
     serde_json::from_slice(bytes).map_err(|error| DecodeError::Malformed(error.to_string()))
+}
+
+/// What travels between robots: the version byte, then the value in postcard.
+pub(crate) fn encode_versioned<T: Serialize>(value: &T) -> Vec<u8> {
+    postcard::to_extend(value, vec![PROTOCOL_VERSION])
+        .expect("memory is the only thing that writing to a vector can lack")
+}
+
+/// Reads what [`encode_versioned`] wrote, of at most `limit` bytes, and nothing else.
+pub(crate) fn decode_versioned<'a, T: Deserialize<'a>>(
+    bytes: &'a [u8],
+    limit: usize,
+) -> Result<T, DecodeError> {
+    let (value, rest) = take_versioned(bytes, limit)?;
+    if rest.is_empty() { Ok(value) } else { Err(DecodeError::Trailing(rest.len())) }
+}
+
+/// Reads what [`encode_versioned`] wrote, of at most `limit` bytes together with what follows it, which is given too.
+pub(crate) fn take_versioned<'a, T: Deserialize<'a>>(
+    bytes: &'a [u8],
+    limit: usize,
+) -> Result<(T, &'a [u8]), DecodeError> {
+    if bytes.len() > limit {
+        return Err(DecodeError::TooLong { length: bytes.len(), limit });
+    }
+    let (&version, body) = bytes.split_first().ok_or(DecodeError::Empty)?;
+    if version != PROTOCOL_VERSION {
+        return Err(DecodeError::Version { found: version });
+    }
+    postcard::take_from_bytes(body).map_err(|error| DecodeError::Malformed(error.to_string()))
 }

@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::decision::Decision;
-use crate::decode::DecodeError;
+use crate::decision::{Certificate, Decision};
+use crate::decode::{DecodeError, encode_versioned, take_versioned};
 use crate::id::{ClassId, RobotId, Stamp};
-use crate::limits::{MAX_MESSAGE, PROTOCOL_VERSION};
-use crate::message::{Message, Vote};
+use crate::limits::MAX_MESSAGE;
+use crate::message::{HeldVote, Message, Vote};
+use crate::signature::Signature;
 
 /// A message with its author's name and stamp on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,14 +18,24 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// What is said.
     pub message: Message,
+    /// By which the author stands by all of it; robots of an open swarm sign nothing. `gestalt-trust` makes and checks it.
+    #[serde(skip)]
+    pub signature: Option<Signature>,
 }
 
 impl Envelope {
-    /// The bytes that travel: the version byte, then the envelope in postcard.
+    /// The bytes that travel: the [statement](Envelope::statement), then the 64 bytes of the signature, if there is one.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        postcard::to_extend(self, vec![PROTOCOL_VERSION])
-            .expect("memory is the only thing that writing to a vector can lack")
+        let mut bytes = self.statement();
+        bytes.extend(self.signature.iter().flat_map(Signature::as_bytes));
+        bytes
+    }
+
+    /// What is signed: the version byte, then author, stamp and message in postcard.
+    #[must_use]
+    pub fn statement(&self) -> Vec<u8> {
+        encode_versioned(self)
     }
 
     /// Reads what [`Envelope::encode`] wrote.
@@ -32,20 +43,23 @@ impl Envelope {
     /// # Errors
     /// See [`DecodeError`]; the check of the values is part of the decoding.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        if bytes.len() > MAX_MESSAGE {
-            return Err(DecodeError::TooLong { length: bytes.len(), limit: MAX_MESSAGE });
-        }
-        let (&version, body) = bytes.split_first().ok_or(DecodeError::Empty)?;
-        if version != PROTOCOL_VERSION {
-            return Err(DecodeError::Version { found: version });
-        }
-        let (envelope, rest) = postcard::take_from_bytes::<Self>(body)
-            .map_err(|error| DecodeError::Malformed(error.to_string()))?;
-        if !rest.is_empty() {
-            return Err(DecodeError::Trailing(rest.len()));
-        }
+        let (envelope, rest): (Self, _) = take_versioned(bytes, MAX_MESSAGE)?;
+        let signature = match rest {
+            [] => None,
+            rest => Some(
+                rest.try_into().map(Signature::from_bytes).map_err(|_| DecodeError::Trailing(rest.len()))?,
+            ),
+        };
         envelope.message.check()?;
-        Ok(envelope)
+        Ok(Self { signature, ..envelope })
+    }
+}
+
+impl From<HeldVote> for Envelope {
+    /// The vote as its author said it.
+    fn from(held: HeldVote) -> Self {
+        let HeldVote { robot, stamp, vote, signature } = held;
+        Self { author: robot, stamp, message: Message::Vote(vote), signature }
     }
 }
 
@@ -90,22 +104,31 @@ impl Decision {
     /// # Errors
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
+        let Certificate { probabilities, votes, others, .. } = &self.certificate;
         let probability = |p: f64| (0.0..=1.0).contains(&p);
-        let classes = self.certificate.probabilities.len();
-        let known = |class: ClassId| class.index() < classes;
-        if !(probability(self.confidence) && self.certificate.probabilities.iter().copied().all(probability))
-        {
+        let known = |class: ClassId| class.index() < probabilities.len();
+        if !(probability(self.confidence) && probabilities.iter().copied().all(probability)) {
             return Err(DecodeError::Impossible("a probability outside 0..=1"));
         }
-        if !self.class.is_none_or(known) || !self.certificate.votes.iter().all(|vote| known(vote.class)) {
+        if !self.class.is_none_or(known) || !votes.iter().all(|counted| known(counted.class)) {
             return Err(DecodeError::Impossible("a class outside the vocabulary"));
         }
-        if !self.certificate.votes.iter().all(|vote| vote.weight.is_finite() && vote.weight >= 0.0) {
+        if !votes.iter().all(|counted| counted.weight.is_finite() && counted.weight >= 0.0) {
             return Err(DecodeError::Impossible("a negative or infinite weight"));
         }
-        if !self.certificate.votes.is_sorted_by(|a, b| a.robot < b.robot) {
+        let in_order =
+            votes.is_sorted_by(|a, b| a.robot < b.robot) && others.is_sorted_by(|a, b| a.robot < b.robot);
+        let counted = |robot| votes.binary_search_by_key(&robot, |counted| counted.robot).is_ok();
+        if !in_order || others.iter().any(|held| counted(held.robot)) {
             return Err(DecodeError::Impossible("a robot counted twice, or out of order"));
         }
-        Ok(())
+        if votes.iter().any(|counted| counted.vote.evidence.len() != probabilities.len()) {
+            return Err(DecodeError::Impossible("a counted vote over other classes"));
+        }
+        votes
+            .iter()
+            .map(|counted| &counted.vote)
+            .chain(others.iter().map(|held| &held.vote))
+            .try_for_each(Vote::check)
     }
 }

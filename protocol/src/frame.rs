@@ -6,9 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::decode::DecodeError;
+use crate::decode::{DecodeError, decode_versioned, encode_versioned};
 use crate::id::RoundId;
-use crate::limits::PROTOCOL_VERSION;
 
 /// The largest encoded picture accepted, in bytes.
 pub const MAX_FRAME: usize = 4 * 1024 * 1024;
@@ -61,7 +60,7 @@ impl FrameHeader {
     /// The bytes that travel: the protocol's version byte, then postcard.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        encode(self)
+        encode_versioned(self)
     }
 
     /// Reads what [`FrameHeader::encode`] wrote.
@@ -69,7 +68,7 @@ impl FrameHeader {
     /// # Errors
     /// See [`DecodeError`]; the check of the values is part of the decoding.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        let header: Self = decode(bytes)?;
+        let header: Self = decode_versioned(bytes, MAX_FRAME_HEADER)?;
         if !(header.fps > 0.0 && header.fps <= 1000.0) {
             return Err(DecodeError::Impossible("frames per second, above 0 and at most 1000"));
         }
@@ -84,7 +83,7 @@ impl FrameTaken {
     /// The bytes that travel: the protocol's version byte, then postcard.
     #[must_use]
     pub fn encode(&self) -> Vec<u8> {
-        encode(self)
+        encode_versioned(self)
     }
 
     /// Reads what [`FrameTaken::encode`] wrote.
@@ -92,24 +91,6 @@ impl FrameTaken {
     /// # Errors
     /// See [`DecodeError`].
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        decode(bytes)
+        decode_versioned(bytes, MAX_FRAME_HEADER)
     }
-}
-
-fn encode<T: Serialize>(value: &T) -> Vec<u8> {
-    postcard::to_extend(value, vec![PROTOCOL_VERSION])
-        .expect("memory is the only thing that writing to a vector can lack")
-}
-
-fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, DecodeError> {
-    if bytes.len() > MAX_FRAME_HEADER {
-        return Err(DecodeError::TooLong { length: bytes.len(), limit: MAX_FRAME_HEADER });
-    }
-    let (&version, body) = bytes.split_first().ok_or(DecodeError::Empty)?;
-    if version != PROTOCOL_VERSION {
-        return Err(DecodeError::Version { found: version });
-    }
-    let (value, rest) =
-        postcard::take_from_bytes(body).map_err(|error| DecodeError::Malformed(error.to_string()))?;
-    if rest.is_empty() { Ok(value) } else { Err(DecodeError::Trailing(rest.len())) }
 }

@@ -24,7 +24,7 @@ pub enum Topic {
     Sample(RobotId),
     /// `robot/<id>/repair`: what neighbours tell that robot alone, a postcard [`Envelope`](crate::Envelope).
     Repair(RobotId),
-    /// `robot/<id>/decision`: the decision that robot holds, JSON.
+    /// `robot/<id>/decision`: which decision that robot holds, JSON.
     RobotDecision(RobotId),
     /// `robot/<id>/status`: a queryable, JSON [`Status`](crate::Status).
     Status(RobotId),

@@ -28,7 +28,7 @@ mod sample;
 mod signature;
 mod status;
 
-pub use decision::{Certificate, CountedVote, Decision, Rank};
+pub use decision::{Certificate, CountedVote, Decision, Holding, Rank};
 pub use decode::{DecodeError, decode_json};
 pub use envelope::Envelope;
 pub use fnv::Fnv1a;

@@ -6,8 +6,8 @@ pub const PROTOCOL_VERSION: u8 = 3;
 /// The longest envelope accepted, in bytes.
 pub const MAX_MESSAGE: usize = 512 * 1024;
 
-/// The longest JSON document accepted, in bytes.
-pub const MAX_JSON: usize = 1024 * 1024;
+/// The longest JSON document accepted, in bytes: a decision of the largest swarm, with all its votes.
+pub const MAX_JSON: usize = 2 * 1024 * 1024;
 
 /// The most memory that reading one message can allocate, in bytes, whatever the message claims: a message of
 /// [`MAX_MESSAGE`] bytes, each element of which is larger in memory than on the wire.

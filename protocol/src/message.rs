@@ -7,6 +7,7 @@ use crate::decision::{Decision, Rank};
 use crate::id::{RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 use crate::sample::{Digest, Know, Lessons, Samples};
+use crate::signature::Signature;
 
 /// Everything a robot says to other robots. The variants' order is part of the wire format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,6 +68,8 @@ pub struct HeldVote {
     pub stamp: Stamp,
     /// The vote itself.
     pub vote: Vote,
+    /// The author's signature under the [`Envelope`](crate::Envelope) that it came in.
+    pub signature: Option<Signature>,
 }
 
 /// What a neighbour was found to lack.

@@ -19,6 +19,8 @@ pub struct Status {
     pub camera: Camera,
     /// Its classifier, in words; `none` when it has none.
     pub model: String,
+    /// Whether it signs what it says and believes members of the swarm alone.
+    pub sealed: bool,
     /// The labels of the gestures it can tell, by class.
     pub vocabulary: Vec<String>,
     /// The robots it is directly linked to.
@@ -47,6 +49,7 @@ impl Status {
             boot,
             camera: Camera { source: "none".to_owned(), ..Camera::default() },
             model: "none".to_owned(),
+            sealed: false,
             vocabulary: Vec::new(),
             neighbours: Vec::new(),
             alive: Vec::new(),

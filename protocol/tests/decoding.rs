@@ -37,24 +37,55 @@ fn decision() -> impl Strategy<Value = Decision> {
         Just(FusionRule::LogPool),
         Just(FusionRule::ConfidenceWeighted),
     ];
-    let counted = (stamp(), 0..2u8, 0f32..1e6);
-    let votes = prop::collection::btree_map(any::<u32>(), counted, 0..8).prop_map(|votes| {
-        let counted = |(robot, (stamp, class, weight))| CountedVote {
-            robot: RobotId(robot),
-            stamp,
-            class: ClassId(class),
-            weight,
-        };
-        votes.into_iter().map(counted).collect()
-    });
-    let certificate = (rule, prop::collection::vec(0f64..=1.0, 2..=MAX_CLASSES), votes, any::<u32>());
+    let counted = (stamp(), 0..2u8, 0f32..1e6, vote());
+    let votes = prop::collection::btree_map(any::<u32>(), counted, 0..8);
+    let certificate =
+        (rule, prop::collection::vec(0f64..=1.0, 2..=MAX_CLASSES), votes, any::<[u32; 3]>(), any::<bool>());
     (round(), prop::option::of(0..2u8), 0f64..=1.0, any::<u32>(), certificate).prop_map(
-        |(round, class, confidence, author, (rule, probabilities, votes, elapsed_ms))| Decision {
+        |(
             round,
-            class: class.map(ClassId),
+            class,
             confidence,
-            author: RobotId(author),
-            certificate: Certificate { vocabulary: VocabularyId(1), rule, probabilities, votes, elapsed_ms },
+            author,
+            (rule, probabilities, said, [robots, quorum, elapsed_ms], is_final),
+        )| {
+            let (mut votes, mut others) = (Vec::new(), Vec::new());
+            for (robot, (stamp, class, weight, vote)) in said {
+                let robot = RobotId(robot);
+                if vote.evidence.is_empty() {
+                    others.push(HeldVote { robot, stamp, vote, signature: None });
+                } else {
+                    let evidence =
+                        (0..probabilities.len()).map(|k| vote.evidence[k % vote.evidence.len()]).collect();
+                    let vote = Vote { evidence, ..vote };
+                    votes.push(CountedVote {
+                        robot,
+                        stamp,
+                        class: ClassId(class),
+                        weight,
+                        vote,
+                        signature: None,
+                    });
+                }
+            }
+            let vocabulary = VocabularyId(1);
+            Decision {
+                round,
+                class: class.map(ClassId),
+                confidence,
+                author: RobotId(author),
+                is_final,
+                certificate: Certificate {
+                    vocabulary,
+                    rule,
+                    probabilities,
+                    votes,
+                    others,
+                    robots,
+                    quorum,
+                    elapsed_ms,
+                },
+            }
         },
     )
 }
@@ -78,6 +109,7 @@ fn message() -> impl Strategy<Value = Message> {
         robot: RobotId(robot),
         stamp,
         vote,
+        signature: None,
     });
     let give = (prop::option::of(decision()), prop::collection::vec(held, 0..5))
         .prop_map(|(decision, votes)| Give { decision, votes });
@@ -152,6 +184,7 @@ fn envelope() -> impl Strategy<Value = Envelope> {
         author: RobotId(author),
         stamp,
         message,
+        signature: None,
     })
 }
 
@@ -217,7 +250,7 @@ fn vote_of(evidence: Vec<f32>) -> Vote {
 
 fn read(message: Message) -> Result<Envelope, DecodeError> {
     let stamp = Stamp { boot: 1, sequence: 1 };
-    Envelope::decode(&Envelope { author: RobotId(1), stamp, message }.encode())
+    Envelope::decode(&Envelope { author: RobotId(1), stamp, message, signature: None }.encode())
 }
 
 #[test]
@@ -245,7 +278,7 @@ fn a_vote_says_only_what_a_robot_can_mean() {
     ] {
         let Err(DecodeError::Impossible(why)) = read(Message::Vote(vote.clone())) else { panic!("{vote:?}") };
         assert!(why.contains(what), "{why}");
-        let held = HeldVote { robot: RobotId(1), stamp: Stamp::default(), vote };
+        let held = HeldVote { robot: RobotId(1), stamp: Stamp::default(), vote, signature: None };
         assert!(read(Message::Give(Give { decision: None, votes: vec![held] })).is_err());
     }
 }
@@ -313,22 +346,36 @@ fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
 
 #[test]
 fn a_decision_that_contradicts_itself_is_refused() {
+    let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
+    let vote = |evidence| Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0 };
     let counted = |robot, class| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp::default(),
         class: ClassId(class),
         weight: 1.0,
+        vote: vote(vec![0.5, -0.5]),
+        signature: None,
+    };
+    let null = |robot| HeldVote {
+        robot: RobotId(robot),
+        stamp: Stamp::default(),
+        vote: vote(vec![]),
+        signature: None,
     };
     let sound = Decision {
-        round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
+        round,
         class: Some(ClassId(1)),
         confidence: 0.75,
         author: RobotId(1),
+        is_final: false,
         certificate: Certificate {
             vocabulary: VocabularyId(1),
             rule: FusionRule::LogPool,
             probabilities: vec![0.25, 0.75],
             votes: vec![counted(1, 0), counted(2, 1)],
+            others: vec![null(3), null(4)],
+            robots: 5,
+            quorum: 3,
             elapsed_ms: 1,
         },
     };
@@ -349,12 +396,18 @@ fn a_decision_that_contradicts_itself_is_refused() {
         "one robot counts once"
     );
     assert!(broken(&|d| d.certificate.votes.swap(0, 1)).contains("out of order"));
+    assert!(broken(&|d| d.certificate.others.swap(0, 1)).contains("out of order"));
+    assert!(broken(&|d| d.certificate.others[0] = null(2)).contains("counted twice"));
+    assert!(broken(&|d| d.certificate.votes[0].vote.evidence.push(0.0)).contains("other classes"));
+    assert!(broken(&|d| d.certificate.votes[0].vote.evidence[0] = f32::NAN).contains("not finite"));
+    assert!(broken(&|d| d.certificate.others[0].vote.looks = -1.0).contains("looks"));
 }
 
 /// The bytes that one value takes on the wire, at least.
 fn on_the_wire(messages: [Message; 2]) -> usize {
-    let [without, with] = messages
-        .map(|message| Envelope { author: RobotId(0), stamp: Stamp::default(), message }.encode().len());
+    let [without, with] = messages.map(|message| {
+        Envelope { author: RobotId(0), stamp: Stamp::default(), message, signature: None }.encode().len()
+    });
     with - without
 }
 
@@ -374,13 +427,16 @@ fn no_message_takes_more_memory_than_promised() {
     let known = on_the_wire([have(vec![]), have(vec![(RobotId(0), Stamp::default())])]);
     assert!(2 * size_of::<(RobotId, Stamp)>() <= factor * known);
     let give = |votes| Message::Give(Give { decision: None, votes });
-    let held = HeldVote { robot: RobotId(0), stamp: Stamp::default(), vote: null };
+    let held = HeldVote { robot: RobotId(0), stamp: Stamp::default(), vote: null, signature: None };
     let given = on_the_wire([give(vec![]), give(vec![held])]);
     assert!(2 * size_of::<HeldVote>() <= factor * given);
-    let counted = 1 + 2 + 1 + 4;
+    // Beside the vote: the class and the weight.
+    let counted = given + 1 + 4;
     assert!(2 * size_of::<CountedVote>() <= factor * counted);
     // A claim of four thousand million elements with nothing behind it.
-    let mut claim = Envelope { author: RobotId(0), stamp: Stamp::default(), message: have(vec![]) }.encode();
+    let mut claim =
+        Envelope { author: RobotId(0), stamp: Stamp::default(), message: have(vec![]), signature: None }
+            .encode();
     claim.truncate(claim.len() - 3);
     claim.extend([0xff, 0xff, 0xff, 0xff, 0x0f]);
     assert!(matches!(Envelope::decode(&claim), Err(DecodeError::Malformed(_))));

@@ -19,6 +19,7 @@ fn decision() -> Decision {
         class: Some(ClassId(1)),
         confidence: 0.75,
         author: RobotId(4),
+        is_final: true,
         certificate: Certificate {
             vocabulary: VocabularyId(0x0102_0304),
             rule: FusionRule::LogPool,
@@ -28,14 +29,19 @@ fn decision() -> Decision {
                 stamp: Stamp { boot: 1, sequence: 9 },
                 class: ClassId(1),
                 weight: 1.0,
+                vote: vote(),
+                signature: None,
             }],
+            others: vec![],
+            robots: 3,
+            quorum: 2,
             elapsed_ms: 1250,
         },
     }
 }
 
 fn envelope(message: Message) -> Envelope {
-    Envelope { author: RobotId(7), stamp: Stamp { boot: 1, sequence: 130 }, message }
+    Envelope { author: RobotId(7), stamp: Stamp { boot: 1, sequence: 130 }, message, signature: None }
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -76,11 +82,11 @@ fn what_a_robot_has() {
         knowledge: Some(Digest { samples: 300, lessons: 1 }),
         answer: true,
     };
-    // Some round; Some rank: decided, robots, confidence as f64, author; one vote: robot, boot, sequence; Some digest:
+    // Some round; Some rank: decided, robots, looks and confidence as f32, author; one vote: robot, boot, sequence; Some digest:
     // samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202a101 01 01 01 000000000000e83f 04 01 07 01 09 01ac0201 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 07 01 09 01ac0201 01"),
     );
     let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
     travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
@@ -88,9 +94,11 @@ fn what_a_robot_has() {
 
 #[test]
 fn what_a_robot_gives() {
-    let held = HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote() };
-    let decided = "01 ac0202a101 0101 000000000000e83f 04 84868808 02 02 000000000000d03f 000000000000e83f \
-                   01 07 01 09 01 0000803f e209";
+    let held =
+        HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote(), signature: None };
+    // The decision; its certificate: vocabulary, rule, probabilities, one vote as it was said, no others, n, q, time.
+    let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 03 02 e209";
     let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040";
     travels_as(
         Message::Give(Give { decision: Some(decision()), votes: vec![held] }),
@@ -133,7 +141,9 @@ fn a_sample_of_24_components_takes_at_most_64_bytes() {
     };
     let samples = Samples { space: FeatureSpaceId(u64::MAX), samples: vec![sample] };
     let stamp = Stamp { boot: 10_000, sequence: 1_000_000 };
-    let bytes = Envelope { author: RobotId(4096), stamp, message: Message::Samples(samples) }.encode();
+    let bytes =
+        Envelope { author: RobotId(4096), stamp, message: Message::Samples(samples), signature: None }
+            .encode();
     assert!(bytes.len() <= 64, "{} bytes", bytes.len());
 }
 
@@ -165,9 +175,11 @@ fn what_instructors_said() {
 
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0}],"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0}}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"rank":{"decided":true,"robots":1,"looks":2.0,"confidence":0.75,"author":4},"guests":[9]}"#;
+    assert_eq!(serde_json::to_string(&decision().holding(vec![RobotId(9)])).unwrap(), json);
     let none = Decision { class: None, ..decision() };
     assert!(serde_json::to_string(&none).unwrap().contains(r#""class":null"#));
 }

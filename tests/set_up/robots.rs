@@ -39,6 +39,7 @@ pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         vocabulary: Some(Fixed::default().vocabulary().clone()),
         learning: None,
         nonce: fresh_nonce(),
+        seal: None,
     }
 }
 

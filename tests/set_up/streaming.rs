@@ -9,6 +9,7 @@ use gestalt_peer::config::{CameraChoice, CameraSection, Config, FilesSection, So
 use gestalt_peer::picture::write_png;
 use gestalt_peer::stream::{Feed, SenderConfig};
 use gestalt_protocol::RobotId;
+use gestalt_strategies::Quorum;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::pose::Pose;
@@ -100,6 +101,8 @@ pub fn center_config(orders: &Value) -> Config {
         config.center.max_robots = most;
     }
     config.center.gone_after = Duration::from_secs(4);
+    // Two of five go on when a centre takes three with it.
+    config.rounds.quorum = Quorum::Evidence(1);
     config
 }
 

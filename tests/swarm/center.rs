@@ -42,7 +42,7 @@ impl Mixed {
             "listen": if node < 3 { vec![format!("tcp/0.0.0.0:{PORT}")] } else { vec![] },
             "connect": self.namespaces.to_dial(node, PORT),
         });
-        let mut orders = json!({"id": node, "swarm": self.swarm, "link": link});
+        let mut orders = json!({"id": node, "swarm": self.swarm, "link": link, "quorum": 1});
         match node {
             0 => (orders["sees"], orders["p"]) = (json!(FINGERS), json!(0.9)),
             // It is not sure, and mistaken.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+use gestalt_strategies::Quorum;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::Value;
@@ -34,7 +35,7 @@ fn one_run(seed: u64, time: Duration) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // One robot mistakes the gesture. Alone or with few others it would settle on another one than the rest; the
     // quorum keeps it from that, however the links are cut.
-    let mut field = Field::new(9, &grid(), 4, |node| match node {
+    let mut field = Field::new(9, &grid(), Quorum::Evidence(4), |node| match node {
         0 | 2 | 3 | 4 | 6 | 8 => Some((1, 0.7)),
         1 => Some((2, 0.7)),
         _ => None,

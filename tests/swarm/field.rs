@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use gestalt_strategies::Quorum;
 use gestalt_tests::{Namespaces, Process, unique};
 use serde_json::{Value, json};
 
@@ -16,16 +17,16 @@ pub struct Field {
     pub namespaces: Namespaces,
     swarm: String,
     sees: Vec<Sees>,
-    quorum: u32,
+    quorum: Quorum,
 }
 
 /// The class that a robot sees, and how sure of it it is; `None` for one that cannot see.
 pub type Sees = Option<(u8, f64)>;
 
 impl Field {
-    /// Starts a robot in each of `nodes` namespaces and waits until all know of all. They decide when `quorum` of them have
-    /// seen something.
-    pub fn new(nodes: u32, links: &[(u32, u32)], quorum: u32, sees: impl Fn(u32) -> Sees) -> Self {
+    /// Starts a robot in each of `nodes` namespaces and waits until all know of all. They decide by that
+    /// quorum.
+    pub fn new(nodes: u32, links: &[(u32, u32)], quorum: Quorum, sees: impl Fn(u32) -> Sees) -> Self {
         let namespaces = Namespaces::new(nodes, links);
         let sees = (0..nodes).map(sees).collect();
         let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, quorum };

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use gestalt_link::RobotConfig;
 use gestalt_protocol::ClassId;
-use gestalt_strategies::MindConfig;
+use gestalt_strategies::{MindConfig, Quorum};
 use gestalt_tests::{Watched, agreed, config, start, unique};
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -15,7 +15,7 @@ pub async fn line(n: u32, quorum: u32, sees: impl Fn(u32) -> Option<ClassId>) ->
     let mut robots: Vec<Watched> = Vec::new();
     for id in 0..n {
         let connect = robots.last().map(|before| before.robot.locators().to_vec()).unwrap_or_default();
-        let mind = MindConfig { quorum, ..MindConfig::default() };
+        let mind = MindConfig { quorum: Quorum::Evidence(quorum), ..MindConfig::default() };
         robots.push(start(RobotConfig { mind, ..config(id, &swarm, &connect) }, sees(id)).await);
     }
     for robot in &robots {

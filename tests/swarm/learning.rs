@@ -204,7 +204,10 @@ pub async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained
         let message = Message::Samples(Samples { space: *space, samples: vec![sample.clone()] });
         let stamp = Stamp { boot: 1, sequence: 1 };
         forger
-            .put(keys.key(&Topic::Sample(author)), Envelope { author, stamp, message }.encode())
+            .put(
+                keys.key(&Topic::Sample(author)),
+                Envelope { author, stamp, message, signature: None }.encode(),
+            )
             .await
             .unwrap();
     }
@@ -275,7 +278,10 @@ async fn decides_while_training() -> bool {
     zenoh.insert_json5("connect/endpoints", &locators).unwrap();
     zenoh.insert_json5("scouting/multicast/enabled", "false").unwrap();
     let giver = zenoh::open(zenoh).await.unwrap();
-    giver.put(keys.key(&Topic::Sample(author)), Envelope { author, stamp, message }.encode()).await.unwrap();
+    giver
+        .put(keys.key(&Topic::Sample(author)), Envelope { author, stamp, message, signature: None }.encode())
+        .await
+        .unwrap();
     let learned = |robot: &Watched| robot.robot.status().learning.expect("it learns");
     let deadline = tokio::time::Instant::now() + PATIENCE;
     while learned(&busy).external.iter().sum::<usize>() < SAMPLES as usize {

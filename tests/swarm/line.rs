@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use gestalt_strategies::Quorum;
 use serde_json::json;
 
 use crate::field::Field;
@@ -9,7 +10,7 @@ use crate::field::Field;
 pub fn the_eighth_in_a_line_decides_what_the_first_two_see() {
     let links: Vec<_> = (0..7).map(|i| (i, i + 1)).collect();
     // The sixth sees something else, and is outvoted.
-    let mut field = Field::new(8, &links, 2, |node| match node {
+    let mut field = Field::new(8, &links, Quorum::Evidence(2), |node| match node {
         0 | 1 => Some((4, 0.9)),
         5 => Some((2, 0.9)),
         _ => None,

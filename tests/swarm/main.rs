@@ -17,6 +17,7 @@ mod motion;
 mod partition;
 mod ring;
 mod scouting;
+mod stranger;
 mod stream;
 mod trouble;
 
@@ -35,6 +36,7 @@ fn main() -> std::process::ExitCode {
         [Works, Namespaces] center::a_stream_cut_and_a_centre_killed_come_back_to_robots_that_gossip,
         [Waits] clients::a_client_hears_each_decision_once_and_can_ask_and_instruct.await,
         [Waits] clients::a_decision_is_announced_once_though_the_spokesrobot_is_killed.await,
+        [Waits, Namespaces] partition::a_part_without_the_majority_decides_nothing_and_says_why,
         [Waits, Namespaces] partition::the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal,
         [Waits] trouble::votes_cost_little_while_a_round_is_open_and_nothing_otherwise.await,
         [Waits, Mount] memory::a_full_disk_is_reported_and_the_robot_votes_on_and_recovers.await,
@@ -60,6 +62,8 @@ fn main() -> std::process::ExitCode {
         [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
         [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,
+        [Waits] stranger::one_who_is_no_member_changes_nothing_and_every_lie_is_named.await,
+        [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
         [Alone] stream::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use gestalt_strategies::Quorum;
 use serde_json::json;
 
 use crate::field::{Field, Sees};
@@ -13,7 +14,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 fn ring(sees: impl Fn(u32) -> Sees) -> Field {
     let links: Vec<_> = (0..NODES).map(|i| (i, (i + 1) % NODES)).collect();
-    Field::new(NODES, &links, 2, sees)
+    Field::new(NODES, &links, Quorum::Evidence(2), sees)
 }
 
 pub fn a_ring_goes_on_after_a_relay_is_killed() {

@@ -7,7 +7,7 @@ use gestalt_protocol::{
     Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Keys, Message, RobotId, RoundId,
     Stamp, Topic, Vote,
 };
-use gestalt_strategies::{Classify, MindConfig};
+use gestalt_strategies::{Classify, MindConfig, Quorum};
 use gestalt_tests::{Fixed, Watched, agreed, config, start, unique};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -18,7 +18,7 @@ use crate::in_process::line;
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A plain Zenoh client.
-async fn attach(locators: &[String]) -> zenoh::Session {
+pub async fn attach(locators: &[String]) -> zenoh::Session {
     let mut zenoh = zenoh::Config::default();
     zenoh.insert_json5("mode", "\"client\"").unwrap();
     zenoh.insert_json5("connect/endpoints", &json!(locators).to_string()).unwrap();
@@ -27,7 +27,7 @@ async fn attach(locators: &[String]) -> zenoh::Session {
 }
 
 /// Waits until the robot's counters that begin like this come to so many.
-async fn counted(robot: &Watched, prefix: &str, wanted: u64) {
+pub async fn counted(robot: &Watched, prefix: &str, wanted: u64) {
     let deadline = tokio::time::Instant::now() + PATIENCE;
     loop {
         let counters = robot.robot.status().counters;
@@ -82,12 +82,17 @@ pub async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on
 }
 
 /// A decision that follows from nothing: its fields are in range, its certificate names votes that nobody cast.
-fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Decision {
+pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Decision {
+    let vocabulary = Fixed::default().vocabulary().id();
+    let mut evidence = vec![-1.0; 6];
+    evidence[usize::from(class)] = 5.0;
     let vote = |robot| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp { boot: 1, sequence: 1 },
         class: ClassId(class),
         weight: 1.0,
+        vote: Vote { round, vocabulary, evidence: evidence.clone(), looks: 1.0 },
+        signature: None,
     };
     let mut probabilities = vec![0.002; 6];
     probabilities[usize::from(class)] = 0.99;
@@ -96,11 +101,15 @@ fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Decision
         class: Some(ClassId(class)),
         confidence: 0.99,
         author,
+        is_final: false,
         certificate: Certificate {
-            vocabulary: Fixed::default().vocabulary().id(),
+            vocabulary,
             rule: FusionRule::LogPool,
             probabilities,
             votes: (0..robots).map(vote).collect(),
+            others: Vec::new(),
+            robots,
+            quorum: 1,
             elapsed_ms: 1,
         },
     }
@@ -122,7 +131,9 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     let vote = |evidence: Vec<f32>| Message::Vote(Vote { round, vocabulary, evidence, looks: 1.0 });
     let say = async |topic: Topic, author, message| {
         let stamp = Stamp { boot: 1, sequence: 1 };
-        liar.put(keys.key(&topic), Envelope { author, stamp, message }.encode()).await.unwrap();
+        liar.put(keys.key(&topic), Envelope { author, stamp, message, signature: None }.encode())
+            .await
+            .unwrap();
     };
     // What cannot be, what is somebody else's to say, and what belongs elsewhere.
     let cases = [
@@ -151,13 +162,13 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     let mut certain = sound.clone();
     certain.confidence = 1.5;
     let mut twice = sound.clone();
-    twice.certificate.votes[1] = twice.certificate.votes[0];
+    twice.certificate.votes[1] = twice.certificate.votes[0].clone();
     let mut beyond = sound.clone();
     beyond.class = Some(ClassId(200));
     for lie in [certain, twice, beyond] {
         let before = refusals(&robots[0]);
         let json = serde_json::to_string(&lie).unwrap();
-        liar.put(keys.key(&Topic::RobotDecision(nine)), json).await.unwrap();
+        liar.put(keys.key(&Topic::Decision), json).await.unwrap();
         counted(&robots[0], "refused_", before + 1).await;
     }
     robots[1].robot.open_round();
@@ -225,7 +236,7 @@ pub async fn a_black_hole_in_the_routing_delays_and_loses_nothing() {
         let plain = config(id, &swarm, &before);
         let zenoh = if id == 2 { black_hole() } else { serde_json::Map::new() };
         let link = LinkConfig { zenoh, ..plain.link.clone() };
-        let mind = MindConfig { quorum: 2, ..MindConfig::default() };
+        let mind = MindConfig { quorum: Quorum::Evidence(2), ..MindConfig::default() };
         let robot = start(RobotConfig { link, mind, ..plain }, sees.map(ClassId)).await;
         before = robot.robot.locators().to_vec();
         robots.push(robot);

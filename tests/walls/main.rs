@@ -48,7 +48,10 @@ fn the_mind_knows_no_host() {
 fn trust_is_judged_without_a_network_and_without_a_mind() {
     let minds = ["gestalt-strategies", "gestalt-rounds", "gestalt-svm"];
     knows_none("gestalt-trust", &minds);
-    knows_none("gestalt-trust", &["nalgebra", "linfa", "ndarray", "zenoh", "tokio", "opencv", "clap", "redb"]);
+    knows_none(
+        "gestalt-trust",
+        &["nalgebra", "linfa", "ndarray", "zenoh", "tokio", "opencv", "clap", "redb"],
+    );
 }
 
 #[test]

@@ -27,6 +27,7 @@ async fn main() {
         vocabulary: None,
         learning: None,
         nonce: fresh_nonce(),
+        seal: None,
     })
     .await
     .expect("the robot starts");
@@ -96,7 +97,7 @@ fn vote(counter: u32) -> Vec<u8> {
         looks: 3.0,
     };
     let stamp = Stamp { boot: 1, sequence: counter };
-    Envelope { author: RobotId(0), stamp, message: Message::Vote(vote) }.encode()
+    Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }.encode()
 }
 
 fn put(session: &Session, key: &str, bytes: Vec<u8>) -> Instant {

@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, Reported, Status};
+use gestalt_trust::Distrust;
 
 const MAX_ERRORS: usize = 16;
 const MAX_ERROR_LENGTH: usize = 400;
@@ -134,6 +135,8 @@ pub(super) enum Refusal {
     Full,
     #[error("another robot of the swarm has this robot's id: give each its own, then restart one")]
     Twin,
+    #[error(transparent)]
+    Distrust(#[from] Distrust),
 }
 
 impl Refusal {
@@ -151,6 +154,7 @@ impl Refusal {
             Self::Time => "time",
             Self::Full => "full",
             Self::Twin => "twin",
+            Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
         }
     }
 }

@@ -6,6 +6,7 @@ use gestalt_strategies::{LearnError, LearningError};
 use thiserror::Error;
 
 use crate::memory::StoreError;
+use crate::seal::SealError;
 
 /// A robot that could not be linked. Nothing is left running.
 #[derive(Debug, Error)]
@@ -51,6 +52,9 @@ pub enum LinkError {
         /// Zenoh's reason.
         cause: String,
     },
+    /// The seal does not fit the robot.
+    #[error(transparent)]
+    Seal(#[from] SealError),
     /// A robot that is there already cannot be a guest.
     #[error("robot {0} is here already: give each robot an id of its own")]
     Guest(gestalt_protocol::RobotId),

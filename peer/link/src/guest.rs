@@ -15,6 +15,7 @@ use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::presence::Presence;
 use crate::robot::Robot;
+use crate::seal::SealError;
 use crate::supervisor::{Supervisor, run_apart};
 use crate::wake::sleep_until;
 
@@ -43,9 +44,18 @@ impl Robot {
             return Err(LinkError::Guest(id));
         }
         let departure = Departure { guest: id, guests: self.guests.clone(), host: self.commands.downgrade() };
-        let voter = Voter::new(id, boot, self.rounds.clone())?;
+        let mut voter = Voter::new(id, boot, self.rounds.clone())?;
+        if let Some(seal) = self.seal.as_deref() {
+            let signer = seal.signer_of(id).ok_or(LinkError::Seal(SealError::NotEnrolled(id)))?;
+            voter = voter.signed_by(signer);
+        }
         let vocabulary = self.account.lock().vocabulary.clone();
-        let status = Status { vocabulary, neighbours: vec![host], ..Status::new(id, name, boot) };
+        let status = Status {
+            vocabulary,
+            neighbours: vec![host],
+            sealed: self.seal.is_some(),
+            ..Status::new(id, name, boot)
+        };
         let account = Arc::new(Account::new(status, self.started));
         let (events, first_events) = broadcast::channel(MAX_EVENTS);
         let supervisor = Supervisor::new(account.clone(), events.clone());
@@ -84,6 +94,7 @@ impl Robot {
             rounds: self.rounds.clone(),
             lost_links: self.lost_links.clone(),
             guests: Arc::default(),
+            seal: self.seal.clone(),
         })
     }
 }

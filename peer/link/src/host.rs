@@ -19,6 +19,7 @@ use crate::identity::{self, fresh_nonce};
 use crate::inbox::Inbox;
 use crate::memory::Found;
 use crate::mind::new_mind;
+use crate::seal::Seal;
 use crate::supervisor::Supervisor;
 use crate::voice::Voice;
 use crate::wake::sleep_until;
@@ -36,6 +37,7 @@ pub(crate) struct Host {
     pub events: broadcast::Sender<Event>,
     /// Your own fusion rule.
     pub fusion: Option<Arc<dyn Fuse>>,
+    pub seal: Option<Arc<Seal>>,
     pub vocabulary: Option<Vocabulary>,
     pub apprentice: Option<Apprentice>,
     /// For the program around the robot to look at.
@@ -135,11 +137,13 @@ impl Host {
         let learning = apprentice.learning().clone();
         // Its rounds are counted anew from what is remembered: another life, by name too.
         let life = identity::life(boot, fresh_nonce());
-        let mind = new_mind(self.me, life, self.mind.config().clone(), self.fusion.clone())
-            .map_err(|error| error.to_string())
-            .and_then(|mind| {
-                mind.learning(learning.setup(self.me, boot, Some(memory))).map_err(|error| error.to_string())
-            });
+        let mind =
+            new_mind(self.me, life, self.mind.config().clone(), self.fusion.clone(), self.seal.as_deref())
+                .map_err(|error| error.to_string())
+                .and_then(|mind| {
+                    mind.learning(learning.setup(self.me, boot, Some(memory)))
+                        .map_err(|error| error.to_string())
+                });
         let mind = match mind {
             Ok(mind) => mind,
             Err(error) => {
@@ -201,7 +205,7 @@ impl Host {
                 let mut status = self.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
-                self.voice.hold(self.announcement(&decision));
+                self.voice.hold(self.announcement(&decision), self.guests.present().into_iter().collect());
                 self.tell(Event::Held(decision));
             }
             Output::Announce(decision) => {

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use gestalt_protocol::{
-    Answer, Decision, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message,
-    RobotId, Topic, decode_json,
+    Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId,
+    Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use rand::{RngExt, SeedableRng};
@@ -17,6 +17,7 @@ use zenoh::session::ZenohId;
 use super::account::{Account, Refusal};
 use super::announcement::Announcement;
 use super::identity::robot_of;
+use super::seal::Gate;
 
 /// The most messages that wait for the mind, votes apart.
 const MAX_QUEUE: usize = 8192;
@@ -35,6 +36,8 @@ pub(super) struct Inbox {
     keys: Keys,
     account: Arc<Account>,
     state: Mutex<State>,
+    /// In a sealed swarm: who lets in what its members said.
+    gate: Option<Gate>,
     /// For trials: the part of what arrives that is dropped, and the chance that chooses it.
     loss: f64,
     chance: Mutex<ChaCha8Rng>,
@@ -55,7 +58,14 @@ struct State {
 }
 
 impl Inbox {
-    pub(super) fn new(me: RobotId, swarm: u32, keys: Keys, account: Arc<Account>, loss: f64) -> Self {
+    pub(super) fn new(
+        me: RobotId,
+        swarm: u32,
+        keys: Keys,
+        account: Arc<Account>,
+        loss: f64,
+        gate: Option<Gate>,
+    ) -> Self {
         let state = Mutex::new(State::default());
         Self {
             me,
@@ -63,6 +73,7 @@ impl Inbox {
             keys,
             account,
             state,
+            gate,
             loss,
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
@@ -125,10 +136,8 @@ impl Inbox {
             Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample)),
             Some(Topic::Sample(id)) => ("sample", self.on_shared(id, sample)),
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
-            Some(Topic::RobotDecision(id)) => {
-                ("robot_decision", self.on_decision(sample, |decision| Input::Heard(id, decision)))
-            }
-            Some(Topic::Decision) => ("decision", self.on_decision(sample, Input::Announced)),
+            Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(id, sample)),
+            Some(Topic::Decision) => ("decision", self.on_decision(sample)),
             Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
             Some(Topic::Answer(to)) => ("answer", self.on_answer(to, sample)),
             _ => ("other", Err(Refusal::Key)),
@@ -157,6 +166,7 @@ impl Inbox {
         if !matches!(envelope.message, Message::Vote(_)) {
             return Err(Refusal::Kind);
         }
+        self.gate.as_ref().map_or(Ok(()), |gate| gate.envelope(&envelope))?;
         let mut state = self.lock();
         if id == self.me {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
@@ -190,20 +200,32 @@ impl Inbox {
     }
 
     fn on_repair(&self, sample: &Sample) -> Result<(), Refusal> {
-        let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
+        let mut envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
         if envelope.author == self.me {
             return Err(Refusal::Twin);
         }
         if matches!(envelope.message, Message::Vote(_)) {
             return Err(Refusal::Kind);
         }
+        if let (Message::Give(give), Some(gate)) = (&mut envelope.message, &self.gate)
+            && let Some(distrust) = gate.give(give)
+        {
+            // The rest of it may be true: who passes on what it was told is no liar.
+            let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
+            self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
+        }
         self.queue(Input::Received(envelope))
     }
 
-    fn on_decision(&self, sample: &Sample, input: impl FnOnce(Decision) -> Input) -> Result<(), Refusal> {
+    fn on_decision(&self, sample: &Sample) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
         announcement.decision.check()?;
-        self.queue(input(announcement.decision))
+        self.gate.as_ref().map_or(Ok(()), |gate| gate.decision(&announcement.decision))?;
+        self.queue(Input::Announced(announcement.decision))
+    }
+
+    fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+        self.queue(Input::Heard(id, decode_json(&payload(sample, MAX_JSON)?)?))
     }
 
     fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use gestalt_protocol::{Decision, Keys, RobotId, RoundId, Topic, decode_json};
+use gestalt_protocol::{Holding, Keys, RobotId, RoundId, Topic, decode_json};
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 use zenoh::Session;
@@ -19,8 +19,8 @@ const MAX_WAITING: usize = 1024;
 pub enum Heard {
     /// The swarm decided.
     Decided(Announcement),
-    /// That robot now holds that decision.
-    Held(RobotId, Decision),
+    /// That robot now holds another decision.
+    Held(RobotId, Holding),
     /// A robot came.
     Came(RobotId),
     /// A robot left, or was lost.
@@ -38,7 +38,7 @@ pub struct News {
 #[derive(Debug, Default)]
 struct Known {
     alive: BTreeSet<RobotId>,
-    held: BTreeMap<RobotId, Decision>,
+    held: BTreeMap<RobotId, Holding>,
     newest: Option<u32>,
 }
 
@@ -79,7 +79,7 @@ impl News {
 
     /// The decisions that robots hold for a round, as far as they have said so.
     #[must_use]
-    pub fn holding(&self, round: RoundId) -> Vec<(RobotId, Decision)> {
+    pub fn holding(&self, round: RoundId) -> Vec<(RobotId, Holding)> {
         let known = self.known();
         let of_round = known.held.iter().filter(|(_, held)| held.round.counter == round.counter);
         of_round.map(|(robot, held)| (*robot, held.clone())).collect()
@@ -119,21 +119,28 @@ impl Listener {
     }
 
     fn on_decision(&self, sample: &Sample) {
-        let announcement = match decode_json::<Announcement>(&sample.payload().to_bytes()) {
-            Ok(announcement) => announcement,
-            Err(error) => return tracing::warn!("{}: {error}", sample.key_expr()),
-        };
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let counter = announcement.decision.round.counter;
-        known.newest = known.newest.max(Some(counter));
+        let json = sample.payload().to_bytes();
         let heard = match self.keys.parse(sample.key_expr()) {
-            Some(Topic::Decision) => Heard::Decided(announcement),
+            Some(Topic::Decision) => decode_json(&json).map(Heard::Decided),
             Some(Topic::RobotDecision(robot)) => {
-                known.held.insert(robot, announcement.decision.clone());
-                Heard::Held(robot, announcement.decision)
+                decode_json(&json).map(|holding| Heard::Held(robot, holding))
             }
             _ => return,
         };
+        let heard = match heard {
+            Ok(heard) => heard,
+            Err(error) => return tracing::warn!("{}: {error}", sample.key_expr()),
+        };
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let round = match &heard {
+            Heard::Decided(announcement) => Some(announcement.decision.round.counter),
+            Heard::Held(robot, holding) => {
+                known.held.insert(*robot, holding.clone());
+                Some(holding.round.counter)
+            }
+            Heard::Came(_) | Heard::Left(_) => None,
+        };
+        known.newest = known.newest.max(round);
         drop(known);
         // An error says that nobody reads, which is the reader's own business.
         let _ = self.news.send(heard);

@@ -26,6 +26,7 @@ use crate::keeper::Keeper;
 use crate::mind::new_mind;
 use crate::outbox::Outbox;
 use crate::presence::Presence;
+use crate::seal::{Gate, Seal};
 use crate::session::{Node, watch_session};
 use crate::subscriptions::listen;
 use crate::supervisor::{Supervisor, run_apart};
@@ -55,6 +56,8 @@ pub struct RobotConfig {
     pub learning: Option<RobotLearning>,
     /// Differs at every start, see [`fresh_nonce`](super::fresh_nonce).
     pub nonce: u64,
+    /// What makes it one of a sealed swarm; `None` for an open one, in which robots are who they say they are.
+    pub seal: Option<Seal>,
 }
 
 /// A running robot. Dropping it ends it without waiting; [`Robot::stop`] waits until its session is closed.
@@ -75,6 +78,7 @@ pub struct Robot {
     pub(super) rounds: MindConfig,
     pub(super) lost_links: watch::Receiver<u64>,
     pub(super) guests: Arc<Guests>,
+    pub(super) seal: Option<Arc<Seal>>,
 }
 
 impl Robot {
@@ -86,12 +90,16 @@ impl Robot {
         if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
             return Err(LinkError::Runtime);
         }
-        let RobotConfig { id, name, boot, swarm, mind, fusion, link, vocabulary, learning, nonce } = config;
+        let RobotConfig { id, name, boot, swarm, mind, fusion, link, vocabulary, learning, nonce, seal } =
+            config;
+        seal.as_ref().map_or(Ok(()), |seal| seal.check(id, &swarm))?;
+        let seal = seal.map(Arc::new);
         let vocabulary = vocabulary.or_else(|| learning.as_ref().map(|learning| learning.vocabulary.clone()));
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
         let rounds = mind;
-        let mut mind = new_mind(id, identity::life(boot, nonce), rounds.clone(), fusion.clone())?;
+        let mut mind =
+            new_mind(id, identity::life(boot, nonce), rounds.clone(), fusion.clone(), seal.as_deref())?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
         }
@@ -101,13 +109,15 @@ impl Robot {
         let status = Status {
             vocabulary: vocabulary.as_ref().map(|v| v.labels().to_vec()).unwrap_or_default(),
             alive: vec![id],
+            sealed: seal.is_some(),
             ..Status::new(id, name, boot)
         };
         let account = Arc::new(Account::new(status, started));
         let (events, first_events) = broadcast::channel(MAX_EVENTS);
         let supervisor = Supervisor::new(account.clone(), events.clone());
+        let gate = seal.as_deref().map(|seal| Gate::new(seal, started));
         let inbox =
-            Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone(), link.loss));
+            Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone(), link.loss, gate));
         let mut first_classifier = None;
         let apprentice = match prepared {
             Some(prepared) => {
@@ -151,6 +161,7 @@ impl Robot {
         let host = Host {
             me: id,
             fusion,
+            seal: seal.clone(),
             mind,
             started,
             inbox,
@@ -180,6 +191,7 @@ impl Robot {
             rounds,
             lost_links,
             guests,
+            seal,
         };
         if let Some(classifier) = first_classifier {
             robot.learned(classifier, "from before");

@@ -6,7 +6,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{Answer, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
@@ -20,11 +21,8 @@ use crate::inbox::Inbox;
 use crate::outbox::{Outbox, Parcel};
 use crate::presence::Presence;
 
-/// A robot that draws another decision of the same round within this time says so only once.
-const OWN_HOLD_INTERVAL: Duration = Duration::from_millis(50);
-
-/// How long a robot holds another's decision before it says so: all have heard it from its author.
-const ADOPTED_HOLD_DELAY: Duration = Duration::from_millis(300);
+/// A robot that comes to hold another decision of the same round within this time says so only once.
+const HOLD_INTERVAL: Duration = Duration::from_millis(50);
 
 /// What a robot says.
 pub(crate) struct Voice {
@@ -38,8 +36,8 @@ pub(crate) struct Voice {
     held: Publisher<'static>,
     swarm: Publisher<'static>,
     last: Arc<Last>,
-    /// The decision still to be published on `robot/<me>/decision`, and when.
-    unsaid: Option<(Announcement, Instant)>,
+    /// What is still to be published on `robot/<me>/decision`, and when.
+    unsaid: Option<(Announcement, Vec<RobotId>, Instant)>,
     /// The round of the decision published last, and when.
     said: Option<(u32, Instant)>,
 }
@@ -115,7 +113,7 @@ impl Voice {
 
     /// Answers an instructor.
     pub fn answer(&self, instructor: &InstructorId, answer: &Answer) {
-        let json = serde_json::to_string(answer).expect("an answer has a place in JSON");
+        let json = as_json(answer);
         self.account.sent("answer", json.len());
         let put = self
             .session
@@ -132,43 +130,39 @@ impl Voice {
         self.publish("decision", &self.swarm, announcement);
     }
 
-    /// Notes the decision that the robot holds now; it is published when it is due. Robots that are just settling among
-    /// each other would otherwise each say every step of it to all.
-    pub fn hold(&mut self, announcement: Announcement) {
-        let due = self.hold_due(&announcement.decision);
-        self.unsaid = Some((announcement, due));
-    }
-
-    fn hold_due(&self, decision: &Decision) -> Instant {
-        let now = Instant::now();
-        if decision.author != self.me {
-            return now + ADOPTED_HOLD_DELAY;
-        }
-        let before = self.said.filter(|(round, _)| *round == decision.round.counter);
-        before.map_or(now, |(_, at)| at + OWN_HOLD_INTERVAL)
+    /// Notes the decision that the robot and its guests hold now; that is said when it is due. Robots that are just settling
+    /// among each other would otherwise each say every step of it to all.
+    pub fn hold(&mut self, announcement: Announcement, guests: Vec<RobotId>) {
+        let round = announcement.decision.round.counter;
+        let before = self.said.filter(|(said, _)| *said == round);
+        let due = before.map_or_else(Instant::now, |(_, at)| at + HOLD_INTERVAL);
+        self.unsaid = Some((announcement, guests, due));
     }
 
     /// When [`publish_hold`](Self::publish_hold) is to be called.
     pub fn due(&self) -> Option<Instant> {
-        self.unsaid.as_ref().map(|(_, due)| *due)
+        self.unsaid.as_ref().map(|(_, _, due)| *due)
     }
 
-    /// Publishes the decision that the robot holds, when it is due.
+    /// Says which decision the robot holds, when it is due.
     pub fn publish_hold(&mut self) {
-        if let Some((announcement, _)) = self.unsaid.take_if(|(_, due)| Instant::now() >= *due) {
-            let json = self.publish("robot_decision", &self.held, &announcement);
-            self.last.set(json, self.session.new_timestamp());
+        if let Some((announcement, guests, _)) = self.unsaid.take_if(|(_, _, due)| Instant::now() >= *due) {
+            self.publish("robot_decision", &self.held, &announcement.decision.holding(guests));
+            self.last.set(as_json(&announcement), self.session.new_timestamp());
             self.said = Some((announcement.decision.round.counter, Instant::now()));
         }
     }
 
-    fn publish(&self, kind: &str, publisher: &Publisher<'_>, announcement: &Announcement) -> String {
-        let json = serde_json::to_string(announcement)
-            .expect("every field of a decision, with string keys and finite numbers, has a place in JSON");
+    fn publish(&self, kind: &str, publisher: &Publisher<'_>, said: &impl Serialize) {
+        let json = as_json(said);
         self.account.sent(kind, json.len());
-        self.account.check(publisher.put(json.as_str()).wait());
-        json
+        self.account.check(publisher.put(json).wait());
     }
+}
+
+fn as_json(said: &impl Serialize) -> String {
+    serde_json::to_string(said)
+        .expect("what is said, with string keys and finite numbers, has a place in JSON")
 }
 
 /// The decision this robot holds, as the queryable on `decision` gives it.

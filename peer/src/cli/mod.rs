@@ -10,6 +10,7 @@ mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod explain;
+mod keys;
 #[cfg(feature = "opencv")]
 mod look;
 mod manual;
@@ -33,6 +34,7 @@ mod swarm;
 mod teach;
 #[cfg(feature = "opencv")]
 mod train;
+mod verify;
 mod watch;
 
 use std::io::{self, Write};
@@ -88,6 +90,10 @@ enum Verb {
     Emulate(emulate::Args),
     /// Draw which samples each selection or forgetting rule picks
     Explain(explain::Args),
+    /// Make keys for the robots of a sealed swarm, and the roster that names them
+    Keys(keys::Args),
+    /// Check a decision without the swarm: that every vote it rests on was signed by a member, and that it follows from them
+    Verify(verify::Args),
     /// Print a commented configuration, or check one
     Config(config::Args),
     /// Print shell completions
@@ -127,6 +133,8 @@ impl Command {
             Verb::Look(args) => look::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
+            Verb::Keys(args) => keys::run(&args),
+            Verb::Verify(args) => verify::run(&args),
             Verb::Config(args) => config::run(&args),
             Verb::Completions(args) => manual::completions(&args),
             Verb::Man(args) => manual::man(&args),

@@ -86,6 +86,12 @@ pub(super) fn decision(decision: &Decision, label: Option<&str>, names: &Names) 
     let what = match (class, label) {
         (Some(_), Some(label)) => format!("{}, p = {confidence:.3}", quoted(label)),
         (Some(class), None) => format!("{}, p = {confidence:.3}", names.gesture(*class, certificate)),
+        (None, _) if certificate.reached() < certificate.quorum as usize => format!(
+            "undecided: {} of {} took part, {} needed",
+            certificate.reached(),
+            counted(certificate.robots as usize, "robot"),
+            certificate.quorum
+        ),
         (None, _) => "undecided".to_owned(),
     };
     let votes = &certificate.votes;
@@ -140,27 +146,34 @@ pub(super) fn robots<'a>(robots: impl IntoIterator<Item = &'a RobotId>) -> Strin
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{CountedVote, Stamp, VocabularyId};
+    use gestalt_protocol::{CountedVote, Stamp, VocabularyId, Vote};
 
     use super::*;
 
     fn of(class: Option<u8>, votes: &[(u32, u8)], vocabulary: VocabularyId) -> Decision {
+        let round = RoundId { counter: 18, opener: RobotId(1), life: 0 };
         let vote = |&(robot, class): &(u32, u8)| CountedVote {
             robot: RobotId(robot),
             stamp: Stamp { boot: 1, sequence: 1 },
             class: ClassId(class),
             weight: 1.0,
+            vote: Vote { round, vocabulary, evidence: Vec::new(), looks: 1.0 },
+            signature: None,
         };
         Decision {
-            round: RoundId { counter: 18, opener: RobotId(1), life: 0 },
+            round,
             class: class.map(ClassId),
             confidence: 0.9996,
             author: RobotId(2),
+            is_final: true,
             certificate: Certificate {
                 vocabulary,
                 rule: FusionRule::LogPool,
                 probabilities: Vec::new(),
                 votes: votes.iter().map(vote).collect(),
+                others: Vec::new(),
+                robots: 3,
+                quorum: u32::from(!votes.is_empty()),
                 elapsed_ms: 252,
             },
         }

@@ -9,6 +9,7 @@ mod error;
 mod learning;
 mod links;
 mod template;
+mod trust;
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -31,6 +32,7 @@ pub use gestalt_vision::config::{LayerConfig, MotionConfig, MotionConfigError, S
 pub use learning::{LearnFrom, LearningSection};
 pub use links::{LinksSection, ScoutingSection};
 pub use template::TEMPLATE;
+pub use trust::{ROSTER_FILE, TrustSection, key_file};
 
 /// One robot: who it is, what it sees with, how it decides, whom it talks to.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -50,6 +52,8 @@ pub struct Config {
     pub rounds: MindConfig,
     /// For a fusion centre: how it serves robots that only stream.
     pub center: CenterSection,
+    /// Whom the robot believes.
+    pub trust: TrustSection,
     /// How the robot finds others, and how many it links to.
     pub links: LinksSection,
     /// Zenoh's own configuration, verbatim; it takes precedence over what Gestalt sets, key by key.
@@ -115,7 +119,7 @@ impl FromStr for ModelSection {
 impl Config {
     /// The names of the sections: what a `--cfg` path can begin with, besides Zenoh's own keys.
     pub const SECTIONS: &[&str] =
-        &["robot", "swarm", "camera", "model", "learning", "rounds", "center", "links", "zenoh"];
+        &["robot", "swarm", "camera", "model", "learning", "rounds", "center", "trust", "links", "zenoh"];
 
     /// Reads and checks a configuration file.
     ///

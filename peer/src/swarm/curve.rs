@@ -93,11 +93,15 @@ mod tests {
             class,
             confidence: 1.0,
             author: RobotId(1),
+            is_final: false,
             certificate: Certificate {
                 vocabulary: VocabularyId(0),
                 rule: FusionRule::LogPool,
                 probabilities: Vec::new(),
                 votes: Vec::new(),
+                others: Vec::new(),
+                robots: 1,
+                quorum: 1,
                 elapsed_ms: 0,
             },
         }

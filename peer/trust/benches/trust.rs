@@ -27,7 +27,7 @@ fn vote(author: u32) -> Vec<u8> {
     let round = RoundId { counter: 1, opener: RobotId(0), life: 0xA1A1_A1A1 };
     let vote = Vote { round, vocabulary: VocabularyId(0xDEAD_BEEF), evidence, looks: 3.0 };
     let stamp = Stamp { boot: 1, sequence: 1000 };
-    Envelope { author: RobotId(author), stamp, message: Message::Vote(vote) }.encode()
+    Envelope { author: RobotId(author), stamp, message: Message::Vote(vote), signature: None }.encode()
 }
 
 fn votes(roster: &Roster, robots: u32) -> Vec<(Vec<u8>, Signature)> {

@@ -43,5 +43,6 @@ pub(crate) fn have(author: u32, sequence: u32) -> Vec<u8> {
 }
 
 fn said(author: u32, sequence: u32, message: Message) -> Vec<u8> {
-    Envelope { author: RobotId(author), stamp: Stamp { boot: 1, sequence }, message }.encode()
+    Envelope { author: RobotId(author), stamp: Stamp { boot: 1, sequence }, message, signature: None }
+        .encode()
 }

@@ -81,6 +81,7 @@ fn what_robots_say_reads_as_it_was_written() {
             decision: None,
             votes: Vec::new(),
         }),
+        signature: None,
     };
     assert_eq!(statement::read(&envelope.encode()), Ok(envelope));
 }

@@ -10,7 +10,7 @@ fn said(sequence: u32, other: bool) -> Vec<u8> {
     let give = Message::Give(Give { decision: None, votes: Vec::new() });
     let have = Have { round: None, decision: None, votes: Vec::new(), knowledge: None, answer: false };
     let message = if other { give } else { Message::Have(have) };
-    Envelope { author: RobotId(1), stamp, message }.encode()
+    Envelope { author: RobotId(1), stamp, message, signature: None }.encode()
 }
 
 #[test]

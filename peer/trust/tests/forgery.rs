@@ -25,7 +25,7 @@ fn vote(evidence: Vec<f32>) -> Message {
 
 fn said(author: u8, message: Message) -> Vec<u8> {
     let stamp = Stamp { boot: 2, sequence: 300 };
-    Envelope { author: RobotId(author.into()), stamp, message }.encode()
+    Envelope { author: RobotId(author.into()), stamp, message, signature: None }.encode()
 }
 
 /// All neighbours of these bytes: one bit each.

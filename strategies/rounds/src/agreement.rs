@@ -7,55 +7,52 @@ use gestalt_protocol::{ClassId, Decision, MAX_ROBOTS, Rank, RobotId};
 
 /// What a robot knows of the decisions of one round.
 ///
-/// Hearing commutes and repeats harmlessly: the greatest decision that may be believed is kept, whatever the order.
+/// Believing commutes and repeats harmlessly: the greatest decision is kept, whatever the order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
     best: Option<Decision>,
-    witnesses: BTreeMap<Option<ClassId>, Witnesses>,
+    /// What each other robot said that it holds, its greatest. At most [`MAX_ROBOTS`].
+    holders: BTreeMap<RobotId, (Rank, Option<ClassId>)>,
     held: Option<Held>,
-    announced: Option<Option<ClassId>>,
-}
-
-/// Who was heard holding a class, and the greatest decision for it.
-#[derive(Clone, Debug, PartialEq)]
-struct Witnesses {
-    robots: BTreeSet<RobotId>,
-    best: Decision,
+    announced: Option<Announced>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 struct Held {
     decision: Decision,
     since: Duration,
-    /// When the class last changed, or was last contradicted by an announcement.
+    /// When the class last changed, or was first contradicted by an announcement.
     unsettled: Duration,
 }
 
+/// What was last said aloud for the swarm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Announced {
+    class: Option<ClassId>,
+    is_final: bool,
+}
+
 impl Agreement {
-    /// Hears that `holder` holds a decision (`None`: nobody vouches for it by name). With liars among the robots it
-    /// is believed once one more than those are heard holding its class. Says whether that is news: whether a
-    /// greater decision than before may now be held.
-    pub fn hear(&mut self, holder: Option<RobotId>, decision: Decision, liars: u32) -> bool {
-        if liars == 0 {
-            return self.believe(decision);
+    /// Hears which decision a robot says it holds.
+    pub fn note_holder(&mut self, holder: RobotId, rank: Rank, class: Option<ClassId>) {
+        if self.holders.len() >= MAX_ROBOTS && !self.holders.contains_key(&holder) {
+            return;
         }
-        let Some(holder) = holder else { return false };
-        // A class is one of at most MAX_CLASSES + 1, so this map is bounded, and so is each set in it.
-        let witnesses = self
-            .witnesses
-            .entry(decision.class)
-            .or_insert_with(|| Witnesses { robots: BTreeSet::new(), best: decision.clone() });
-        if witnesses.robots.len() < MAX_ROBOTS {
-            witnesses.robots.insert(holder);
+        let held = self.holders.entry(holder).or_insert((rank, class));
+        if rank > held.0 {
+            *held = (rank, class);
         }
-        if decision.rank() > witnesses.best.rank() {
-            witnesses.best = decision;
-        }
-        if witnesses.robots.len() <= liars as usize {
-            return false;
-        }
-        let best = witnesses.best.clone();
-        self.believe(best)
+    }
+
+    /// Whether so many robots, this one and its guests among them, are known to hold the class held here.
+    #[must_use]
+    pub fn is_final(&self, quorum: u32, guests: &BTreeSet<RobotId>) -> bool {
+        let Some(class) = self.held().and_then(|held| held.class) else { return false };
+        let others = self
+            .holders
+            .iter()
+            .filter(|(robot, (_, other))| *other == Some(class) && !guests.contains(robot));
+        1 + guests.len() + others.count() >= quorum as usize
     }
 
     /// Takes the greater of this decision and the best known one. A robot's own conclusion needs no witnesses.
@@ -90,10 +87,10 @@ impl Agreement {
         self.held.as_ref().map(|held| &held.decision)
     }
 
-    /// The class of the greatest decision that may be held; `Some(None)` is "no decision".
+    /// The greatest decision that may be held.
     #[must_use]
-    pub fn best_class(&self) -> Option<Option<ClassId>> {
-        self.best.as_ref().map(|best| best.class)
+    pub fn best(&self) -> Option<&Decision> {
+        self.best.as_ref()
     }
 
     /// Since when one is held.
@@ -109,49 +106,71 @@ impl Agreement {
     }
 
     /// Notes that this class was announced for the swarm, by whomever.
-    pub fn note_announced(&mut self, now: Duration, class: Option<ClassId>) {
-        self.announced = Some(class);
-        if let Some(held) = self.held.as_mut().filter(|held| held.decision.class != class) {
+    pub fn note_announced(&mut self, now: Duration, class: Option<ClassId>, is_final: bool) {
+        let answered = self.announced.map(|announced| announced.class);
+        self.announced = Some(Announced { class, is_final });
+        if let Some(held) = self.held.as_mut().filter(|held| held.decision.class != class)
+            // Who goes on contradicting keeps nobody from answering.
+            && answered.is_none_or(|answered| answered == held.decision.class)
+        {
             held.unsettled = now;
         }
     }
 
     /// When a robot that waits that long after the last change announces the decision held; `None` while there is
-    /// none, or its class is announced already.
+    /// none, or its class is announced already. A gesture that no majority is known to hold waits `provisional` longer,
+    /// and is announced again when one is.
     #[must_use]
-    pub fn announcement(&self, wait: Duration) -> Option<Duration> {
+    pub fn announcement(&self, wait: Duration, is_final: bool, provisional: Duration) -> Option<Duration> {
         let held = self.held.as_ref()?;
-        (self.announced != Some(held.decision.class)).then_some(held.unsettled + wait)
+        let due = held.unsettled + wait;
+        match self.announced.filter(|announced| announced.class == held.decision.class) {
+            Some(announced) if announced.is_final || !is_final => None,
+            None if !is_final && held.decision.class.is_some() => Some(due + provisional),
+            Some(_) | None => Some(due),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Certificate, CountedVote, FusionRule, RoundId, Stamp, VocabularyId};
+    use gestalt_protocol::{Certificate, CountedVote, FusionRule, RoundId, Stamp, VocabularyId, Vote};
     use proptest::prelude::*;
 
     use super::*;
 
     fn decision(class: Option<u8>, robots: u32, confidence: f64, author: u32) -> Decision {
+        let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
         let vote = |robot| CountedVote {
             robot: RobotId(robot),
             stamp: Stamp::default(),
             class: ClassId(0),
             weight: 1.0,
+            vote: Vote { round, vocabulary: VocabularyId(0), evidence: vec![0.0; 4], looks: 1.0 },
+            signature: None,
         };
         Decision {
-            round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
+            round,
             class: class.map(ClassId),
             confidence,
             author: RobotId(author),
+            is_final: false,
             certificate: Certificate {
                 vocabulary: VocabularyId(0),
                 rule: FusionRule::LogPool,
                 probabilities: vec![0.5; 4],
                 votes: (0..robots).map(vote).collect(),
+                others: Vec::new(),
+                robots,
+                quorum: 1,
                 elapsed_ms: 0,
             },
         }
+    }
+
+    /// Nobody need be known to hold it, and nothing waits for that.
+    fn announcement(agreement: &Agreement) -> Option<Duration> {
+        agreement.announcement(at(200), true, at(5000))
     }
 
     fn at(ms: u64) -> Duration {
@@ -161,86 +180,120 @@ mod tests {
     #[test]
     fn the_greater_decision_replaces_the_held_one_and_the_lesser_does_not() {
         let mut agreement = Agreement::default();
-        assert!(agreement.hear(None, decision(Some(1), 2, 0.96, 5), 0));
+        assert!(agreement.believe(decision(Some(1), 2, 0.96, 5)));
         assert_eq!(agreement.settle(at(0), true).unwrap().class, Some(ClassId(1)));
-        assert!(!agreement.hear(None, decision(Some(2), 1, 0.99, 4), 0), "fewer robots");
+        assert!(!agreement.believe(decision(Some(2), 1, 0.99, 4)), "fewer robots");
         assert_eq!(agreement.settle(at(1), true), None);
-        assert!(agreement.hear(None, decision(Some(2), 3, 0.95, 6), 0), "more robots");
+        assert!(agreement.believe(decision(Some(2), 3, 0.95, 6)), "more robots");
         assert_eq!(agreement.settle(at(2), true).unwrap().class, Some(ClassId(2)));
     }
 
     #[test]
     fn no_decision_is_held_only_when_that_is_allowed_and_yields_to_any_class() {
         let mut agreement = Agreement::default();
-        agreement.hear(None, decision(None, 9, 0.5, 1), 0);
+        agreement.believe(decision(None, 9, 0.5, 1));
         assert_eq!(agreement.settle(at(0), false), None);
         assert_eq!(agreement.settle(at(1), true).unwrap().class, None);
-        agreement.hear(None, decision(Some(3), 1, 0.95, 2), 0);
+        agreement.believe(decision(Some(3), 1, 0.95, 2));
         assert_eq!(agreement.settle(at(2), false).unwrap().class, Some(ClassId(3)));
     }
 
     #[test]
-    fn with_f_liars_f_plus_1_distinct_robots_must_hold_the_class() {
+    fn a_decision_is_final_once_so_many_robots_are_known_to_hold_its_class() {
         let mut agreement = Agreement::default();
-        let lie = decision(Some(1), 4000, 1.0, 66);
-        for _ in 0..3 {
-            assert!(!agreement.hear(Some(RobotId(66)), lie.clone(), 1), "the same robot again");
-        }
-        assert!(!agreement.hear(None, lie.clone(), 1), "nobody's word");
-        assert!(!agreement.hear(Some(RobotId(1)), decision(Some(2), 3, 0.97, 1), 1));
-        assert!(agreement.hear(Some(RobotId(2)), decision(Some(2), 4, 0.97, 2), 1));
-        assert_eq!(
-            agreement.settle(at(0), true).unwrap().certificate.votes.len(),
-            4,
-            "the greatest of the class"
-        );
-        assert!(agreement.hear(Some(RobotId(3)), lie, 1), "one more than the liars vouch for it");
+        agreement.believe(decision(Some(1), 3, 0.96, 5));
+        agreement.settle(at(0), true);
+        let holds = |agreement: &mut Agreement, robot, class, robots| {
+            let decision = decision(Some(class), robots, 0.96, robot);
+            agreement.note_holder(RobotId(robot), decision.rank(), decision.class);
+        };
+        holds(&mut agreement, 2, 1, 2);
+        holds(&mut agreement, 2, 1, 3);
+        holds(&mut agreement, 3, 0, 2);
+        let of = |agreement: &Agreement, guests: &[u32]| {
+            let guests = guests.iter().copied().map(RobotId).collect();
+            (2..9).rfind(|quorum| agreement.is_final(*quorum, &guests))
+        };
+        assert_eq!(of(&agreement, &[]), Some(2), "one robot counts once");
+        holds(&mut agreement, 3, 1, 3);
+        assert_eq!(of(&agreement, &[]), Some(3), "it has changed its mind");
+        holds(&mut agreement, 3, 0, 2);
+        assert_eq!(of(&agreement, &[]), Some(3), "an old word comes late");
+        assert_eq!(of(&agreement, &[3, 4]), Some(4), "what holds through this one counts, once");
+    }
+
+    #[test]
+    fn what_no_majority_holds_is_announced_late_and_again_when_one_does() {
+        let mut agreement = Agreement::default();
+        agreement.believe(decision(Some(1), 3, 0.96, 5));
+        agreement.settle(at(100), true);
+        let due = |agreement: &Agreement| {
+            let is_final = agreement.is_final(2, &BTreeSet::new());
+            agreement.announcement(at(200), is_final, at(5000))
+        };
+        assert_eq!(due(&agreement), Some(at(5300)));
+        agreement.note_announced(at(5300), Some(ClassId(1)), false);
+        assert_eq!(due(&agreement), None);
+        let held = agreement.held().cloned().unwrap();
+        agreement.note_holder(RobotId(2), held.rank(), held.class);
+        assert_eq!(due(&agreement), Some(at(300)), "overdue");
+        agreement.note_announced(at(6000), Some(ClassId(1)), true);
+        assert_eq!(due(&agreement), None);
     }
 
     #[test]
     fn what_was_announced_is_not_announced_again_unless_the_class_changes() {
         let mut agreement = Agreement::default();
-        assert_eq!(agreement.announcement(at(200)), None);
-        agreement.hear(None, decision(Some(1), 2, 0.96, 5), 0);
+        assert_eq!(announcement(&agreement), None);
+        agreement.believe(decision(Some(1), 2, 0.96, 5));
         agreement.settle(at(100), true);
-        assert_eq!(agreement.announcement(at(200)), Some(at(300)));
-        agreement.note_announced(at(300), Some(ClassId(1)));
-        assert_eq!(agreement.announcement(at(200)), None);
-        agreement.hear(None, decision(Some(1), 3, 0.96, 5), 0);
+        assert_eq!(announcement(&agreement), Some(at(300)));
+        agreement.note_announced(at(300), Some(ClassId(1)), true);
+        assert_eq!(announcement(&agreement), None);
+        agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(400), true);
-        assert_eq!(agreement.announcement(at(200)), None, "the same class by more robots");
-        agreement.hear(None, decision(Some(2), 4, 0.96, 5), 0);
+        assert_eq!(announcement(&agreement), None, "the same class by more robots");
+        agreement.believe(decision(Some(2), 4, 0.96, 5));
         agreement.settle(at(500), true);
-        assert_eq!(agreement.announcement(at(200)), Some(at(700)));
+        assert_eq!(announcement(&agreement), Some(at(700)));
     }
 
     #[test]
     fn an_announcement_that_contradicts_is_answered() {
         let mut agreement = Agreement::default();
-        agreement.hear(None, decision(Some(1), 2, 0.96, 5), 0);
+        agreement.believe(decision(Some(1), 2, 0.96, 5));
         agreement.settle(at(0), true);
-        agreement.note_announced(at(900), Some(ClassId(3)));
-        assert_eq!(agreement.announcement(at(200)), Some(at(1100)));
+        agreement.note_announced(at(900), Some(ClassId(3)), true);
+        assert_eq!(announcement(&agreement), Some(at(1100)));
+    }
+
+    #[test]
+    fn who_goes_on_contradicting_keeps_nobody_from_answering() {
+        let mut agreement = Agreement::default();
+        agreement.believe(decision(Some(1), 2, 0.96, 5));
+        agreement.settle(at(0), true);
+        for time in [100, 200, 290] {
+            agreement.note_announced(at(time), Some(ClassId(3)), false);
+        }
+        assert_eq!(announcement(&agreement), Some(at(300)));
     }
 
     proptest! {
         #[test]
         fn order_and_repetition_make_no_difference(
             (heard, shuffled) in prop::collection::vec(
-                (0..5u32, prop::option::of(0..3u8), 1..4u32, 0..3u32, 0..5u32), 1..20
+                (prop::option::of(0..3u8), 1..4u32, 0..3u32, 0..5u32), 1..20
             ).prop_flat_map(|heard| {
                 let twice: Vec<_> = heard.iter().chain(&heard).copied().collect();
                 (Just(heard), Just(twice).prop_shuffle())
             }),
-            liars in 0..3u32,
         ) {
-            let held = |heard: &[(u32, Option<u8>, u32, u32, u32)]| {
+            let held = |heard: &[(Option<u8>, u32, u32, u32)]| {
                 let mut agreement = Agreement::default();
-                for &(holder, class, robots, confidence, author) in heard {
+                for &(class, robots, confidence, author) in heard {
                     // What has one rank is one decision: a robot makes one of its own per round.
                     let author = author + 5 * class.map_or(3, u32::from);
-                    let decision = decision(class, robots, f64::from(confidence) / 4.0, author);
-                    agreement.hear(Some(RobotId(holder)), decision, liars);
+                    agreement.believe(decision(class, robots, f64::from(confidence) / 4.0, author));
                     agreement.settle(at(0), true);
                 }
                 agreement.held().cloned()

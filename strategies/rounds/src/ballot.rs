@@ -28,26 +28,34 @@ pub struct Scale {
     pub classes: usize,
 }
 
+impl Scale {
+    /// Whether a vote is evidence on it.
+    #[must_use]
+    pub fn is_of(self, vote: &Vote) -> bool {
+        vote.evidence.len() == self.classes && vote.vocabulary == self.vocabulary
+    }
+}
+
 /// The latest vote of each robot. Putting votes in commutes and repeats harmlessly: whatever the order and the
 /// number of copies, the same votes make the same ballot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ballot {
-    votes: BTreeMap<RobotId, (Stamp, Vote)>,
+    votes: BTreeMap<RobotId, HeldVote>,
 }
 
 impl Ballot {
     /// Puts a vote in, if it is the latest of its robot.
-    pub fn cast(&mut self, robot: RobotId, stamp: Stamp, vote: Vote) -> Cast {
+    pub fn cast(&mut self, held: HeldVote) -> Cast {
         let full = self.votes.len() >= MAX_ROBOTS;
-        match self.votes.entry(robot) {
-            Entry::Occupied(held) if held.get().0 >= stamp => Cast::Known,
-            Entry::Occupied(mut held) => {
-                held.insert((stamp, vote));
+        match self.votes.entry(held.robot) {
+            Entry::Occupied(known) if known.get().stamp >= held.stamp => Cast::Known,
+            Entry::Occupied(mut known) => {
+                known.insert(held);
                 Cast::Counted
             }
             Entry::Vacant(_) if full => Cast::Full,
             Entry::Vacant(place) => {
-                place.insert((stamp, vote));
+                place.insert(held);
                 Cast::Counted
             }
         }
@@ -70,33 +78,31 @@ impl Ballot {
     pub fn has_spoken(&self, robot: RobotId) -> bool {
         self.votes
             .get(&robot)
-            .is_some_and(|(_, vote)| !vote.evidence.is_empty() || vote.vocabulary == VocabularyId::NONE)
+            .is_some_and(|held| !held.vote.evidence.is_empty() || held.vote.vocabulary == VocabularyId::NONE)
     }
 
     /// Which vote of that robot is held.
     #[must_use]
     pub fn stamp(&self, robot: RobotId) -> Option<Stamp> {
-        self.votes.get(&robot).map(|(stamp, _)| *stamp)
+        self.votes.get(&robot).map(|held| held.stamp)
     }
 
     /// Which votes are held, by robot.
     pub fn stamps(&self) -> impl Iterator<Item = (RobotId, Stamp)> + '_ {
-        self.votes.iter().map(|(robot, (stamp, _))| (*robot, *stamp))
+        self.votes.values().map(|held| (held.robot, held.stamp))
     }
 
     /// The votes that one who holds `known` lacks or has only older versions of, by robot.
     pub fn lacking<'a>(&'a self, known: &'a BTreeMap<RobotId, Stamp>) -> impl Iterator<Item = HeldVote> + 'a {
-        self.votes
-            .iter()
-            .filter(|(robot, (stamp, _))| known.get(robot).is_none_or(|theirs| theirs < stamp))
-            .map(|(robot, (stamp, vote))| HeldVote { robot: *robot, stamp: *stamp, vote: vote.clone() })
+        let lacking = |held: &&HeldVote| known.get(&held.robot).is_none_or(|theirs| *theirs < held.stamp);
+        self.votes.values().filter(lacking).cloned()
     }
 
     /// The scale most votes with evidence are on; of equals the one of the smaller vocabulary, then of fewer classes.
     #[must_use]
     pub fn prevailing_scale(&self) -> Option<Scale> {
         let mut scales = BTreeMap::<(u32, usize), usize>::new();
-        for (_, vote) in self.votes.values().filter(|(_, vote)| !vote.evidence.is_empty()) {
+        for HeldVote { vote, .. } in self.votes.values().filter(|held| !held.vote.evidence.is_empty()) {
             *scales.entry((vote.vocabulary.0, vote.evidence.len())).or_default() += 1;
         }
         // Reversed, because of equal maxima the last one is returned.
@@ -113,7 +119,7 @@ impl Ballot {
     /// All evidence on that scale as one distribution; `None` when there is none, or the rule makes none of it.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
-        let votes: Vec<&[f32]> = self.on(scale).map(|(_, _, vote)| vote.evidence.as_slice()).collect();
+        let votes: Vec<&[f32]> = self.on(scale).map(|held| held.vote.evidence.as_slice()).collect();
         rule.fuse(clip, scale.classes, &votes).filter(|fusion| fusion.is_sound(scale.classes))
     }
 
@@ -122,22 +128,33 @@ impl Ballot {
     pub fn counted(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Vec<CountedVote> {
         let weight = |vote: &Vote| Some(rule.weight(clip, &vote.evidence) as f32);
         self.on(scale)
-            .map(|(robot, stamp, vote)| CountedVote {
-                robot,
-                stamp,
+            .map(|HeldVote { robot, stamp, vote, signature }| CountedVote {
+                robot: *robot,
+                stamp: *stamp,
                 class: fusion::top_of(&vote.evidence),
                 weight: weight(vote).filter(|w| w.is_finite() && *w >= 0.0).unwrap_or(0.0),
+                vote: vote.clone(),
+                signature: *signature,
             })
             .collect()
     }
 
-    fn on(&self, scale: Scale) -> impl Iterator<Item = (RobotId, Stamp, &Vote)> {
-        self.votes
-            .iter()
-            .filter(move |(_, (_, vote))| {
-                vote.evidence.len() == scale.classes && vote.vocabulary == scale.vocabulary
-            })
-            .map(|(robot, (stamp, vote))| (*robot, *stamp, vote))
+    /// The votes that [`Ballot::fuse`] does not count on that scale: all of them where there is none.
+    #[must_use]
+    pub fn uncounted(&self, scale: Option<Scale>) -> Vec<HeldVote> {
+        let counted = |held: &&HeldVote| !scale.is_some_and(|scale| scale.is_of(&held.vote));
+        self.votes.values().filter(counted).cloned().collect()
+    }
+
+    /// Whether that vote of that robot is held, word for word; `None` when another one of it, or none, is held.
+    #[must_use]
+    pub(crate) fn confirms(&self, robot: RobotId, stamp: Stamp, vote: &Vote) -> Option<bool> {
+        let held = self.votes.get(&robot).filter(|held| held.stamp == stamp)?;
+        Some(held.vote.vocabulary == vote.vocabulary && held.vote.evidence == vote.evidence)
+    }
+
+    fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> {
+        self.votes.values().filter(move |held| scale.is_of(&held.vote))
     }
 }
 
@@ -160,6 +177,10 @@ mod tests {
         }
     }
 
+    fn held(robot: RobotId, stamp: Stamp, vote: Vote) -> HeldVote {
+        HeldVote { robot, stamp, vote, signature: None }
+    }
+
     fn stamp(boot: u32, sequence: u32) -> Stamp {
         Stamp { boot, sequence }
     }
@@ -167,10 +188,10 @@ mod tests {
     #[test]
     fn the_latest_vote_replaces_the_earlier() {
         let mut ballot = Ballot::default();
-        assert_eq!(ballot.cast(RobotId(1), stamp(1, 5), vote(&[3.0, 0.0, 0.0])), Cast::Counted);
-        assert_eq!(ballot.cast(RobotId(1), stamp(1, 4), vote(&[0.0, 3.0, 0.0])), Cast::Known);
+        assert_eq!(ballot.cast(held(RobotId(1), stamp(1, 5), vote(&[3.0, 0.0, 0.0]))), Cast::Counted);
+        assert_eq!(ballot.cast(held(RobotId(1), stamp(1, 4), vote(&[0.0, 3.0, 0.0]))), Cast::Known);
         assert_eq!(ballot.fuse(&FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 0);
-        assert_eq!(ballot.cast(RobotId(1), stamp(2, 0), vote(&[0.0, 0.0, 3.0])), Cast::Counted);
+        assert_eq!(ballot.cast(held(RobotId(1), stamp(2, 0), vote(&[0.0, 0.0, 3.0]))), Cast::Counted);
         assert_eq!(ballot.fuse(&FusionRule::LogPool, 6.0, SCALE).unwrap().top.0, 2);
         assert_eq!(ballot.len(), 1);
     }
@@ -178,7 +199,7 @@ mod tests {
     #[test]
     fn a_null_vote_takes_part_without_counting() {
         let mut ballot = Ballot::default();
-        ballot.cast(RobotId(1), stamp(1, 1), vote(&[]));
+        ballot.cast(held(RobotId(1), stamp(1, 1), vote(&[])));
         assert!(!ballot.has_spoken(RobotId(1)));
         assert_eq!(ballot.len(), 1);
         assert_eq!(ballot.contributors(SCALE), 0);
@@ -190,10 +211,14 @@ mod tests {
     fn only_votes_on_one_scale_are_fused() {
         let mut ballot = Ballot::default();
         for robot in 1..=2 {
-            ballot.cast(RobotId(robot), stamp(1, 1), vote(&[3.0, 0.0, 0.0]));
+            ballot.cast(held(RobotId(robot), stamp(1, 1), vote(&[3.0, 0.0, 0.0])));
         }
-        ballot.cast(RobotId(3), stamp(1, 1), Vote { vocabulary: VocabularyId(8), ..vote(&[0.0, 6.0, 0.0]) });
-        ballot.cast(RobotId(4), stamp(1, 1), vote(&[0.0, 6.0]));
+        ballot.cast(held(
+            RobotId(3),
+            stamp(1, 1),
+            Vote { vocabulary: VocabularyId(8), ..vote(&[0.0, 6.0, 0.0]) },
+        ));
+        ballot.cast(held(RobotId(4), stamp(1, 1), vote(&[0.0, 6.0])));
         assert_eq!(ballot.prevailing_scale(), Some(SCALE));
         assert_eq!(ballot.contributors(SCALE), 2);
         let counted: Vec<_> = ballot.counted(&FusionRule::LogPool, 6.0, SCALE);
@@ -207,10 +232,10 @@ mod tests {
     fn a_ballot_never_outgrows_the_largest_swarm() {
         let mut ballot = Ballot::default();
         for robot in 0..MAX_ROBOTS as u32 {
-            assert_eq!(ballot.cast(RobotId(robot), stamp(1, 1), vote(&[])), Cast::Counted);
+            assert_eq!(ballot.cast(held(RobotId(robot), stamp(1, 1), vote(&[]))), Cast::Counted);
         }
-        assert_eq!(ballot.cast(RobotId(u32::MAX), stamp(1, 1), vote(&[])), Cast::Full);
-        assert_eq!(ballot.cast(RobotId(0), stamp(1, 2), vote(&[])), Cast::Counted);
+        assert_eq!(ballot.cast(held(RobotId(u32::MAX), stamp(1, 1), vote(&[]))), Cast::Full);
+        assert_eq!(ballot.cast(held(RobotId(0), stamp(1, 2), vote(&[]))), Cast::Counted);
         assert_eq!(ballot.len(), MAX_ROBOTS);
     }
 
@@ -237,7 +262,7 @@ mod tests {
             let count = |votes: &[(RobotId, Stamp, Vote)]| {
                 let mut ballot = Ballot::default();
                 for (robot, stamp, vote) in votes {
-                    ballot.cast(*robot, *stamp, vote.clone());
+                    ballot.cast(held(*robot, *stamp, vote.clone()));
                 }
                 ballot
             };

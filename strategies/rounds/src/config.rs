@@ -6,6 +6,9 @@ use gestalt_protocol::{FusionRule, MAX_ROBOTS, RuleName};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::fusion::Fusion;
+use crate::quorum::Quorum;
+
 /// Parameters no robot can work with; each names the field and the mend.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -20,8 +23,18 @@ pub enum RoundsConfigError {
     )]
     Rule(RuleName),
     /// A quorum that is always or never met.
-    #[error("quorum is {0}: choose from 1 to {MAX_ROBOTS} robots")]
+    #[error("quorum is {0}: choose \"majority\", or from 1 to {MAX_ROBOTS} robots")]
     Quorum(u32),
+    /// As many liars as could make a decision of their own.
+    #[error(
+        "liars is {liars} and quorum is {quorum}: a quorum must be more than twice the liars, or \"majority\""
+    )]
+    Liars {
+        /// f.
+        liars: u32,
+        /// q.
+        quorum: u32,
+    },
     /// A bound on the evidence that bounds nothing or leaves none.
     #[error("clip is {0}: choose it above 0 and at most 1000 nats, for example 6")]
     Clip(f64),
@@ -51,10 +64,14 @@ pub struct RoundsConfig {
     pub rule: FusionRule,
     /// α: decide once the fused probability of the top class reaches 1 − α. Range `0.0 < α < 0.5`.
     pub alpha: f64,
-    /// q: how many robots must have contributed evidence. At least 1.
-    pub quorum: u32,
+    /// q: how many robots a decision needs.
+    pub quorum: Quorum,
+    /// For how long a robot counts for the majority after its last vote: as long as parts of a swarm may be cut off from each other
+    /// and neither is to take itself for the whole.
+    #[serde(with = "humantime_serde")]
+    pub lately: Duration,
     /// f: how many lying robots a decision must withstand. The margin top − second must exceed what f robots can
-    /// add to it (2·f·c for the log pools), and a decision heard is believed once f + 1 robots hold its class.
+    /// add to it (2·f·c for the log pools), and more than 2·f robots must give evidence.
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
@@ -99,7 +116,8 @@ impl Default for RoundsConfig {
         Self {
             rule: FusionRule::LogPool,
             alpha: 0.05,
-            quorum: 1,
+            quorum: Quorum::Majority,
+            lately: Duration::from_secs(120),
             liars: 0,
             clip: 6.0,
             decorrelation: Duration::from_millis(500),
@@ -118,6 +136,40 @@ impl Default for RoundsConfig {
 }
 
 impl RoundsConfig {
+    /// q: how many robots a decision needs, of so many.
+    #[must_use]
+    pub fn needs(&self, robots: u32) -> u32 {
+        match self.quorum {
+            Quorum::Majority => robots / 2 + 1,
+            Quorum::Evidence(quorum) => quorum,
+        }
+    }
+
+    /// How many robots must be known to hold a decision for it to be final, of so many.
+    #[must_use]
+    pub fn holders(&self, robots: u32) -> u32 {
+        match self.quorum {
+            Quorum::Majority => self.needs(robots),
+            Quorum::Evidence(_) => 1,
+        }
+    }
+
+    /// Whether these are enough to decide: the robots that take part, those of them that gave evidence, and all there are.
+    #[must_use]
+    pub fn suffice(&self, reached: usize, contributors: usize, robots: u32) -> bool {
+        let counted = match self.quorum {
+            Quorum::Majority => reached,
+            Quorum::Evidence(_) => contributors,
+        };
+        counted >= self.needs(robots) as usize && (self.liars == 0 || contributors > 2 * self.liars as usize)
+    }
+
+    /// Whether votes that were fused to this decide.
+    #[must_use]
+    pub fn convinces(&self, fusion: &Fusion) -> bool {
+        fusion.probabilities[fusion.top.index()] >= 1.0 - self.alpha && fusion.margin > f64::from(self.liars)
+    }
+
     /// Whether a robot can work with these parameters.
     ///
     /// # Errors
@@ -129,8 +181,13 @@ impl RoundsConfig {
         if let FusionRule::Other(name) = self.rule {
             return Err(RoundsConfigError::Rule(name));
         }
-        if !(1..=MAX_ROBOTS).contains(&(self.quorum as usize)) {
-            return Err(RoundsConfigError::Quorum(self.quorum));
+        if let Quorum::Evidence(quorum) = self.quorum {
+            if !(1..=MAX_ROBOTS).contains(&(quorum as usize)) {
+                return Err(RoundsConfigError::Quorum(quorum));
+            }
+            if u64::from(quorum) <= 2 * u64::from(self.liars) && self.liars > 0 {
+                return Err(RoundsConfigError::Liars { liars: self.liars, quorum });
+            }
         }
         if !(self.clip > 0.0 && self.clip <= 1000.0) {
             return Err(RoundsConfigError::Clip(self.clip));
@@ -147,7 +204,12 @@ impl RoundsConfig {
         if let Some((field, _)) = above_zero.iter().find(|(_, duration)| duration.is_zero()) {
             return Err(RoundsConfigError::Zero(field));
         }
-        let any = [("patience", self.patience), ("refractory", self.refractory), ("settle", self.settle)];
+        let any = [
+            ("patience", self.patience),
+            ("refractory", self.refractory),
+            ("settle", self.settle),
+            ("lately", self.lately),
+        ];
         let day = Duration::from_secs(24 * 60 * 60);
         if let Some((field, _)) = above_zero.iter().chain(&any).find(|(_, duration)| *duration > day) {
             return Err(RoundsConfigError::TooLong(field));
@@ -181,7 +243,8 @@ mod tests {
             (RoundsConfig { alpha: 0.5, ..default() }, "alpha"),
             (RoundsConfig { alpha: f64::NAN, ..default() }, "alpha"),
             (RoundsConfig { rule: FusionRule::Other("mine".parse().unwrap()), ..default() }, "mine"),
-            (RoundsConfig { quorum: 0, ..default() }, "quorum"),
+            (RoundsConfig { quorum: Quorum::Evidence(0), ..default() }, "quorum"),
+            (RoundsConfig { quorum: Quorum::Evidence(2), liars: 1, ..default() }, "liars"),
             (RoundsConfig { clip: f64::INFINITY, ..default() }, "clip"),
             (RoundsConfig { repair_busy: ms(0), ..default() }, "repair_busy"),
             (RoundsConfig { settle: Duration::MAX, ..default() }, "settle"),

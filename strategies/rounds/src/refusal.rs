@@ -7,6 +7,8 @@ pub enum Refusal {
     DuplicateId,
     /// A round so far ahead of all rounds known that its counter is taken for a mistake or a lie.
     FarAhead,
+    /// A round that would end the open one before that had its time.
+    TooSoon,
     /// A vote or decision over another vocabulary, or with another number of classes, than this robot's classifier has.
     Vocabulary,
     /// A decision that is none by this robot's own rule, quorum and alpha: all robots need the same.
@@ -33,9 +35,10 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::DuplicateId,
         Self::FarAhead,
+        Self::TooSoon,
         Self::Vocabulary,
         Self::Unfounded,
         Self::Impossible,
@@ -55,6 +58,7 @@ impl Refusal {
         match self {
             Self::DuplicateId => "refused_duplicate_id",
             Self::FarAhead => "refused_round_far_ahead",
+            Self::TooSoon => "refused_round_too_soon",
             Self::Vocabulary => "refused_other_vocabulary",
             Self::Unfounded => "refused_unfounded_decision",
             Self::Impossible => "refused_impossible_value",

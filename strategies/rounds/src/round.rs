@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, Decision, Envelope, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Certificate, Decision, Envelope, HeldVote, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 use crate::agreement::Agreement;
@@ -14,6 +14,7 @@ use crate::config::RoundsConfig;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::observation::Observation;
+use crate::sign::Sign;
 
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
 #[derive(Clone, Debug)]
@@ -27,6 +28,8 @@ pub(crate) struct Round {
     pub agreement: Agreement,
     evidence: Option<Evidence>,
     said: Option<Said>,
+    /// Whether this robot has drawn its own conclusion.
+    concluded: bool,
     /// When it ends undecided, if before its deadline.
     ends: Option<Duration>,
 }
@@ -50,6 +53,7 @@ impl Round {
             agreement: Agreement::default(),
             evidence: None,
             said: None,
+            concluded: false,
             ends: None,
         }
     }
@@ -118,15 +122,11 @@ impl Round {
         Vote { round: self.id, vocabulary, evidence, looks }
     }
 
-    /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next. `stamp` is that of
-    /// the last message said; `vocabulary` is the classifier's; `blind`: who has seen nothing says that it cannot.
+    /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next.
     pub fn speak(
         &mut self,
         now: Duration,
-        me: RobotId,
-        stamp: &mut Stamp,
-        vocabulary: Option<VocabularyId>,
-        blind: bool,
+        speaker: &mut Speaker<'_>,
         config: &RoundsConfig,
     ) -> Option<Envelope> {
         if self.vote_due(config).is_none_or(|due| now < due) {
@@ -135,11 +135,13 @@ impl Round {
         if let Some(repeated) = self.repeat(now) {
             return Some(repeated);
         }
-        let vocabulary = vocabulary.filter(|_| !blind || self.has_evidence());
+        let vocabulary = speaker.vocabulary.filter(|_| !speaker.blind || self.has_evidence());
         let vote = self.vote(vocabulary.unwrap_or(VocabularyId::NONE), config.clip);
-        stamp.sequence = stamp.sequence.saturating_add(1);
-        self.ballot.cast(me, *stamp, vote.clone());
-        let envelope = Envelope { author: me, stamp: *stamp, message: Message::Vote(vote) };
+        speaker.stamp.sequence = speaker.stamp.sequence.saturating_add(1);
+        let (author, stamp) = (speaker.me, *speaker.stamp);
+        let mut envelope = Envelope { author, stamp, message: Message::Vote(vote.clone()), signature: None };
+        envelope.signature = speaker.signer.map(|signer| signer.sign(&envelope.statement()));
+        self.ballot.cast(HeldVote { robot: author, stamp, vote, signature: envelope.signature });
         self.said = Some(Said { at: now, envelope: envelope.clone(), outdated: false });
         Some(envelope)
     }
@@ -172,43 +174,38 @@ impl Round {
         self.ends.get_or_insert(now + config.patience);
     }
 
-    /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline.
-    pub fn conclude(
-        &mut self,
-        now: Duration,
-        me: RobotId,
-        alive: &BTreeSet<RobotId>,
-        scale: Option<Scale>,
-        rule: &dyn Fuse,
-        config: &RoundsConfig,
-    ) {
-        // One of its own per round: what is concluded is held at once.
-        if !self.open || self.agreement.held().is_some() {
+    /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline. Who holds the decision of
+    /// another goes on to conclude when it knows of more evidence than that rests on.
+    pub fn conclude(&mut self, now: Duration, view: &View<'_>, rule: &dyn Fuse, config: &RoundsConfig) {
+        if !self.open || self.concluded {
             return;
         }
         let (patience, deadline) = self.patience_and_deadline(config);
         let late = now >= deadline;
         // Asked at every input: with a thousand robots, counting their votes each time would be most of the work.
-        if now < patience && self.ballot.len() < alive.len() {
+        if now < patience && self.ballot.len() < view.expected.len() {
             return;
         }
+        let scale = view.scale.or_else(|| self.ballot.prevailing_scale());
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
+        if self
+            .agreement
+            .best()
+            .is_some_and(|best| best.class.is_some() && best.certificate.votes.len() >= contributors)
+        {
+            return;
+        }
         // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
-        let mut robots = alive.iter().chain([&me]);
+        let mut robots = view.expected.iter().chain([&view.me]);
         let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
-        if !late && (contributors == 0 || contributors < config.quorum as usize || !heard_all) {
+        let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
+        if !late && !(suffice && heard_all) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
-        let class = fusion
-            .as_ref()
-            .filter(|fusion| {
-                contributors >= config.quorum as usize
-                    && fusion.probabilities[fusion.top.index()] >= 1.0 - config.alpha
-                    && fusion.margin > f64::from(config.liars)
-            })
-            .map(|fusion| fusion.top);
-        if class.is_none() && !late {
+        let class =
+            fusion.as_ref().filter(|fusion| suffice && config.convinces(fusion)).map(|fusion| fusion.top);
+        if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {
             return;
         }
         // Where nothing was fused nothing was counted.
@@ -218,18 +215,46 @@ impl Round {
             let confidence = fusion.probabilities[fusion.top.index()];
             (fusion.probabilities, confidence)
         });
+        self.concluded = true;
         self.agreement.believe(Decision {
             round: self.id,
             class,
             confidence,
-            author: me,
+            author: view.me,
+            is_final: false,
             certificate: Certificate {
                 vocabulary: scale.map_or(VocabularyId::NONE, |scale| scale.vocabulary),
                 rule: rule.rule(),
                 probabilities,
                 votes,
+                others: self.ballot.uncounted(counted),
+                robots: view.robots,
+                quorum: config.needs(view.robots),
                 elapsed_ms: u32::try_from(now.saturating_sub(self.since).as_millis()).unwrap_or(u32::MAX),
             },
         });
     }
+}
+
+/// In whose name a vote is said.
+pub(crate) struct Speaker<'a> {
+    pub me: RobotId,
+    /// That of the last message said.
+    pub stamp: &'a mut Stamp,
+    /// The classifier's.
+    pub vocabulary: Option<VocabularyId>,
+    /// Who is blind and has seen nothing says that it cannot see.
+    pub blind: bool,
+    pub signer: Option<&'a dyn Sign>,
+}
+
+/// What a robot knows of the swarm when it concludes.
+pub(crate) struct View<'a> {
+    pub me: RobotId,
+    /// The other robots that are alive and may yet say something.
+    pub expected: &'a BTreeSet<RobotId>,
+    /// How many robots there are.
+    pub robots: u32,
+    /// The scale of this robot's own classifier.
+    pub scale: Option<Scale>,
 }

@@ -8,7 +8,8 @@ use gestalt_protocol::{Envelope, RobotId, RoundId, Stamp};
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
 use crate::observation::Observation;
-use crate::round::Round;
+use crate::round::{Round, Speaker};
+use crate::sign::Sign;
 
 /// Turns what a robot sees into that robot's votes, as its own mind would. The rounds are those of another mind, which
 /// tells when one opens and closes.
@@ -23,6 +24,7 @@ pub struct Voter {
     stamp: Stamp,
     round: Option<Round>,
     blind: bool,
+    signer: Option<Arc<dyn Sign>>,
 }
 
 impl Voter {
@@ -39,7 +41,15 @@ impl Voter {
             stamp: Stamp { boot, sequence: 0 },
             round: None,
             blind: false,
+            signer: None,
         })
+    }
+
+    /// The same voter, that signs its votes.
+    #[must_use]
+    pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
+        self.signer = Some(signer);
+        self
     }
 
     /// It votes in that round from now on; an older one is over.
@@ -93,7 +103,10 @@ impl Voter {
     /// The vote to be said now, if one is due.
     pub fn speak(&mut self, now: Duration) -> Option<Envelope> {
         let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary().id());
-        self.round.as_mut()?.speak(now, self.me, &mut self.stamp, vocabulary, self.blind, &self.config)
+        let signer = self.signer.as_deref();
+        let mut speaker =
+            Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
+        self.round.as_mut()?.speak(now, &mut speaker, &self.config)
     }
 
     /// When to ask it to [`speak`](Voter::speak) again, if nothing else comes before.

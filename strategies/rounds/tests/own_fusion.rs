@@ -79,7 +79,12 @@ fn vote(author: u32, evidence: [f32; 2]) -> Input {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
     let vote = Vote { round, vocabulary: vocabulary().id(), evidence: evidence.to_vec(), looks: 1.0 };
     let stamp = Stamp { boot: 1, sequence: 1 };
-    Input::Received(Envelope { author: RobotId(author), stamp, message: Message::Vote(vote) })
+    Input::Received(Envelope {
+        author: RobotId(author),
+        stamp,
+        message: Message::Vote(vote),
+        signature: None,
+    })
 }
 
 /// The decisions a robot holds on two votes that contradict each other, until long after the deadline.
@@ -117,10 +122,10 @@ fn a_decision_is_adopted_by_who_has_the_rule_and_by_nobody_else() {
     let heard: Decision = decode_json(&json).unwrap();
     assert_eq!(heard, decision);
     let mut same = rounds(8, Some(Arc::new(First)));
-    same.handle(Duration::ZERO, Input::Heard(RobotId(7), heard.clone()));
+    same.handle(Duration::ZERO, Input::Announced(heard.clone()));
     assert_eq!(same.held(), Some(&decision));
     let mut other = rounds(9, None);
-    other.handle(Duration::ZERO, Input::Heard(RobotId(7), heard));
+    other.handle(Duration::ZERO, Input::Announced(heard));
     assert_eq!(other.held(), None);
     assert_eq!(other.refusals().count(Refusal::Unfounded), 1);
 }

@@ -50,7 +50,7 @@ impl Learning {
         let length = |samples: Vec<SharedSample>| {
             let message = Message::Samples(Samples { space: self.space_id, samples });
             let stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
-            Envelope { author: self.me, stamp, message }.encode().len()
+            Envelope { author: self.me, stamp, message, signature: None }.encode().len()
         };
         let empty = length(Vec::new());
         let each = length(vec![sample]) - empty;

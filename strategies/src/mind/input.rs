@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Instruction, InstructorId, RobotId};
+use gestalt_protocol::{Decision, Envelope, Holding, Instruction, InstructorId, RobotId};
 use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
 
 /// What the world tells the mind.
@@ -31,8 +31,8 @@ pub enum Input {
     Observed(Observation),
     /// A robot's message arrived, by whichever way.
     Received(Envelope),
-    /// That robot says it holds this decision (`robot/<id>/decision`).
-    Heard(RobotId, Decision),
+    /// That robot says which decision it holds (`robot/<id>/decision`).
+    Heard(RobotId, Holding),
     /// This decision was announced for the swarm (`decision`).
     Announced(Decision),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
@@ -81,7 +81,7 @@ impl Input {
             Self::Blind(blind) => AboutRounds::Blind(blind),
             Self::Observed(observation) => AboutRounds::Observed(observation),
             Self::Received(envelope) => AboutRounds::Received(envelope),
-            Self::Heard(robot, decision) => AboutRounds::Heard(robot, decision),
+            Self::Heard(robot, holding) => AboutRounds::Heard(robot, holding),
             Self::Announced(decision) => AboutRounds::Announced(decision),
             Self::Alive(robots) => AboutRounds::Alive(robots),
             Self::Guests(robots) => AboutRounds::Guests(robots),

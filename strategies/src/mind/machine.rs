@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message, RobotId};
 use gestalt_rounds::{
-    Classify, Follow, Fuse, Input as AboutRounds, Life, Rounds, RoundsConfig, RoundsConfigError,
+    Classify, Follow, Fuse, Input as AboutRounds, Life, Rounds, RoundsConfig, RoundsConfigError, Sign,
 };
 
 use super::answers::Answers;
@@ -74,6 +74,13 @@ impl Mind {
     #[must_use]
     pub fn fused_by(mut self, rule: Arc<dyn Fuse>) -> Self {
         self.rounds = self.rounds.fused_by(rule);
+        self
+    }
+
+    /// The same mind, that signs its votes, see [`Rounds::signed_by`].
+    #[must_use]
+    pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
+        self.rounds = self.rounds.signed_by(signer);
         self
     }
 

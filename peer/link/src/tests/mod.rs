@@ -77,6 +77,7 @@ fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         vocabulary: None,
         learning: None,
         nonce: fresh_nonce(),
+        seal: None,
     }
 }
 

@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use self::showing::Showing;
+use super::keys;
 use super::progress::bar;
 use super::show::{Names, counted, line};
 use super::{Failure, interrupted};
@@ -89,6 +90,14 @@ pub struct Args {
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
     swarm: String,
 
+    /// Keep the robots' keys and the roster in this folder [default: made for this run alone]
+    #[arg(long, value_name = "DIR")]
+    keys: Option<PathBuf>,
+
+    /// An open swarm: robots sign nothing, and are who they say they are
+    #[arg(long, conflicts_with = "keys")]
+    open: bool,
+
     /// Print JSON Lines, one object per line
     #[arg(long)]
     json: bool,
@@ -117,12 +126,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(curve) = &args.curve {
         gestalt_draw::check(curve)?;
     }
-    let configs = plan::configs(args)?;
+    let folder = tempfile::tempdir()?;
+    let keys = (!args.open).then(|| args.keys.clone().unwrap_or_else(|| folder.path().join("keys")));
+    let configs = plan::configs(args, keys.as_deref())?;
+    if let Some(keys) = &keys {
+        keys::enrol(keys, &args.swarm, configs.iter().map(|config| config.robot.id))?;
+    }
     let model = crate::model::load(&args.model)?.ok_or("a swarm needs a model: give --model FILE")?;
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         let mut swarm = tokio::select! {
-            started = start(args, &configs, &model) => started?,
+            started = start(args, &configs, &model, folder) => started?,
             () = &mut interrupted => return Ok(()),
         };
         let names = Names::new(model.classifier.vocabulary());
@@ -147,14 +161,18 @@ struct Swarm {
     members: Members,
     client: Client,
     news: News,
-    /// Holds the configurations of robots in processes of their own.
+    /// Holds their keys, and the configurations of robots in processes of their own.
     _folder: tempfile::TempDir,
 }
 
 /// Starts the robots, and waits until they know each other.
-async fn start(args: &Args, configs: &[Config], model: &RobotModel) -> Result<Swarm, Failure> {
+async fn start(
+    args: &Args,
+    configs: &[Config],
+    model: &RobotModel,
+    folder: tempfile::TempDir,
+) -> Result<Swarm, Failure> {
     let links = args.topology.links(configs.len(), &mut ChaCha8Rng::seed_from_u64(args.seed));
-    let folder = tempfile::tempdir()?;
     let began = Instant::now();
     let starting = bar("starting", configs.len());
     let started = |n| starting.set_position(n as u64);

@@ -1,5 +1,7 @@
 //! Who takes part: one configuration for each robot.
 
+use std::path::Path;
+
 use gestalt_protocol::RobotId;
 use serde_json::json;
 
@@ -9,7 +11,7 @@ use crate::config::{CameraSection, Config, LearningSection, MotionConfig, Render
 use gestalt_vision::pose::place;
 
 /// One configuration for each robot: all around one person, listening on a free port of this machine.
-pub(super) fn configs(args: &Args) -> Result<Vec<Config>, Failure> {
+pub(super) fn configs(args: &Args, keys: Option<&Path>) -> Result<Vec<Config>, Failure> {
     let cameras = args.robots.cameras();
     let schedule = (args.by == By::Motion).then_some(SCHEDULE);
     let mut configs = Vec::with_capacity(cameras.len());
@@ -26,6 +28,7 @@ pub(super) fn configs(args: &Args) -> Result<Vec<Config>, Failure> {
         };
         config.model = args.model.clone();
         config.rounds.rule = args.rule;
+        config.trust.keys = keys.map(Path::to_owned);
         if let Some(from) = args.learn {
             let memory = args.memory.as_ref().map(|folder| folder.join(format!("robot-{id}.memory")));
             config.learning = LearningSection {

@@ -85,6 +85,9 @@ impl Rounds {
     pub(super) fn close(&mut self, effects: &mut Effects<'_>) {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.open = false;
+            if self.now >= round.since + self.config.patience {
+                self.electorate.round_over(round.since);
+            }
         }
         if self.looking_until(effects.follower).is_none() {
             self.stop_looking(effects);
@@ -124,6 +127,7 @@ impl Rounds {
         self.close(effects);
         self.stop_looking(effects);
         self.highest = self.highest.max(Some(id.counter));
+        self.electorate.forget(self.now, self.config.lately);
         self.round = Some(Round::new(id, self.now, open));
         self.looking = open.then_some(id);
         effects.follower.entered(id);

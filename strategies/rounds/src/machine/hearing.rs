@@ -2,19 +2,38 @@
 
 use std::cmp::Ordering;
 
-use gestalt_protocol::{Certificate, Decision, Envelope, Message, RobotId, RoundId, Stamp, Vote};
+use std::time::Duration;
+
+use gestalt_protocol::{
+    Certificate, Decision, Envelope, HeldVote, Holding, Message, RobotId, RoundId, Stamp,
+};
 
 use super::rounds::{Effects, Rounds};
 use crate::ballot::{Cast, Scale};
+use crate::proof::follows;
 use crate::refusal::Refusal;
 use crate::round::Round;
 
-/// A round this many counters ahead of the newest known is refused: nobody shows a million gestures unnoticed.
-const MAX_LEAP: u32 = 1_000_000;
+/// Counters may run ahead of what this life of the robot began with by so many, which is two years of gestures without a pause,
+const MAX_AHEAD: u64 = 1 << 24;
+
+/// and by so many more a second, which is as fast as gestures can be shown. So nobody uses them up.
+const AHEAD_PER_SECOND: u64 = 2;
+
+/// Who lacks a decision that another holds asks for it after this long: most have the votes, and conclude it themselves.
+const ASK_AFTER: Duration = Duration::from_millis(100);
+
+/// A decision that is lacking here.
+#[derive(Clone, Debug)]
+pub(super) struct Wanted {
+    pub holder: RobotId,
+    pub holding: Holding,
+    pub due: Duration,
+}
 
 impl Rounds {
     pub(super) fn on_received(&mut self, envelope: Envelope, effects: &mut Effects<'_>) {
-        let Envelope { author, stamp, message } = envelope;
+        let Envelope { author, stamp, message, signature } = envelope;
         if author == self.me {
             // The own words may come back; words never said are another's.
             if stamp.boot != self.stamp.boot || stamp > self.stamp {
@@ -24,7 +43,7 @@ impl Rounds {
         }
         match message {
             Message::Vote(vote) => {
-                self.hear_vote(author, stamp, vote, effects);
+                self.hear_vote(HeldVote { robot: author, stamp, vote, signature }, effects);
             }
             Message::Have(have) => self.on_have(author, &have, effects),
             Message::Give(give) => self.on_give(author, give, effects),
@@ -33,19 +52,56 @@ impl Rounds {
         }
     }
 
-    pub(super) fn on_heard(&mut self, robot: RobotId, decision: Decision, effects: &mut Effects<'_>) {
-        if robot != self.me {
-            self.hear_decision(Some(robot), decision, effects);
+    /// Hears which decision a robot holds. That is a hint: the decision itself is asked for.
+    pub(super) fn on_heard(&mut self, robot: RobotId, holding: Holding) {
+        if robot == self.me {
+            return;
+        }
+        if self.is_this_round(holding.round)
+            && let Some(round) = &mut self.round
+        {
+            for holder in holding.guests.iter().chain([&robot]) {
+                round.agreement.note_holder(*holder, holding.rank, holding.class);
+            }
+        }
+        let greater = self.wanted.as_ref().is_none_or(|wanted| {
+            (holding.round.counter, holding.rank) > (wanted.holding.round.counter, wanted.holding.rank)
+        });
+        if greater && self.lacks(&holding) {
+            let due = self.wanted.as_ref().map_or(self.now + ASK_AFTER, |wanted| wanted.due);
+            self.wanted = Some(Wanted { holder: robot, holding, due });
+        }
+    }
+
+    /// Whether that is a decision of a newer round than this robot knows, or a greater one of the newest.
+    fn lacks(&self, holding: &Holding) -> bool {
+        if holding.class.is_none() {
+            return false;
+        }
+        match &self.round {
+            Some(round) if self.is_this_round(holding.round) => round.agreement.rank() < Some(holding.rank),
+            Some(round) => round.id < holding.round,
+            None => true,
+        }
+    }
+
+    /// Asks for a decision that is lacking here, if it still is when its time has come.
+    pub(super) fn ask_when_due(&mut self, effects: &mut Effects<'_>) {
+        if let Some(wanted) = self.wanted.take_if(|wanted| self.now >= wanted.due)
+            && self.lacks(&wanted.holding)
+        {
+            self.tell_have(wanted.holder, false, effects);
         }
     }
 
     pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
-        let (id, class) = (decision.round, decision.class);
-        self.hear_decision(None, decision, effects);
-        if self.is_this_round(id)
+        let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
+        // What nobody would decide, nobody announced.
+        if self.hear_decision(decision, effects) != Heard::Refused
+            && self.is_this_round(id)
             && let Some(round) = &mut self.round
         {
-            round.agreement.note_announced(self.now, class);
+            round.agreement.note_announced(self.now, class, is_final);
         }
     }
 
@@ -58,34 +114,51 @@ impl Rounds {
         self.round.as_ref().is_some_and(|round| round.id == id || opened_at_once(round))
     }
 
-    /// Where a round that was heard of stands to the newest one known; refuses one too far ahead. Rounds opened at the same time
+    /// Where a round that was heard of stands to the newest one known.
+    pub(super) fn compare(&self, id: RoundId) -> Ordering {
+        match &self.round {
+            None => Ordering::Greater,
+            Some(_) if self.is_this_round(id) => Ordering::Equal,
+            Some(round) => id.cmp(&round.id),
+        }
+    }
+
+    /// The same, of a round that robots are in; refuses one too far ahead. Rounds opened at the same time
     /// merge here, on the smaller name; of others with equal counters, the greater name is the newer, for all alike.
     pub(super) fn place(&mut self, id: RoundId, effects: &mut Effects<'_>) -> Option<Ordering> {
-        if self.highest.is_some_and(|highest| id.counter > highest.saturating_add(MAX_LEAP)) {
+        let (first, began) = self.began;
+        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
+        if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
             self.refusals.add(Refusal::FarAhead);
             return None;
         }
-        self.highest = self.highest.max(Some(id.counter));
-        let this = self.is_this_round(id);
-        let Some(round) = &mut self.round else { return Some(Ordering::Greater) };
-        if !this {
-            return Some(id.cmp(&round.id));
+        if self.is_too_soon(id) {
+            self.refusals.add(Refusal::TooSoon);
+            return None;
         }
-        if round.id != id {
+        self.highest = self.highest.max(Some(id.counter));
+        let order = self.compare(id);
+        if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
             effects.follower.merged(round.id, id);
             round.id = round.id.min(id);
         }
-        Some(Ordering::Equal)
+        Some(order)
+    }
+
+    /// Whether that is a newer round that would end the open one, in which others take part, before that had its time.
+    fn is_too_soon(&self, id: RoundId) -> bool {
+        self.round.as_ref().is_some_and(|round| {
+            let begun = round.open && round.ballot.len() > 1;
+            begun
+                && round.id < id
+                && !self.is_this_round(id)
+                && self.now < round.since + self.config.refractory
+        })
     }
 
     /// Counts a robot's vote, by whichever way it came. Says whether it was news.
-    pub(super) fn hear_vote(
-        &mut self,
-        robot: RobotId,
-        stamp: Stamp,
-        vote: Vote,
-        effects: &mut Effects<'_>,
-    ) -> bool {
+    pub(super) fn hear_vote(&mut self, held: HeldVote, effects: &mut Effects<'_>) -> bool {
+        let HeldVote { robot, stamp, ref vote, .. } = held;
         if robot == self.me {
             // From an earlier life it is merely old.
             if stamp > self.stamp {
@@ -108,8 +181,11 @@ impl Rounds {
             Some(Ordering::Equal) => {}
         }
         let Some(round) = self.round.as_mut() else { return false };
-        match round.ballot.cast(robot, stamp, vote) {
-            Cast::Counted => true,
+        match round.ballot.cast(held) {
+            Cast::Counted => {
+                self.electorate.hear(robot, self.now);
+                true
+            }
             Cast::Known => false,
             Cast::Full => {
                 self.refusals.add(Refusal::BallotFull);
@@ -118,30 +194,38 @@ impl Rounds {
         }
     }
 
-    /// Takes in a decision, by whichever way it came. Says whether it was news.
-    pub(super) fn hear_decision(
-        &mut self,
-        holder: Option<RobotId>,
-        decision: Decision,
-        effects: &mut Effects<'_>,
-    ) -> bool {
+    /// Takes in a decision, by whichever way it came.
+    pub(super) fn hear_decision(&mut self, decision: Decision, effects: &mut Effects<'_>) -> Heard {
+        let decision = Decision { is_final: false, ..decision };
         if decision.check().is_err() {
             self.refusals.add(Refusal::Impossible);
-            return false;
+            return Heard::Refused;
         }
-        if let Err(refusal) = self.would_decide(&decision) {
+        let this = self.is_this_round(decision.round);
+        let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
+        if held == Some(&decision) {
+            return Heard::Known;
+        }
+        if let Err(refusal) = self.judge(&decision, this) {
             self.refusals.add(refusal);
-            return false;
+            return Heard::Refused;
         }
         match self.place(decision.round, effects) {
-            None | Some(Ordering::Less) => return false,
-            // What is decided elsewhere needs no looking; unless it cannot be believed on one robot's word.
-            Some(Ordering::Greater) if self.config.liars == 0 => self.enter(decision.round, false, effects),
-            Some(Ordering::Greater) => self.join(decision.round, effects),
+            None | Some(Ordering::Less) => return Heard::Refused,
+            // What is decided elsewhere needs no looking.
+            Some(Ordering::Greater) => self.enter(decision.round, false, effects),
             Some(Ordering::Equal) => {}
         }
-        let Some(round) = self.round.as_mut() else { return false };
-        round.agreement.hear(holder, decision, self.config.liars)
+        let Some(round) = self.round.as_mut() else { return Heard::Refused };
+        for counted in &decision.certificate.votes {
+            if counted.robot != self.me {
+                round.ballot.cast(counted.held());
+            }
+        }
+        if decision.author != self.me {
+            round.agreement.note_holder(decision.author, decision.rank(), decision.class);
+        }
+        if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
     }
 
     /// Whether that is another scale than this robot's own, if it has one.
@@ -149,27 +233,45 @@ impl Rounds {
         self.own_scale().is_some_and(|own| own != scale)
     }
 
-    /// Whether this robot would decide so itself, by what the decision says that it rests on.
-    fn would_decide(&self, decision: &Decision) -> Result<(), Refusal> {
-        /// What a sum may lose on the way through text.
-        const TOLERANCE: f64 = 1e-9;
-        let Some(class) = decision.class else { return Ok(()) };
-        let Certificate { vocabulary, rule, probabilities, votes, .. } = &decision.certificate;
-        let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
-        if self.is_foreign(scale) {
+    /// Whether this robot would decide so itself on the votes that the decision rests on. `this`: where it is of the newest
+    /// round, votes held here must be in it as their robots said them.
+    fn judge(&self, decision: &Decision, this: bool) -> Result<(), Refusal> {
+        if decision.class.is_none() {
+            // It decides nothing, but may be the first word of a round: somebody must have been in that.
+            let somebody = this || decision.certificate.reached() > 0;
+            return if somebody { Ok(()) } else { Err(Refusal::Unfounded) };
+        }
+        let Certificate { vocabulary, probabilities, votes, others, .. } = &decision.certificate;
+        if self.is_foreign(Scale { vocabulary: *vocabulary, classes: probabilities.len() }) {
             return Err(Refusal::Vocabulary);
         }
-        let p = probabilities.get(class.index()).copied().unwrap_or_default();
-        let founded = *rule == self.config.rule
-            && votes.len() >= self.config.quorum as usize
-            && (p - decision.confidence).abs() <= TOLERANCE
-            && p + TOLERANCE >= 1.0 - self.config.alpha
-            && probabilities.iter().all(|other| *other <= p);
-        if founded { Ok(()) } else { Err(Refusal::Unfounded) }
+        let counted = votes.iter().map(|counted| (counted.robot, counted.stamp, &counted.vote));
+        let mut said = counted.chain(others.iter().map(|held| (held.robot, held.stamp, &held.vote)));
+        let ballot = self.round.as_ref().filter(|_| this).map(|round| &round.ballot);
+        let true_words = said.all(|(robot, stamp, vote)| {
+            let known = ballot.and_then(|ballot| ballot.confirms(robot, stamp, vote));
+            let never_said = robot == self.me && stamp > self.stamp;
+            known != Some(false) && !never_said
+        });
+        match true_words && follows(decision, &*self.fusion, &self.config, self.electorate.count()) {
+            true => Ok(()),
+            false => Err(Refusal::Unfounded),
+        }
     }
 
     fn meet_duplicate(&mut self, stamp: Stamp) {
         self.refusals.add(Refusal::DuplicateId);
         self.duplicate = Some(stamp);
     }
+}
+
+/// What became of a decision that was heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Heard {
+    /// It may be held now: it is greater than those before.
+    News,
+    /// It changes nothing.
+    Known,
+    /// It is none, or of an older round.
+    Refused,
 }

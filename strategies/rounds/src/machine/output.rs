@@ -9,7 +9,7 @@ pub enum Output {
     Broadcast(Envelope),
     /// Say this to one neighbour (`robot/<id>/repair`): the sure way.
     Tell(RobotId, Envelope),
-    /// This robot now holds that decision: publish it (`robot/<me>/decision`).
+    /// This robot now holds that decision: say so (`robot/<me>/decision`, [`Decision::holding`]).
     Hold(Decision),
     /// As the spokesrobot: announce the swarm's decision (`decision`).
     Announce(Decision),

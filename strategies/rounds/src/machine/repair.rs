@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
 
+use super::hearing::Heard;
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
 
@@ -39,18 +40,14 @@ impl Rounds {
 
     /// Hears what a neighbour has: gives what it lacks, and asks for what this robot lacks itself.
     pub(super) fn on_have(&mut self, from: RobotId, have: &Have, effects: &mut Effects<'_>) {
-        let order = match have.round {
-            None => Ordering::Less,
-            Some(id) => match self.place(id, effects) {
-                None => return,
-                // A round still undecided there is one to take part in.
-                Some(Ordering::Greater) if have.decision.is_none() => {
-                    self.join(id, effects);
-                    Ordering::Equal
-                }
-                Some(order) => order,
-            },
-        };
+        // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
+        let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
+        if let Some(round) =
+            self.round.as_mut().filter(|round| order.is_eq() && round.agreement.rank() == have.decision)
+            && let Some((rank, class)) = round.agreement.held().map(|held| (held.rank(), held.class))
+        {
+            round.agreement.note_holder(from, rank, class);
+        }
         if let Some(give) = self.lacking_there(order, have) {
             self.tell(from, Message::Give(give), effects);
         }
@@ -64,7 +61,13 @@ impl Rounds {
         let mut news = Give { decision: None, votes: Vec::new() };
         if let Some(decision) = give.decision {
             let missed = !self.is_this_round(decision.round);
-            if self.hear_decision(Some(from), decision.clone(), effects) {
+            if decision.class.is_some()
+                && self.is_this_round(decision.round)
+                && let Some(round) = &mut self.round
+            {
+                round.agreement.note_holder(from, decision.rank(), decision.class);
+            }
+            if self.hear_decision(decision.clone(), effects) == Heard::News {
                 if !self.is_open() && missed {
                     self.note_missed_announcement();
                 }
@@ -72,7 +75,7 @@ impl Rounds {
             }
         }
         for held in give.votes {
-            if self.hear_vote(held.robot, held.stamp, held.vote.clone(), effects) {
+            if self.hear_vote(held.clone(), effects) {
                 news.votes.push(held);
             }
         }
@@ -88,9 +91,9 @@ impl Rounds {
     /// A round learnt of only after it was decided is not this robot's to announce: those who took part did.
     fn note_missed_announcement(&mut self) {
         if let Some(round) = &mut self.round
-            && let Some(class) = round.agreement.best_class()
+            && let Some(class) = round.agreement.best().map(|best| best.class)
         {
-            round.agreement.note_announced(self.now, class);
+            round.agreement.note_announced(self.now, class, true);
         }
     }
 
@@ -102,8 +105,8 @@ impl Rounds {
             _ => (None, BTreeMap::<RobotId, Stamp>::new()),
         };
         let decision = round.agreement.held().filter(|held| Some(held.rank()) > rank).cloned();
-        // Who gets a decision needs no votes; unless it must not believe one robot's word.
-        let votes = if rank.is_none() && (decision.is_none() || self.config.liars > 0) {
+        // Who gets a decision gets the votes with it.
+        let votes = if rank.is_none() && decision.is_none() {
             round.ballot.lacking(&known).take(MAX_GIVEN).collect()
         } else {
             Vec::new()
@@ -121,7 +124,7 @@ impl Rounds {
         have.decision > rank || (rank.is_none() && have.votes.iter().any(newer))
     }
 
-    fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
+    pub(super) fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
         let have = Have {
             round: self.round(),
             decision: self.round.as_ref().and_then(|round| round.agreement.rank()),

@@ -7,15 +7,18 @@ use std::time::Duration;
 use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Stamp};
 
 use super::follow::Follow;
+use super::hearing::Wanted;
 use super::input::Input;
 use super::output::Output;
 use super::partners::Partners;
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
+use crate::electorate::Electorate;
 use crate::fuse::Fuse;
 use crate::life::Life;
 use crate::refusal::Refusals;
 use crate::round::Round;
+use crate::sign::Sign;
 
 /// The rounds of one robot: what the world tells it goes in, what it wants done comes out.
 ///
@@ -68,7 +71,9 @@ use crate::round::Round;
 ///         for output in swarm[robot].handle(now, input) {
 ///             match output {
 ///                 Output::Broadcast(vote) => inbox.push((1 - robot, Input::Received(vote))),
-///                 Output::Hold(decision) => inbox.push((1 - robot, Input::Heard(robots[robot], decision))),
+///                 Output::Hold(decision) => {
+///                     inbox.push((1 - robot, Input::Heard(robots[robot], decision.holding(Vec::new()))));
+///                 }
 ///                 Output::Announce(decision) => {
 ///                     decided.push(decision.clone());
 ///                     inbox.push((1 - robot, Input::Announced(decision)));
@@ -91,6 +96,7 @@ pub struct Rounds {
     pub(super) config: RoundsConfig,
     pub(super) fusion: Arc<dyn Fuse>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
+    pub(super) signer: Option<Arc<dyn Sign>>,
     /// The stamp of the last message said.
     pub(super) stamp: Stamp,
     pub(super) now: Duration,
@@ -98,6 +104,11 @@ pub struct Rounds {
     pub(super) round: Option<Round>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
     pub(super) highest: Option<u32>,
+    /// The counter that this life began with, and when it began.
+    pub(super) began: (u32, Option<Duration>),
+    pub(super) electorate: Electorate,
+    /// The greatest decision that a robot said it holds and that is lacking here, and when it is asked for.
+    pub(super) wanted: Option<Wanted>,
     /// The other robots alive, guests among them.
     pub(super) alive: BTreeSet<RobotId>,
     /// How many of them have a smaller id: whoever speaks for the swarm waits this many turns.
@@ -131,10 +142,14 @@ impl Rounds {
             me,
             nonce: life.nonce,
             classifier: None,
+            signer: None,
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
             round: None,
             highest: None,
+            began: (0, None),
+            electorate: Electorate::default(),
+            wanted: None,
             alive: BTreeSet::new(),
             turns: 0,
             guests: BTreeSet::new(),
@@ -153,6 +168,7 @@ impl Rounds {
     #[must_use]
     pub fn counting_from(mut self, counter: Option<u32>) -> Self {
         self.highest = self.highest.max(counter);
+        self.began.0 = counter.unwrap_or_default();
         self
     }
 
@@ -165,6 +181,13 @@ impl Rounds {
         self
     }
 
+    /// The same rounds, in which this robot signs its votes.
+    #[must_use]
+    pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
+        self.signer = Some(signer);
+        self
+    }
+
     /// Takes in one input at the time `now` and says what is to be done.
     pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
         self.handle_with(now, input, &mut ())
@@ -173,6 +196,7 @@ impl Rounds {
     /// The same for a robot whose learning follows the rounds: the same one at every call.
     pub fn handle_with(&mut self, now: Duration, input: Input, follower: &mut dyn Follow) -> Vec<Output> {
         self.now = now.max(self.now);
+        self.began.1.get_or_insert(self.now);
         let mut effects = Effects { follower, out: Vec::new() };
         match input {
             Input::Tick => {}
@@ -184,7 +208,7 @@ impl Rounds {
                 self.on_observed(&observation, effects.follower.knowledge().is_some());
             }
             Input::Received(envelope) => self.on_received(envelope, &mut effects),
-            Input::Heard(robot, decision) => self.on_heard(robot, decision, &mut effects),
+            Input::Heard(robot, holding) => self.on_heard(robot, holding),
             Input::Announced(decision) => self.on_announced(decision, &mut effects),
             Input::Alive(robots) => self.on_alive(robots),
             Input::Guests(robots) => self.on_guests(robots),
@@ -218,6 +242,7 @@ impl Rounds {
             self.looking_until(follower),
             self.showing(),
             self.partners.due(&self.alive),
+            self.wanted.as_ref().map(|wanted| wanted.due),
         ]
         .into_iter()
         .flatten()
@@ -241,6 +266,7 @@ impl Rounds {
         if self.looking_until(effects.follower).is_some_and(|until| self.now >= until) {
             self.stop_looking(effects);
         }
+        self.ask_when_due(effects);
         self.repair_when_due(effects);
     }
 
@@ -248,6 +274,6 @@ impl Rounds {
     #[must_use]
     pub fn stamped(&mut self, message: Message) -> Envelope {
         self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-        Envelope { author: self.me, stamp: self.stamp, message }
+        Envelope { author: self.me, stamp: self.stamp, message, signature: None }
     }
 }

@@ -3,16 +3,19 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Decision, RobotId};
 
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
+use crate::agreement::Agreement;
 use crate::ballot::Scale;
+use crate::round::{Speaker, View};
 
 impl Rounds {
     pub(super) fn on_alive(&mut self, robots: BTreeSet<RobotId>) {
         self.alive = &robots | &self.guests;
         self.alive.remove(&self.me);
+        self.electorate.alive(&self.alive, self.now);
         // This robot speaks for its guests too: its turn is that of the smallest of them all.
         let first = self.guests.first().map_or(self.me, |guest| self.me.min(*guest));
         self.turns = u32::try_from(self.alive.range(..first).count()).unwrap_or(u32::MAX);
@@ -28,17 +31,20 @@ impl Rounds {
     pub(super) fn speak(&mut self, effects: &mut Effects<'_>) {
         let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary().id());
         let Some(round) = self.round.as_mut() else { return };
-        let said = round.speak(self.now, self.me, &mut self.stamp, vocabulary, self.blind, &self.config);
+        let signer = self.signer.as_deref();
+        let mut speaker =
+            Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
+        let said = round.speak(self.now, &mut speaker, &self.config);
         effects.out.extend(said.map(Output::Broadcast));
     }
 
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
     pub(super) fn decide(&mut self, effects: &mut Effects<'_>) {
-        let own_scale = self.own_scale();
+        let scale = self.own_scale();
+        let expected = self.electorate.expected(&self.alive);
+        let view = View { me: self.me, expected: &expected, robots: self.electorate.count(), scale };
         let Some(round) = self.round.as_mut() else { return };
-        let concludes = round.open && round.agreement.held().is_none();
-        let scale = own_scale.or_else(|| concludes.then(|| round.ballot.prevailing_scale())?);
-        round.conclude(self.now, self.me, &self.alive, scale, &*self.fusion, &self.config);
+        round.conclude(self.now, &view, &*self.fusion, &self.config);
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
@@ -56,15 +62,21 @@ impl Rounds {
     /// When this robot, as the spokesrobot or in its place, is to announce the decision it holds.
     pub(super) fn announcement(&self) -> Option<Duration> {
         let wait = self.config.settle.saturating_add(self.turn());
-        self.round.as_ref()?.agreement.announcement(wait)
+        let agreement = &self.round.as_ref()?.agreement;
+        agreement.announcement(wait, self.is_final(agreement), self.config.deadline)
     }
 
     pub(super) fn announce(&mut self, effects: &mut Effects<'_>) {
+        let is_final = self.round.as_ref().is_some_and(|round| self.is_final(&round.agreement));
         let Some(agreement) = self.round.as_mut().map(|round| &mut round.agreement) else { return };
         if let Some(decision) = agreement.held().cloned() {
-            agreement.note_announced(self.now, decision.class);
-            effects.out.push(Output::Announce(decision));
+            agreement.note_announced(self.now, decision.class, is_final);
+            effects.out.push(Output::Announce(Decision { is_final, ..decision }));
         }
+    }
+
+    fn is_final(&self, agreement: &Agreement) -> bool {
+        agreement.is_final(self.config.holders(self.electorate.count()), &self.guests)
     }
 
     pub(super) fn own_scale(&self) -> Option<Scale> {

@@ -115,7 +115,7 @@ fn a_lesson_counts_for_samples_that_come_after_it() {
     };
     let message = Message::Samples(Samples { space: space().id(), samples: vec![sample] });
     let stamp = Stamp { boot: 1, sequence: 1 };
-    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
     let set = swarm.minds[0].training_set().unwrap();
     assert_eq!((set.class_count(ClassId(3)), set.class_count(ClassId(1))), (3, 0));
 }

@@ -170,7 +170,7 @@ impl Swarm {
                     }
                     Output::Hold(decision) => {
                         for j in (0..self.minds.len()).filter(|j| *j != i) {
-                            due.push_back((j, Input::Heard(me, decision.clone())));
+                            due.push_back((j, Input::Heard(me, decision.holding(Vec::new()))));
                         }
                     }
                     Output::Answer(by, answer) => {

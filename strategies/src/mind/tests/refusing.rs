@@ -25,13 +25,13 @@ fn a_sample_that_is_none_is_refused_and_counted() {
         let before = swarm.minds[0].refusals().count(refusal);
         let message = Message::Samples(Samples { space, samples: vec![sample] });
         let stamp = Stamp { boot: 1, sequence: 1 };
-        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
         assert_eq!(swarm.minds[0].refusals().count(refusal), before + 1, "{refusal:?}");
         assert_eq!(swarm.sizes(0), [0, 0, 0]);
     }
     let message = Message::Samples(Samples { space, samples: vec![sample(1, 1, sound)] });
     let stamp = Stamp { boot: 1, sequence: 2 };
-    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
     assert_eq!(swarm.sizes(0), [0, 0, 1], "a sound one is taken");
     swarm.check();
 }

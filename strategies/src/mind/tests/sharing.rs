@@ -45,7 +45,7 @@ fn bytes_bound_what_a_round_shares() {
         let own = learning.set().common().filter(|sample| sample.part == SetPart::Shared);
         let message = Message::Samples(learning.told(own));
         let stamp = Stamp { boot: 1, sequence: 100 };
-        let length = Envelope { author: mind.me(), stamp, message }.encode().len();
+        let length = Envelope { author: mind.me(), stamp, message, signature: None }.encode().len();
         assert!((80..=128).contains(&length), "{length} bytes");
     }
 }

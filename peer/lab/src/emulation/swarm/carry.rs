@@ -59,8 +59,8 @@ impl Swarm<'_> {
             Output::Hold(decision) => {
                 self.note(&Happening::Hold { robot, decision: (&decision).into() });
                 self.record.hold(self.now, i, &decision);
-                let (decision, bytes) = as_json(&decision);
-                self.broadcast(i, bytes, Kind::Decision, &Parcel::Held(robot, decision));
+                let (holding, bytes) = as_json(&decision.holding(Vec::new()));
+                self.broadcast(i, bytes, Kind::Decision, &Parcel::Held(robot, holding));
             }
             Output::Announce(decision) => {
                 self.note(&Happening::Announce { robot, decision: (&decision).into() });

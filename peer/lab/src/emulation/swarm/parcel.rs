@@ -2,14 +2,16 @@
 
 use std::rc::Rc;
 
-use gestalt_protocol::{Decision, Envelope, InstructorId, RobotId};
+use gestalt_protocol::{Decision, Envelope, Holding, InstructorId, RobotId};
 use gestalt_strategies::{Input, Instructed};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// What travels.
 #[derive(Clone)]
 pub(super) enum Parcel {
     Said(Rc<Envelope>),
-    Held(RobotId, Rc<Decision>),
+    Held(RobotId, Rc<Holding>),
     Announced(Rc<Decision>),
     Instructed(Rc<Instructed>),
     Answered(InstructorId, u64, RobotId),
@@ -20,7 +22,7 @@ impl Parcel {
     pub fn opened(self) -> Input {
         match self {
             Self::Said(envelope) => Input::Received((*envelope).clone()),
-            Self::Held(robot, decision) => Input::Heard(robot, (*decision).clone()),
+            Self::Held(robot, holding) => Input::Heard(robot, (*holding).clone()),
             Self::Announced(decision) => Input::Announced((*decision).clone()),
             Self::Instructed(instructed) => Input::Instructed((*instructed).clone()),
             Self::Answered(by, at, robot) => Input::Answered(by, at, robot),
@@ -36,13 +38,13 @@ pub(super) fn over_the_wire(envelope: &Envelope) -> (Rc<Envelope>, usize) {
 }
 
 /// How many bytes something takes that travels as JSON.
-pub(super) fn json_bytes(value: &impl serde::Serialize) -> usize {
+pub(super) fn json_bytes(value: &impl Serialize) -> usize {
     serde_json::to_vec(value).expect("what people say holds nothing that JSON cannot").len()
 }
 
-/// The same for a decision, which travels as JSON.
-pub(super) fn as_json(decision: &Decision) -> (Rc<Decision>, usize) {
-    let json = serde_json::to_vec(decision).expect("a decision holds nothing that JSON cannot");
+/// The same for what travels as JSON.
+pub(super) fn as_json<T: Serialize + DeserializeOwned>(said: &T) -> (Rc<T>, usize) {
+    let json = serde_json::to_vec(said).expect("a decision holds nothing that JSON cannot");
     let read = gestalt_protocol::decode_json(&json).expect("what was written can be read");
     (Rc::new(read), json.len())
 }

@@ -6,19 +6,20 @@ use super::*;
 fn the_greater_decision_replaces_the_held_one_and_is_held_aloud() {
     let mut mind = mind(7);
     mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
-    let out = mind.handle(ms(2), Input::Heard(RobotId(2), decision(1, Some(2), 2, 2)));
+    let out = mind.handle(ms(2), gives(2, decision(1, Some(2), 2, 2)));
     assert_eq!(holds(&out), [Some(2)]);
-    assert!(holds(&mind.handle(ms(3), Input::Heard(RobotId(2), decision(1, Some(2), 2, 2)))).is_empty());
+    assert!(holds(&mind.handle(ms(3), gives(2, decision(1, Some(2), 2, 2)))).is_empty());
 }
 
 #[test]
 fn the_smallest_live_robot_announces_once_settled_and_only_once() {
     let mut mind = mind(2);
     mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
-    mind.handle(ms(100), Input::Heard(RobotId(5), decision(1, Some(0), 3, 5)));
+    mind.handle(ms(100), Input::Open);
+    mind.handle(ms(100), gives(5, decision(1, Some(0), 3, 5)));
     let mut all = live(&mut mind, ms(150));
     // The same class by more robots is no reason to wait longer.
-    mind.handle(ms(150), Input::Heard(RobotId(5), decision(1, Some(0), 4, 5)));
+    mind.handle(ms(150), gives(5, decision(1, Some(0), 4, 5)));
     all.extend(live(&mut mind, ms(20_000)));
     let announced: Vec<_> =
         all.iter().filter(|(_, o)| matches!(o, Output::Announce(_))).map(|(at, _)| *at).collect();
@@ -30,9 +31,10 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
     let next = |heard: bool| {
         let mut mind = mind(9);
         mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
-        mind.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(0), 3, 5)));
+        mind.handle(ms(0), Input::Open);
+        mind.handle(ms(0), gives(5, decision(1, Some(0), 3, 5)));
         if heard {
-            mind.handle(ms(500), Input::Announced(decision(1, Some(0), 3, 5)));
+            mind.handle(ms(500), Input::Announced(Decision { is_final: true, ..decision(1, Some(0), 3, 5) }));
         }
         let all = live(&mut mind, ms(20_000));
         all.iter().filter(|(_, o)| matches!(o, Output::Announce(_))).map(|(at, _)| *at).collect::<Vec<_>>()
@@ -46,7 +48,8 @@ fn who_has_guests_speaks_for_them_too() {
     let mut host = mind(8);
     host.handle(ms(0), Input::Guests(robots([2, 3])));
     host.handle(ms(0), Input::Alive(robots([1, 5])));
-    host.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(1), 2, 5)));
+    host.handle(ms(0), Input::Open);
+    host.handle(ms(0), gives(5, decision(1, Some(1), 3, 5)));
     let times = (1..40).map(|k| ms(k * 50));
     let announced = |mind: &mut Rounds, mut times: Box<dyn Iterator<Item = Duration>>| {
         times.find(|at| announces(&mind.handle(*at, Input::Tick)) > 0)
@@ -56,7 +59,8 @@ fn who_has_guests_speaks_for_them_too() {
     let mut host = mind(8);
     host.handle(ms(0), Input::Alive(robots([2, 5])));
     host.handle(ms(0), Input::Guests(robots([2])));
-    host.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(1), 2, 5)));
+    host.handle(ms(0), Input::Open);
+    host.handle(ms(0), gives(5, decision(1, Some(1), 3, 5)));
     assert_eq!(announced(&mut host, Box::new(times)), Some(ms(200)));
 }
 
@@ -77,11 +81,12 @@ fn a_round_waits_for_guests_as_for_all_the_living() {
 #[test]
 fn a_changed_class_is_announced_again_and_the_same_class_is_not() {
     let mut mind = mind(2);
-    mind.handle(ms(0), Input::Heard(RobotId(5), decision(1, Some(0), 3, 5)));
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(0), gives(5, decision(1, Some(0), 3, 5)));
     assert_eq!(announces(&mind.handle(ms(200), Input::Tick)), 1);
-    mind.handle(ms(300), Input::Heard(RobotId(5), decision(1, Some(0), 4, 5)));
+    mind.handle(ms(300), gives(5, decision(1, Some(0), 4, 5)));
     assert_eq!(announces(&mind.handle(ms(900), Input::Tick)), 0);
-    mind.handle(ms(1000), Input::Heard(RobotId(5), decision(1, Some(1), 5, 5)));
+    mind.handle(ms(1000), gives(5, decision(1, Some(1), 5, 5)));
     assert_eq!(announces(&mind.handle(ms(1200), Input::Tick)), 1);
 }
 
@@ -93,26 +98,85 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
         change(&mut decision);
         decision
     };
-    let config = RoundsConfig { quorum: 3, ..RoundsConfig::default() };
+    let config = RoundsConfig { quorum: Quorum::Evidence(3), ..RoundsConfig::default() };
     for (lie, refusal) in [
         (changed(&|d| d.certificate.vocabulary = VocabularyId(77)), Refusal::Vocabulary),
-        (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Vocabulary),
+        (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Impossible),
         (changed(&|d| d.certificate.rule = FusionRule::Majority), Refusal::Unfounded),
-        (changed(&|d| d.certificate.votes.truncate(2)), Refusal::Unfounded),
+        (decision(1, Some(1), 3, 5), Refusal::Unfounded),
         (changed(&|d| d.class = Some(ClassId(0))), Refusal::Unfounded),
         (changed(&|d| d.confidence = 0.999), Refusal::Unfounded),
+        (changed(&|d| d.certificate.probabilities = vec![0.0, 1.0, 0.0]), Refusal::Unfounded),
+        (changed(&|d| d.certificate.votes[1].vote.round.counter = 2), Refusal::Unfounded),
+        // Words that were never said, in the name of a robot that is known, and of this one.
+        (changed(&|d| d.certificate.votes[1].vote.evidence = vec![-2.0, 3.9, -1.9]), Refusal::Unfounded),
+        (changed(&|d| d.certificate.votes[0].robot = RobotId(7)), Refusal::Unfounded),
+        // Undecided votes decide nothing.
         (
-            changed(&|d| {
-                d.confidence = 0.6;
-                d.certificate.probabilities = vec![0.2, 0.6, 0.2];
-            }),
+            {
+                let votes = changed(&|d| {
+                    d.certificate
+                        .votes
+                        .iter_mut()
+                        .for_each(|counted| counted.vote.evidence = vec![0.0, 0.1, -0.1]);
+                });
+                decided(round(1, 1), Some(1), votes.certificate.votes, 5)
+            },
             Refusal::Unfounded,
         ),
     ] {
         let mut mind = mind_with(7, config.clone());
-        mind.handle(ms(0), Input::Heard(RobotId(5), lie.clone()));
+        mind.handle(ms(0), Input::Alive(robots([99])));
+        mind.handle(ms(0), votes(11, 2, vote(1, 1, SURE)));
+        mind.handle(ms(0), gives(5, lie.clone()));
         assert_eq!((mind.held(), mind.refusals().count(refusal)), (None, 1), "{lie:?}");
-        mind.handle(ms(1), Input::Heard(RobotId(5), sound.clone()));
+        mind.handle(ms(1), gives(5, sound.clone()));
         assert_eq!(mind.held(), Some(&sound));
     }
+}
+
+#[test]
+fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
+    let mut mind = mind(7);
+    let heard = decision(3, Some(1), 4, 5);
+    let out = mind.handle(ms(0), Input::Heard(RobotId(5), heard.holding(Vec::new())));
+    assert!(out.is_empty() && mind.held().is_none() && mind.round().is_none());
+    assert_eq!(mind.next_wake(), Some(ms(100)), "most conclude it themselves until then");
+    let out = mind.handle(ms(100), Input::Tick);
+    assert!(matches!(told(&out)[..], [(5, Message::Have(Have { answer: false, .. }))]), "{out:?}");
+    let mut holder = blind(5);
+    holder.handle(ms(0), gives(9, heard.clone()));
+    let Some((5, Message::Have(have))) = told(&out).first().copied() else { unreachable!() };
+    let out = holder.handle(ms(101), says(7, 1, Message::Have(have.clone())));
+    let [(7, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
+    mind.handle(ms(102), says(5, 2, Message::Give(give.clone())));
+    assert_eq!(mind.held(), Some(&heard));
+    let out = mind.handle(ms(103), Input::Heard(RobotId(6), heard.holding(Vec::new())));
+    assert!(out.is_empty() && mind.wanted.is_none(), "it is held");
+}
+
+#[test]
+fn a_gesture_is_final_once_a_majority_is_known_to_hold_it() {
+    let announced = |holders: &[u32]| {
+        let mut mind = mind(1);
+        mind.handle(ms(0), Input::Alive(robots(2..=5)));
+        mind.handle(ms(0), Input::Open);
+        mind.handle(ms(0), gives(9, decision(1, Some(1), 5, 9)));
+        for holder in holders {
+            mind.handle(
+                ms(10),
+                Input::Heard(RobotId(*holder), decision(1, Some(1), 5, 9).holding(Vec::new())),
+            );
+        }
+        let all = live(&mut mind, ms(20_000));
+        let said = all.iter().filter_map(|(at, output)| match output {
+            Output::Announce(decision) => Some((at.as_millis(), decision.is_final)),
+            _ => None,
+        });
+        said.collect::<Vec<_>>()
+    };
+    // Five robots: this one, and the author of the decision, and one more.
+    assert_eq!(announced(&[2]), [(200, true)]);
+    assert_eq!(announced(&[]), [(5200, false)], "nobody is known to hold it");
+    assert_eq!(announced(&[9]), [(5200, false)], "that one was counted");
 }

@@ -38,7 +38,7 @@ fn a_round_waits_until_every_live_robot_has_seen_something_but_not_beyond_patien
 
 #[test]
 fn fewer_robots_than_the_quorum_decide_nothing() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: 2, ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(2), ..RoundsConfig::default() });
     mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
     mind.handle(ms(1), votes(2, 1, null(1)));
     assert_eq!(mind.held(), None);
@@ -65,7 +65,7 @@ fn at_the_deadline_the_outcome_is_no_decision_said_as_such() {
 fn the_no_decision_of_an_impatient_robot_ends_nothing_for_the_others() {
     let mut mind = mind(7);
     mind.handle(ms(0), Input::Open);
-    mind.handle(ms(100), Input::Heard(RobotId(3), decision(1, None, 1, 3)));
+    mind.handle(ms(100), gives(3, decision(1, None, 1, 3)));
     assert_eq!(mind.held(), None);
     mind.handle(ms(200), votes(1, 1, vote(1, 0, SURE)));
     assert_eq!(mind.held().unwrap().class, Some(ClassId(0)));
@@ -81,7 +81,7 @@ fn a_robot_draws_one_conclusion_per_round_and_none_after_adopting_one() {
     assert!(holds(&out).is_empty());
     let mut other = mind_with(8, RoundsConfig::default());
     other.handle(ms(0), Input::Open);
-    other.handle(ms(5), Input::Heard(RobotId(7), decision(1, Some(2), 1, 7)));
+    other.handle(ms(5), gives(7, decision(1, Some(2), 1, 7)));
     let out = other.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
     assert!(holds(&out).is_empty());
     assert_eq!(other.held().unwrap().author, RobotId(7));
@@ -101,15 +101,80 @@ fn a_liars_vote_is_clipped_and_f_liars_cannot_make_a_decision() {
 }
 
 #[test]
-fn with_liars_a_heard_decision_needs_f_plus_1_holders() {
+fn with_liars_a_decision_heard_needs_more_than_two_votes_for_each_and_their_margin() {
     let mut mind = mind_with(7, RoundsConfig { liars: 1, ..RoundsConfig::default() });
-    mind.handle(ms(0), Input::Heard(RobotId(66), decision(1, Some(2), 9, 66)));
-    mind.handle(ms(1), Input::Heard(RobotId(66), decision(1, Some(2), 9, 66)));
-    mind.handle(ms(1), Input::Announced(decision(1, Some(2), 9, 66)));
-    assert_eq!(mind.held(), None);
-    assert!(mind.is_open(), "it takes part, to find out for itself");
-    mind.handle(ms(2), Input::Heard(RobotId(1), decision(1, Some(2), 5, 1)));
+    mind.handle(ms(0), gives(66, decision(1, Some(2), 2, 66)));
+    assert_eq!((mind.held(), mind.refusals().count(Refusal::Unfounded)), (None, 1));
+    mind.handle(ms(2), gives(1, decision(1, Some(2), 5, 1)));
     assert_eq!(mind.held().unwrap().class, Some(ClassId(2)));
+}
+
+#[test]
+fn a_part_without_a_majority_decides_nothing_and_says_how_many_it_lacks() {
+    let mut mind = mind(1);
+    mind.handle(ms(0), Input::Alive(robots(2..=9)));
+    for robot in 2..=9 {
+        mind.handle(ms(1), votes(robot, 1, vote(1, 0, SURE)));
+    }
+    assert_eq!(mind.held().map(|held| held.certificate.robots), Some(9));
+    live(&mut mind, ms(10_000));
+    // Five of them are cut off.
+    mind.handle(ms(10_000), Input::Alive(robots(2..=4)));
+    for robot in 2..=4 {
+        mind.handle(ms(10_001), votes(robot, 2, vote(2, 0, SURE)));
+    }
+    live(&mut mind, ms(20_000));
+    let held = mind.held().unwrap();
+    assert_eq!((held.round.counter, held.class), (2, None));
+    let certificate = &held.certificate;
+    assert_eq!((certificate.robots, certificate.quorum, certificate.reached()), (9, 5, 4));
+    // When they have been gone for long, those left are the swarm.
+    for robot in 2..=4 {
+        mind.handle(ms(140_000), votes(robot, 3, vote(3, 0, SURE)));
+    }
+    assert_eq!(mind.held().unwrap().class, Some(ClassId(0)));
+}
+
+#[test]
+fn robots_that_see_nothing_count_for_the_majority() {
+    let mut mind = mind(1);
+    mind.handle(ms(0), Input::Alive(robots(2..=9)));
+    mind.handle(ms(1), votes(2, 1, vote(1, 0, SURE)));
+    for robot in 3..=4 {
+        mind.handle(ms(2), votes(robot, 1, null(1)));
+    }
+    mind.handle(ms(1100), Input::Tick);
+    assert_eq!(mind.held(), None, "four of nine");
+    mind.handle(ms(1200), votes(5, 1, null(1)));
+    let held = mind.held().unwrap();
+    assert_eq!(
+        (held.class, held.certificate.votes.len(), held.certificate.reached()),
+        (Some(ClassId(0)), 1, 5)
+    );
+}
+
+#[test]
+fn names_without_robots_delay_one_round_and_no_other() {
+    let mut mind = mind(1);
+    mind.handle(ms(0), Input::Alive(robots([2].into_iter().chain(100..140))));
+    mind.handle(ms(1), votes(2, 1, vote(1, 0, SURE)));
+    live(&mut mind, ms(9000));
+    assert_eq!(mind.held().unwrap().class, None);
+    mind.handle(ms(9000), votes(2, 2, vote(2, 0, SURE)));
+    assert_eq!(mind.held().unwrap().class, Some(ClassId(0)), "at once");
+}
+
+#[test]
+fn who_adopted_a_decision_goes_on_to_conclude_from_more_evidence() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(5), gives(5, decision(1, Some(2), 1, 5)));
+    assert_eq!(mind.held().unwrap().author, RobotId(5));
+    for robot in 1..=3 {
+        mind.handle(ms(10), votes(robot, 1, vote(1, 0, SURE)));
+    }
+    let held = mind.held().unwrap();
+    assert_eq!((held.author, held.class, held.certificate.votes.len()), (RobotId(7), Some(ClassId(0)), 3));
 }
 
 #[test]

@@ -20,8 +20,10 @@ use gestalt_protocol::{
 use super::{Input, Output, Rounds};
 use crate::classify::{Classify, ClassifyError};
 use crate::config::RoundsConfig;
+use crate::fusion::fuse;
 use crate::life::Life;
 use crate::observation::Observation;
+use crate::quorum::Quorum;
 use crate::refusal::{Refusal, Refusals};
 use crate::vocabulary::Vocabulary;
 
@@ -93,35 +95,65 @@ fn null(counter: u32) -> Vote {
 }
 
 fn says(author: u32, sequence: u32, message: Message) -> Input {
-    Input::Received(Envelope { author: RobotId(author), stamp: Stamp { boot: 1, sequence }, message })
+    Input::Received(Envelope {
+        author: RobotId(author),
+        stamp: Stamp { boot: 1, sequence },
+        message,
+        signature: None,
+    })
 }
 
 fn votes(author: u32, sequence: u32, vote: Vote) -> Input {
     says(author, sequence, Message::Vote(vote))
 }
 
+/// A decision that follows from the votes of robots 10, 11, 12 …, each sure of its class; without a class from none.
 fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decision {
-    let counted = |robot| CountedVote {
-        robot: RobotId(robot),
-        stamp: Stamp { boot: 1, sequence: 1 },
-        class: ClassId(0),
-        weight: 1.0,
-    };
-    let top = class.unwrap_or(0);
-    let probabilities = (0..3).map(|class| if class == top { 0.97 } else { 0.015 }).collect();
+    let votes: Vec<CountedVote> = class.map_or(Vec::new(), |class| {
+        let counted = |robot| CountedVote {
+            robot: RobotId(10 + robot),
+            // Another vote of it for each class.
+            stamp: Stamp { boot: 1, sequence: 1 + u32::from(class) },
+            class: ClassId(class),
+            weight: 1.0,
+            vote: vote(counter, usize::from(class), SURE),
+            signature: None,
+        };
+        (0..robots).map(counted).collect()
+    });
+    decided(round(counter, 1), class, votes, author)
+}
+
+/// What a robot makes of these votes, as the default has it.
+fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u32) -> Decision {
+    let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
+    let fused = fuse(FusionRule::LogPool, RoundsConfig::default().clip, 3, rows);
+    let (probabilities, confidence) = fused.map_or((Vec::new(), 0.0), |fused| {
+        (fused.probabilities.clone(), fused.probabilities[fused.top.index()])
+    });
+    let robots = votes.len() as u32;
     Decision {
-        round: round(counter, 1),
+        round,
         class: class.map(ClassId),
-        confidence: 0.97,
+        confidence,
         author: RobotId(author),
+        is_final: false,
         certificate: gestalt_protocol::Certificate {
             vocabulary: vocabulary().id(),
             rule: FusionRule::LogPool,
             probabilities,
-            votes: (0..robots).map(counted).collect(),
+            votes,
+            others: Vec::new(),
+            robots,
+            quorum: robots / 2 + 1,
             elapsed_ms: 10,
         },
     }
+}
+
+/// A robot that holds a decision gives it to this one.
+fn gives(from: u32, decision: Decision) -> Input {
+    says(from, 50, Message::Give(Give { decision: Some(decision), votes: Vec::new() }))
 }
 
 fn broadcast(out: &[Output]) -> Vec<&Vote> {

@@ -17,7 +17,7 @@ fn a_request_to_open_has_no_effect_while_a_round_is_open_or_has_just_begun() {
     let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
     mind.handle(ms(0), Input::Open);
     assert!(mind.handle(ms(5), Input::Open).is_empty());
-    mind.handle(ms(10), Input::Heard(RobotId(1), decision(1, Some(0), 2, 1)));
+    mind.handle(ms(10), gives(1, decision(1, Some(0), 2, 1)));
     assert!(!mind.is_open(), "decided and closed");
     mind.handle(ms(499), Input::Open);
     assert_eq!(mind.round(), Some(round(1, 7).min(round(1, 1))));
@@ -50,28 +50,46 @@ fn equal_counters_merge_on_the_smaller_opener_and_keep_what_was_seen() {
 }
 
 #[test]
-fn a_counter_a_million_ahead_is_refused_but_a_newborn_mind_believes_any() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), votes(3, 1, null(4_000_000)));
-    assert_eq!(mind.round().unwrap().counter, 4_000_000);
-    mind.handle(ms(1), votes(3, 2, null(5_000_001)));
-    assert_eq!(mind.refusals().count(Refusal::FarAhead), 1);
-    mind.handle(ms(2), votes(3, 3, null(5_000_000)));
-    assert_eq!(mind.round().unwrap().counter, 5_000_000);
+fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
+    let mut mind = mind(7).counting_from(Some(1000));
+    let ahead = 1000 + (1 << 24);
+    mind.handle(ms(0), votes(3, 1, null(ahead + 1)));
+    assert_eq!((mind.round(), mind.refusals().count(Refusal::FarAhead)), (None, 1));
+    mind.handle(ms(1), votes(3, 2, null(ahead)));
+    assert_eq!(mind.round().unwrap().counter, ahead);
+    // Whatever is said, and however often.
+    for leap in 1..5000 {
+        mind.handle(ms(1000 + leap), votes(3, 3, null(u32::try_from(u64::from(ahead) + leap).unwrap())));
+    }
+    assert!(mind.highest.unwrap() <= ahead + 2 * 6);
+    mind.handle(ms(7000), Input::Open);
+    assert!(mind.is_open() && mind.refusals().count(Refusal::CountersUsedUp) == 0);
 }
 
 #[test]
 fn when_the_counters_are_used_up_no_round_opens_and_it_is_counted() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), Input::Heard(RobotId(1), decision(u32::MAX, Some(0), 2, 1)));
+    let mut mind = mind(7).counting_from(Some(u32::MAX));
     mind.handle(ms(900), Input::Open);
     assert_eq!(mind.refusals().count(Refusal::CountersUsedUp), 1);
 }
 
 #[test]
+fn a_round_in_which_others_take_part_has_its_time_whatever_is_said_of_newer_ones() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3, 66, 99])));
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, LEANING)));
+    for k in 0..4 {
+        mind.handle(ms(100 * u64::from(k) + 100), votes(66, k, null(2 + k)));
+    }
+    assert_eq!((mind.round().unwrap().counter, mind.refusals().count(Refusal::TooSoon)), (1, 4));
+    mind.handle(ms(500), votes(3, 2, null(2)));
+    assert_eq!(mind.round().unwrap().counter, 2);
+}
+
+#[test]
 fn a_round_decided_elsewhere_is_adopted_without_opening() {
     let mut mind = mind(7);
-    let out = mind.handle(ms(0), Input::Heard(RobotId(3), decision(9, Some(2), 4, 1)));
+    let out = mind.handle(ms(0), gives(3, decision(9, Some(2), 4, 1)));
     assert_eq!(out, [Output::Hold(decision(9, Some(2), 4, 1))]);
     assert!(!mind.is_open());
     let have = Have {
@@ -91,7 +109,7 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
 fn equal_counters_of_rounds_opened_at_other_times_are_two_rounds() {
     let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
     mind.handle(ms(0), Input::Open);
-    mind.handle(ms(10), Input::Heard(RobotId(9), decision(1, Some(0), 2, 9)));
+    mind.handle(ms(10), gives(9, decision(1, Some(0), 2, 9)));
     assert_eq!(mind.round(), Some(round(1, 1)), "heard while it is shown: another name of it");
     // Somebody who was cut off, or lost what it knew, shows another gesture under the same count.
     mind.handle(ms(9000), votes(3, 1, Vote { round: round(1, 0), ..vote(1, 1, LEANING) }));

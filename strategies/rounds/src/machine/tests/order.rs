@@ -4,6 +4,20 @@ use proptest::prelude::*;
 
 use super::*;
 
+/// What robot n makes of votes of robots 20 to 20 + n.
+fn concluded(counter: u32, n: u32) -> Decision {
+    let class = (n % 3) as u8;
+    let counted = |robot| CountedVote {
+        robot: RobotId(20 + robot),
+        stamp: Stamp { boot: 1, sequence: 10 * counter + n },
+        class: ClassId(class),
+        weight: 1.0,
+        vote: vote(counter, usize::from(class), SURE),
+        signature: None,
+    };
+    decided(round(counter, 1), Some(class), (0..n).map(counted).collect(), n)
+}
+
 /// Things robots may say about rounds 1 to 3: what has one author and stamp is one message.
 fn heard() -> impl Strategy<Value = Input> {
     prop_oneof![
@@ -12,23 +26,27 @@ fn heard() -> impl Strategy<Value = Input> {
             let said = vote(counter, (sequence + author) as usize % 3, n as f32);
             votes(author, sequence, Vote { round: round(counter, author), ..said })
         }),
+        (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| gives(robot, concluded(counter, n))),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| {
-            Input::Heard(RobotId(robot), decision(counter, Some((n % 3) as u8), n, n))
+            Input::Heard(RobotId(robot), concluded(counter, n).holding(Vec::new()))
         }),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(from, counter, n)| {
             let held = HeldVote {
                 robot: RobotId(n),
                 stamp: Stamp { boot: 1, sequence: 10 * counter + 2 },
                 vote: vote(counter, (10 * counter + 2 + n) as usize % 3, 2.0),
+                signature: None,
             };
             says(from, 90, Message::Give(Give { decision: None, votes: vec![held] }))
         }),
     ]
 }
 
-/// The ballot and the decision that a mind ends with which only listens: a quorum never met, no time passing.
+/// The ballot and the decision that a mind ends with which only listens: it waits for a robot that says nothing, and no time passes.
 fn outcome(heard: &[Input]) -> (Option<RoundId>, BTreeMap<RobotId, Stamp>, Option<Decision>) {
-    let mut mind = mind_with(100, RoundsConfig { quorum: 4096, ..RoundsConfig::default() });
+    let quorum = Quorum::Evidence(1);
+    let mut mind = mind_with(100, RoundsConfig { quorum, refractory: ms(0), ..RoundsConfig::default() });
+    mind.handle(ms(1), Input::Alive(robots([99])));
     for input in heard {
         mind.handle(ms(1), input.clone());
     }

@@ -32,7 +32,7 @@ fn a_new_neighbour_is_greeted_at_once_and_the_neighbours_in_turn_from_then_on() 
 
 #[test]
 fn a_neighbour_is_given_the_votes_it_lacks_and_asked_for_those_lacking_here() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: 9, ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..RoundsConfig::default() });
     mind.handle(ms(0), votes(1, 5, vote(1, 0, LEANING)));
     mind.handle(ms(0), votes(2, 5, vote(1, 0, LEANING)));
     let out = mind.handle(ms(10), says(3, 1, Message::Have(have(1, &[(1, 4), (2, 6), (7, 1)]))));
@@ -48,13 +48,14 @@ fn a_neighbour_is_given_the_votes_it_lacks_and_asked_for_those_lacking_here() {
 
 #[test]
 fn what_was_given_and_is_news_goes_on_to_the_other_neighbours_and_nothing_else_does() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: 9, ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..RoundsConfig::default() });
     mind.handle(ms(0), Input::Neighbours(robots([3, 4])));
     mind.handle(ms(0), votes(1, 5, vote(1, 0, LEANING)));
     let held = |robot, sequence| HeldVote {
         robot: RobotId(robot),
         stamp: Stamp { boot: 1, sequence },
         vote: vote(1, 0, LEANING),
+        signature: None,
     };
     let give = Message::Give(Give { decision: None, votes: vec![held(1, 5), held(2, 2)] });
     let out = mind.handle(ms(10), says(3, 1, give.clone()));
@@ -66,7 +67,7 @@ fn what_was_given_and_is_news_goes_on_to_the_other_neighbours_and_nothing_else_d
 #[test]
 fn one_who_missed_the_round_is_given_the_decision_and_does_not_announce_it_again() {
     let mut knows = mind(7);
-    knows.handle(ms(0), Input::Heard(RobotId(5), decision(3, Some(1), 3, 5)));
+    knows.handle(ms(0), gives(5, decision(3, Some(1), 3, 5)));
     let out = knows.handle(ms(10), says(1, 1, Message::Have(Have { round: None, ..have(1, &[]) })));
     let [(1, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
     assert_eq!(give.decision.as_ref().unwrap().class, Some(ClassId(1)));
@@ -81,7 +82,7 @@ fn one_who_missed_the_round_is_given_the_decision_and_does_not_announce_it_again
 fn an_idle_mind_says_one_small_message_per_idle_period() {
     let mut mind = mind(7);
     mind.handle(ms(0), Input::Neighbours(robots([3])));
-    mind.handle(ms(0), Input::Heard(RobotId(5), decision(3, Some(1), 3, 5)));
+    mind.handle(ms(0), gives(5, decision(3, Some(1), 3, 5)));
     live(&mut mind, ms(10_000));
     let idle = live(&mut mind, ms(70_000));
     assert_eq!(idle.len(), 15);

@@ -75,7 +75,12 @@ fn a_second_robot_with_my_id_is_counted_and_reported_but_my_echo_is_not() {
     assert_eq!(mind.duplicate(), None, "the own null vote came back");
     mind.handle(ms(2), says(7, 40, Message::Vote(vote(1, 1, SURE))));
     assert_eq!(mind.refusals().count(Refusal::DuplicateId), 1);
-    let held = HeldVote { robot: RobotId(7), stamp: Stamp { boot: 2, sequence: 1 }, vote: vote(1, 1, SURE) };
+    let held = HeldVote {
+        robot: RobotId(7),
+        stamp: Stamp { boot: 2, sequence: 1 },
+        vote: vote(1, 1, SURE),
+        signature: None,
+    };
     mind.handle(ms(3), says(3, 1, Message::Give(Give { decision: None, votes: vec![held.clone()] })));
     assert_eq!(mind.duplicate(), Some(held.stamp));
     let earlier = HeldVote { stamp: Stamp { boot: 0, sequence: 9 }, ..held };

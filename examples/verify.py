@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Checks a decision of a sealed swarm without the swarm, and without a line of Gestalt's own code.
+
+    pip install cryptography
+    python3 examples/verify.py decision.json --roster keys/roster.json
+
+Every vote that the decision rests on must be signed by a member of the roster, and the decision must follow from them. `--alpha`, `--clip` and
+`--liars` are those of the swarm's `rounds`.
+"""
+import argparse
+import hashlib
+import json
+import math
+import struct
+import sys
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+VERSION = 3
+
+
+class Refused(Exception):
+    """Why a decision is none."""
+
+
+def require(holds: bool, why: str) -> None:
+    if not holds:
+        raise Refused(why)
+
+
+def varint(number: int) -> bytes:
+    """An unsigned number as postcard writes it: seven bits a byte, the least first."""
+    out = bytearray()
+    while number >= 0x80:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    out.append(number)
+    return bytes(out)
+
+
+def text(word: str) -> bytes:
+    return varint(len(word.encode())) + word.encode()
+
+
+def verify(key: str, message: bytes, signature: str) -> None:
+    Ed25519PublicKey.from_public_bytes(bytes.fromhex(key)).verify(bytes.fromhex(signature), message)
+
+
+def members(roster: dict) -> bytes:
+    """Checks who signed the roster; gives the swarm's id."""
+    def keys(of: dict, write, order) -> bytes:
+        entries = [write(name) + bytes.fromhex(key) for name, key in sorted(of.items(), key=order)]
+        return varint(len(entries)) + b"".join(entries)
+
+    number, name = (lambda item: int(item[0])), (lambda item: item[0])
+    body = bytes.fromhex(roster["authority"]) + text(roster["swarm"]) + varint(roster["epoch"])
+    body += keys(roster["robots"], lambda robot: varint(int(robot)), number)
+    body += keys(roster.get("instructors", {}), text, name)
+    body += keys(roster.get("expelled", {}), lambda robot: varint(int(robot)), number)
+    verify(roster["authority"], b"gestalt-roster-1\0" + body, roster["signature"])
+    return hashlib.sha256(b"gestalt-swarm-1" + bytes.fromhex(roster["authority"]) + roster["swarm"].encode()).digest()
+
+
+def statement(held: dict) -> bytes:
+    """The vote as its robot said and signed it."""
+    vote, stamp = held["vote"], held["stamp"]
+    name = vote["round"]
+    numbers = [held["robot"], stamp["boot"], stamp["sequence"], 0, name["counter"], name["opener"], name["life"]]
+    body = b"".join(map(varint, [*numbers, vote["vocabulary"], len(vote["evidence"])]))
+    return bytes([VERSION]) + body + struct.pack(f"<{len(vote['evidence']) + 1}f", *vote["evidence"], vote["looks"])
+
+
+def softmax(row: list) -> list:
+    powers = [math.exp(value - max(row)) for value in row]
+    return [power / sum(powers) for power in powers]
+
+
+def certainty(row: list) -> float:
+    return 1 + sum(p * math.log(p) for p in softmax(row) if p > 0) / math.log(len(row))
+
+
+def fuse(rule: str, votes: list, clip: float) -> tuple:
+    """The probability of each class, and by how many robots' greatest reach the first leads the second."""
+    rows = [[min(max(value, -clip), clip) for value in vote] for vote in votes]
+    if rule == "majority":
+        shares = [[float(k == max(range(len(row)), key=lambda j: (row[j], -j))) for k in range(len(row))] for row in rows]
+        if any(row.count(max(row)) > 1 for row in rows):
+            raise Refused("a vote without a first choice: this program does not judge it")
+    else:
+        shares = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows,
+                  "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
+    totals = [sum(column) for column in zip(*shares)]
+    pooled = rule in ("log_pool", "confidence_weighted")
+    first, second = sorted(totals, reverse=True)[:2]
+    probabilities = softmax(totals) if pooled else [total / len(rows) for total in totals]
+    return probabilities, (first - second) / (2 * clip if pooled else 1)
+
+
+def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
+    swarm, certificate = members(roster), decision["certificate"]
+    votes, others = certificate["votes"], certificate["others"]
+    robots = [held["robot"] for held in votes + others]
+    require(len(set(robots)) == len(robots), "a robot is counted twice")
+    for held in votes + others:
+        require(str(held["robot"]) in roster["robots"], f"robot {held['robot']} is no member")
+        require(held["signature"], f"the vote of robot {held['robot']} is not signed")
+        require(held["vote"]["round"]["counter"] == decision["round"]["counter"], "a vote of another round")
+        key = roster["robots"][str(held["robot"])]
+        verify(key, b"gestalt-statement-1\0" + swarm + statement(held), held["signature"])
+    if decision["class"] is None:
+        return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
+    classes = len(certificate["probabilities"])
+    require(all(len(held["vote"]["evidence"]) == classes for held in votes), "a vote over other gestures")
+    require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
+    require(len(robots) >= certificate["robots"] // 2 + 1, "no majority took part")
+    require(given.liars == 0 or len(votes) > 2 * given.liars, "too few votes for so many liars")
+    probabilities, margin = fuse(certificate["rule"], [held["vote"]["evidence"] for held in votes], given.clip)
+    of_class = probabilities[decision["class"]]
+    require(all(abs(a - b) <= 1e-9 for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
+    require(abs(of_class - decision["confidence"]) <= 1e-9, "another confidence")
+    require(abs(of_class - max(probabilities)) <= 1e-9, "another class is likelier")
+    require(of_class >= 1 - given.alpha and margin > given.liars, "the votes do not suffice")
+    return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON; - for standard input")
+    arguments.add_argument("--roster", required=True, help="the swarm's roster.json")
+    arguments.add_argument("--alpha", type=float, default=0.05)
+    arguments.add_argument("--clip", type=float, default=6.0)
+    arguments.add_argument("--liars", type=int, default=0)
+    given = arguments.parse_args()
+    with sys.stdin if given.decision == "-" else open(given.decision, encoding="utf-8") as file:
+        decision = json.load(file)
+    with open(given.roster, encoding="utf-8") as file:
+        roster = json.load(file)
+    try:
+        print(f"proven: round {decision['round']['counter']}, {check(decision, roster, given)}")
+    except Refused as error:
+        sys.exit(f"refused: {error}")
+    except InvalidSignature:
+        sys.exit("refused: a signature is not its author's")
+    except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+        sys.exit(f"refused: no decision, or no roster: {error!r}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+//! `gestalt verify`: whether a decision was really made.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use gestalt_link::Announcement;
+use gestalt_protocol::{MAX_JSON, decode_json};
+use gestalt_trust::Roster;
+use serde_json::json;
+
+use super::Failure;
+use super::show::{counted, line};
+use crate::config::Config;
+use crate::proof;
+
+/// Check a decision without the swarm: that every vote it rests on was signed by a member, and that it follows from them
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt verify decision.json --roster keys/roster.json
+
+A decision is what robots publish on `gestalt/<swarm>/decision`, as it stands.")]
+pub struct Args {
+    /// Decision, JSON; `-` for standard input
+    decision: PathBuf,
+    /// Roster of the swarm, as `gestalt keys` writes it
+    #[arg(long, value_name = "FILE")]
+    roster: PathBuf,
+    /// Configuration of a robot of the swarm, for its rounds [default: the defaults]
+    #[arg(short, long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// What keeps the decision from being one.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let announcement: Announcement = decode_json(&read(&args.decision)?)?;
+    let decision = announcement.decision;
+    let roster: Roster = Roster::read(&args.roster)?;
+    let config = args.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
+    proof::check(&decision, &roster, &config.rounds)?;
+    let certificate = &decision.certificate;
+    let reached = certificate.reached();
+    let words = format!(
+        "proven: round {}, {}, by {} of {}, signed by members of \"{}\"",
+        decision.round.counter,
+        decision
+            .class
+            .map_or("undecided".to_owned(), |class| format!("class {class}, p = {:.3}", decision.confidence)),
+        reached,
+        counted(certificate.robots as usize, "robot"),
+        roster.members().swarm
+    );
+    let object = json!({"proven": true, "round": decision.round, "class": decision.class, "robots": reached});
+    line(args.json, &object, &words)
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let at_most = MAX_JSON as u64 + 1;
+    let mut bytes = Vec::new();
+    if path == Path::new("-") {
+        std::io::stdin().take(at_most).read_to_end(&mut bytes)?;
+    } else {
+        let file = std::fs::File::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        file.take(at_most).read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}

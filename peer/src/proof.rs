@@ -1,0 +1,187 @@
+//! Whether a decision was really made: checked offline, by whoever has the roster.
+
+use gestalt_protocol::{CountedVote, Decision, Envelope, FusionRule, RobotId};
+use gestalt_strategies::{MindConfig, follows};
+use gestalt_trust::{Distrust, Roster};
+use thiserror::Error;
+
+/// What keeps a decision from being one.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum Unproven {
+    /// A vote that no member of the roster cast.
+    #[error("the vote of robot {robot}: {cause}")]
+    Vote {
+        /// In whose name it stands.
+        robot: RobotId,
+        /// Why it is not believed.
+        cause: Distrust,
+    },
+    /// Another fusion rule than the swarm's.
+    #[error("it was fused by {found}, and the swarm's rule is {expected}: give the configuration of one of its robots", found = found.name(), expected = expected.name())]
+    Rule {
+        /// The one it names.
+        found: FusionRule,
+        /// The one of the configuration.
+        expected: FusionRule,
+    },
+    /// The votes are true, and do not make this decision.
+    #[error("it does not follow from its votes: robots of this configuration would not decide so")]
+    Follows,
+}
+
+/// Whether every vote that a decision rests on was signed by a member of the swarm, and the decision follows from them by the rounds of that
+/// configuration. Its author, its duration and what was announced of it are nobody's word.
+///
+/// # Errors
+/// The first [`Unproven`] found.
+pub fn check(decision: &Decision, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
+    let certificate = &decision.certificate;
+    let votes = certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned());
+    for held in votes {
+        let robot = held.robot;
+        let envelope = Envelope::from(held);
+        let signature = envelope.signature.ok_or(Unproven::Vote { robot, cause: Distrust::Unsigned })?;
+        let checked = roster.check(&envelope.statement(), &signature);
+        checked.map_err(|cause| Unproven::Vote { robot, cause })?;
+    }
+    if certificate.rule != rounds.rule {
+        return Err(Unproven::Rule { found: certificate.rule, expected: rounds.rule });
+    }
+    match follows(decision, &rounds.rule, rounds, certificate.robots) {
+        true => Ok(()),
+        false => Err(Unproven::Follows),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use gestalt_protocol::{ClassId, Message, Signature};
+    use gestalt_strategies::{
+        Classify, ClassifyError, Input, Life, Mind, Observation, Output, Sign, Vocabulary,
+    };
+    use gestalt_trust::{Identity, Membership, SwarmId, statement};
+
+    use super::*;
+
+    #[derive(Debug)]
+    struct Verbatim(Vocabulary);
+
+    impl Classify for Verbatim {
+        fn vocabulary(&self) -> &Vocabulary {
+            &self.0
+        }
+
+        fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+            Ok(features.iter().map(|p| f64::from(*p)).collect())
+        }
+    }
+
+    #[derive(Debug)]
+    struct Signer(Identity, SwarmId);
+
+    impl Sign for Signer {
+        fn sign(&self, words: &[u8]) -> Signature {
+            statement::sign(&self.0, &self.1, words)
+        }
+    }
+
+    /// What four robots decide, one of which sees nothing.
+    fn decided() -> (Decision, Roster) {
+        let identity = |k: u8| Identity::from_bytes(&[k; 32]);
+        let robots = (1..=4).map(|k| (RobotId(u32::from(k)), identity(k).public_key())).collect();
+        let members = Membership { swarm: "demo".to_owned(), epoch: 1, robots, ..Membership::default() };
+        let roster = members.sign(&identity(99)).unwrap();
+        let mut minds: Vec<Mind> = (1..=4)
+            .map(|k| {
+                let life = Life { boot: 1, nonce: 7 };
+                let mind = Mind::new(RobotId(u32::from(k)), life, MindConfig::default()).unwrap();
+                mind.signed_by(Arc::new(Signer(identity(k), roster.swarm_id())))
+            })
+            .collect();
+        let mut due: Vec<(usize, Input)> = Vec::new();
+        for k in 0..4 {
+            let vocabulary = Vocabulary::new(["a", "b"]).unwrap();
+            due.push((k, Input::Learned(Arc::new(Verbatim(vocabulary)))));
+            due.push((k, Input::Alive((1..=4).map(RobotId).collect())));
+            due.push((k, Input::Blind(k == 3)));
+            due.push((k, Input::Open));
+            if k < 3 {
+                due.push((k, Input::Observed(Observation { features: vec![0.1, 0.9], quality: 1.0 })));
+            }
+        }
+        for ms in 1..3000 {
+            for (k, input) in std::mem::take(&mut due).into_iter().chain((0..4).map(|k| (k, Input::Tick))) {
+                for output in minds[k].handle(Duration::from_millis(ms), input) {
+                    match output {
+                        Output::Broadcast(envelope) => {
+                            due.extend(
+                                (0..4).filter(|j| *j != k).map(|j| (j, Input::Received(envelope.clone()))),
+                            );
+                        }
+                        Output::Hold(decision) => return (decision, roster),
+                        _ => {}
+                    }
+                }
+            }
+        }
+        panic!("nothing was decided");
+    }
+
+    #[test]
+    fn a_decision_is_proven_by_its_votes_and_by_nothing_else() {
+        let (decision, roster) = decided();
+        let rounds = MindConfig::default();
+        assert_eq!((decision.class, decision.certificate.votes.len()), (Some(ClassId(1)), 3));
+        assert_eq!(decision.certificate.others.len(), 1, "who saw nothing took part");
+        assert_eq!(check(&decision, &roster, &rounds), Ok(()));
+        // What its author says of itself is not part of it.
+        let mut vain = decision.clone();
+        (vain.author, vain.certificate.elapsed_ms, vain.is_final) = (RobotId(4), 0, true);
+        assert_eq!(check(&vain, &roster, &rounds), Ok(()));
+        let unproven = |change: &dyn Fn(&mut Decision)| {
+            let mut decision = decision.clone();
+            change(&mut decision);
+            check(&decision, &roster, &rounds).unwrap_err()
+        };
+        assert_eq!(unproven(&|d| d.class = Some(ClassId(0))), Unproven::Follows);
+        assert_eq!(unproven(&|d| d.confidence += 1e-6), Unproven::Follows);
+        assert_eq!(unproven(&|d| d.certificate.robots = 8), Unproven::Follows, "no majority");
+        assert_eq!(unproven(&|d| drop(d.certificate.votes.pop())), Unproven::Follows);
+        assert!(matches!(unproven(&|d| d.certificate.rule = FusionRule::Majority), Unproven::Rule { .. }));
+        let unsigned = unproven(&|d| d.certificate.votes[0].signature = None);
+        assert_eq!(unsigned, Unproven::Vote { robot: RobotId(1), cause: Distrust::Unsigned });
+        let stranger = unproven(&|d| d.certificate.votes[2].robot = RobotId(5));
+        assert_eq!(stranger, Unproven::Vote { robot: RobotId(5), cause: Distrust::Stranger });
+    }
+
+    #[test]
+    fn no_byte_of_the_votes_can_be_another() {
+        let (decision, roster) = decided();
+        let mut read = 0;
+        for vote in 0..decision.certificate.votes.len() {
+            let bytes = Envelope::from(decision.certificate.votes[vote].held()).encode();
+            for place in 0..bytes.len() {
+                let mut bytes = bytes.clone();
+                bytes[place] ^= 1;
+                let Ok(Envelope { author, stamp, message: Message::Vote(said), signature }) =
+                    Envelope::decode(&bytes)
+                else {
+                    continue;
+                };
+                read += 1;
+                let mut forged = decision.clone();
+                let counted = &mut forged.certificate.votes[vote];
+                (counted.robot, counted.stamp, counted.vote, counted.signature) =
+                    (author, stamp, said, signature);
+                assert!(
+                    check(&forged, &roster, &MindConfig::default()).is_err(),
+                    "byte {place} of vote {vote}"
+                );
+            }
+        }
+        assert!(read > 200, "{read} forgeries were votes at all");
+    }
+}

@@ -1,0 +1,132 @@
+//! Of whom the majority is: the robots heard lately.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use gestalt_protocol::{MAX_ROBOTS, RobotId};
+
+/// Who counts as one of the swarm, whether or not it can be reached now.
+///
+/// A robot that voted counts for a while after its last vote: a part of the swarm that is cut off remembers how many there
+/// are elsewhere. One that is said to be alive and was never heard counts until a whole round has passed in which it said
+/// nothing: names without robots keep nobody from deciding for long.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Electorate {
+    /// When each other robot last voted. At most [`MAX_ROBOTS`].
+    heard: BTreeMap<RobotId, Duration>,
+    /// Alive and never heard, by now: since when.
+    unheard: BTreeMap<RobotId, Duration>,
+    /// Alive through a whole round, and never heard.
+    silent: BTreeSet<RobotId>,
+}
+
+impl Electorate {
+    /// A robot voted.
+    pub fn hear(&mut self, robot: RobotId, now: Duration) {
+        self.unheard.remove(&robot);
+        self.silent.remove(&robot);
+        if self.heard.len() < MAX_ROBOTS || self.heard.contains_key(&robot) {
+            self.heard.insert(robot, now);
+        }
+    }
+
+    /// These are alive now.
+    pub fn alive(&mut self, robots: &BTreeSet<RobotId>, now: Duration) {
+        self.unheard.retain(|robot, _| robots.contains(robot));
+        self.silent.retain(|robot| robots.contains(robot));
+        for robot in robots.iter().take(MAX_ROBOTS) {
+            if !self.heard.contains_key(robot) && !self.silent.contains(robot) {
+                self.unheard.entry(*robot).or_insert(now);
+            }
+        }
+    }
+
+    /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
+    /// without a robot.
+    pub fn round_over(&mut self, since: Duration) {
+        let silent: Vec<RobotId> =
+            self.unheard.iter().filter(|(_, alive)| **alive <= since).map(|(robot, _)| *robot).collect();
+        for robot in silent {
+            self.unheard.remove(&robot);
+            self.silent.insert(robot);
+        }
+    }
+
+    /// Those of the living of whom anything is to be expected.
+    pub fn expected<'a>(&self, alive: &'a BTreeSet<RobotId>) -> Cow<'a, BTreeSet<RobotId>> {
+        match self.silent.is_empty() {
+            true => Cow::Borrowed(alive),
+            false => Cow::Owned(alive - &self.silent),
+        }
+    }
+
+    /// Forgets who was not heard for that long.
+    pub fn forget(&mut self, now: Duration, lately: Duration) {
+        self.heard.retain(|_, at| now.saturating_sub(*at) <= lately);
+    }
+
+    /// How many robots there are, this one included.
+    pub fn count(&self) -> u32 {
+        u32::try_from(1 + self.heard.len() + self.unheard.len()).unwrap_or(u32::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LATELY: Duration = Duration::from_secs(60);
+
+    fn at(seconds: u64) -> Duration {
+        Duration::from_secs(seconds)
+    }
+
+    fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
+        ids.into_iter().map(RobotId).collect()
+    }
+
+    #[test]
+    fn who_was_heard_counts_for_a_while_also_when_it_cannot_be_reached() {
+        let mut electorate = Electorate::default();
+        electorate.alive(&robots(1..=8), at(0));
+        assert_eq!(electorate.count(), 9, "before they had a chance to say anything");
+        for robot in 1..=8 {
+            electorate.hear(RobotId(robot), at(1));
+        }
+        electorate.alive(&robots(1..=3), at(2));
+        electorate.round_over(at(2));
+        electorate.forget(at(61), LATELY);
+        assert_eq!(electorate.count(), 9);
+        electorate.forget(at(62), LATELY);
+        assert_eq!(electorate.count(), 1);
+    }
+
+    #[test]
+    fn a_name_without_a_robot_counts_for_one_round() {
+        let mut electorate = Electorate::default();
+        let expects =
+            |electorate: &Electorate, robot| electorate.expected(&robots(1..=3)).contains(&RobotId(robot));
+        electorate.alive(&robots(1..=2), at(0));
+        electorate.hear(RobotId(1), at(1));
+        electorate.round_over(at(0));
+        assert_eq!((electorate.count(), expects(&electorate, 2)), (2, false));
+        // It came in the midst of a round.
+        electorate.alive(&robots(1..=3), at(3));
+        electorate.round_over(at(2));
+        assert_eq!((electorate.count(), expects(&electorate, 3)), (3, true));
+        electorate.hear(RobotId(2), at(5));
+        assert!(expects(&electorate, 2), "it was slow");
+        assert_eq!(electorate.count(), 4);
+    }
+
+    #[test]
+    fn no_number_of_names_makes_it_grow_without_bound() {
+        let mut electorate = Electorate::default();
+        for robot in 0..2 * MAX_ROBOTS as u32 {
+            electorate.hear(RobotId(robot), at(0));
+        }
+        electorate.alive(&robots(10_000..20_000), at(0));
+        assert!(electorate.count() as usize <= 1 + 2 * MAX_ROBOTS);
+    }
+}

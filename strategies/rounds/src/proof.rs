@@ -1,0 +1,43 @@
+//! Whether a decision follows from the votes in its certificate.
+
+use gestalt_protocol::{Certificate, Decision};
+
+use crate::ballot::Scale;
+use crate::config::RoundsConfig;
+use crate::fuse::Fuse;
+
+/// What the exponentials of two platforms may differ by.
+const TOLERANCE: f64 = 1e-9;
+
+/// Whether robots of that configuration, so many of them, decide so on the votes that the decision brings with it, fused by that
+/// rule. What it says of itself counts for nothing. Whether the votes were cast is another question, for `gestalt-trust`.
+///
+/// A decision without a class claims nothing, and follows from any votes.
+#[must_use]
+pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robots: u32) -> bool {
+    let Some(class) = decision.class else { return decision.check().is_ok() };
+    let certificate = &decision.certificate;
+    let Certificate { vocabulary, probabilities, votes, others, .. } = certificate;
+    let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
+    let of_the_round = |counter| counter == decision.round.counter;
+    let sound = decision.check().is_ok()
+        && certificate.rule == rule.rule()
+        && votes.iter().all(|counted| scale.is_of(&counted.vote) && of_the_round(counted.vote.round.counter))
+        && others.iter().all(|held| of_the_round(held.vote.round.counter))
+        && config.suffice(certificate.reached(), votes.len(), robots);
+    if !sound {
+        return false;
+    }
+    let rows: Vec<&[f32]> = votes.iter().map(|counted| counted.vote.evidence.as_slice()).collect();
+    let Some(fusion) =
+        rule.fuse(config.clip, scale.classes, &rows).filter(|fusion| fusion.is_sound(scale.classes))
+    else {
+        return false;
+    };
+    let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
+    let likeliest = fusion.probabilities[class.index()];
+    fusion.probabilities.iter().zip(probabilities).all(|(a, b)| close(*a, *b))
+        && close(likeliest, decision.confidence)
+        && close(likeliest, fusion.probabilities[fusion.top.index()])
+        && config.convinces(&fusion)
+}

@@ -1,0 +1,175 @@
+//! A sealed swarm, and one who is no member of it.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_link::{RobotConfig, Seal};
+use gestalt_protocol::{
+    ClassId, Envelope, Give, Have, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote,
+};
+use gestalt_strategies::Classify;
+use gestalt_tests::{Fixed, agreed, config, start, unique};
+use gestalt_trust::{Identity, Membership, statement};
+use serde_json::Value;
+
+use crate::trouble::{attach, counted, invented};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// The key of robot `id`; any other number is somebody's too.
+fn key(id: u32) -> Identity {
+    let mut secret = [7; 32];
+    secret[..4].copy_from_slice(&id.to_le_bytes());
+    Identity::from_bytes(&secret)
+}
+
+fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
+    let roster = members.clone().sign(&key(1000)).expect("a roster");
+    let seal = Seal { identity: Arc::new(key(id)), roster, guests: std::collections::BTreeMap::new() };
+    RobotConfig { seal: Some(seal), ..config(id, &members.swarm, connect) }
+}
+
+pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
+    let swarm = unique("stranger");
+    let robots = (0..3).map(|id| (RobotId(id), key(id).public_key())).collect();
+    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
+    let locators = robots[0].robot.locators().to_vec();
+    robots.push(start(sealed(1, &members, &locators), Some(ClassId(4))).await);
+    robots.push(start(sealed(2, &members, &locators), None).await);
+    for robot in &robots {
+        assert!(robot.sees_alive(2, PATIENCE).await && robot.robot.status().sealed);
+    }
+    robots[1].robot.open_round();
+    let first = agreed(&mut robots, 1, PATIENCE).await;
+    let signed = first.certificate.votes.iter().all(|counted| counted.signature.is_some());
+    assert!(signed && first.certificate.reached() == 3, "{first:?}");
+
+    let liar = attach(&locators).await;
+    let keys = Keys::new(&swarm).unwrap();
+    let vocabulary = Fixed::default().vocabulary().id();
+    let put = async |topic: Topic, bytes: Vec<u8>| liar.put(keys.key(&topic), bytes).await.unwrap();
+    let vote = |counter: u32, robot: u32| {
+        let round = RoundId { counter, opener: RobotId(0), life: 9 };
+        let vote = Vote { round, vocabulary, evidence: vec![-1.0, 5.0, -1.0, -1.0, -1.0, -1.0], looks: 16.0 };
+        let (author, stamp) = (RobotId(robot), Stamp { boot: u32::MAX, sequence: counter });
+        Envelope { author, stamp, message: Message::Vote(vote), signature: None }
+    };
+    // Votes of all robots, in a round of the stranger's own: unsigned, and signed by a key that is nobody's.
+    let stranger = key(77);
+    let swarm_id = members.clone().sign(&key(1000)).unwrap().swarm_id();
+    for robot in 0..3 {
+        let unsigned = vote(2, robot);
+        let signature = Some(statement::sign(&stranger, &swarm_id, &unsigned.statement()));
+        put(Topic::Vote(RobotId(robot)), unsigned.encode()).await;
+        put(Topic::Vote(RobotId(robot)), Envelope { signature, ..unsigned }.encode()).await;
+    }
+    // A robot that does not exist, with that key.
+    let ghost = vote(2, 50);
+    let signature = Some(statement::sign(&stranger, &swarm_id, &ghost.statement()));
+    put(Topic::Vote(RobotId(50)), Envelope { signature, ..ghost }.encode()).await;
+    // A decision by two hundred invented votes: announced, and given as a neighbour gives.
+    let round = RoundId { counter: 2, opener: RobotId(0), life: 9 };
+    let decision = invented(round, RobotId(1), 1, 200);
+    put(Topic::Decision, serde_json::to_vec(&decision).unwrap()).await;
+    let held = |robot| {
+        let Envelope { author, stamp, message: Message::Vote(vote), signature } = vote(2, robot) else {
+            unreachable!()
+        };
+        HeldVote { robot: author, stamp, vote, signature }
+    };
+    let said = |sequence, message| {
+        Envelope { author: RobotId(1), stamp: Stamp { boot: u32::MAX, sequence }, message, signature: None }
+            .encode()
+    };
+    let give = Give { decision: Some(decision.clone()), votes: (0..3).map(held).collect() };
+    put(Topic::Repair(RobotId(0)), said(1, Message::Give(give))).await;
+    // Counters that would be used up: as votes, and as what a neighbour says it has.
+    for step in 0..4400 {
+        let counter = 1_000_000_u32.saturating_mul(step + 1);
+        put(Topic::Vote(RobotId(1)), vote(counter, 1).encode()).await;
+        let round = Some(RoundId { counter, opener: RobotId(0), life: 9 });
+        let have = Have { round, decision: None, votes: vec![], knowledge: None, answer: true };
+        put(Topic::Repair(RobotId(0)), said(2 + step, Message::Have(have))).await;
+    }
+    // What a robot says it holds is asked for, and nobody has it.
+    put(Topic::RobotDecision(RobotId(1)), serde_json::to_vec(&decision.holding(vec![RobotId(2)])).unwrap())
+        .await;
+    for (counter, least) in [
+        ("refused_vote_unsigned", 4403),
+        ("refused_vote_forged", 2),
+        ("refused_vote_stranger", 1),
+        ("refused_decision_unsigned", 1),
+        ("refused_repair_unsigned", 1),
+    ] {
+        counted(&robots[0], counter, least).await;
+    }
+    robots[1].robot.open_round();
+    let second = agreed(&mut robots, 2, PATIENCE).await;
+    assert_eq!((second.round.counter, second.round.life), (2, first.round.life), "{second:?}");
+    assert_eq!((second.class, second.certificate.robots), (Some(ClassId(4)), 3), "{second:?}");
+    liar.close().await.unwrap();
+    for robot in robots {
+        robot.stop().await;
+    }
+}
+
+pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let keys = folder.path().join("keys");
+    let gestalt = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_test-gestalt"));
+        command.args(words).stderr(Stdio::piped()).output().expect("gestalt runs")
+    };
+    let folder_of_keys = keys.to_str().unwrap();
+    let ran =
+        gestalt(&["swarm", "--robots", "footbot:3", "--rounds", "1", "--json", "--keys", folder_of_keys]);
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    let lines = String::from_utf8(ran.stdout).unwrap();
+    let told = lines.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let decision =
+        told.filter(|told| told["event"] == "decision").map(|told| told["decision"].clone()).next();
+    let decision = decision.expect("a decision");
+    let roster = keys.join("roster.json");
+    let (file, roster) = (folder.path().join("decision.json"), roster.to_str().unwrap());
+    let python = Command::new("python3").args(["-c", "import cryptography"]).stderr(Stdio::null()).status();
+    let python = python.is_ok_and(|status| status.success());
+    if !python {
+        eprintln!("skipped: verify.py: python3 has no package cryptography");
+    }
+    let verdicts = |decision: &Value| {
+        std::fs::write(&file, decision.to_string()).unwrap();
+        let file = file.to_str().unwrap();
+        let by_rust = gestalt(&["verify", file, "--roster", roster]);
+        let mut verdicts =
+            vec![(by_rust.status.success(), String::from_utf8_lossy(&by_rust.stderr).into_owned())];
+        if python {
+            let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/verify.py");
+            let ran = Command::new("python3").arg(program).args([file, "--roster", roster]).output().unwrap();
+            verdicts.push((ran.status.success(), String::from_utf8_lossy(&ran.stderr).into_owned()));
+        }
+        verdicts
+    };
+    for (proven, why) in verdicts(&decision) {
+        assert!(proven, "{why}: {decision}");
+    }
+    let forgeries: [&dyn Fn(&mut Value); 8] = [
+        &|d| d["class"] = ((d["class"].as_u64().unwrap() + 1) % 6).into(),
+        &|d| d["confidence"] = 0.96.into(),
+        &|d| d["certificate"]["votes"][0]["vote"]["evidence"][0] = 1.25.into(),
+        &|d| d["certificate"]["votes"][0]["vote"]["looks"] = 15.0.into(),
+        &|d| d["certificate"]["votes"][1]["stamp"]["sequence"] = 1_000_000.into(),
+        &|d| d["certificate"]["votes"][1]["vote"]["round"]["life"] = 5.into(),
+        &|d| d["certificate"]["votes"][0]["signature"] = d["certificate"]["votes"][1]["signature"].clone(),
+        &|d| d["certificate"]["robots"] = 20.into(),
+    ];
+    for (n, forge) in forgeries.iter().enumerate() {
+        let mut forged = decision.clone();
+        forge(&mut forged);
+        for (proven, why) in verdicts(&forged) {
+            assert!(!proven && !why.contains("Traceback"), "forgery {n} is taken for a decision: {why}");
+        }
+    }
+}
