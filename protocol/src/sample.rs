@@ -127,6 +127,9 @@ pub struct Know {
     pub digest: Digest,
     /// Whether this is itself an answer to a [`Know`]; such a one is answered with what is lacking only.
     pub answer: bool,
+    /// The digest in the [`Know`] that this answers, if its author had nothing to give for it: the reader need not ask
+    /// again until either's digest has changed. The lists are empty then.
+    pub nothing_for: Option<Digest>,
 }
 
 impl Know {

@@ -124,13 +124,17 @@ fn know() -> impl Strategy<Value = Know> {
     let samples = prop::collection::btree_map(any::<u32>(), numbers, 0..5).prop_map(|known| {
         known.into_iter().map(|(author, numbers)| Known { author: RobotId(author), numbers }).collect()
     });
-    (samples, prop::collection::vec((round(), any::<u64>()), 0..5), any::<(u64, u64)>(), any::<bool>())
-        .prop_map(|(samples, lessons, (of_samples, of_lessons), answer)| Know {
+    let digest = || any::<(u64, u64)>().prop_map(|(samples, lessons)| Digest { samples, lessons });
+    let lessons = prop::collection::vec((round(), any::<u64>()), 0..5);
+    (samples, lessons, digest(), any::<bool>(), prop::option::of(digest())).prop_map(
+        |(samples, lessons, digest, answer, nothing_for)| Know {
             samples,
             lessons,
-            digest: Digest { samples: of_samples, lessons: of_lessons },
+            digest,
             answer,
-        })
+            nothing_for,
+        },
+    )
 }
 
 fn lesson() -> impl Strategy<Value = Lesson> {
@@ -302,6 +306,7 @@ fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
             lessons: vec![],
             digest: Digest::default(),
             answer: false,
+            nothing_for: None,
         }))
         .is_ok()
     };

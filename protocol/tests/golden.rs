@@ -144,11 +144,20 @@ fn what_a_robot_knows() {
         lessons: vec![(ROUND, 5)],
         digest: Digest { samples: 300, lessons: 1 },
         answer: true,
+        nothing_for: None,
     };
     travels_as(
         Message::Know(know),
-        &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01"),
+        &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01 00"),
     );
+    let nothing = Know {
+        samples: vec![],
+        lessons: vec![],
+        digest: Digest { samples: 300, lessons: 1 },
+        answer: true,
+        nothing_for: Some(Digest { samples: 5, lessons: 6 }),
+    };
+    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 ac0201 01 01 05 06"));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use gestalt_protocol::{ClassId, Fnv1a, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
 
 /// The most instructors of one round.
-const MAX_INSTRUCTORS: usize = 16;
+pub(crate) const MAX_INSTRUCTORS: usize = 16;
 
 /// Which gestures a round may have shown, by all that was said of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,11 +94,16 @@ impl LessonBook {
         LessonReceipt::New
     }
 
-    fn forget_oldest(&mut self) {
+    pub(crate) fn forget_oldest(&mut self) {
         if let Some(oldest) = self.oldest() {
-            self.digest ^= self.digest_of(oldest);
-            self.rounds.remove(&oldest);
+            self.forget(oldest);
         }
+    }
+
+    /// Forgets what was said of a round.
+    pub(crate) fn forget(&mut self, round: RoundId) {
+        self.digest ^= self.digest_of(round);
+        self.rounds.remove(&round);
     }
 
     /// What all that was said of a round comes to, in a vocabulary of so many classes. Where instructors contradict

@@ -27,13 +27,15 @@ pub enum Refusal {
     UnknownClass,
     /// A sample with an author or number beyond the bounds of what one robot remembers.
     SampleNumber,
+    /// A lesson on a round of which as many instructors spoke as are kept, or on one older than all that are kept.
+    LessonFull,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::Vocabulary,
@@ -46,6 +48,7 @@ impl Refusal {
         Self::BadVector,
         Self::UnknownClass,
         Self::SampleNumber,
+        Self::LessonFull,
         Self::CountersUsedUp,
     ];
 
@@ -65,6 +68,7 @@ impl Refusal {
             Self::BadVector => "refused_sample_with_bad_vector",
             Self::UnknownClass => "refused_sample_of_unknown_class",
             Self::SampleNumber => "refused_sample_number",
+            Self::LessonFull => "refused_lesson_full",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

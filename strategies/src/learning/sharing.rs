@@ -105,6 +105,11 @@ impl Learning {
         })
     }
 
+    /// Whether a shared sample is not told to others yet.
+    pub fn withholds(&self) -> bool {
+        self.unsent.iter().any(|(revision, _)| *revision > self.remembered)
+    }
+
     /// Whether a sample may be told to others: an own one only once it is remembered as shared.
     pub fn may_tell(&self, id: SampleId) -> bool {
         id.author != self.me

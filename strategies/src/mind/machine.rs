@@ -9,6 +9,7 @@ use gestalt_rounds::{
 };
 
 use super::answers::Answers;
+use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
 use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory};
@@ -57,6 +58,7 @@ pub struct Mind {
     pub(super) rounds: Rounds,
     pub(super) learning: Option<Learning>,
     pub(super) answers: Answers,
+    pub(super) exchanges: Exchanges,
 }
 
 impl Mind {
@@ -67,7 +69,12 @@ impl Mind {
     /// # Errors
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
     pub fn new(me: RobotId, life: Life, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
-        Ok(Self { rounds: Rounds::new(me, life, config)?, learning: None, answers: Answers::default() })
+        Ok(Self {
+            rounds: Rounds::new(me, life, config)?,
+            learning: None,
+            answers: Answers::default(),
+            exchanges: Exchanges::default(),
+        })
     }
 
     /// The same mind, in which votes are fused by the user's rule, see [`Rounds::fused_by`].
@@ -130,6 +137,7 @@ impl Mind {
             AboutRounds::Received(envelope) if envelope.author != self.me() => {
                 self.on_received(envelope, out);
             }
+            AboutRounds::Neighbours(robots) => self.exchanges.keep(|robot| robots.contains(&robot)),
             _ => {}
         }
         input
@@ -141,7 +149,7 @@ impl Mind {
             Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
             Message::Samples(samples) => self.on_samples(author, samples),
             Message::Know(know) => self.on_know(author, know, out),
-            Message::Lessons(lessons) => self.on_lessons(&lessons.lessons),
+            Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
             Message::Vote(_) | Message::Have(_) | Message::Give(_) => {}
         }
     }

@@ -7,8 +7,11 @@ use thiserror::Error;
 
 /// Authors that are kept track of.
 pub const MAX_AUTHORS: usize = 4096;
-/// Intervals of numbers kept per author: more gaps than that mean that something other than loss is at work.
+/// Intervals of numbers kept per author. Beyond, the lowest gap counts as seen: what is missing there was lost long ago, or
+/// forgotten by whoever could give it.
 pub const MAX_GAPS: usize = 256;
+/// Intervals kept of all authors together, so that a list of them always fits in a message.
+pub const MAX_INTERVALS_IN_ALL: usize = 16_384;
 /// How far a number may lie beyond the highest one seen of its author, once it is beyond [`LAST_NUMBER`].
 const FAR_AHEAD: u32 = 1_000_000;
 /// Up to here an author may begin with any number, as one does that has lost its memory. The last ones are for who came
@@ -25,8 +28,10 @@ pub enum SeenError {
     /// Samples of as many authors as can be kept track of were seen already.
     #[error("sample {0}: samples of {MAX_AUTHORS} other authors were seen, which is the most that is kept")]
     TooManyAuthors(SampleId),
-    /// The number would leave one gap too many between the numbers seen.
-    #[error("sample {0}: more than {MAX_GAPS} gaps between the numbers seen; send the earlier ones first")]
+    /// More intervals are claimed of one author, or of all together, than are kept.
+    #[error(
+        "sample {0}: more than {MAX_GAPS} intervals of an author's numbers, or {MAX_INTERVALS_IN_ALL} in all"
+    )]
     TooManyGaps(SampleId),
     /// The number lies further ahead than its author can have come.
     #[error("sample {0}: no author can have come so far")]
@@ -38,11 +43,12 @@ pub enum SeenError {
 
 /// A set of sample identifiers: for each author the numbers seen, as intervals. A robot that misses nothing holds
 /// one interval per author, however long it lives, and one more for each time that the author lost its memory and
-/// numbered on from its boot number; the bounds of this module hold whatever arrives.
+/// numbered on from its boot number; [`MAX_AUTHORS`], [`MAX_GAPS`] and [`MAX_INTERVALS_IN_ALL`] hold whatever arrives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SeenSamples {
     authors: BTreeMap<RobotId, Vec<(u32, u32)>>,
-    digest: u64,
+    /// How many intervals there are in all.
+    intervals: usize,
 }
 
 impl SeenSamples {
@@ -62,7 +68,7 @@ impl SeenSamples {
             if first == 0 {
                 return Err(SeenError::Zero(id));
             }
-            if intervals.len() > MAX_GAPS {
+            if intervals.len() > MAX_GAPS || seen.intervals + intervals.len() > MAX_INTERVALS_IN_ALL {
                 return Err(SeenError::TooManyGaps(id));
             }
             if seen.authors.len() >= MAX_AUTHORS {
@@ -74,7 +80,7 @@ impl SeenSamples {
             if !(forwards && apart) {
                 return Err(SeenError::Disorder(author));
             }
-            seen.digest ^= intervals.iter().fold(0, |sum, interval| sum ^ mark(author, *interval));
+            seen.intervals += intervals.len();
             if seen.authors.insert(author, intervals).is_some() {
                 return Err(SeenError::Disorder(author));
             }
@@ -98,29 +104,54 @@ impl SeenSamples {
         if !self.would_accept(id)? {
             return Ok(false);
         }
-        let SampleId { author, number } = id;
-        let intervals = self.authors.entry(author).or_default();
-        let at = intervals.partition_point(|(from, _)| *from < number);
-        let follows = at > 0 && intervals[at - 1].1 + 1 == number;
-        let precedes = at < intervals.len() && number + 1 == intervals[at].0;
-        match (follows, precedes) {
-            (true, true) => {
-                intervals[at - 1].1 = intervals[at].1;
-                intervals.remove(at);
-            }
-            (true, false) => intervals[at - 1].1 = number,
-            (false, true) => intervals[at].0 = number,
-            (false, false) => intervals.insert(at, (number, number)),
-        }
-        self.digest ^= mark(author, (number, number));
+        self.add(id.author, (id.number, id.number));
         Ok(true)
+    }
+
+    /// Remembers all that another set has; of authors that there is no room for, nothing.
+    pub fn extend(&mut self, other: &Self) {
+        for (author, intervals) in &other.authors {
+            if self.authors.contains_key(author) || self.authors.len() < MAX_AUTHORS {
+                intervals.iter().for_each(|interval| self.add(*author, *interval));
+            }
+        }
+    }
+
+    /// Forgets an author.
+    pub fn forget(&mut self, author: RobotId) {
+        self.intervals -= self.authors.remove(&author).map_or(0, |intervals| intervals.len());
+    }
+
+    /// Adds an interval, and closes gaps until all is within the bounds.
+    fn add(&mut self, author: RobotId, (mut from, mut to): (u32, u32)) {
+        let intervals = self.authors.entry(author).or_default();
+        let before = intervals.len();
+        // Those that it overlaps or touches become one with it.
+        let first = intervals.partition_point(|(_, end)| end.saturating_add(1) < from);
+        let last = intervals.partition_point(|(start, _)| *start <= to.saturating_add(1));
+        if let Some(merged) = intervals.get(first..last).filter(|merged| !merged.is_empty()) {
+            (from, to) = (from.min(merged[0].0), to.max(merged[merged.len() - 1].1));
+        }
+        intervals.splice(first..last, [(from, to)]);
+        if intervals.len() > MAX_GAPS {
+            close_lowest_gap(intervals);
+        }
+        self.intervals = self.intervals + intervals.len() - before;
+        while self.intervals > MAX_INTERVALS_IN_ALL {
+            // More than one each, as there are more intervals than authors.
+            let Some(most) = self.authors.values_mut().max_by_key(|intervals| intervals.len()) else {
+                return;
+            };
+            close_lowest_gap(most);
+            self.intervals -= 1;
+        }
     }
 
     /// What [`SeenSamples::insert`] would say: whether the sample is new.
     ///
     /// # Errors
-    /// [`SeenError::Zero`], [`SeenError::FarAhead`], [`SeenError::TooManyAuthors`] and [`SeenError::TooManyGaps`]:
-    /// an identifier that cannot be remembered within the bounds.
+    /// [`SeenError::Zero`], [`SeenError::FarAhead`] and [`SeenError::TooManyAuthors`]: an identifier that cannot be
+    /// remembered within the bounds.
     pub fn would_accept(&self, id: SampleId) -> Result<bool, SeenError> {
         if id.number == 0 {
             return Err(SeenError::Zero(id));
@@ -136,20 +167,15 @@ impl SeenSamples {
         if intervals.is_empty() && self.authors.len() >= MAX_AUTHORS {
             return Err(SeenError::TooManyAuthors(id));
         }
-        let touches = intervals.iter().any(|(from, to)| {
-            to.checked_add(1) == Some(id.number) || id.number.checked_add(1) == Some(*from)
-        });
-        if !touches && intervals.len() >= MAX_GAPS {
-            return Err(SeenError::TooManyGaps(id));
-        }
         Ok(true)
     }
 
-    /// Names the set: the same samples give the same digest, whatever the order they came in. Kept up to date at
-    /// each insertion in constant time; two different sets share it with probability 2⁻⁶⁴.
+    /// Names the set: the same samples give the same digest, whatever the order they came in; two different sets
+    /// share it with probability 2⁻⁶⁴.
     #[must_use]
     pub fn digest(&self) -> u64 {
-        self.digest
+        let intervals = self.authors.iter().flat_map(|(author, of)| of.iter().map(|i| (*author, *i)));
+        intervals.fold(0, |digest, (author, interval)| digest ^ mark(author, interval))
     }
 
     /// The authors of which a sample was seen, ascending.
@@ -189,6 +215,14 @@ impl SeenSamples {
             .flat_map(|(from, before)| from..before)
             // Numbers of an interval of u32 are u32.
             .map(move |number| SampleId { author, number: number as u32 })
+    }
+}
+
+/// Takes what lies between the two lowest intervals as seen.
+fn close_lowest_gap(intervals: &mut Vec<(u32, u32)>) {
+    if intervals.len() > 1 {
+        let (from, _) = intervals.remove(0);
+        intervals[0].0 = from;
     }
 }
 
@@ -249,12 +283,25 @@ mod tests {
     }
 
     #[test]
-    fn the_gaps_of_an_author_are_bounded_and_can_be_filled() {
+    fn the_lowest_gaps_count_as_seen_when_there_are_too_many() {
         let mut seen = of((0..MAX_GAPS as u32).map(|i| (1, 1 + 2 * i)));
         let next = 1 + 2 * MAX_GAPS as u32;
-        assert_eq!(seen.insert(id(1, next)), Err(SeenError::TooManyGaps(id(1, next))));
-        assert_eq!(seen.insert(id(1, 2)), Ok(true));
+        assert!(!seen.contains(id(1, 2)));
         assert_eq!(seen.insert(id(1, next)), Ok(true));
+        assert_eq!(seen.intervals(RobotId(1)).len(), MAX_GAPS);
+        assert!(seen.contains(id(1, 2)) && !seen.contains(id(1, 4)));
+        assert_eq!(seen.insert(id(1, 4)), Ok(true), "the others can still be filled");
+    }
+
+    #[test]
+    fn the_gaps_of_all_authors_together_are_bounded() {
+        let authors = (MAX_INTERVALS_IN_ALL / MAX_GAPS) as u32 + 3;
+        let seen = of((0..authors).flat_map(|author| (0..MAX_GAPS as u32).map(move |i| (author, 1 + 2 * i))));
+        let kept: Vec<usize> = seen.authors().map(|author| seen.intervals(author).len()).collect();
+        assert_eq!(kept.iter().sum::<usize>(), MAX_INTERVALS_IN_ALL);
+        assert!(kept.iter().all(|kept| *kept > MAX_GAPS / 2), "all give way alike: {kept:?}");
+        let last = 1 + 2 * (MAX_GAPS as u32 - 1);
+        assert!((0..authors).all(|author| seen.contains(id(author, last))), "nothing seen is lost");
     }
 
     #[test]
@@ -315,6 +362,13 @@ mod tests {
             prop_assert_eq!(of(a.clone()).digest(), of(shuffled).digest());
             let (a, b) = (of(a), of(b));
             prop_assert_eq!(a.digest() == b.digest(), a == b);
+        }
+
+        #[test]
+        fn two_sets_together_have_what_either_has(a in ids(), b in ids()) {
+            let mut together = of(a.clone());
+            together.extend(&of(b.clone()));
+            prop_assert_eq!(together, of(a.into_iter().chain(b)));
         }
 
         #[test]

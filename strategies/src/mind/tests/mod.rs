@@ -3,6 +3,7 @@
 mod feedback;
 mod knowledge;
 mod refusing;
+mod rest;
 mod sharing;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -76,6 +77,10 @@ struct Swarm {
     answers: Vec<gestalt_protocol::Answer>,
     said: Vec<SharedSample>,
     trained: Vec<BTreeMap<u64, ClassId>>,
+    spaces: Vec<Arc<FeatureSpace>>,
+    vocabularies: Vec<Vocabulary>,
+    /// How many messages robots told each other, and their bytes, by kind.
+    told: BTreeMap<&'static str, (usize, usize)>,
 }
 
 impl Swarm {
@@ -95,6 +100,9 @@ impl Swarm {
             answers: Vec::new(),
             said: Vec::new(),
             trained: vec![BTreeMap::new(); n],
+            spaces: vec![space(); n],
+            vocabularies: vec![vocabulary(); n],
+            told: BTreeMap::new(),
         };
         for i in 0..n {
             let mind = swarm.waken(i);
@@ -114,8 +122,8 @@ impl Swarm {
         let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
         let setup = LearningSetup {
             config: self.config.clone(),
-            space: space(),
-            vocabulary: vocabulary(),
+            space: self.spaces[i].clone(),
+            vocabulary: self.vocabularies[i].clone(),
             rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(id.0) * 1000 + u64::from(boot))),
             memory: Some(RobotMemory::read(records).unwrap()),
             rules: self.rules.clone(),
@@ -136,6 +144,12 @@ impl Swarm {
         let mind = self.waken(i);
         self.minds[i] = mind;
         self.introduce(i);
+    }
+
+    /// Its disk is gone.
+    fn restart_empty(&mut self, i: usize) {
+        self.disks[i].clear();
+        self.restart(i);
     }
 
     /// All are switched off and on: none finds another that goes on.
@@ -164,6 +178,8 @@ impl Swarm {
                         }
                     }
                     Output::Tell(robot, envelope) => {
+                        let told = self.told.entry(kind(&envelope.message)).or_default();
+                        *told = (told.0 + 1, told.1 + envelope.encode().len());
                         if self.arrives() {
                             due.push_back((robot.0 as usize - 1, Input::Received(envelope)));
                         }
@@ -194,8 +210,9 @@ impl Swarm {
                                 TrainingChange::Insert { key, class, .. } => {
                                     self.trained[i].insert(key, class);
                                 }
+                                // One that went as soon as it came was never told.
                                 TrainingChange::Remove(key) => {
-                                    assert!(self.trained[i].remove(&key).is_some())
+                                    self.trained[i].remove(&key);
                                 }
                                 TrainingChange::Relabel { key, class } => {
                                     assert!(self.trained[i].insert(key, class).is_some());
@@ -284,6 +301,16 @@ impl Swarm {
             assert_eq!(held, kept, "robot {} remembers what it holds", i + 1);
             assert_eq!(&memory.seen, set.seen());
         }
+    }
+}
+
+fn kind(message: &Message) -> &'static str {
+    match message {
+        Message::Have(_) => "have",
+        Message::Know(_) => "know",
+        Message::Samples(_) => "samples",
+        Message::Lessons(_) => "lessons",
+        _ => "other",
     }
 }
 

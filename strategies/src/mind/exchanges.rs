@@ -1,0 +1,87 @@
+//! What was settled with each neighbour, so that two robots that cannot come to know the same stop telling each other.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{Digest, Lesson, RobotId, RoundId, SampleId};
+
+use crate::lessons::LessonBook;
+use crate::sample::SeenSamples;
+
+/// The most neighbours of whom something is kept; of the others everything is offered again.
+const MAX_NEIGHBOURS: usize = 64;
+
+/// The most rounds of which a neighbour's lessons are kept as declined; those beyond are offered again.
+const MAX_DECLINED_ROUNDS: usize = 64;
+
+/// What was settled with one neighbour. It binds nobody else: what this neighbour has no more use in offering is still
+/// taken from another, so a neighbour that lies deprives this robot of nothing but its own help.
+#[derive(Clone, Debug, Default)]
+struct Exchange {
+    /// This robot's digest and the neighbour's, for which the neighbour said that it had nothing to give.
+    at_rest: Option<(Digest, Digest)>,
+    /// What it offered and this robot cannot take: within the bounds of [`SeenSamples`].
+    declined: SeenSamples,
+    /// The lessons it offered, some of which this robot cannot take: at most [`MAX_DECLINED_ROUNDS`] rounds.
+    declined_lessons: LessonBook,
+}
+
+/// What was settled with the neighbours: at most [`MAX_NEIGHBOURS`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct Exchanges(BTreeMap<RobotId, Exchange>);
+
+impl Exchanges {
+    /// Whether that neighbour said that it had nothing to give, when both knew what they know now.
+    pub fn is_at_rest(&self, robot: RobotId, mine: Digest, theirs: Digest) -> bool {
+        self.0.get(&robot).is_some_and(|exchange| exchange.at_rest == Some((mine, theirs)))
+    }
+
+    pub fn rest(&mut self, robot: RobotId, mine: Digest, theirs: Digest) {
+        self.with(robot).at_rest = Some((mine, theirs));
+    }
+
+    /// What this robot tells that neighbour to have: what it has seen, and what it cannot take.
+    pub fn told_to(&self, robot: RobotId, seen: &SeenSamples) -> SeenSamples {
+        let mut told = seen.clone();
+        if let Some(exchange) = self.0.get(&robot) {
+            told.extend(&exchange.declined);
+        }
+        told
+    }
+
+    /// A sample that neighbour offered cannot be taken.
+    pub fn decline(&mut self, robot: RobotId, sample: SampleId) {
+        // One that cannot be noted is offered again.
+        let _ = self.with(robot).declined.insert(sample);
+    }
+
+    /// Some of these lessons of one round, all that neighbour has, cannot be taken.
+    pub fn decline_lessons<'a>(&mut self, robot: RobotId, of_round: impl Iterator<Item = &'a Lesson>) {
+        let declined = &mut self.with(robot).declined_lessons;
+        for (place, lesson) in of_round.enumerate() {
+            if place == 0 {
+                declined.forget(lesson.round);
+            }
+            declined.hear(lesson);
+        }
+        while declined.len() > MAX_DECLINED_ROUNDS {
+            declined.forget_oldest();
+        }
+    }
+
+    /// The rounds of which this robot cannot take what that neighbour says, each with the digest of that.
+    pub fn declined_rounds(&self, robot: RobotId) -> BTreeMap<RoundId, u64> {
+        self.0.get(&robot).map(|exchange| exchange.declined_lessons.rounds().collect()).unwrap_or_default()
+    }
+
+    /// Only these are neighbours now. One that comes back begins anew.
+    pub fn keep(&mut self, is_neighbour: impl Fn(RobotId) -> bool) {
+        self.0.retain(|robot, _| is_neighbour(*robot));
+    }
+
+    fn with(&mut self, robot: RobotId) -> &mut Exchange {
+        if !self.0.contains_key(&robot) && self.0.len() >= MAX_NEIGHBOURS {
+            self.0.pop_first();
+        }
+        self.0.entry(robot).or_default()
+    }
+}
