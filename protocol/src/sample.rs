@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bounded;
 use crate::decode::DecodeError;
-use crate::id::{ClassId, FeatureSpaceId, RobotId, RoundId, SampleId};
+use crate::id::{ClassId, FeatureSpaceId, RoundId, SampleId, SampleSeries};
 use crate::lesson::{Lesson, MAX_LESSONS, Word};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 
@@ -14,7 +14,7 @@ pub const MAX_COMPONENTS: usize = 2048;
 /// The most samples in one message.
 pub const MAX_SAMPLES: usize = 4096;
 
-/// The most intervals of sample numbers that are told of one author.
+/// The most intervals of sample numbers that are told of one series.
 pub const MAX_INTERVALS: usize = 256;
 
 /// A feature vector as it travels. How its numbers stand for coordinates is the feature space's matter.
@@ -104,11 +104,11 @@ pub struct Digest {
     pub lessons: u64,
 }
 
-/// Which samples of one author a robot ever had.
+/// Which samples of one series a robot ever had.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Known {
-    /// Whose samples.
-    pub author: RobotId,
+    /// Whose samples, of which life.
+    pub series: SampleSeries,
     /// Their numbers, first to last of each interval; ascending, and with gaps between them.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_INTERVALS>")]
     pub numbers: Vec<(u32, u32)>,
@@ -117,7 +117,7 @@ pub struct Known {
 /// To one neighbour: all that the author knows, in short, so that each can give the other what it lacks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Know {
-    /// The samples it ever had, by author, ascending.
+    /// The samples it ever had, by series, ascending.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub samples: Vec<Known>,
     /// What instructors said of each round, as a digest.
@@ -140,8 +140,8 @@ impl Know {
                     .windows(2)
                     .all(|pair| pair[0].1.checked_add(1).is_some_and(|next| next < pair[1].0))
         };
-        if !self.samples.is_sorted_by(|a, b| a.author < b.author) {
-            return Err(DecodeError::Impossible("an author twice, or out of order"));
+        if !self.samples.is_sorted_by(|a, b| a.series < b.series) {
+            return Err(DecodeError::Impossible("a series of samples twice, or out of order"));
         }
         if !self.samples.iter().all(|known| apart(&known.numbers)) {
             return Err(DecodeError::Impossible("intervals of sample numbers that overlap, or none of them"));

@@ -4,7 +4,8 @@
 use gestalt_protocol::{
     Answer, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId, FusionRule,
     Gesture, Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message, Outcome, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    RoundId, SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word,
+    decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -99,7 +100,7 @@ fn what_a_robot_gives() {
 }
 
 fn sample(vector: Vector) -> SharedSample {
-    let id = SampleId { author: RobotId(7), number: 200 };
+    let id = SampleId { author: RobotId(7), life: 0xB2, number: 200 };
     SharedSample { id, class: ClassId(3), round: ROUND, vector }
 }
 
@@ -111,12 +112,12 @@ fn shared_samples() {
         Vector::F16(vec![0x00, 0x3e, 0x00, 0xbe]),
         Vector::I8(vec![127, -128]),
     ];
-    // the space (varint); each sample: author, number, class, round, kind of vector, length, components
+    // the space (8 bytes); each sample: author, its life (4 bytes), number, class, round, kind of vector, length, components
     travels_as(
         Message::Samples(Samples { space, samples: samples.map(sample).to_vec() }),
         &format!(
-            "{HEAD} 03 8202 03 07c80103ac0202a101 00 02 0000c03f0000c0bf 07c80103ac0202a101 01 04 003e00be \
-             07c80103ac0202a101 02 02 7f80"
+            "{HEAD} 03 0201000000000000 03 07b2000000c80103ac0202a101 00 02 0000c03f0000c0bf 07b2000000c80103ac0202a101 01 04 003e00be \
+             07b2000000c80103ac0202a101 02 02 7f80"
         )
         .replace("\n", ""),
     );
@@ -124,9 +125,9 @@ fn shared_samples() {
 
 #[test]
 fn a_sample_of_24_components_takes_at_most_64_bytes() {
-    // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot come to.
+    // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot in one life come to.
     let sample = SharedSample {
-        id: SampleId { author: RobotId(4096), number: 1_000_000 },
+        id: SampleId { author: RobotId(4096), life: u32::MAX, number: 1_000_000 },
         class: ClassId(63),
         round: RoundId { counter: 1_000_000, opener: RobotId(4096), life: u32::MAX },
         vector: Vector::I8(vec![-128; 24]),
@@ -140,7 +141,10 @@ fn a_sample_of_24_components_takes_at_most_64_bytes() {
 #[test]
 fn what_a_robot_knows() {
     let know = Know {
-        samples: vec![Known { author: RobotId(3), numbers: vec![(1, 300), (302, 302)] }],
+        samples: vec![Known {
+            series: SampleSeries { author: RobotId(3), life: 0xB2 },
+            numbers: vec![(1, 300), (302, 302)],
+        }],
         lessons: vec![(ROUND, 5)],
         digest: Digest { samples: 300, lessons: 1 },
         answer: true,
@@ -148,7 +152,7 @@ fn what_a_robot_knows() {
     };
     travels_as(
         Message::Know(know),
-        &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01 00"),
+        &format!("{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01 00"),
     );
     let nothing = Know {
         samples: vec![],

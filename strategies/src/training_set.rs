@@ -9,17 +9,14 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId, SampleSeries};
 use gestalt_rounds::Classify;
 use rand::Rng;
 use thiserror::Error;
 
 use crate::forgetting::Forgetting;
-use crate::sample::{HeldSample, HeldSamples, MAX_AUTHORS, SeenError, SeenSamples, SetPart};
+use crate::sample::{HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart};
 use crate::selection::Selection;
-
-/// How far a number of this robot's own may lie beyond the ones that it knows it used.
-const FAR_AHEAD: u32 = 1_000_000;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -35,6 +32,8 @@ pub enum SetChange {
     Relabelled(u64),
     /// The sample with this key went from personal to shared under this name; its vector is now what travels.
     Shared(u64, SampleId),
+    /// Nothing is known any more of what was seen of this series: another took its place.
+    Unseen(SampleSeries),
 }
 
 /// What became of a received sample.
@@ -76,14 +75,12 @@ pub enum RestoreError {
     /// A sample with a name that was not seen.
     #[error("stored sample {0} is not among those seen")]
     Unseen(SampleId),
-    /// A number of this robot's that was seen, but is yet to be given out.
-    #[error("sample {0} of this robot was shared, but the next number would be no greater")]
-    NumberAhead(SampleId),
 }
 
 /// The bounded set of samples of one robot.
 ///
-/// A sample is in one [`SetPart`] at a time. It is shared at most once, under a number that counts up without gaps, and
+/// A sample is in one [`SetPart`] at a time. It is shared at most once, under a number that counts up without gaps in the
+/// [life](Self::in_life) of the robot, and
 /// taken in at most once under one name, also after it was forgotten. After [`keep`](Self::keep) and
 /// [`receive`](Self::receive) at most `capacity` samples are held: the [`Forgetting`] rule says which one goes.
 ///
@@ -91,14 +88,14 @@ pub enum RestoreError {
 /// Everything that can be asked is asked through [`HeldSamples`], which the set dereferences to.
 #[derive(Debug)]
 pub struct TrainingSet {
-    me: RobotId,
+    /// Under which this robot shares.
+    series: SampleSeries,
     capacity: usize,
     selection: Box<dyn Selection>,
     forgetting: Box<dyn Forgetting>,
     samples: HeldSamples,
     seen: SeenSamples,
     next_key: u64,
-    next_number: u32,
 }
 
 impl Deref for TrainingSet {
@@ -119,26 +116,26 @@ impl TrainingSet {
         forgetting: Box<dyn Forgetting>,
     ) -> Self {
         Self {
-            me,
+            series: SampleSeries { author: me, life: 0 },
             capacity: capacity.max(1),
             selection,
             forgetting,
             samples: HeldSamples::default(),
             seen: SeenSamples::default(),
             next_key: 1,
-            next_number: 1,
         }
     }
 
-    /// The numbers of what this robot shares begin there, unless they are further already: for a robot that does not know
-    /// which it used before.
-    pub fn number_from(&mut self, first: u32) {
-        self.next_number = self.next_number.max(first);
+    /// The same set, that shares under the number which this life of the robot drew at random: whatever it knows or forgot
+    /// of the samples of earlier lives, it gives no name twice.
+    #[must_use]
+    pub fn in_life(mut self, life: u32) -> Self {
+        self.series.life = life;
+        self
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
-    /// was seen, the next key and the next share number. If more samples were stored than the capacity,
-    /// [`trim`](Self::trim) brings them down.
+    /// was seen, and the next key. If more samples were stored than the capacity, [`trim`](Self::trim) brings them down.
     ///
     /// # Errors
     /// See [`RestoreError`].
@@ -150,16 +147,10 @@ impl TrainingSet {
         samples: Vec<HeldSample>,
         seen: SeenSamples,
         next_key: u64,
-        next_number: u32,
     ) -> Result<(), RestoreError> {
         assert!(self.samples.is_empty(), "a stored set is taken up before anything is added");
         if next_key > LAST_KEY {
             return Err(RestoreError::NextKey(next_key));
-        }
-        if let Some(&(_, last)) = seen.intervals(self.me).last()
-            && last >= next_number
-        {
-            return Err(RestoreError::NumberAhead(SampleId { author: self.me, number: last }));
         }
         let mut restored = HeldSamples::default();
         for sample in samples {
@@ -195,7 +186,6 @@ impl TrainingSet {
         self.samples = restored;
         self.seen = seen;
         self.next_key = next_key.max(1);
-        self.next_number = next_number.max(1);
         Ok(())
     }
 
@@ -222,18 +212,17 @@ impl TrainingSet {
         as_sent: &dyn Fn(&[f32]) -> Vec<f32>,
         rng: &mut dyn Rng,
     ) -> Vec<SetChange> {
-        let mut changes = Vec::new();
-        while changes.len() < n {
+        let mut changes = self.make_room(self.series);
+        let room = changes.len();
+        while changes.len() < room + n {
             let Some(key) = self.selection.select(&self.samples, classifier, rng) else { break };
             let Some(sample) = self.samples.get(key).filter(|sample| sample.part == SetPart::Personal) else {
                 break;
             };
-            let id = SampleId { author: self.me, number: self.next_number };
-            let Some(following) = self.next_number.checked_add(1) else { break };
+            let id = self.series.sample(self.next_number());
             if self.seen.insert(id) != Ok(true) {
                 break;
             }
-            self.next_number = following;
             let vector = Arc::from(as_sent(&sample.vector));
             self.replace(HeldSample { part: SetPart::Shared, id: Some(id), vector, ..sample.clone() });
             changes.push(SetChange::Shared(key, id));
@@ -243,8 +232,8 @@ impl TrainingSet {
 
     /// Takes a shared sample in, unless it was seen before. Then forgets while there are more than the capacity.
     ///
-    /// Another's sample becomes external. A robot that lost its memory gets its own samples back this way: they
-    /// become shared, and its next number lies beyond them.
+    /// Another's sample becomes external. A robot that lost its memory gets its own samples of earlier lives back this
+    /// way: they become shared.
     pub fn receive(
         &mut self,
         id: SampleId,
@@ -253,27 +242,48 @@ impl TrainingSet {
         vector: Vec<f32>,
         rng: &mut dyn Rng,
     ) -> SampleReceipt {
-        // A place is kept for this robot, or the names of strangers could keep it from sharing.
-        let stranger = id.author != self.me && self.seen.intervals(id.author).is_empty();
-        if stranger
-            && self.seen.intervals(self.me).is_empty()
-            && self.seen.authors().count() >= MAX_AUTHORS - 1
-        {
-            return SampleReceipt::Refused(SeenError::TooManyAuthors(id));
+        if let Err(error) = self.may_receive(id) {
+            return SampleReceipt::Refused(error);
         }
-        // Whoever could push this robot's numbers up to the last one could keep it from sharing.
-        if id.author == self.me && id.number.saturating_sub(self.next_number) > FAR_AHEAD {
-            return SampleReceipt::Refused(SeenError::FarAhead(id));
-        }
+        let mut changes = self.make_room(id.series());
         match self.seen.insert(id) {
             Err(error) => return SampleReceipt::Refused(error),
             Ok(false) => return SampleReceipt::Known,
             Ok(true) => {}
         }
-        if id.author == self.me {
-            self.next_number = self.next_number.max(id.number.saturating_add(1));
+        changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
+        SampleReceipt::New(changes)
+    }
+
+    /// Where a series is one life of its author too many, forgets the life of which the least is held, and what that is.
+    fn make_room(&mut self, series: SampleSeries) -> Vec<SetChange> {
+        let full = self.seen.lives(series.author).count() >= MAX_LIVES;
+        if !full || !self.seen.intervals(series).is_empty() {
+            return Vec::new();
         }
-        SampleReceipt::New(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng))
+        let of = |life: SampleSeries| {
+            self.samples.iter().filter(move |sample| sample.id.is_some_and(|id| id.series() == life))
+        };
+        let lives = self.seen.lives(series.author).filter(|life| *life != self.series);
+        let Some(least) = lives.min_by_key(|life| of(*life).count()) else { return Vec::new() };
+        let keys: Vec<u64> = of(least).map(|sample| sample.key).collect();
+        self.seen.forget(least);
+        let gone = keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed);
+        gone.chain([SetChange::Unseen(least)]).collect()
+    }
+
+    fn may_receive(&self, id: SampleId) -> Result<(), SeenError> {
+        // Whoever could speak under the name of this very life could keep this robot from sharing.
+        if id.series() == self.series && id.number >= self.next_number() {
+            return Err(SeenError::NeverShared(id));
+        }
+        // A place is kept for this robot, or the names of strangers could.
+        let stranger = self.seen.intervals(id.series()).is_empty();
+        let spoke = !self.seen.intervals(self.series).is_empty();
+        if stranger && !spoke && self.seen.series().len() >= MAX_SERIES - 1 {
+            return Err(SeenError::TooManyAuthors(id));
+        }
+        Ok(())
     }
 
     /// Takes a shared sample in again that was [retracted](Self::retract), under the class it turned out to have. One
@@ -348,7 +358,17 @@ impl TrainingSet {
     /// The number of the next sample that this robot shares.
     #[must_use]
     pub fn next_number(&self) -> u32 {
-        self.next_number
+        self.seen.intervals(self.series).last().map_or(1, |(_, last)| last.saturating_add(1))
+    }
+
+    /// Under which this robot shares.
+    #[must_use]
+    pub fn series(&self) -> SampleSeries {
+        self.series
+    }
+
+    fn me(&self) -> RobotId {
+        self.series.author
     }
 
     fn of_round(&self, round: RoundId) -> impl Iterator<Item = &HeldSample> {
@@ -356,7 +376,7 @@ impl TrainingSet {
     }
 
     fn part_of(&self, id: SampleId) -> SetPart {
-        if id.author == self.me { SetPart::Shared } else { SetPart::External }
+        if id.author == self.me() { SetPart::Shared } else { SetPart::External }
     }
 
     fn add(

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, VocabularyId, Word,
+    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, SampleSeries, VocabularyId,
+    Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
@@ -58,7 +59,7 @@ pub enum MemoryError {
 }
 
 /// The layout of the records; another layout gets another number.
-const LAYOUT: u8 = 2;
+const LAYOUT: u8 = 3;
 
 /// Whose memory it is, and of what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,7 +80,6 @@ impl Owner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Counters {
     pub next_key: u64,
-    pub next_number: u32,
     pub next_aside: u64,
 }
 
@@ -89,7 +89,7 @@ pub(super) enum Item {
     Owner,
     Counters,
     Sample(u64),
-    Seen(RobotId),
+    Seen(SampleSeries),
     Lessons(RoundId),
     Aside(u64),
 }
@@ -119,7 +119,9 @@ impl Item {
             Self::Owner => vec![0],
             Self::Counters => vec![1],
             Self::Sample(key) => [&[2][..], &key.to_be_bytes()].concat(),
-            Self::Seen(author) => [&[3][..], &author.0.to_be_bytes()].concat(),
+            Self::Seen(SampleSeries { author, life }) => {
+                [&[3][..], [author.0, life].map(u32::to_be_bytes).as_flattened()].concat()
+            }
             Self::Lessons(round) => {
                 let parts = [round.counter, round.opener.0, round.life].map(u32::to_be_bytes);
                 [&[4][..], parts.as_flattened()].concat()
@@ -136,7 +138,10 @@ impl Item {
             0 if number.is_empty() => Some(Self::Owner),
             1 if number.is_empty() => Some(Self::Counters),
             2 => long(number).map(Self::Sample),
-            3 => word(number).map(|author| Self::Seen(RobotId(author))),
+            3 => {
+                let (author, life) = number.split_at_checked(4)?;
+                Some(Self::Seen(SampleSeries { author: RobotId(word(author)?), life: word(life)? }))
+            }
             4 => {
                 let (counter, rest) = number.split_at_checked(4)?;
                 let (opener, life) = rest.split_at_checked(4)?;
@@ -212,7 +217,7 @@ impl RobotMemory {
     /// [`MemoryError::Layout`] and [`MemoryError::Damaged`].
     pub fn read<'a>(records: impl IntoIterator<Item = (&'a [u8], &'a [u8])>) -> Result<Self, MemoryError> {
         let mut memory = Self::default();
-        let mut seen: Vec<(RobotId, Vec<(u32, u32)>)> = Vec::new();
+        let mut seen: Vec<(SampleSeries, Vec<(u32, u32)>)> = Vec::new();
         for (key, value) in records {
             match Item::read(key).ok_or(MemoryError::Damaged("an unknown record"))? {
                 Item::Owner => {
@@ -229,7 +234,7 @@ impl RobotMemory {
                     let vector = Arc::from(finite(vector)?);
                     memory.samples.push(HeldSample { key, part, id, class, round, vector });
                 }
-                Item::Seen(author) => seen.push((author, decode(value)?)),
+                Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {
                     let words: Vec<(InstructorId, u64, Word)> = decode(value)?;
                     memory.lessons.extend(words.into_iter().map(|(instructor, at, word)| Lesson {

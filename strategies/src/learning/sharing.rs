@@ -42,7 +42,7 @@ impl Learning {
         let Some(bytes) = self.config.share_bytes else { return usize::MAX };
         let vector = vec![0.0; self.space.components()];
         let sample = SharedSample {
-            id: SampleId { author: self.me, number: self.set.next_number().saturating_add(64) },
+            id: self.set.series().sample(self.set.next_number().saturating_add(64)),
             class: ClassId(0),
             round: self.recent.newest().unwrap_or(RoundId { counter: 1, opener: self.me, life: u32::MAX }),
             vector: self.config.precision.encode(&vector, &self.space),

@@ -64,8 +64,8 @@ impl fmt::Debug for Learning {
 }
 
 impl Learning {
-    /// What that robot learned so far, in its `boot`th life.
-    pub fn new(me: RobotId, boot: u32, setup: LearningSetup) -> Result<Self, LearningError> {
+    /// What that robot learned so far, in the life that drew this number.
+    pub fn new(me: RobotId, life: u32, setup: LearningSetup) -> Result<Self, LearningError> {
         let LearningSetup { config, space, vocabulary, rng, memory, rules } = setup;
         config.validate()?;
         let durable = memory.is_some();
@@ -74,16 +74,10 @@ impl Learning {
         let owner = Owner::new(me, space_id, vocabulary.id());
         memory.check(owner, space.components(), vocabulary.classes())?;
         let (selection, forgetting) = rules.make(&config);
-        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting);
+        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
         let fresh = memory.is_empty();
         let RobotMemory { counters, samples, seen, lessons: heard, aside, .. } = memory;
-        if !fresh {
-            set.restore(samples, seen, counters.next_key, counters.next_number)?;
-        } else {
-            // An empty memory proves nothing: a disk may have been lost, with the numbers used before. Boots grow by more
-            // than a robot can share in a life, so these numbers are new, and nobody has to be asked.
-            set.number_from(boot);
-        }
+        set.restore(samples, seen, counters.next_key)?;
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
             lessons.hear(lesson);
@@ -177,7 +171,7 @@ impl Learning {
         let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
             SampleReceipt::New(changes) => {
-                self.dirty.insert(Item::Seen(id.author));
+                self.dirty.insert(Item::Seen(id.series()));
                 self.absorb(changes);
                 // A class is what it was taken under; anything else concerns all samples of the round.
                 if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
@@ -203,14 +197,17 @@ impl Learning {
                     self.dirty.insert(Item::Sample(sample.key));
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
+                SetChange::Unseen(series) => {
+                    self.dirty.insert(Item::Seen(series));
+                }
                 SetChange::Relabelled(key) => {
                     self.dirty.insert(Item::Sample(key));
                     self.training.extend(
                         self.set.get(key).map(|sample| TrainingChange::Relabel { key, class: sample.class }),
                     );
                 }
-                SetChange::Shared(key, _) => {
-                    self.dirty.extend([Item::Sample(key), Item::Seen(self.me)]);
+                SetChange::Shared(key, id) => {
+                    self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);
                     self.training.extend(self.set.get(key).map(inserted));
                 }
             }
@@ -246,11 +243,13 @@ impl Learning {
             Item::Owner => Some(memory::encode(&Owner::new(self.me, self.space_id, self.vocabulary.id()))),
             Item::Counters => Some(memory::encode(&Counters {
                 next_key: self.set.next_key(),
-                next_number: self.set.next_number(),
                 next_aside: self.aside.next(),
             })),
             Item::Sample(key) => self.set.get(key).map(memory::encode_sample),
-            Item::Seen(author) => Some(memory::encode(&self.set.seen().intervals(author).to_vec())),
+            Item::Seen(series) => {
+                let intervals = self.set.seen().intervals(series);
+                (!intervals.is_empty()).then(|| memory::encode(&intervals.to_vec()))
+            }
             Item::Lessons(round) => {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
@@ -284,8 +283,8 @@ impl Learning {
         let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
         let mut fnv = Fnv1a::default();
         for (id, class) in common.collect::<BTreeMap<_, _>>() {
-            let number = id.author.0.to_le_bytes().into_iter().chain(id.number.to_le_bytes());
-            fnv.add(number.chain([class.0]));
+            let name = [id.author.0, id.life, id.number].into_iter().flat_map(u32::to_le_bytes);
+            fnv.add(name.chain([class.0]));
         }
         LearningStatus {
             space: self.space_id.to_string(),

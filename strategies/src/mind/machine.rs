@@ -59,12 +59,13 @@ pub struct Mind {
     pub(super) learning: Option<Learning>,
     pub(super) answers: Answers,
     pub(super) exchanges: Exchanges,
+    /// Of this life, in the names of its rounds and samples.
+    nonce: u32,
 }
 
 impl Mind {
-    /// The mind of robot `me` in one of its lives. A robot that learns takes the life's `boot` from a clock, in tenths of a second or
-    /// finer, so that it grows also when all that was on the disk is lost, and faster than samples are made: their numbers begin
-    /// there. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides, but gives no evidence.
+    /// The mind of robot `me` in one of its lives, whose `nonce` names the rounds that it opens and the samples that it
+    /// shares. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides, but gives no evidence.
     ///
     /// # Errors
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
@@ -74,6 +75,7 @@ impl Mind {
             learning: None,
             answers: Answers::default(),
             exchanges: Exchanges::default(),
+            nonce: life.nonce,
         })
     }
 
@@ -90,7 +92,7 @@ impl Mind {
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
         let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
-        self.learning = Some(Learning::new(self.me(), self.rounds.boot(), setup)?);
+        self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
         self.rounds = self.rounds.counting_from(counter);
         Ok(self)
     }

@@ -45,8 +45,8 @@ impl Mind {
             Vec::new()
         } else {
             let seen = self.exchanges.told_to(to, learning.set().seen());
-            let known = |author| Known { author, numbers: seen.intervals(author).to_vec() };
-            seen.authors().map(known).collect()
+            let known = |series| Known { series, numbers: seen.intervals(series).to_vec() };
+            seen.series().map(known).collect()
         };
         let lessons = if mine.lessons == theirs.lessons {
             Vec::new()
@@ -72,7 +72,7 @@ impl Mind {
         let mut lacking_here = false;
         let mut given = Vec::new();
         if mine.samples != know.digest.samples {
-            let theirs = know.samples.iter().map(|known| (known.author, known.numbers.clone()));
+            let theirs = know.samples.iter().map(|known| (known.series, known.numbers.clone()));
             let Ok(theirs) = SeenSamples::from_intervals(theirs) else {
                 return self.rounds.note_refusal(Refusal::SampleNumber);
             };

@@ -108,7 +108,7 @@ fn a_lesson_counts_for_samples_that_come_after_it() {
     let lesson = Lesson { round, instructor: "ada".parse().unwrap(), at: 9, word: Word::Was(ClassId(3)) };
     swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
     let sample = SharedSample {
-        id: SampleId { author: RobotId(9), number: 1 },
+        id: SampleId { author: RobotId(9), life: 5, number: 1 },
         class: ClassId(1),
         round,
         vector: Vector::F32(vec![0.5; 4]),

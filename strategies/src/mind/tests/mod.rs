@@ -79,6 +79,10 @@ struct Swarm {
     trained: Vec<BTreeMap<u64, ClassId>>,
     spaces: Vec<Arc<FeatureSpace>>,
     vocabularies: Vec<Vocabulary>,
+    /// What the clock says at the next start, if not the truth.
+    boot: Option<u32>,
+    /// Of the latest start.
+    nonce: u32,
     /// How many messages robots told each other, and their bytes, by kind.
     told: BTreeMap<&'static str, (usize, usize)>,
 }
@@ -102,6 +106,8 @@ impl Swarm {
             trained: vec![BTreeMap::new(); n],
             spaces: vec![space(); n],
             vocabularies: vec![vocabulary(); n],
+            boot: None,
+            nonce: 0,
             told: BTreeMap::new(),
         };
         for i in 0..n {
@@ -117,7 +123,8 @@ impl Swarm {
     /// A mind with what its disk holds.
     fn waken(&mut self, i: usize) -> Mind {
         let id = RobotId(i as u32 + 1);
-        let boot = self.now.as_secs() as u32 + 1;
+        let boot = self.boot.unwrap_or(self.now.as_secs() as u32 + 1);
+        self.nonce = self.nonce.wrapping_mul(0x9E37_79B1).wrapping_add(1);
         let config = RoundsConfig { patience: Duration::from_millis(600), ..RoundsConfig::default() };
         let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
         let setup = LearningSetup {
@@ -129,7 +136,7 @@ impl Swarm {
             rules: self.rules.clone(),
         };
         self.trained[i].clear();
-        let life = Life { boot, nonce: boot.wrapping_mul(7919) };
+        let life = Life { boot, nonce: self.nonce };
         Mind::new(id, life, config).unwrap().learning(setup).unwrap()
     }
 

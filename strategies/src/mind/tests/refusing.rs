@@ -7,7 +7,7 @@ fn a_sample_that_is_none_is_refused_and_counted() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 11);
     let space = space().id();
     let sample = |number, class, vector| SharedSample {
-        id: SampleId { author: RobotId(9), number },
+        id: SampleId { author: RobotId(9), life: 5, number },
         class: ClassId(class),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector,
