@@ -145,12 +145,15 @@ fn lesson() -> impl Strategy<Value = Lesson> {
         (0..MAX_CLASSES as u8).prop_map(|class| Word::Not(ClassId(class))),
         Just(Word::Retracted),
     ];
-    (round(), "[a-zA-Z0-9_-]{1,32}", any::<u64>(), word).prop_map(|(round, name, at, word)| Lesson {
-        round,
-        instructor: name.parse().expect("a name of that form"),
-        at,
-        word,
-    })
+    (round(), "[a-zA-Z0-9_-]{1,32}", any::<(u64, u64)>(), word).prop_map(
+        |(round, name, (count, at), word)| Lesson {
+            round,
+            instructor: name.parse().expect("a name of that form"),
+            count,
+            at,
+            word,
+        },
+    )
 }
 
 fn envelope() -> impl Strategy<Value = Envelope> {

@@ -166,12 +166,12 @@ fn what_a_robot_knows() {
 
 #[test]
 fn what_instructors_said() {
-    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), at: 1, word };
+    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), count: 2, at: 1, word };
     let lessons = vec![said(Word::Was(ClassId(3))), said(Word::Not(ClassId(4))), said(Word::Retracted)];
     travels_as(
         Message::Lessons(Lessons { lessons }),
         &format!(
-            "{HEAD} 05 03 ac0202a101 03616461 01 0003 ac0202a101 03616461 01 0104 ac0202a101 03616461 01 02"
+            "{HEAD} 05 03 ac0202a101 03616461 02 01 0003 ac0202a101 03616461 02 01 0104 ac0202a101 03616461 02 01 02"
         ),
     );
 }

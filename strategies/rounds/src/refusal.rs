@@ -29,13 +29,15 @@ pub enum Refusal {
     SampleNumber,
     /// A lesson on a round of which as many instructors spoke as are kept, or on one older than all that are kept.
     LessonFull,
+    /// A lesson on a round, or with a count, so far ahead of all known that it is taken for a mistake or a lie.
+    LessonFarAhead,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::Vocabulary,
@@ -49,6 +51,7 @@ impl Refusal {
         Self::UnknownClass,
         Self::SampleNumber,
         Self::LessonFull,
+        Self::LessonFarAhead,
         Self::CountersUsedUp,
     ];
 
@@ -69,6 +72,7 @@ impl Refusal {
             Self::UnknownClass => "refused_sample_of_unknown_class",
             Self::SampleNumber => "refused_sample_number",
             Self::LessonFull => "refused_lesson_full",
+            Self::LessonFarAhead => "refused_lesson_far_ahead",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

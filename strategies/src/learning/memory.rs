@@ -112,6 +112,9 @@ struct StoredAside {
     guess: Option<ClassId>,
 }
 
+/// An instructor's word on a round, with its count and time.
+type StoredWord = (InstructorId, u64, u64, Word);
+
 impl Item {
     /// The record's key: a byte for the kind, then its number in big-endian order.
     pub fn key(self) -> Vec<u8> {
@@ -182,8 +185,8 @@ pub(super) fn encode_aside(aside: &UnresolvedSample) -> Vec<u8> {
 }
 
 pub(super) fn encode_lessons(lessons: impl Iterator<Item = Lesson>) -> Vec<u8> {
-    let words: Vec<(InstructorId, u64, Word)> =
-        lessons.map(|lesson| (lesson.instructor, lesson.at, lesson.word)).collect();
+    let words: Vec<StoredWord> =
+        lessons.map(|lesson| (lesson.instructor, lesson.count, lesson.at, lesson.word)).collect();
     encode(&words)
 }
 
@@ -236,10 +239,11 @@ impl RobotMemory {
                 }
                 Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {
-                    let words: Vec<(InstructorId, u64, Word)> = decode(value)?;
-                    memory.lessons.extend(words.into_iter().map(|(instructor, at, word)| Lesson {
+                    let words: Vec<StoredWord> = decode(value)?;
+                    memory.lessons.extend(words.into_iter().map(|(instructor, count, at, word)| Lesson {
                         round,
                         instructor,
+                        count,
                         at,
                         word,
                     }));
@@ -265,11 +269,14 @@ impl RobotMemory {
         self.owner.is_none()
     }
 
-    /// The highest count of a round that anything is remembered of.
+    /// The highest count of a round that this robot saw something of itself, or heard spoken of. What others say they saw is
+    /// not looked at: of that nobody checks the count.
     pub(crate) fn newest_counter(&self) -> Option<u32> {
-        let rounds = self.samples.iter().map(|sample| sample.round);
+        let own = self.samples.iter().filter(|sample| sample.part == SetPart::Personal);
+        let rounds = own.map(|sample| sample.round);
         let rounds = rounds.chain(self.lessons.iter().map(|lesson| lesson.round));
-        rounds.chain(self.aside.iter().map(|(_, aside)| aside.round)).map(|round| round.counter).max()
+        let aside = self.aside.iter().filter(|(_, aside)| aside.part == SetPart::Personal);
+        rounds.chain(aside.map(|(_, aside)| aside.round)).map(|round| round.counter).max()
     }
 
     pub(super) fn check(&self, owner: Owner, components: usize, classes: usize) -> Result<(), MemoryError> {

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Digest, FeatureSpaceId, Fnv1a, LearningStatus, Lesson, RobotId, RoundId, SampleId, SharedSample,
+    ClassId, Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
+    SharedSample, Word,
 };
 use gestalt_rounds::{Follow, Vocabulary};
 use gestalt_svm::FeatureSpace;
@@ -21,6 +22,12 @@ use crate::lessons::{LessonBook, LessonReceipt, Verdict};
 use crate::sample::SetPart;
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
+
+/// How far beyond the newest round known one may lie that is spoken of.
+const LEAP: u32 = 64;
+
+/// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
+const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
 /// Why a received sample was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,6 +49,8 @@ pub(crate) struct Learning {
     pub(super) lessons: LessonBook,
     pub(super) recent: RecentRounds,
     pub(super) aside: Unresolved,
+    /// The highest counter of a round that this robot knows of.
+    newest: Option<u32>,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
     /// What is to be trained and remembered, and was not yet said.
@@ -70,6 +79,7 @@ impl Learning {
         config.validate()?;
         let durable = memory.is_some();
         let memory = memory.unwrap_or_default();
+        let newest = memory.newest_counter();
         let space_id = space.id();
         let owner = Owner::new(me, space_id, vocabulary.id());
         memory.check(owner, space.components(), vocabulary.classes())?;
@@ -99,6 +109,7 @@ impl Learning {
             set,
             lessons,
             recent: RecentRounds::default(),
+            newest,
             credit: 0.0,
             training,
             dirty,
@@ -146,15 +157,45 @@ impl Learning {
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
     pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
-        let oldest = self.lessons.oldest();
-        let heard = self.lessons.hear(lesson);
+        if lesson.round.counter > self.furthest() {
+            return LessonReceipt::FarAhead;
+        }
+        let recent = &self.recent;
+        let (heard, forgotten) = self.lessons.hear_among(lesson, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.dirty.insert(Item::Lessons(lesson.round));
-            let forgotten = oldest.filter(|round| !self.lessons.contains(*round));
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
         }
         heard
+    }
+
+    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
+    fn furthest(&self) -> u32 {
+        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
+    }
+
+    /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.
+    fn note_counter(&mut self, counter: u32) {
+        if self.newest >= Some(counter) {
+            return;
+        }
+        let first = self.newest.is_none();
+        self.newest = Some(counter);
+        if first {
+            let forgotten = self.lessons.forget_beyond(self.furthest());
+            self.dirty.extend(forgotten.into_iter().map(Item::Lessons));
+        }
+    }
+
+    /// The latest word of an instructor on a round, with its count and time.
+    pub fn latest(&self, round: RoundId, instructor: &InstructorId) -> Option<(u64, u64, Word)> {
+        self.lessons.latest(self.recent.names(round), instructor)
+    }
+
+    /// The count of what is said next of a round.
+    pub fn next_count(&self, round: RoundId) -> u64 {
+        self.lessons.highest_count(self.recent.names(round)).saturating_add(1)
     }
 
     /// Takes in a sample that another robot shared. Says whether it was news.
@@ -303,12 +344,14 @@ impl Learning {
 
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
+        self.note_counter(round.counter);
         if self.recent.enter(round) {
             self.apply_to_round(round);
         }
     }
 
     fn merged(&mut self, round: RoundId, other: RoundId) {
+        self.note_counter(round.counter);
         if self.recent.merge(round, other) {
             self.apply_to_round(round);
         }

@@ -73,6 +73,13 @@ impl Exchanges {
         self.0.get(&robot).map(|exchange| exchange.declined_lessons.rounds().collect()).unwrap_or_default()
     }
 
+    /// Lessons that lay too far ahead may do so no longer.
+    pub fn forget_declined_lessons(&mut self) {
+        for exchange in self.0.values_mut().filter(|exchange| !exchange.declined_lessons.is_empty()) {
+            (exchange.declined_lessons, exchange.at_rest) = (LessonBook::default(), None);
+        }
+    }
+
     /// Only these are neighbours now. One that comes back begins anew.
     pub fn keep(&mut self, is_neighbour: impl Fn(RobotId) -> bool) {
         self.0.retain(|robot, _| is_neighbour(*robot));

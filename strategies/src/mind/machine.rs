@@ -107,10 +107,14 @@ impl Mind {
             Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };
+        let round = self.rounds.round();
         let done = match &mut self.learning {
             Some(learning) => self.rounds.handle_with(now, about_rounds, learning),
             None => self.rounds.handle(now, about_rounds),
         };
+        if self.rounds.round() != round {
+            self.exchanges.forget_declined_lessons();
+        }
         out.extend(done.into_iter().map(Output::from));
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);

@@ -162,6 +162,10 @@ impl Mind {
                         refused = true;
                         self.rounds.note_refusal(Refusal::LessonFull);
                     }
+                    LessonReceipt::FarAhead => {
+                        refused = true;
+                        self.rounds.note_refusal(Refusal::LessonFarAhead);
+                    }
                 }
             }
             if refused && is_neighbour {

@@ -65,3 +65,91 @@ fn a_memory_of_another_robot_or_space_is_refused() {
     let space_error = new(1, setup(Arc::new(other), vocabulary())).unwrap_err();
     assert!(matches!(space_error, LearningError::Memory(MemoryError::Space { .. })));
 }
+
+fn lessons(swarm: &mut Swarm, i: usize, lessons: Vec<Lesson>) {
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    let message = Message::Lessons(gestalt_protocol::Lessons { lessons });
+    swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+}
+
+fn forged(round: RoundId, who: &str, count: u64, word: Word) -> Lesson {
+    Lesson { round, instructor: who.parse().unwrap(), count, at: u64::MAX, word }
+}
+
+#[test]
+fn lessons_on_rounds_to_come_keep_nobody_from_teaching() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 31);
+    let first = swarm.show(1);
+    let to_come = |i| {
+        let round = RoundId { counter: u32::MAX - i, opener: RobotId(1), life: 0 };
+        forged(round, "eve", 1, Word::Was(ClassId(1)))
+    };
+    lessons(&mut swarm, 0, (0..1024).map(to_come).collect());
+    assert_eq!(swarm.minds[0].refusals().count(Refusal::LessonFarAhead), 1024);
+    // As far ahead as may be, under many names.
+    let near = |i: u32| {
+        let round = RoundId { counter: first.counter + i % 64, opener: RobotId(u32::MAX), life: i };
+        forged(round, "eve", 1, Word::Was(ClassId(1)))
+    };
+    for part in 0..4 {
+        lessons(&mut swarm, 0, (0..1024).map(|i| near(1024 * part + i)).collect());
+    }
+    swarm.pass(Duration::from_secs(10));
+    for class in [2, 3] {
+        let round = swarm.show(class);
+        let at = swarm.was(round, class);
+        assert_eq!(swarm.outcome(at), Outcome::Learned);
+        for mind in &swarm.minds {
+            assert_eq!(mind.training_set().unwrap().class_count(ClassId(class)), 6);
+        }
+    }
+    swarm.restart(0);
+    swarm.pass(Duration::from_secs(1));
+    assert!(swarm.show(4).counter <= first.counter + 3 + 64, "the counters are not run up");
+}
+
+#[test]
+fn what_a_newborn_was_told_of_rounds_to_come_is_forgotten_when_it_knows_better() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 32);
+    let far = RoundId { counter: 900_000, opener: RobotId(1), life: 0 };
+    lessons(&mut swarm, 0, vec![forged(far, "eve", 1, Word::Was(ClassId(1)))]);
+    assert_eq!(swarm.minds[0].learned().unwrap().lessons, 1);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect::<Vec<_>>(), [1, 1]);
+    swarm.check();
+}
+
+#[test]
+fn an_instructor_can_correct_whatever_was_said_in_its_name() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 33);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    lessons(&mut swarm, 0, vec![forged(round, "ada", 1 << 32, Word::Retracted)]);
+    lessons(&mut swarm, 0, (0..16).map(|i| forged(round, &format!("eve{i}"), 9, Word::Retracted)).collect());
+    swarm.pass(Duration::from_secs(10));
+    let at = swarm.was(round, 5);
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    swarm.pass(Duration::from_secs(10));
+    for mind in &swarm.minds {
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(5)), 6);
+    }
+}
+
+#[test]
+fn no_clock_orders_the_words_of_an_instructor() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 34);
+    let round = swarm.show(1);
+    for (at, class) in [(u64::MAX, 1), (500, 2), (400, 3)] {
+        let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+        for i in 0..3 {
+            let instructed = Instructed { by: "ada".parse().unwrap(), at, instruction: instruction.clone() };
+            swarm.input(i, Input::Instructed(instructed));
+        }
+        swarm.pass(Duration::from_secs(5));
+        for mind in &swarm.minds {
+            assert_eq!(mind.training_set().unwrap().class_count(ClassId(class)), 6);
+        }
+    }
+}
