@@ -6,6 +6,7 @@
 //!                     └──────────────────┴───── forget when full ─────┘
 //! ```
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -17,6 +18,7 @@ use thiserror::Error;
 use crate::forgetting::Forgetting;
 use crate::sample::{HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart};
 use crate::selection::Selection;
+use crate::shares::Shares;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -95,6 +97,7 @@ pub struct TrainingSet {
     forgetting: Box<dyn Forgetting>,
     samples: HeldSamples,
     seen: SeenSamples,
+    shares: Shares,
     next_key: u64,
 }
 
@@ -122,6 +125,7 @@ impl TrainingSet {
             forgetting,
             samples: HeldSamples::default(),
             seen: SeenSamples::default(),
+            shares: Shares::default(),
             next_key: 1,
         }
     }
@@ -132,6 +136,13 @@ impl TrainingSet {
     pub fn in_life(mut self, life: u32) -> Self {
         self.series.life = life;
         self
+    }
+
+    /// These other robots are alive now. From then on no author's samples push out those of the others when the set is full,
+    /// and when more series were seen than are kept track of, those of robots that are not there give way: each other robot
+    /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) {
+        self.shares.meet(self.me(), alive);
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
@@ -255,18 +266,36 @@ impl TrainingSet {
         SampleReceipt::New(changes)
     }
 
-    /// Where a series is one life of its author too many, forgets the life of which the least is held, and what that is.
+    /// Whether there is no room for that series, which is new. A place is kept for this robot's own.
+    fn is_full_for(&self, series: SampleSeries) -> bool {
+        let spoke = series == self.series || !self.seen.intervals(self.series).is_empty();
+        self.seen.series().len() >= MAX_SERIES - usize::from(!spoke)
+    }
+
+    /// Where a series is one too many, forgets the one of which the least is held, and what that is: of its author's other
+    /// lives, or, for a robot that is alive, of those that are not.
     fn make_room(&mut self, series: SampleSeries) -> Vec<SetChange> {
-        let full = self.seen.lives(series.author).count() >= MAX_LIVES;
-        if !full || !self.seen.intervals(series).is_empty() {
+        if !self.seen.intervals(series).is_empty() {
             return Vec::new();
         }
-        let of = |life: SampleSeries| {
-            self.samples.iter().filter(move |sample| sample.id.is_some_and(|id| id.series() == life))
+        let may_go: Vec<SampleSeries> = if self.seen.lives(series.author).count() >= MAX_LIVES {
+            self.seen.lives(series.author).filter(|life| *life != self.series).collect()
+        } else if self.is_full_for(series) {
+            let stays = |robot| robot == self.me() || self.shares.is_alive(robot);
+            self.seen.series().filter(|series| !stays(series.author)).collect()
+        } else {
+            Vec::new()
         };
-        let lives = self.seen.lives(series.author).filter(|life| *life != self.series);
-        let Some(least) = lives.min_by_key(|life| of(*life).count()) else { return Vec::new() };
-        let keys: Vec<u64> = of(least).map(|sample| sample.key).collect();
+        let mut held: BTreeMap<SampleSeries, Vec<u64>> =
+            may_go.into_iter().map(|series| (series, Vec::new())).collect();
+        for sample in self.samples.iter() {
+            if let Some(keys) = sample.id.and_then(|id| held.get_mut(&id.series())) {
+                keys.push(sample.key);
+            }
+        }
+        let Some((least, keys)) = held.into_iter().min_by_key(|(_, keys)| keys.len()) else {
+            return Vec::new();
+        };
         self.seen.forget(least);
         let gone = keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed);
         gone.chain([SetChange::Unseen(least)]).collect()
@@ -277,10 +306,9 @@ impl TrainingSet {
         if id.series() == self.series && id.number >= self.next_number() {
             return Err(SeenError::NeverShared(id));
         }
-        // A place is kept for this robot, or the names of strangers could.
+        // So could the names of strangers.
         let stranger = self.seen.intervals(id.series()).is_empty();
-        let spoke = !self.seen.intervals(self.series).is_empty();
-        if stranger && !spoke && self.seen.series().len() >= MAX_SERIES - 1 {
+        if stranger && self.is_full_for(id.series()) && !self.shares.is_alive(id.author) {
             return Err(SeenError::TooManyAuthors(id));
         }
         Ok(())
@@ -330,8 +358,14 @@ impl TrainingSet {
         let mut changes = Vec::new();
         while self.samples.len() > self.capacity {
             let oldest = self.samples.iter().next().map(|sample| sample.key);
-            let named = self.forgetting.victim(&self.samples, rng).filter(|key| self.get(*key).is_some());
-            let Some(victim) = named.or(oldest).and_then(|key| self.remove(key)) else { break };
+            let victim = self.shares.above(&self.samples, self.capacity).or_else(|| {
+                let named = self.forgetting.victim(&self.samples, rng).or(oldest);
+                let named = named.and_then(|key| self.samples.get(key));
+                let instead =
+                    named.and_then(|named| self.shares.in_place_of(named, &self.samples, self.capacity));
+                instead.or(named.map(|named| named.key)).or(oldest)
+            });
+            let Some(victim) = victim.and_then(|key| self.remove(key)) else { break };
             changes.push(SetChange::Removed(victim));
         }
         changes

@@ -271,6 +271,69 @@ fn strangers_cannot_keep_a_robot_from_sharing() {
 }
 
 #[test]
+fn robots_that_are_there_are_heard_however_many_strangers_were() {
+    let mut rng = generator(1);
+    let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
+    for author in 1..=gestalt_strategies::sample::MAX_SERIES as u32 {
+        robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    }
+    let alive = [RobotId(70_000), RobotId(70_001)];
+    let refused = robot.receive(id(70_000, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    assert!(matches!(refused, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
+    robot.meet(&alive.into());
+    for author in [70_000, 70_001] {
+        let SampleReceipt::New(changes) =
+            robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng)
+        else {
+            panic!("robot {author} is not heard")
+        };
+        let Some(SetChange::Unseen(gone)) = changes.first() else { panic!("{changes:?}") };
+        assert!(robot.seen().intervals(*gone).is_empty() && gone.author < RobotId(70_000));
+    }
+    let refused = robot.receive(id(80_000, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    assert!(matches!(refused, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whoever_floods_a_robot_has_no_more_than_its_share_of_a_full_set(
+        sent in prop::collection::vec((0..14_u32, 0..4_u8, any::<u8>()), 300..600),
+        capacity in 20..80_usize, rules in rules(), seed: u64
+    ) {
+        const ALIVE: std::ops::Range<u32> = 1..5;
+        let mut rng = generator(seed);
+        let mut robot = set(capacity, rules.0, rules.1);
+        robot.meet(&ALIVE.map(RobotId).collect());
+        // An author that says more than all others, and strangers beside it.
+        let mut numbers = BTreeMap::new();
+        let mut own = 0;
+        for (who, class, place) in sent {
+            let author = if who < 5 { who } else if who < 10 { 2 } else { 100 + who };
+            let (class, at) = (ClassId(class), vec![f32::from(place), if author == 2 { 1e4 } else { 0.0 }]);
+            if author == 0 {
+                own += 1;
+                robot.keep(class, round(1), at, &mut rng);
+                continue;
+            }
+            let number = numbers.entry(author).and_modify(|n| *n += 1).or_insert(1);
+            robot.receive(id(author, *number), class, round(1), at, &mut rng);
+        }
+        prop_assert_eq!(robot.len(), capacity);
+        let each = 5.max((5 * capacity).div_ceil(20));
+        for author in ALIVE {
+            let held = robot.authors().find(|(a, _)| *a == RobotId(author)).map_or(0, |(_, held)| held);
+            prop_assert!(held <= each, "robot {} has {} of {}", author, held, each);
+        }
+        let strange: usize = robot.authors().filter(|(a, _)| a.0 >= 100).map(|(_, held)| held).sum();
+        prop_assert!(strange <= 5.max(capacity.div_ceil(4)), "strangers have {}", strange);
+        let kept = robot.total(SetPart::Personal) + robot.total(SetPart::Shared);
+        prop_assert!(kept >= own.min(5.max(capacity.div_ceil(5)).min(capacity / 2)), "{} own of {}", kept, own);
+    }
+}
+
+#[test]
 fn a_robot_that_was_started_ever_so_often_still_shares_and_is_heard() {
     let mut rng = generator(1);
     let mut hearer = set(100, SelectionRule::Random, ForgettingRule::Fifo);

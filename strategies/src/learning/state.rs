@@ -129,6 +129,11 @@ impl Learning {
         }
     }
 
+    /// These robots are alive now: their samples come before those of strangers.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) {
+        self.set.meet(alive);
+    }
+
     /// Whether this robot knows anything of a round.
     pub fn knows(&self, round: RoundId) -> bool {
         self.recent.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0

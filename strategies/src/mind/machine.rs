@@ -143,6 +143,11 @@ impl Mind {
             AboutRounds::Received(envelope) if envelope.author != self.me() => {
                 self.on_received(envelope, out);
             }
+            AboutRounds::Alive(robots) => {
+                if let Some(learning) = &mut self.learning {
+                    learning.meet(robots);
+                }
+            }
             AboutRounds::Neighbours(robots) => self.exchanges.keep(|robot| robots.contains(&robot)),
             _ => {}
         }

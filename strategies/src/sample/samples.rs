@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
 use rand::{Rng, RngExt};
 
 /// The part of a training set that a sample is in.
@@ -39,6 +39,14 @@ pub struct HeldSample {
     pub vector: Arc<[f32]>,
 }
 
+impl HeldSample {
+    /// Who shared it, if anybody did.
+    #[must_use]
+    pub fn author(&self) -> Option<RobotId> {
+        self.id.map(|id| id.author)
+    }
+}
+
 /// The samples held, as selection and forgetting rules see them. Every list is in the order of the keys, so what a
 /// rule picks depends on what is held and not on how it came to be.
 #[derive(Debug, Default)]
@@ -46,6 +54,8 @@ pub struct HeldSamples {
     held: BTreeMap<u64, HeldSample>,
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
+    /// How many external ones there are, by author.
+    authors: BTreeMap<RobotId, usize>,
     arrivals: u64,
 }
 
@@ -95,6 +105,11 @@ impl HeldSamples {
     #[must_use]
     pub fn arrivals(&self) -> u64 {
         self.arrivals
+    }
+
+    /// The other robots of whom a sample is held, ascending, each with how many.
+    pub fn authors(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
+        self.authors.iter().map(|(author, held)| (*author, *held))
     }
 
     /// How many samples of a class are in a part.
@@ -160,6 +175,9 @@ impl HeldSamples {
         self.arrivals = self.arrivals.max(sample.key);
         if let Some(id) = sample.id {
             self.ids.insert(id, sample.key);
+            if sample.part == SetPart::External {
+                *self.authors.entry(id.author).or_default() += 1;
+            }
         }
         let keys = self.classes.entry(sample.class).or_default();
         for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
@@ -173,6 +191,13 @@ impl HeldSamples {
         let sample = self.held.remove(&key)?;
         if let Some(id) = sample.id {
             self.ids.remove(&id);
+            if let Some(held) = self.authors.get_mut(&id.author).filter(|_| sample.part == SetPart::External)
+            {
+                *held -= 1;
+                if *held == 0 {
+                    self.authors.remove(&id.author);
+                }
+            }
         }
         if let Some(keys) = self.classes.get_mut(&sample.class) {
             for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
