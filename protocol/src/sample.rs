@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::bounded;
 use crate::decode::DecodeError;
+use crate::fixed;
 use crate::id::{ClassId, FeatureSpaceId, RoundId, SampleId, SampleSeries};
 use crate::lesson::{Lesson, MAX_LESSONS, Word};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
@@ -95,12 +96,23 @@ impl Samples {
     }
 }
 
-/// What a robot knows, in two numbers: equal ones say that there is nothing to tell each other.
+/// What a robot knows, in two numbers: if what the reader knows gives the same under that key, there is nothing to tell each
+/// other.
+///
+/// The key is drawn anew whenever what the robot knows has changed. So whoever wants two robots to take different knowledge for
+/// the same, and chooses names and words for it, does not know the key that they are to agree under: of two robots that
+/// compare, the one that learned something last has drawn its key after that. It is no secret once said, and proves nothing
+/// of who said it: a robot that lies about its own knowledge still can, and deprives others of nothing but its own help.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Digest {
+    /// Under which key.
+    #[serde(with = "fixed::u64")]
+    pub key: u64,
     /// Over the ids of all samples it ever had.
+    #[serde(with = "fixed::u64")]
     pub samples: u64,
     /// Over all that instructors said.
+    #[serde(with = "fixed::u64")]
     pub lessons: u64,
 }
 
@@ -120,10 +132,10 @@ pub struct Know {
     /// The samples it ever had, by series, ascending.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub samples: Vec<Known>,
-    /// What instructors said of each round, as a digest.
+    /// What instructors said of each round, as a digest under the key of `digest`.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_LESSONS>")]
     pub lessons: Vec<(RoundId, u64)>,
-    /// Both in short. Where one of its numbers is the reader's own, the list it stands for is left out.
+    /// Both in short. Where its author takes the reader to know the same, the list is left out.
     pub digest: Digest,
     /// Whether this is itself an answer to a [`Know`]; such a one is answered with what is lacking only.
     pub answer: bool,

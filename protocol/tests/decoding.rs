@@ -64,14 +64,14 @@ fn message() -> impl Strategy<Value = Message> {
         prop::option::of(round()),
         prop::option::of(decision()),
         prop::collection::vec((any::<u32>(), stamp()), 0..10),
-        prop::option::of((any::<u64>(), any::<u64>())),
+        prop::option::of(any::<(u64, u64, u64)>()),
         any::<bool>(),
     )
         .prop_map(|(round, decision, votes, knowledge, answer)| Have {
             round,
             decision: decision.map(|decision| decision.rank()),
             votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
-            knowledge: knowledge.map(|(samples, lessons)| Digest { samples, lessons }),
+            knowledge: knowledge.map(|(key, samples, lessons)| Digest { key, samples, lessons }),
             answer,
         });
     let held = (any::<u32>(), stamp(), vote()).prop_map(|(robot, stamp, vote)| HeldVote {
@@ -126,7 +126,8 @@ fn know() -> impl Strategy<Value = Know> {
             let series = |(author, life)| SampleSeries { author: RobotId(author), life };
             known.into_iter().map(|(of, numbers)| Known { series: series(of), numbers }).collect()
         });
-    let digest = || any::<(u64, u64)>().prop_map(|(samples, lessons)| Digest { samples, lessons });
+    let digest =
+        || any::<(u64, u64, u64)>().prop_map(|(key, samples, lessons)| Digest { key, samples, lessons });
     let lessons = prop::collection::vec((round(), any::<u64>()), 0..5);
     (samples, lessons, digest(), any::<bool>(), prop::option::of(digest())).prop_map(
         |(samples, lessons, digest, answer, nothing_for)| Know {

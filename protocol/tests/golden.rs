@@ -53,6 +53,13 @@ fn travels_as(message: Message, expected: &str) {
 // version, author, boot, sequence (varint), variant
 const HEAD: &str = "03 07 01 8201";
 
+fn digest(samples: u64, lessons: u64) -> Digest {
+    Digest { key: 0xC3, samples, lessons }
+}
+
+// of the above, 300 and 1: 8 bytes each
+const DIGEST: &str = "c300000000000000 2c01000000000000 0100000000000000";
+
 #[test]
 fn a_vote() {
     // round, vocabulary (varint), two f32 in little-endian order, looks
@@ -74,14 +81,14 @@ fn what_a_robot_has() {
         round: Some(ROUND),
         decision: Some(decision().rank()),
         votes: vec![(RobotId(7), Stamp { boot: 1, sequence: 9 })],
-        knowledge: Some(Digest { samples: 300, lessons: 1 }),
+        knowledge: Some(digest(300, 1)),
         answer: true,
     };
     // Some round; Some rank: decided, robots, confidence as f64, author; one vote: robot, boot, sequence; Some digest:
-    // samples, lessons; answer
+    // key, samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202a101 01 01 01 000000000000e83f 04 01 07 01 09 01ac0201 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 000000000000e83f 04 01 07 01 09 01 {DIGEST} 01"),
     );
     let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
     travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
@@ -146,22 +153,22 @@ fn what_a_robot_knows() {
             numbers: vec![(1, 300), (302, 302)],
         }],
         lessons: vec![(ROUND, 5)],
-        digest: Digest { samples: 300, lessons: 1 },
+        digest: digest(300, 1),
         answer: true,
         nothing_for: None,
     };
     travels_as(
         Message::Know(know),
-        &format!("{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01 00"),
+        &format!("{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 {DIGEST} 01 00"),
     );
     let nothing = Know {
         samples: vec![],
         lessons: vec![],
-        digest: Digest { samples: 300, lessons: 1 },
+        digest: digest(300, 1),
         answer: true,
-        nothing_for: Some(Digest { samples: 5, lessons: 6 }),
+        nothing_for: Some(digest(300, 1)),
     };
-    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 ac0201 01 01 05 06"));
+    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 {DIGEST} 01 01 {DIGEST}"));
 }
 
 #[test]

@@ -2,8 +2,10 @@
 //! or in another order comes to the same.
 
 use std::collections::BTreeMap;
+use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, Fnv1a, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+use siphasher::sip::SipHasher24;
 
 /// The most instructors of one round: beyond, those who were heard of first, on whatever round, are kept. Names made up
 /// later lock nobody out.
@@ -85,7 +87,6 @@ pub enum LessonReceipt {
 #[derive(Clone, Debug, Default)]
 pub struct LessonBook {
     rounds: BTreeMap<RoundId, BTreeMap<InstructorId, Said>>,
-    digest: u64,
     /// In which order the first [`MAX_FAMILIAR`] instructors were heard of.
     familiar: BTreeMap<InstructorId, usize>,
 }
@@ -136,13 +137,11 @@ impl LessonBook {
             }
             None => {}
         }
-        self.digest ^= self.digest_of(lesson.round);
         let words = self.rounds.entry(lesson.round).or_default();
         if let Some(replaced) = replaced {
             words.remove(&replaced);
         }
         words.insert(lesson.instructor.clone(), said);
-        self.digest ^= self.digest_of(lesson.round);
         if self.familiar.len() < MAX_FAMILIAR {
             let next = self.familiar.len();
             self.familiar.entry(lesson.instructor.clone()).or_insert(next);
@@ -178,7 +177,6 @@ impl LessonBook {
 
     /// Forgets what was said of a round.
     pub(crate) fn forget(&mut self, round: RoundId) {
-        self.digest ^= self.digest_of(round);
         self.rounds.remove(&round);
     }
 
@@ -239,9 +237,9 @@ impl LessonBook {
         words.max().copied()
     }
 
-    /// The rounds of which something is known, each with a digest of what.
-    pub fn rounds(&self) -> impl Iterator<Item = (RoundId, u64)> + '_ {
-        self.rounds.keys().map(|round| (*round, self.digest_of(*round)))
+    /// The rounds of which something is known, each with a digest of what under that key.
+    pub fn rounds(&self, key: u64) -> impl Iterator<Item = (RoundId, u64)> + '_ {
+        self.rounds.keys().map(move |round| (*round, self.digest_of(*round, key)))
     }
 
     /// The oldest round of which something is known.
@@ -268,28 +266,31 @@ impl LessonBook {
         self.rounds.is_empty()
     }
 
-    /// A digest of everything: the same lessons, heard in whatever order, give the same.
+    /// A digest of everything under a key: the same lessons, heard in whatever order, give the same.
     #[must_use]
-    pub fn digest(&self) -> u64 {
-        self.digest
+    pub fn digest(&self, key: u64) -> u64 {
+        self.rounds(key).fold(0, |digest, (_, of_round)| digest ^ of_round)
     }
 
-    /// The digest of what is known of one round, 0 for nothing: FNV-1a over its words.
+    /// The digest of what is known of one round under a key, 0 for nothing.
     #[must_use]
-    pub fn digest_of(&self, round: RoundId) -> u64 {
+    pub fn digest_of(&self, round: RoundId, key: u64) -> u64 {
         let Some(words) = self.rounds.get(&round) else { return 0 };
-        let mut fnv = Fnv1a::default();
-        fnv.add([round.counter, round.opener.0, round.life].into_iter().flat_map(u32::to_le_bytes));
+        let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"lessons "));
+        [round.counter, round.opener.0, round.life].iter().for_each(|part| sip.write(&part.to_le_bytes()));
         for (instructor, (count, at, word)) in words {
             let (kind, class) = match word {
                 Word::Was(class) => (1, class.0),
                 Word::Not(class) => (2, class.0),
                 Word::Retracted => (3, 0),
             };
-            let when = [*count, *at].map(u64::to_le_bytes);
-            fnv.add(instructor.to_string().bytes().chain(when.into_iter().flatten()).chain([kind, class]));
+            let name = instructor.to_string();
+            sip.write(&[name.len() as u8]);
+            sip.write(name.as_bytes());
+            [count, at].into_iter().for_each(|when| sip.write(&when.to_le_bytes()));
+            sip.write(&[kind, class]);
         }
-        fnv.hash()
+        sip.finish()
     }
 }
 
@@ -358,7 +359,7 @@ mod tests {
             let middle = order.index(lessons.len() + 1);
             let twice = lessons[middle..].iter().chain(&lessons[..middle]).rev().chain(&lessons);
             twice.for_each(|lesson| { turned.hear(lesson); });
-            prop_assert_eq!(forwards.digest(), turned.digest());
+            prop_assert_eq!(forwards.digest(7), turned.digest(7));
             prop_assert_eq!(forwards.rounds, turned.rounds);
         }
     }
@@ -375,7 +376,7 @@ mod tests {
         book.rounds.keys().for_each(|round| {
             fresh.hear(&lesson(round.counter, "ada", 1, was(1)));
         });
-        assert_eq!(book.digest(), fresh.digest(), "the digest is of what is kept");
+        assert_eq!(book.digest(7), fresh.digest(7), "the digest is of what is kept");
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub enum Refusal {
     Unclassified,
     /// A sample of another feature space than this robot learns in.
     OtherSpace,
-    /// A sample whose vector has another length, or a component that is not finite.
+    /// A sample whose vector has another length, or a component that is not finite or lies far out.
     BadVector,
     /// A sample of a class that the vocabulary does not have.
     UnknownClass,
@@ -31,13 +31,17 @@ pub enum Refusal {
     LessonFull,
     /// A lesson on a round, or with a count, so far ahead of all known that it is taken for a mistake or a lie.
     LessonFarAhead,
+    /// A question about what this robot knows, of one that is no neighbour.
+    Stranger,
+    /// A question about what this robot knows, of a neighbour that was told much just now.
+    TooOften,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::Vocabulary,
@@ -52,6 +56,8 @@ impl Refusal {
         Self::SampleNumber,
         Self::LessonFull,
         Self::LessonFarAhead,
+        Self::Stranger,
+        Self::TooOften,
         Self::CountersUsedUp,
     ];
 
@@ -73,6 +79,8 @@ impl Refusal {
             Self::SampleNumber => "refused_sample_number",
             Self::LessonFull => "refused_lesson_full",
             Self::LessonFarAhead => "refused_lesson_far_ahead",
+            Self::Stranger => "refused_question_of_stranger",
+            Self::TooOften => "refused_question_too_often",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
+use std::hash::Hasher;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -11,6 +12,8 @@ use gestalt_protocol::{
 };
 use gestalt_rounds::{Follow, Vocabulary};
 use gestalt_svm::FeatureSpace;
+use rand::Rng;
+use siphasher::sip::SipHasher24;
 
 use super::changes::{TrainingChange, inserted};
 use super::config::LearningConfig;
@@ -51,6 +54,10 @@ pub(crate) struct Learning {
     pub(super) aside: Unresolved,
     /// The highest counter of a round that this robot knows of.
     newest: Option<u32>,
+    digest: Digest,
+    /// From which the keys of the digest follow, and how many were drawn.
+    secret: u64,
+    drawn: u64,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
     /// What is to be trained and remembered, and was not yet said.
@@ -98,7 +105,12 @@ impl Learning {
         });
         let training = set.iter().map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
-        Ok(Self {
+        let mut rng = rng;
+        let secret = rng.next_u64();
+        let mut learning = Self {
+            digest: Digest::default(),
+            secret,
+            drawn: 0,
             aside: Unresolved::new(aside, counters.next_aside, config.aside),
             config,
             me,
@@ -117,7 +129,9 @@ impl Learning {
             revision: 0,
             remembered: 0,
             unsent: VecDeque::new(),
-        })
+        };
+        learning.digest = learning.digest_under(secret);
+        Ok(learning)
     }
 
     /// Notes a look at the gesture of a round; says whether it was kept.
@@ -318,8 +332,25 @@ impl Learning {
         self.remembered >= revision
     }
 
+    /// What it knows, under its own key.
     pub fn digest(&self) -> Digest {
-        Digest { samples: self.set.seen().digest(), lessons: self.lessons.digest() }
+        self.digest
+    }
+
+    /// What it knows, under another's key.
+    pub fn digest_under(&self, key: u64) -> Digest {
+        Digest { key, samples: self.set.seen().digest(key), lessons: self.lessons.digest(key) }
+    }
+
+    /// Draws another key if what it knows has changed since the changes were last taken. Whoever made it change did not
+    /// know that key.
+    pub fn refresh_digest(&mut self) {
+        if self.dirty.iter().any(|item| matches!(item, Item::Seen(_) | Item::Lessons(_))) {
+            self.drawn += 1;
+            let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
+            sip.write(&self.drawn.to_le_bytes());
+            self.digest = self.digest_under(sip.finish());
+        }
     }
 
     /// Where it stands, for the status. What the host knows of memory and training is left to it.

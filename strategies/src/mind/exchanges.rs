@@ -1,6 +1,7 @@
 //! What was settled with each neighbour, so that two robots that cannot come to know the same stop telling each other.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use gestalt_protocol::{Digest, Lesson, RobotId, RoundId, SampleId};
 
@@ -13,6 +14,13 @@ const MAX_NEIGHBOURS: usize = 64;
 /// The most rounds of which a neighbour's lessons are kept as declined; those beyond are offered again.
 const MAX_DECLINED_ROUNDS: usize = 64;
 
+/// How many messages a neighbour is told at once at most, of 16 KiB at most. A question of 40 bytes in its name brings no
+/// more upon it.
+const REPLIES_AT_ONCE: f64 = 128.0;
+
+/// How many more each second.
+const REPLIES_PER_SECOND: f64 = 16.0;
+
 /// What was settled with one neighbour. It binds nobody else: what this neighbour has no more use in offering is still
 /// taken from another, so a neighbour that lies deprives this robot of nothing but its own help.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +31,9 @@ struct Exchange {
     declined: SeenSamples,
     /// The lessons it offered, some of which this robot cannot take: at most [`MAX_DECLINED_ROUNDS`] rounds.
     declined_lessons: LessonBook,
+    /// The messages it was told, less those that time has made up for, and when that was reckoned.
+    told: f64,
+    told_at: Duration,
 }
 
 /// What was settled with the neighbours: at most [`MAX_NEIGHBOURS`].
@@ -68,9 +79,25 @@ impl Exchanges {
         }
     }
 
-    /// The rounds of which this robot cannot take what that neighbour says, each with the digest of that.
-    pub fn declined_rounds(&self, robot: RobotId) -> BTreeMap<RoundId, u64> {
-        self.0.get(&robot).map(|exchange| exchange.declined_lessons.rounds().collect()).unwrap_or_default()
+    /// The rounds of which this robot cannot take what that neighbour says, each with the digest of that
+    /// under a key.
+    pub fn declined_rounds(&self, robot: RobotId, key: u64) -> BTreeMap<RoundId, u64> {
+        let declined = self.0.get(&robot).map(|exchange| exchange.declined_lessons.rounds(key).collect());
+        declined.unwrap_or_default()
+    }
+
+    /// How many messages that neighbour may be told now.
+    pub fn allowance(&mut self, now: Duration, robot: RobotId) -> usize {
+        let exchange = self.with(robot);
+        let passed = now.saturating_sub(exchange.told_at).as_secs_f64();
+        exchange.told = (exchange.told - passed * REPLIES_PER_SECOND).max(0.0);
+        exchange.told_at = now;
+        (REPLIES_AT_ONCE - exchange.told).max(0.0) as usize
+    }
+
+    /// That neighbour is told so many.
+    pub fn spend(&mut self, robot: RobotId, messages: usize) {
+        self.with(robot).told += messages as f64;
     }
 
     /// Lessons that lay too far ahead may do so no longer.

@@ -109,7 +109,10 @@ impl Mind {
         };
         let round = self.rounds.round();
         let done = match &mut self.learning {
-            Some(learning) => self.rounds.handle_with(now, about_rounds, learning),
+            Some(learning) => {
+                learning.refresh_digest();
+                self.rounds.handle_with(now, about_rounds, learning)
+            }
             None => self.rounds.handle(now, about_rounds),
         };
         if self.rounds.round() != round {
@@ -189,6 +192,7 @@ impl Mind {
     /// Says what is to be trained and remembered, and shares what is remembered as shared.
     fn carry_on_learning(&mut self, out: &mut Vec<Output>) {
         let Some(learning) = &mut self.learning else { return };
+        learning.refresh_digest();
         let changes = learning.take_training();
         if !changes.is_empty() {
             out.push(Output::Train(changes));

@@ -32,27 +32,28 @@ impl Mind {
     /// of no use before.
     pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
         let (Some(theirs), Some(learning)) = (theirs, &self.learning) else { return };
-        let mine = learning.digest();
-        if theirs != mine && !self.exchanges.is_at_rest(from, mine, theirs) {
+        let same = learning.digest_under(theirs.key) == theirs;
+        if !same && !self.exchanges.is_at_rest(from, learning.digest(), theirs) && self.may_answer(from) {
+            self.exchanges.spend(from, 1);
             self.tell_know(from, theirs, false, out);
         }
     }
 
     fn tell_know(&mut self, to: RobotId, theirs: Digest, answer: bool, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
-        let mine = learning.digest();
-        let samples = if mine.samples == theirs.samples {
+        let (mine, here) = (learning.digest(), learning.digest_under(theirs.key));
+        let samples = if here.samples == theirs.samples {
             Vec::new()
         } else {
             let seen = self.exchanges.told_to(to, learning.set().seen());
             let known = |series| Known { series, numbers: seen.intervals(series).to_vec() };
             seen.series().map(known).collect()
         };
-        let lessons = if mine.lessons == theirs.lessons {
+        let lessons = if here.lessons == theirs.lessons {
             Vec::new()
         } else {
-            let mut rounds: BTreeMap<RoundId, u64> = learning.lessons().rounds().collect();
-            rounds.append(&mut self.exchanges.declined_rounds(to));
+            let mut rounds: BTreeMap<RoundId, u64> = learning.lessons().rounds(mine.key).collect();
+            rounds.append(&mut self.exchanges.declined_rounds(to, mine.key));
             rounds.into_iter().rev().take(MAX_LESSONS).collect()
         };
         let know = Know { samples, lessons, digest: mine, answer, nothing_for: None };
@@ -69,25 +70,35 @@ impl Mind {
             }
             return;
         }
+        let here = learning.digest_under(know.digest.key);
+        if here == know.digest && know.samples.is_empty() && know.lessons.is_empty() {
+            return;
+        }
+        if !self.may_answer(from) {
+            return;
+        }
+        let chunks = self.exchanges.allowance(self.rounds.now(), from).min(MAX_CHUNKS);
+        let Some(learning) = &self.learning else { return };
         let mut lacking_here = false;
         let mut given = Vec::new();
-        if mine.samples != know.digest.samples {
+        if here.samples != know.digest.samples || !know.samples.is_empty() {
             let theirs = know.samples.iter().map(|known| (known.series, known.numbers.clone()));
             let Ok(theirs) = SeenSamples::from_intervals(theirs) else {
                 return self.rounds.note_refusal(Refusal::SampleNumber);
             };
             lacking_here |= self.exchanges.told_to(from, learning.set().seen()).lacks(&theirs);
             let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
-            given.extend(lacking.take(MAX_CHUNKS).map(Message::Samples));
+            given.extend(lacking.take(chunks).map(Message::Samples));
         }
-        if mine.lessons != know.digest.lessons {
+        if here.lessons != know.digest.lessons || !know.lessons.is_empty() {
             let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
             let book = learning.lessons();
-            let declined = self.exchanges.declined_rounds(from);
+            let key = know.digest.key;
+            let declined = self.exchanges.declined_rounds(from, key);
             lacking_here |= theirs.iter().any(|(round, digest)| {
-                book.digest_of(*round) != *digest && declined.get(round) != Some(digest)
+                book.digest_of(*round, key) != *digest && declined.get(round) != Some(digest)
             });
-            let lacking = book.rounds().filter(|(round, digest)| theirs.get(round) != Some(digest));
+            let lacking = book.rounds(key).filter(|(round, digest)| theirs.get(round) != Some(digest));
             let mut lessons: Vec<Lesson> = Vec::new();
             for (round, _) in lacking {
                 // All of a round in one message, so that it is known to be all.
@@ -100,7 +111,8 @@ impl Mind {
                 given.push(Message::Lessons(Lessons { lessons }));
             }
         }
-        let settled = given.is_empty() && mine != know.digest && !learning.withholds();
+        let settled = given.is_empty() && !learning.withholds();
+        self.exchanges.spend(from, given.len() + 1);
         for message in given {
             self.tell(from, message, out);
         }
@@ -140,6 +152,20 @@ impl Mind {
             // The other neighbours may lack it too.
             self.rounds.hurry_repair();
         }
+    }
+
+    /// Whether that robot is answered: a neighbour, and not too often. Whoever asks in the name of another brings no flood
+    /// upon it.
+    fn may_answer(&mut self, from: RobotId) -> bool {
+        let refusal = if !self.compares_with(from) {
+            Refusal::Stranger
+        } else if self.exchanges.allowance(self.rounds.now(), from) == 0 {
+            Refusal::TooOften
+        } else {
+            return true;
+        };
+        self.rounds.note_refusal(refusal);
+        false
     }
 
     /// Whether that robot is one to compare knowledge with: a neighbour, or anyone while none is known.

@@ -153,3 +153,62 @@ fn no_clock_orders_the_words_of_an_instructor() {
         }
     }
 }
+
+#[test]
+fn a_question_in_the_name_of_another_brings_no_flood_upon_it() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 35);
+    let sample = |number| SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number },
+        class: ClassId(1),
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
+        vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
+    };
+    let message =
+        Message::Samples(Samples { space: space().id(), samples: (1..=1000).map(sample).collect() });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    for i in 0..3 {
+        swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message: message.clone() }));
+    }
+    swarm.pass(Duration::from_secs(10));
+    let ask = |swarm: &mut Swarm, author| {
+        swarm.told.clear();
+        let digest = gestalt_protocol::Digest { key: 1, samples: 2, lessons: 3 };
+        let (samples, lessons) = (vec![], vec![]);
+        let know = gestalt_protocol::Know { samples, lessons, digest, answer: true, nothing_for: None };
+        for _ in 0..1000 {
+            let message = Message::Know(know.clone());
+            let out = swarm.minds[0].handle(swarm.now, Input::Received(Envelope { author, stamp, message }));
+            let told = out.iter().filter(|output| matches!(output, Output::Tell(..)));
+            swarm.told.entry("all").or_default().0 += told.count();
+        }
+        swarm.told["all"].0
+    };
+    assert_eq!(ask(&mut swarm, RobotId(7)), 0, "no neighbour");
+    assert_eq!(swarm.minds[0].refusals().count(Refusal::Stranger), 1000);
+    let told = ask(&mut swarm, RobotId(2));
+    assert!((1..=128).contains(&told), "{told} messages for 1000 questions");
+    assert!(swarm.minds[0].refusals().count(Refusal::TooOften) > 0);
+    swarm.pass(Duration::from_secs(10));
+    let again = ask(&mut swarm, RobotId(2));
+    assert!((1..=128).contains(&again), "who waited is answered again: {again}");
+}
+
+#[test]
+fn what_was_chosen_to_look_alike_is_found_all_the_same() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 36);
+    let sample = |number| SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number },
+        class: ClassId(1),
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
+        vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
+    };
+    // The key that the second robot told last is known; it is not the one that it will compare under.
+    let before = swarm.minds[1].learning.as_ref().unwrap().digest();
+    let message = Message::Samples(Samples { space: space().id(), samples: vec![sample(1)] });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    swarm.input(1, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    let after = swarm.minds[1].learning.as_ref().unwrap().digest();
+    assert_ne!(before.key, after.key);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.sizes(0), [0, 0, 1]);
+}
