@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
 use super::unresolved::UnresolvedSample;
-use crate::sample::{HeldSample, SeenSamples, SetPart};
+use crate::sample::{HeldSample, SeenSamples, SetPart, ToldAs};
 
 /// One change of a robot's memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,12 +101,13 @@ struct StoredSample {
     class: ClassId,
     round: RoundId,
     vector: Vec<f32>,
+    told: Option<ToldAs>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct StoredAside {
     part: u8,
-    shared: Option<(SampleId, ClassId)>,
+    shared: Option<(SampleId, ToldAs)>,
     round: RoundId,
     vector: Vec<f32>,
     guess: Option<ClassId>,
@@ -163,13 +164,14 @@ pub(super) fn encode<T: Serialize>(value: &T) -> Vec<u8> {
 }
 
 pub(super) fn encode_sample(sample: &HeldSample) -> Vec<u8> {
-    let HeldSample { part, id, class, round, vector, .. } = sample;
+    let HeldSample { part, id, class, round, vector, told, .. } = sample;
     encode(&StoredSample {
         part: part_number(*part),
         id: *id,
         class: *class,
         round: *round,
         vector: vector.to_vec(),
+        told: *told,
     })
 }
 
@@ -232,10 +234,10 @@ impl RobotMemory {
                 }
                 Item::Counters => memory.counters = decode(value)?,
                 Item::Sample(key) => {
-                    let StoredSample { part, id, class, round, vector } = decode(value)?;
+                    let StoredSample { part, id, class, round, vector, told } = decode(value)?;
                     let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
                     let vector = Arc::from(finite(vector)?);
-                    memory.samples.push(HeldSample { key, part, id, class, round, vector });
+                    memory.samples.push(HeldSample { key, part, id, class, round, vector, told });
                 }
                 Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {

@@ -4,7 +4,7 @@ use gestalt_protocol::{ClassId, Envelope, Message, RoundId, SampleId, Samples, S
 use gestalt_rounds::Classify;
 
 use super::state::Learning;
-use crate::sample::HeldSample;
+use crate::sample::{HeldSample, ToldAs};
 use crate::training_set::SetChange;
 use crate::vector_codec::decode_vector;
 
@@ -31,6 +31,11 @@ impl Learning {
             _ => None,
         });
         let ids: Vec<SampleId> = ids.collect();
+        for id in &ids {
+            if let Some(told) = self.set.find(*id).map(|sample| self.told_as(sample)) {
+                self.set.note_told(*id, told);
+            }
+        }
         self.absorb(changes);
         if !ids.is_empty() {
             self.unsent.push_back((self.revision + 1, ids));
@@ -70,14 +75,21 @@ impl Learning {
     /// Samples as they travel.
     pub fn told<'a>(&self, samples: impl Iterator<Item = &'a HeldSample>) -> Samples {
         let samples = samples.filter_map(|sample| {
-            let HeldSample { class, round, .. } = *sample;
-            Some(self.as_told(sample.id?, class, round, &sample.vector))
+            Some(self.as_told(sample.id?, self.told_as(sample), sample.round, &sample.vector))
         });
         Samples { space: self.space_id, samples: samples.collect() }
     }
 
-    fn as_told(&self, id: SampleId, class: ClassId, round: RoundId, vector: &[f32]) -> SharedSample {
-        SharedSample { id, class, round, vector: self.config.precision.encode(vector, &self.space) }
+    /// How the author of a sample shared it, or this robot does.
+    pub(super) fn told_as(&self, sample: &HeldSample) -> ToldAs {
+        sample.told.unwrap_or(ToldAs { class: sample.class, precision: self.config.precision })
+    }
+
+    /// A sample as its author shared it, byte for byte, whatever this robot holds it for meanwhile: what was said of its
+    /// round reaches the others as well.
+    fn as_told(&self, id: SampleId, told: ToldAs, round: RoundId, vector: &[f32]) -> SharedSample {
+        let ToldAs { class, precision } = told;
+        SharedSample { id, class, round, vector: precision.encode_again(vector, &self.space) }
     }
 
     /// The shared samples held, also those aside, that `lacks` says another robot has not had; in messages of about
@@ -88,10 +100,11 @@ impl Learning {
         bytes: usize,
     ) -> impl Iterator<Item = Samples> + 'a {
         let held = self.set.common();
-        let held = held.filter_map(|sample| Some((sample.id?, sample.class, sample.round, &sample.vector)));
+        let held =
+            held.filter_map(|sample| Some((sample.id?, self.told_as(sample), sample.round, &sample.vector)));
         let aside = self.aside.iter();
         let aside = aside
-            .filter_map(|(_, aside)| aside.shared.map(|(id, class)| (id, class, aside.round, &aside.vector)));
+            .filter_map(|(_, aside)| aside.shared.map(|(id, told)| (id, told, aside.round, &aside.vector)));
         let mut lacking =
             held.chain(aside).filter(move |(id, ..)| lacks(*id) && self.may_tell(*id)).peekable();
         let each = 32 + self.space.components() * self.config.precision.bytes();
@@ -100,7 +113,7 @@ impl Learning {
             lacking.peek()?;
             let told = lacking.by_ref().take(chunk);
             let samples =
-                told.map(|(id, class, round, vector)| self.as_told(id, class, round, vector)).collect();
+                told.map(|(id, told, round, vector)| self.as_told(id, told, round, vector)).collect();
             Some(Samples { space: self.space_id, samples })
         })
     }

@@ -22,9 +22,9 @@ use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
 use super::unresolved::{self, Unresolved};
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
-use crate::sample::SetPart;
+use crate::sample::{SetPart, ToldAs};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
-use crate::vector_codec::{VectorError, decode_vector};
+use crate::vector_codec::{Precision, VectorError, decode_vector};
 
 /// How far beyond the newest round known one may lie that is spoken of.
 const LEAP: u32 = 64;
@@ -232,6 +232,8 @@ impl Learning {
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
             SampleReceipt::New(changes) => {
                 self.dirty.insert(Item::Seen(id.series()));
+                let told = ToldAs { class: sample.class, precision: Precision::of(&sample.vector) };
+                self.set.note_told(id, told);
                 self.absorb(changes);
                 // A class is what it was taken under; anything else concerns all samples of the round.
                 if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {

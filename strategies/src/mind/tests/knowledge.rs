@@ -279,3 +279,23 @@ proptest! {
         swarm.check();
     }
 }
+
+#[test]
+fn what_is_passed_on_is_what_its_author_said() {
+    let mut swarm = Swarm::new(3, LearningConfig { precision: Precision::I8, ..config(2, 1.0) }, 18);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    // The class is corrected, taken back and given again; a restarted robot sends more exactly; the author is gone.
+    swarm.was(round, 4);
+    swarm.say("ada", Instruction::Retract { round });
+    swarm.was(round, 2);
+    swarm.config.precision = Precision::F32;
+    swarm.restart(1);
+    let learning = swarm.minds[1].learning.as_ref().unwrap();
+    let told: Vec<SharedSample> = learning.lacking(|_| true, 1 << 20).flat_map(|told| told.samples).collect();
+    assert_eq!(told.len(), 6);
+    for sample in told {
+        assert!(swarm.said.contains(&sample), "{sample:?}");
+    }
+    assert_eq!(swarm.minds[1].training_set().unwrap().class_count(ClassId(2)), 6);
+}
