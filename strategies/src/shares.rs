@@ -22,14 +22,16 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// These robots are alive now.
-    pub fn meet(&mut self, me: RobotId, alive: &BTreeSet<RobotId>) {
+    /// These robots are alive now. Gives those that were not before.
+    pub fn meet(&mut self, me: RobotId, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        let new = alive.difference(&self.alive).copied().filter(|robot| *robot != me).collect();
         self.alive.clone_from(alive);
         self.alive.remove(&me);
         self.met.extend(&self.alive);
         if self.met.len() > MAX_ROBOTS {
             self.met.clone_from(&self.alive);
         }
+        new
     }
 
     pub fn is_alive(&self, robot: RobotId) -> bool {

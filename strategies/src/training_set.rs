@@ -6,6 +6,8 @@
 //!                     └──────────────────┴───── forget when full ─────┘
 //! ```
 
+mod restore_error;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -13,7 +15,8 @@ use std::sync::Arc;
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId, SampleSeries};
 use gestalt_rounds::Classify;
 use rand::Rng;
-use thiserror::Error;
+
+pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
 use crate::sample::{
@@ -49,36 +52,6 @@ pub enum SampleReceipt {
     Known,
     /// Its name cannot be remembered within the bounds: nothing changed.
     Refused(SeenError),
-}
-
-/// A stored set that contradicts itself. The training set is unchanged.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RestoreError {
-    /// Two samples have one key.
-    #[error("two stored samples have the key {0}")]
-    Key(u64),
-    /// A key that is yet to be given out.
-    #[error("stored sample {key} is newer than the next key, {next}")]
-    KeyAhead {
-        /// The sample's key.
-        key: u64,
-        /// The next key.
-        next: u64,
-    },
-    /// A next key that no robot lives long enough to reach: with it, keys could run out.
-    #[error("the stored next key, {0}, is out of range")]
-    NextKey(u64),
-    /// Two samples have one name.
-    #[error("two stored samples have the name {0}")]
-    Name(SampleId),
-    /// A sample in a part that its name does not fit: a personal one has none, a shared one has this robot's, an
-    /// external one another's.
-    #[error("stored sample {0} is in a part that its name does not fit: was it stored by another robot?")]
-    Part(u64),
-    /// A sample with a name that was not seen.
-    #[error("stored sample {0} is not among those seen")]
-    Unseen(SampleId),
 }
 
 /// The bounded set of samples of one robot.
@@ -143,8 +116,9 @@ impl TrainingSet {
     /// These other robots are alive now. From then on no author's samples push out those of the others when the set is full,
     /// and when more series were seen than are kept track of, those of robots that are not there give way: each other robot
     /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
-    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) {
-        self.shares.meet(self.me(), alive);
+    /// Gives those that were not alive before.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.shares.meet(self.me(), alive)
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what

@@ -3,14 +3,18 @@
 use gestalt_protocol::{ClassId, Envelope, Message, RoundId, SampleId, Samples, SharedSample, Stamp};
 use gestalt_rounds::Classify;
 
-use super::state::Learning;
+use super::state::{Learning, MAX_UNSENT};
 use crate::sample::{HeldSample, ToldAs};
 use crate::training_set::SetChange;
 use crate::vector_codec::decode_vector;
 
 impl Learning {
-    /// Chooses what to share, within the bounds.
+    /// Chooses what to share, within the bounds. While much waits for a disk that does not keep up, nothing: it stays
+    /// personal, and owed.
     pub fn share(&mut self, classifier: Option<&dyn Classify>) {
+        if self.unsent.len() >= MAX_UNSENT {
+            return;
+        }
         // A hair more than a whole: tenths do not add up to one exactly.
         let by_fraction = (self.credit + 1e-9).floor() as usize;
         let by_number = self.config.share_samples.map_or(usize::MAX, |n| n as usize);

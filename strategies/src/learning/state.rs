@@ -29,6 +29,9 @@ use crate::vector_codec::{Precision, VectorError, decode_vector};
 /// How far beyond the newest round known one may lie that is spoken of.
 const LEAP: u32 = 64;
 
+/// The most times that a robot shares before the disk has kept up.
+pub(super) const MAX_UNSENT: usize = 64;
+
 /// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
 const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
@@ -66,7 +69,7 @@ pub(crate) struct Learning {
     pub(super) durable: bool,
     pub(super) revision: u64,
     pub(super) remembered: u64,
-    /// Shared samples that wait until that revision is remembered.
+    /// Shared samples that wait until that revision is remembered: at most [`MAX_UNSENT`] rounds' worth.
     pub(super) unsent: VecDeque<(u64, Vec<SampleId>)>,
 }
 
@@ -143,9 +146,9 @@ impl Learning {
         }
     }
 
-    /// These robots are alive now: their samples come before those of strangers.
-    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) {
-        self.set.meet(alive);
+    /// These robots are alive now: their samples come before those of strangers. Gives those that were not alive before.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.set.meet(alive)
     }
 
     /// Whether this robot knows anything of a round.

@@ -1,6 +1,6 @@
 //! What was settled with each neighbour, so that two robots that cannot come to know the same stop telling each other.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{Digest, Lesson, RobotId, RoundId, SampleId};
@@ -65,6 +65,17 @@ impl Exchanges {
         let _ = self.with(robot).declined.insert(sample);
     }
 
+    /// These robots are alive now and were not before: there may be room for their samples.
+    pub fn readmit(&mut self, robots: &BTreeSet<RobotId>) {
+        for exchange in self.0.values_mut() {
+            let series = exchange.declined.series().filter(|series| robots.contains(&series.author));
+            for series in series.collect::<Vec<_>>() {
+                exchange.declined.forget(series);
+                exchange.at_rest = None;
+            }
+        }
+    }
+
     /// Some of these lessons of one round, all that neighbour has, cannot be taken.
     pub fn decline_lessons<'a>(&mut self, robot: RobotId, of_round: impl Iterator<Item = &'a Lesson>) {
         let declined = &mut self.with(robot).declined_lessons;
@@ -117,5 +128,37 @@ impl Exchanges {
             self.0.pop_first();
         }
         self.0.entry(robot).or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_declined_of_a_robot_is_asked_for_again_when_it_is_there() {
+        let id = |author| SampleId { author: RobotId(author), life: 1, number: 1 };
+        let (neighbour, digest) = (RobotId(1), Digest::default());
+        let mut exchanges = Exchanges::default();
+        exchanges.decline(neighbour, id(5));
+        exchanges.decline(neighbour, id(6));
+        exchanges.rest(neighbour, digest, digest);
+        exchanges.readmit(&[RobotId(7)].into());
+        assert!(exchanges.is_at_rest(neighbour, digest, digest), "of that one nothing was");
+        exchanges.readmit(&[RobotId(5)].into());
+        assert!(!exchanges.is_at_rest(neighbour, digest, digest));
+        let told = exchanges.told_to(neighbour, &SeenSamples::default());
+        assert!(!told.contains(id(5)) && told.contains(id(6)));
+    }
+
+    #[test]
+    fn of_ever_so_many_neighbours_something_is_kept_of_so_many() {
+        let mut exchanges = Exchanges::default();
+        for robot in 0..1000 {
+            exchanges.decline(RobotId(robot), SampleId { author: RobotId(5), life: 1, number: 1 });
+        }
+        assert_eq!(exchanges.0.len(), MAX_NEIGHBOURS);
+        exchanges.keep(|robot| robot == RobotId(999));
+        assert_eq!(exchanges.0.len(), 1);
     }
 }

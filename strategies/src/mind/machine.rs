@@ -148,7 +148,7 @@ impl Mind {
             }
             AboutRounds::Alive(robots) => {
                 if let Some(learning) = &mut self.learning {
-                    learning.meet(robots);
+                    self.exchanges.readmit(&learning.meet(robots));
                 }
             }
             AboutRounds::Neighbours(robots) => self.exchanges.keep(|robot| robots.contains(&robot)),
