@@ -44,6 +44,22 @@ pub(crate) enum Declined {
 }
 
 /// What has come of samples and lessons so far.
+///
+/// What it holds is bounded, whatever arrives and however long the robot lives:
+///
+/// | what | at most |
+/// |---|---|
+/// | samples held | [`capacity`](LearningConfig::capacity), of other authors as a full set's [shares](crate::shares) say |
+/// | samples of which it is open what they show | [`aside`](LearningConfig::aside) |
+/// | series of samples seen | 4,096; 64 lives of an author; 16,384 intervals of numbers in all |
+/// | lessons | 1,024 rounds, 16 instructors each; who was heard of first: 256 |
+/// | rounds lived through | 32, with 1,024 names and [`keep`](LearningConfig::keep) looks each |
+/// | shared and not yet on the disk | 64 times of sharing |
+/// | robots met | 4,096, or those alive |
+/// | changes to be trained and remembered | those of one input: they are taken after each |
+///
+/// Beside it, in the mind: what was settled with 64 neighbours (each within the bounds of what is seen, and 64 rounds),
+/// and 64 answers that wait.
 pub(crate) struct Learning {
     pub(super) config: LearningConfig,
     pub(super) me: RobotId,

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{
-    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, Message, RobotId, RoundId, Samples,
+    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, Message,
+    RobotId, RoundId, Samples,
 };
 use gestalt_rounds::Refusal;
 
@@ -12,7 +13,7 @@ use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Declined;
 use crate::lessons::{LessonReceipt, MAX_INSTRUCTORS};
-use crate::sample::{MAX_GAPS, SeenSamples};
+use crate::sample::{MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_SERIES, SeenSamples};
 use crate::vector_codec::VectorError;
 
 /// About how many bytes of samples one message takes, so that a vote never waits long behind it.
@@ -24,8 +25,10 @@ const MAX_CHUNKS: usize = 32;
 /// The most lessons in one message.
 const MAX_TOLD: usize = 256;
 
-// What is kept of an author can be told.
-const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
+// What is kept of samples and lessons can be told, all of it in one message: an interval takes 10 bytes at most, a series 11
+// beside its intervals, a round of lessons 25, all else 64.
+const _: () = assert!(MAX_GAPS <= MAX_INTERVALS && MAX_SERIES <= MAX_ROBOTS);
+const _: () = assert!(10 * MAX_INTERVALS_IN_ALL + 11 * MAX_SERIES + 25 * MAX_LESSONS + 64 < MAX_MESSAGE);
 
 impl Mind {
     /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length, unless that was
