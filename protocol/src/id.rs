@@ -6,6 +6,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::fixed;
+
 /// A text that is no valid identifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
@@ -140,19 +142,56 @@ pub struct Stamp {
     pub sequence: u32,
 }
 
-/// A sample that was shared: its author, and its place among all that this author ever shared.
+/// A sample that was shared: its author, the life of that author, and its place among all that was shared in that life.
+///
+/// No other sample ever has this name, as no other showing has a [`RoundId`]: whatever became of the author's disk, an old
+/// copy of it put back included, and of its clock, it numbers under another life at each start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct SampleId {
     /// Who made and shared it.
     pub author: RobotId,
-    /// Counts up without gaps from the author's boot number at its first start, also across restarts. An author that lost
-    /// its memory goes on from its boot number again, which lies beyond all that it used.
+    /// A number that the author drew at random when it started. Any is as likely as the others, so it travels as 4 bytes.
+    #[serde(with = "fixed::u32")]
+    pub life: u32,
+    /// Counts up from 1 without gaps.
     pub number: u32,
+}
+
+impl SampleId {
+    /// The series that it is a part of.
+    #[must_use]
+    pub fn series(self) -> SampleSeries {
+        SampleSeries { author: self.author, life: self.life }
+    }
 }
 
 impl fmt::Display for SampleId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}#{}", self.author, self.number)
+        write!(f, "{}#{}-{:08x}", self.author, self.number, self.life)
+    }
+}
+
+/// All samples that one robot shares in one of its lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct SampleSeries {
+    /// Who makes and shares them.
+    pub author: RobotId,
+    /// The author's life, see [`SampleId`].
+    #[serde(with = "fixed::u32")]
+    pub life: u32,
+}
+
+impl SampleSeries {
+    /// The sample of that number.
+    #[must_use]
+    pub fn sample(self, number: u32) -> SampleId {
+        SampleId { author: self.author, life: self.life, number }
+    }
+}
+
+impl fmt::Display for SampleSeries {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}#-{:08x}", self.author, self.life)
     }
 }
 
@@ -169,7 +208,7 @@ impl VocabularyId {
 /// Names what the components of a feature vector mean: the list of features, their scaling and their reduction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct FeatureSpaceId(pub u64);
+pub struct FeatureSpaceId(#[serde(with = "fixed::u64")] pub u64);
 
 impl fmt::Display for FeatureSpaceId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

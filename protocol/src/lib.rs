@@ -14,6 +14,7 @@ mod bounded;
 mod decision;
 mod decode;
 mod envelope;
+mod fixed;
 mod fnv;
 mod frame;
 mod fusion_rule;
@@ -35,7 +36,8 @@ pub use fnv::Fnv1a;
 pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
 pub use fusion_rule::{FusionRule, RuleName, RuleNameError};
 pub use id::{
-    ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, Stamp, VocabularyId,
+    ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, SampleSeries, Stamp,
+    VocabularyId,
 };
 pub use instruction::{Answer, Gesture, Instruction, Outcome};
 pub use key::{Keys, SwarmNameError, Topic};

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::bounded;
 use crate::decode::DecodeError;
-use crate::id::{ClassId, FeatureSpaceId, RobotId, RoundId, SampleId};
+use crate::fixed;
+use crate::id::{ClassId, FeatureSpaceId, RoundId, SampleId, SampleSeries};
 use crate::lesson::{Lesson, MAX_LESSONS, Word};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 
@@ -14,7 +15,7 @@ pub const MAX_COMPONENTS: usize = 2048;
 /// The most samples in one message.
 pub const MAX_SAMPLES: usize = 4096;
 
-/// The most intervals of sample numbers that are told of one author.
+/// The most intervals of sample numbers that are told of one series.
 pub const MAX_INTERVALS: usize = 256;
 
 /// A feature vector as it travels. How its numbers stand for coordinates is the feature space's matter.
@@ -95,20 +96,31 @@ impl Samples {
     }
 }
 
-/// What a robot knows, in two numbers: equal ones say that there is nothing to tell each other.
+/// What a robot knows, in two numbers: if what the reader knows gives the same under that key, there is nothing to tell each
+/// other.
+///
+/// The key is drawn anew whenever what the robot knows has changed. So whoever wants two robots to take different knowledge for
+/// the same, and chooses names and words for it, does not know the key that they are to agree under: of two robots that
+/// compare, the one that learned something last has drawn its key after that. It is no secret once said, and proves nothing
+/// of who said it: a robot that lies about its own knowledge still can, and deprives others of nothing but its own help.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Digest {
+    /// Under which key.
+    #[serde(with = "fixed::u64")]
+    pub key: u64,
     /// Over the ids of all samples it ever had.
+    #[serde(with = "fixed::u64")]
     pub samples: u64,
     /// Over all that instructors said.
+    #[serde(with = "fixed::u64")]
     pub lessons: u64,
 }
 
-/// Which samples of one author a robot ever had.
+/// Which samples of one series a robot ever had.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Known {
-    /// Whose samples.
-    pub author: RobotId,
+    /// Whose samples, of which life.
+    pub series: SampleSeries,
     /// Their numbers, first to last of each interval; ascending, and with gaps between them.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_INTERVALS>")]
     pub numbers: Vec<(u32, u32)>,
@@ -117,16 +129,19 @@ pub struct Known {
 /// To one neighbour: all that the author knows, in short, so that each can give the other what it lacks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Know {
-    /// The samples it ever had, by author, ascending.
+    /// The samples it ever had, by series, ascending.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub samples: Vec<Known>,
-    /// What instructors said of each round, as a digest.
+    /// What instructors said of each round, as a digest under the key of `digest`.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_LESSONS>")]
     pub lessons: Vec<(RoundId, u64)>,
-    /// Both in short. Where one of its numbers is the reader's own, the list it stands for is left out.
+    /// Both in short. Where its author takes the reader to know the same, the list is left out.
     pub digest: Digest,
     /// Whether this is itself an answer to a [`Know`]; such a one is answered with what is lacking only.
     pub answer: bool,
+    /// The digest in the [`Know`] that this answers, if its author had nothing to give for it: the reader need not ask
+    /// again until either's digest has changed. The lists are empty then.
+    pub nothing_for: Option<Digest>,
 }
 
 impl Know {
@@ -137,8 +152,8 @@ impl Know {
                     .windows(2)
                     .all(|pair| pair[0].1.checked_add(1).is_some_and(|next| next < pair[1].0))
         };
-        if !self.samples.is_sorted_by(|a, b| a.author < b.author) {
-            return Err(DecodeError::Impossible("an author twice, or out of order"));
+        if !self.samples.is_sorted_by(|a, b| a.series < b.series) {
+            return Err(DecodeError::Impossible("a series of samples twice, or out of order"));
         }
         if !self.samples.iter().all(|known| apart(&known.numbers)) {
             return Err(DecodeError::Impossible("intervals of sample numbers that overlap, or none of them"));

@@ -4,7 +4,7 @@ use gestalt_protocol::{
     Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope, FeatureSpaceId, FusionRule,
     Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES,
     MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId,
-    SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -95,14 +95,14 @@ fn message() -> impl Strategy<Value = Message> {
         prop::option::of(round()),
         prop::option::of(decision()),
         prop::collection::vec((any::<u32>(), stamp()), 0..10),
-        prop::option::of((any::<u64>(), any::<u64>())),
+        prop::option::of(any::<(u64, u64, u64)>()),
         any::<bool>(),
     )
         .prop_map(|(round, decision, votes, knowledge, answer)| Have {
             round,
             decision: decision.map(|decision| decision.rank()),
             votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
-            knowledge: knowledge.map(|(samples, lessons)| Digest { samples, lessons }),
+            knowledge: knowledge.map(|(key, samples, lessons)| Digest { key, samples, lessons }),
             answer,
         });
     let held = (any::<u32>(), stamp(), vote()).prop_map(|(robot, stamp, vote)| HeldVote {
@@ -130,9 +130,9 @@ fn samples() -> impl Strategy<Value = Samples> {
             .prop_map(|halves| Vector::F16(halves.into_iter().flat_map(|(low, high)| [low, high]).collect())),
         prop::collection::vec(any::<i8>(), 1..40).prop_map(Vector::I8),
     ];
-    let sample = ((any::<u32>(), 1..u32::MAX), 0..MAX_CLASSES as u8, round(), vector).prop_map(
-        |((author, number), class, round, vector)| SharedSample {
-            id: SampleId { author: RobotId(author), number },
+    let sample = ((any::<u32>(), any::<u32>(), 1..u32::MAX), 0..MAX_CLASSES as u8, round(), vector).prop_map(
+        |((author, life, number), class, round, vector)| SharedSample {
+            id: SampleId { author: RobotId(author), life, number },
             class: ClassId(class),
             round,
             vector,
@@ -153,16 +153,23 @@ fn know() -> impl Strategy<Value = Know> {
         };
         steps.into_iter().map(interval).collect::<Vec<_>>()
     });
-    let samples = prop::collection::btree_map(any::<u32>(), numbers, 0..5).prop_map(|known| {
-        known.into_iter().map(|(author, numbers)| Known { author: RobotId(author), numbers }).collect()
-    });
-    (samples, prop::collection::vec((round(), any::<u64>()), 0..5), any::<(u64, u64)>(), any::<bool>())
-        .prop_map(|(samples, lessons, (of_samples, of_lessons), answer)| Know {
+    let samples =
+        prop::collection::btree_map((any::<u32>(), any::<u32>()), numbers, 0..5).prop_map(|known| {
+            let series = |(author, life)| SampleSeries { author: RobotId(author), life };
+            known.into_iter().map(|(of, numbers)| Known { series: series(of), numbers }).collect()
+        });
+    let digest =
+        || any::<(u64, u64, u64)>().prop_map(|(key, samples, lessons)| Digest { key, samples, lessons });
+    let lessons = prop::collection::vec((round(), any::<u64>()), 0..5);
+    (samples, lessons, digest(), any::<bool>(), prop::option::of(digest())).prop_map(
+        |(samples, lessons, digest, answer, nothing_for)| Know {
             samples,
             lessons,
-            digest: Digest { samples: of_samples, lessons: of_lessons },
+            digest,
             answer,
-        })
+            nothing_for,
+        },
+    )
 }
 
 fn lesson() -> impl Strategy<Value = Lesson> {
@@ -171,12 +178,15 @@ fn lesson() -> impl Strategy<Value = Lesson> {
         (0..MAX_CLASSES as u8).prop_map(|class| Word::Not(ClassId(class))),
         Just(Word::Retracted),
     ];
-    (round(), "[a-zA-Z0-9_-]{1,32}", any::<u64>(), word).prop_map(|(round, name, at, word)| Lesson {
-        round,
-        instructor: name.parse().expect("a name of that form"),
-        at,
-        word,
-    })
+    (round(), "[a-zA-Z0-9_-]{1,32}", any::<(u64, u64)>(), word).prop_map(
+        |(round, name, (count, at), word)| Lesson {
+            round,
+            instructor: name.parse().expect("a name of that form"),
+            count,
+            at,
+            word,
+        },
+    )
 }
 
 fn envelope() -> impl Strategy<Value = Envelope> {
@@ -301,7 +311,7 @@ fn more_classes_or_robots_than_the_limit_are_refused_by_their_reader() {
 #[test]
 fn a_sample_says_only_what_a_robot_can_have_seen() {
     let sample = |vector| SharedSample {
-        id: SampleId { author: RobotId(1), number: 1 },
+        id: SampleId { author: RobotId(1), life: 5, number: 1 },
         class: ClassId(0),
         round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
         vector,
@@ -320,7 +330,7 @@ fn a_sample_says_only_what_a_robot_can_have_seen() {
         sample(Vector::F16(vec![0x00])),
         sample(Vector::I8(vec![])),
         SharedSample { class: ClassId(64), ..sound.clone() },
-        SharedSample { id: SampleId { author: RobotId(1), number: 0 }, ..sound },
+        SharedSample { id: SampleId { author: RobotId(1), life: 5, number: 0 }, ..sound },
     ] {
         assert!(matches!(of(wrong.clone()), Err(DecodeError::Impossible(_))), "{wrong:?}");
     }
@@ -329,12 +339,13 @@ fn a_sample_says_only_what_a_robot_can_have_seen() {
 #[test]
 fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
     let of = |numbers: &[(u32, u32)]| {
-        let known = Known { author: RobotId(1), numbers: numbers.to_vec() };
+        let known = Known { series: SampleSeries { author: RobotId(1), life: 5 }, numbers: numbers.to_vec() };
         read(Message::Know(Know {
             samples: vec![known],
             lessons: vec![],
             digest: Digest::default(),
             answer: false,
+            nothing_for: None,
         }))
         .is_ok()
     };

@@ -4,7 +4,8 @@
 use gestalt_protocol::{
     Answer, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId, FusionRule,
     Gesture, Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message, Outcome, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    RoundId, SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word,
+    decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -58,6 +59,13 @@ fn travels_as(message: Message, expected: &str) {
 // version, author, boot, sequence (varint), variant
 const HEAD: &str = "03 07 01 8201";
 
+fn digest(samples: u64, lessons: u64) -> Digest {
+    Digest { key: 0xC3, samples, lessons }
+}
+
+// of the above, 300 and 1: 8 bytes each
+const DIGEST: &str = "c300000000000000 2c01000000000000 0100000000000000";
+
 #[test]
 fn a_vote() {
     // round, vocabulary (varint), two f32 in little-endian order, looks
@@ -79,14 +87,14 @@ fn what_a_robot_has() {
         round: Some(ROUND),
         decision: Some(decision().rank()),
         votes: vec![(RobotId(7), Stamp { boot: 1, sequence: 9 })],
-        knowledge: Some(Digest { samples: 300, lessons: 1 }),
+        knowledge: Some(digest(300, 1)),
         answer: true,
     };
     // Some round; Some rank: decided, robots, looks and confidence as f32, author; one vote: robot, boot, sequence; Some digest:
-    // samples, lessons; answer
+    // key, samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 07 01 09 01ac0201 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 07 01 09 01 {DIGEST} 01"),
     );
     let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
     travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
@@ -107,7 +115,7 @@ fn what_a_robot_gives() {
 }
 
 fn sample(vector: Vector) -> SharedSample {
-    let id = SampleId { author: RobotId(7), number: 200 };
+    let id = SampleId { author: RobotId(7), life: 0xB2, number: 200 };
     SharedSample { id, class: ClassId(3), round: ROUND, vector }
 }
 
@@ -119,12 +127,12 @@ fn shared_samples() {
         Vector::F16(vec![0x00, 0x3e, 0x00, 0xbe]),
         Vector::I8(vec![127, -128]),
     ];
-    // the space (varint); each sample: author, number, class, round, kind of vector, length, components
+    // the space (8 bytes); each sample: author, its life (4 bytes), number, class, round, kind of vector, length, components
     travels_as(
         Message::Samples(Samples { space, samples: samples.map(sample).to_vec() }),
         &format!(
-            "{HEAD} 03 8202 03 07c80103ac0202a101 00 02 0000c03f0000c0bf 07c80103ac0202a101 01 04 003e00be \
-             07c80103ac0202a101 02 02 7f80"
+            "{HEAD} 03 0201000000000000 03 07b2000000c80103ac0202a101 00 02 0000c03f0000c0bf 07b2000000c80103ac0202a101 01 04 003e00be \
+             07b2000000c80103ac0202a101 02 02 7f80"
         )
         .replace("\n", ""),
     );
@@ -132,9 +140,9 @@ fn shared_samples() {
 
 #[test]
 fn a_sample_of_24_components_takes_at_most_64_bytes() {
-    // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot come to.
+    // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot in one life come to.
     let sample = SharedSample {
-        id: SampleId { author: RobotId(4096), number: 1_000_000 },
+        id: SampleId { author: RobotId(4096), life: u32::MAX, number: 1_000_000 },
         class: ClassId(63),
         round: RoundId { counter: 1_000_000, opener: RobotId(4096), life: u32::MAX },
         vector: Vector::I8(vec![-128; 24]),
@@ -150,25 +158,37 @@ fn a_sample_of_24_components_takes_at_most_64_bytes() {
 #[test]
 fn what_a_robot_knows() {
     let know = Know {
-        samples: vec![Known { author: RobotId(3), numbers: vec![(1, 300), (302, 302)] }],
+        samples: vec![Known {
+            series: SampleSeries { author: RobotId(3), life: 0xB2 },
+            numbers: vec![(1, 300), (302, 302)],
+        }],
         lessons: vec![(ROUND, 5)],
-        digest: Digest { samples: 300, lessons: 1 },
+        digest: digest(300, 1),
         answer: true,
+        nothing_for: None,
     };
     travels_as(
         Message::Know(know),
-        &format!("{HEAD} 04 01 03 02 01ac02 ae02ae02 01 ac0202a101 05 ac0201 01"),
+        &format!("{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 {DIGEST} 01 00"),
     );
+    let nothing = Know {
+        samples: vec![],
+        lessons: vec![],
+        digest: digest(300, 1),
+        answer: true,
+        nothing_for: Some(digest(300, 1)),
+    };
+    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 {DIGEST} 01 01 {DIGEST}"));
 }
 
 #[test]
 fn what_instructors_said() {
-    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), at: 1, word };
+    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), count: 2, at: 1, word };
     let lessons = vec![said(Word::Was(ClassId(3))), said(Word::Not(ClassId(4))), said(Word::Retracted)];
     travels_as(
         Message::Lessons(Lessons { lessons }),
         &format!(
-            "{HEAD} 05 03 ac0202a101 03616461 01 0003 ac0202a101 03616461 01 0104 ac0202a101 03616461 01 02"
+            "{HEAD} 05 03 ac0202a101 03616461 02 01 0003 ac0202a101 03616461 02 01 0104 ac0202a101 03616461 02 01 02"
         ),
     );
 }

@@ -70,7 +70,7 @@ fn share(bencher: Bencher, selection: Box<dyn Selection>, size: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut set = TrainingSet::new(RobotId(0), size, selection, Box::new(OldestCommon));
     for number in 1..=size as u32 / 2 {
-        let id = SampleId { author: RobotId(1), number };
+        let id = SampleId { author: RobotId(1), life: 0, number };
         set.receive(id, CLASS, ROUND, vector(&mut rng), &mut rng);
     }
     while set.len() < size {

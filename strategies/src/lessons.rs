@@ -2,11 +2,26 @@
 //! or in another order comes to the same.
 
 use std::collections::BTreeMap;
+use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, Fnv1a, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+use siphasher::sip::SipHasher24;
 
-/// The most instructors of one round.
-const MAX_INSTRUCTORS: usize = 16;
+/// The most instructors of one round: beyond, those who were heard of first, on whatever round, are kept. Names made up
+/// later lock nobody out.
+pub(crate) const MAX_INSTRUCTORS: usize = 16;
+
+/// The most instructors of whom it is known who was heard of first.
+const MAX_FAMILIAR: usize = 256;
+
+/// How far a count may lie beyond the highest known on its round: nobody says so much that others hear none of it.
+const COUNT_LEAP: u64 = 1 << 32;
+
+/// The highest count taken in on a round of which nothing is known. There are as many beyond it.
+const FIRST_COUNT: u64 = u64::MAX / 2;
+
+/// The count, the time and the word of an instructor on a round; the greatest counts.
+type Said = (u64, u64, Word);
 
 /// Which gestures a round may have shown, by all that was said of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,42 +78,106 @@ pub enum LessonReceipt {
     Known,
     /// There is no room: more instructors of one round than are kept, or a round older than all kept.
     Full,
+    /// Its round, or its count, lies too far ahead of all that is known.
+    FarAhead,
 }
 
-/// What every instructor said of every round, as far as it is kept: the latest [`MAX_LESSONS`] rounds.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+/// What every instructor said of every round, as far as it is kept: the latest [`MAX_LESSONS`] rounds, of each the words of
+/// 16 instructors.
+#[derive(Clone, Debug, Default)]
 pub struct LessonBook {
-    rounds: BTreeMap<RoundId, BTreeMap<InstructorId, (u64, Word)>>,
-    digest: u64,
+    rounds: BTreeMap<RoundId, BTreeMap<InstructorId, Said>>,
+    /// In which order the first [`MAX_FAMILIAR`] instructors were heard of.
+    familiar: BTreeMap<InstructorId, usize>,
 }
 
 impl LessonBook {
-    /// Takes in one lesson. Of two words at one time the greater counts, so that all robots keep the same.
+    /// Takes in one lesson. Of two words of one count and time the greater counts, so that all robots keep the same.
     pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
-        let said = (lesson.at, lesson.word);
-        let words = self.rounds.get(&lesson.round);
-        match words.and_then(|words| words.get(&lesson.instructor)) {
-            Some(known) if *known >= said => return LessonReceipt::Known,
-            None if words.is_some_and(|words| words.len() >= MAX_INSTRUCTORS) => return LessonReceipt::Full,
-            _ => {}
-        }
-        if words.is_none() && self.rounds.len() >= MAX_LESSONS {
-            if self.oldest() > Some(lesson.round) {
-                return LessonReceipt::Full;
-            }
-            self.forget_oldest();
-        }
-        self.digest ^= self.digest_of(lesson.round);
-        self.rounds.entry(lesson.round).or_default().insert(lesson.instructor.clone(), said);
-        self.digest ^= self.digest_of(lesson.round);
-        LessonReceipt::New
+        self.hear_among(lesson, |_| false).0
     }
 
-    fn forget_oldest(&mut self) {
-        if let Some(oldest) = self.oldest() {
-            self.digest ^= self.digest_of(oldest);
-            self.rounds.remove(&oldest);
+    /// The same for a robot that lived through some rounds: words on those are taken in before words on others, so that
+    /// made-up rounds keep nobody from teaching. Says also which round was forgotten for it.
+    pub fn hear_among(
+        &mut self,
+        lesson: &Lesson,
+        lived: impl Fn(RoundId) -> bool,
+    ) -> (LessonReceipt, Option<RoundId>) {
+        let said = (lesson.count, lesson.at, lesson.word);
+        let highest = match self.highest_count([lesson.round]) {
+            0 => FIRST_COUNT,
+            known => known.saturating_add(COUNT_LEAP),
+        };
+        if lesson.count > highest {
+            return (LessonReceipt::FarAhead, None);
         }
+        let (mut replaced, mut forgotten) = (None, None);
+        match self.rounds.get(&lesson.round) {
+            Some(words) => match words.get(&lesson.instructor) {
+                Some(known) if *known >= said => return (LessonReceipt::Known, None),
+                None if words.len() >= MAX_INSTRUCTORS => {
+                    let latest = words.keys().max_by_key(|name| self.standing(name)).cloned();
+                    if latest.as_ref().is_some_and(|l| self.standing(l) <= self.standing(&lesson.instructor))
+                    {
+                        return (LessonReceipt::Full, None);
+                    }
+                    replaced = latest;
+                }
+                _ => {}
+            },
+            None if self.rounds.len() >= MAX_LESSONS => {
+                let strange = self.rounds.keys().find(|round| !lived(**round)).copied();
+                let gives_way = match strange.or(self.oldest()) {
+                    Some(strange) if lived(lesson.round) || strange < lesson.round => strange,
+                    _ => return (LessonReceipt::Full, None),
+                };
+                self.forget(gives_way);
+                forgotten = Some(gives_way);
+            }
+            None => {}
+        }
+        let words = self.rounds.entry(lesson.round).or_default();
+        if let Some(replaced) = replaced {
+            words.remove(&replaced);
+        }
+        words.insert(lesson.instructor.clone(), said);
+        if self.familiar.len() < MAX_FAMILIAR {
+            let next = self.familiar.len();
+            self.familiar.entry(lesson.instructor.clone()).or_insert(next);
+        }
+        (LessonReceipt::New, forgotten)
+    }
+
+    /// The smaller, the longer that instructor is known.
+    fn standing(&self, instructor: &InstructorId) -> usize {
+        self.familiar.get(instructor).copied().unwrap_or(MAX_FAMILIAR)
+    }
+
+    /// The highest count of any word on a round, by all its names; 0 if there is none.
+    #[must_use]
+    pub fn highest_count(&self, names: impl IntoIterator<Item = RoundId>) -> u64 {
+        let words = names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten();
+        words.map(|(_, (count, ..))| *count).max().unwrap_or(0)
+    }
+
+    /// Forgets what was said of rounds with higher counters; says of which.
+    pub(crate) fn forget_beyond(&mut self, counter: u32) -> Vec<RoundId> {
+        let beyond = |round: &&RoundId| round.counter > counter;
+        let rounds: Vec<RoundId> = self.rounds.keys().rev().take_while(beyond).copied().collect();
+        rounds.iter().for_each(|round| self.forget(*round));
+        rounds
+    }
+
+    pub(crate) fn forget_oldest(&mut self) {
+        if let Some(oldest) = self.oldest() {
+            self.forget(oldest);
+        }
+    }
+
+    /// Forgets what was said of a round.
+    pub(crate) fn forget(&mut self, round: RoundId) {
+        self.rounds.remove(&round);
     }
 
     /// What all that was said of a round comes to, in a vocabulary of so many classes. Where instructors contradict
@@ -111,17 +190,17 @@ impl LessonBook {
     /// The same of a round that has several names: of what an instructor said under any of them, the latest counts.
     #[must_use]
     pub fn verdict_by_names(&self, names: impl IntoIterator<Item = RoundId>, classes: usize) -> Verdict {
-        let mut words: BTreeMap<&InstructorId, (u64, Word)> = BTreeMap::new();
+        let mut words: BTreeMap<&InstructorId, Said> = BTreeMap::new();
         for (instructor, said) in names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten() {
             words.entry(instructor).and_modify(|known| *known = *said.max(known)).or_insert(*said);
         }
         if words.is_empty() {
             return Verdict::Unsaid;
         }
-        let valid = words.values().filter(|(_, word)| *word != Word::Retracted);
-        let Some((_, latest)) = valid.clone().max() else { return Verdict::Retracted };
+        let valid = words.values().filter(|(.., word)| *word != Word::Retracted);
+        let Some((.., latest)) = valid.clone().max() else { return Verdict::Retracted };
         let all = Candidates::all(classes);
-        let together = valid.fold(all, |candidates, (_, word)| candidates.restricted(*word));
+        let together = valid.fold(all, |candidates, (.., word)| candidates.restricted(*word));
         let candidates = if together.0 == 0 { all.restricted(*latest) } else { together };
         match candidates.only() {
             Some(class) => Verdict::Class(class),
@@ -130,25 +209,37 @@ impl LessonBook {
         }
     }
 
-    /// Every lesson about a round.
+    /// Every lesson about a round, the latest first: who takes that in takes in the others.
     pub fn of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
-        self.rounds.get(&round).into_iter().flatten().map(move |(instructor, (at, word))| Lesson {
+        let mut lessons: Vec<Lesson> = self.all_of(round).collect();
+        lessons.sort_by_key(|lesson| std::cmp::Reverse(lesson.count));
+        lessons.into_iter()
+    }
+
+    fn all_of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
+        self.rounds.get(&round).into_iter().flatten().map(move |(instructor, (count, at, word))| Lesson {
             round,
             instructor: instructor.clone(),
+            count: *count,
             at: *at,
             word: *word,
         })
     }
 
-    /// The word of one instructor on a round.
+    /// The latest word of one instructor on a round that has several names, with its count and time.
     #[must_use]
-    pub fn word(&self, round: RoundId, instructor: &InstructorId) -> Option<Word> {
-        Some(self.rounds.get(&round)?.get(instructor)?.1)
+    pub fn latest(
+        &self,
+        names: impl IntoIterator<Item = RoundId>,
+        instructor: &InstructorId,
+    ) -> Option<(u64, u64, Word)> {
+        let words = names.into_iter().filter_map(|name| self.rounds.get(&name)?.get(instructor));
+        words.max().copied()
     }
 
-    /// The rounds of which something is known, each with a digest of what.
-    pub fn rounds(&self) -> impl Iterator<Item = (RoundId, u64)> + '_ {
-        self.rounds.keys().map(|round| (*round, self.digest_of(*round)))
+    /// The rounds of which something is known, each with a digest of what under that key.
+    pub fn rounds(&self, key: u64) -> impl Iterator<Item = (RoundId, u64)> + '_ {
+        self.rounds.keys().map(move |round| (*round, self.digest_of(*round, key)))
     }
 
     /// The oldest round of which something is known.
@@ -175,27 +266,31 @@ impl LessonBook {
         self.rounds.is_empty()
     }
 
-    /// A digest of everything: the same lessons, heard in whatever order, give the same.
+    /// A digest of everything under a key: the same lessons, heard in whatever order, give the same.
     #[must_use]
-    pub fn digest(&self) -> u64 {
-        self.digest
+    pub fn digest(&self, key: u64) -> u64 {
+        self.rounds(key).fold(0, |digest, (_, of_round)| digest ^ of_round)
     }
 
-    /// The digest of what is known of one round, 0 for nothing: FNV-1a over its words.
+    /// The digest of what is known of one round under a key, 0 for nothing.
     #[must_use]
-    pub fn digest_of(&self, round: RoundId) -> u64 {
+    pub fn digest_of(&self, round: RoundId, key: u64) -> u64 {
         let Some(words) = self.rounds.get(&round) else { return 0 };
-        let mut fnv = Fnv1a::default();
-        fnv.add([round.counter, round.opener.0, round.life].into_iter().flat_map(u32::to_le_bytes));
-        for (instructor, (at, word)) in words {
+        let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"lessons "));
+        [round.counter, round.opener.0, round.life].iter().for_each(|part| sip.write(&part.to_le_bytes()));
+        for (instructor, (count, at, word)) in words {
             let (kind, class) = match word {
                 Word::Was(class) => (1, class.0),
                 Word::Not(class) => (2, class.0),
                 Word::Retracted => (3, 0),
             };
-            fnv.add(instructor.to_string().bytes().chain(at.to_le_bytes()).chain([kind, class]));
+            let name = instructor.to_string();
+            sip.write(&[name.len() as u8]);
+            sip.write(name.as_bytes());
+            [count, at].into_iter().for_each(|when| sip.write(&when.to_le_bytes()));
+            sip.write(&[kind, class]);
         }
-        fnv.hash()
+        sip.finish()
     }
 }
 
@@ -206,9 +301,9 @@ mod tests {
 
     use super::*;
 
-    fn lesson(counter: u32, who: &str, at: u64, word: Word) -> Lesson {
+    fn lesson(counter: u32, who: &str, count: u64, word: Word) -> Lesson {
         let round = RoundId { counter, opener: RobotId(1), life: 0 };
-        Lesson { round, instructor: who.parse().unwrap(), at, word }
+        Lesson { round, instructor: who.parse().unwrap(), count, at: 7, word }
     }
 
     fn was(class: u8) -> Word {
@@ -264,8 +359,8 @@ mod tests {
             let middle = order.index(lessons.len() + 1);
             let twice = lessons[middle..].iter().chain(&lessons[..middle]).rev().chain(&lessons);
             twice.for_each(|lesson| { turned.hear(lesson); });
-            prop_assert_eq!(forwards.digest(), turned.digest());
-            prop_assert_eq!(forwards, turned);
+            prop_assert_eq!(forwards.digest(7), turned.digest(7));
+            prop_assert_eq!(forwards.rounds, turned.rounds);
         }
     }
 
@@ -281,20 +376,67 @@ mod tests {
         book.rounds.keys().for_each(|round| {
             fresh.hear(&lesson(round.counter, "ada", 1, was(1)));
         });
-        assert_eq!(book.digest(), fresh.digest(), "the digest is of what is kept");
+        assert_eq!(book.digest(7), fresh.digest(7), "the digest is of what is kept");
     }
 
     #[test]
-    fn a_round_has_only_so_many_instructors() {
+    fn a_round_has_only_so_many_instructors_and_none_heard_before_is_locked_out() {
         let mut book = LessonBook::default();
+        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), LessonReceipt::New);
         for i in 0..MAX_INSTRUCTORS {
-            assert_eq!(book.hear(&lesson(1, &format!("i{i}"), 1, was(1))), LessonReceipt::New);
+            assert_eq!(book.hear(&lesson(2, &format!("i{i}"), 1, was(1))), LessonReceipt::New);
         }
-        assert_eq!(book.hear(&lesson(1, "one-more", 1, was(1))), LessonReceipt::Full);
+        assert_eq!(book.hear(&lesson(2, "one-more", 1, was(1))), LessonReceipt::Full);
         assert_eq!(
-            book.hear(&lesson(1, "i3", 2, was(2))),
+            book.hear(&lesson(2, "i3", 2, was(2))),
             LessonReceipt::New,
             "who is known may speak again"
         );
+        assert_eq!(book.hear(&lesson(2, "ada", 3, was(4))), LessonReceipt::New, "the newest name gives way");
+        let round = lesson(2, "ada", 1, was(1)).round;
+        assert_eq!(book.of(round).count(), MAX_INSTRUCTORS);
+        assert_eq!(book.verdict(round, 6), Verdict::Class(ClassId(4)));
+        for i in 0..2 * MAX_FAMILIAR {
+            book.hear(&lesson(3 + i as u32 / 10, &format!("flood{i}"), 1, was(1)));
+        }
+        assert_eq!(book.familiar.len(), MAX_FAMILIAR);
+    }
+
+    #[test]
+    fn no_word_is_beyond_correction() {
+        let mut book = LessonBook::default();
+        let round = lesson(1, "ada", 1, was(1)).round;
+        assert_eq!(book.hear(&lesson(1, "ada", u64::MAX, Word::Retracted)), LessonReceipt::FarAhead);
+        // As far as may be, and at a time that no clock comes to.
+        for _ in 0..100 {
+            let count = book.highest_count([round]) + COUNT_LEAP;
+            let forged = Lesson { at: u64::MAX, ..lesson(1, "ada", count, Word::Retracted) };
+            assert_eq!(book.hear(&forged), LessonReceipt::New);
+            let count = book.highest_count([round]) + 1;
+            assert_eq!(book.hear(&lesson(1, "ada", count, was(2))), LessonReceipt::New);
+            assert_eq!(book.verdict(round, 6), Verdict::Class(ClassId(2)));
+        }
+    }
+
+    #[test]
+    fn made_up_rounds_keep_nobody_from_teaching() {
+        let mut book = LessonBook::default();
+        let lived = |round: RoundId| round.life == 0;
+        let made_up = |i: u32| {
+            let round = RoundId { counter: 9, opener: RobotId(u32::MAX), life: 1 + i };
+            Lesson { round, ..lesson(9, "eve", 1, was(1)) }
+        };
+        for i in 0..2 * MAX_LESSONS as u32 {
+            book.hear_among(&made_up(i), lived);
+        }
+        assert_eq!(book.len(), MAX_LESSONS);
+        for counter in 1..9 {
+            assert_eq!(book.hear_among(&lesson(counter, "ada", 1, was(3)), lived).0, LessonReceipt::New);
+        }
+        for i in 0..2 * MAX_LESSONS as u32 {
+            book.hear_among(&made_up(u32::MAX / 2 + i), lived);
+        }
+        assert_eq!(book.len(), MAX_LESSONS);
+        assert!((1..9).all(|counter| book.contains(lesson(counter, "ada", 1, was(3)).round)));
     }
 }

@@ -22,6 +22,7 @@ mod lessons;
 pub mod mind;
 pub mod sample;
 pub mod selection;
+mod shares;
 mod training_set;
 mod vector_codec;
 

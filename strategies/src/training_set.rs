@@ -6,20 +6,24 @@
 //!                     └──────────────────┴───── forget when full ─────┘
 //! ```
 
+mod restore_error;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId, SampleSeries};
 use gestalt_rounds::Classify;
 use rand::Rng;
-use thiserror::Error;
+
+pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
-use crate::sample::{HeldSample, HeldSamples, MAX_AUTHORS, SeenError, SeenSamples, SetPart};
+use crate::sample::{
+    HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart, ToldAs,
+};
 use crate::selection::Selection;
-
-/// How far a number of this robot's own may lie beyond the ones that it knows it used.
-const FAR_AHEAD: u32 = 1_000_000;
+use crate::shares::Shares;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -35,6 +39,8 @@ pub enum SetChange {
     Relabelled(u64),
     /// The sample with this key went from personal to shared under this name; its vector is now what travels.
     Shared(u64, SampleId),
+    /// Nothing is known any more of what was seen of this series: another took its place.
+    Unseen(SampleSeries),
 }
 
 /// What became of a received sample.
@@ -48,42 +54,10 @@ pub enum SampleReceipt {
     Refused(SeenError),
 }
 
-/// A stored set that contradicts itself. The training set is unchanged.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RestoreError {
-    /// Two samples have one key.
-    #[error("two stored samples have the key {0}")]
-    Key(u64),
-    /// A key that is yet to be given out.
-    #[error("stored sample {key} is newer than the next key, {next}")]
-    KeyAhead {
-        /// The sample's key.
-        key: u64,
-        /// The next key.
-        next: u64,
-    },
-    /// A next key that no robot lives long enough to reach: with it, keys could run out.
-    #[error("the stored next key, {0}, is out of range")]
-    NextKey(u64),
-    /// Two samples have one name.
-    #[error("two stored samples have the name {0}")]
-    Name(SampleId),
-    /// A sample in a part that its name does not fit: a personal one has none, a shared one has this robot's, an
-    /// external one another's.
-    #[error("stored sample {0} is in a part that its name does not fit: was it stored by another robot?")]
-    Part(u64),
-    /// A sample with a name that was not seen.
-    #[error("stored sample {0} is not among those seen")]
-    Unseen(SampleId),
-    /// A number of this robot's that was seen, but is yet to be given out.
-    #[error("sample {0} of this robot was shared, but the next number would be no greater")]
-    NumberAhead(SampleId),
-}
-
 /// The bounded set of samples of one robot.
 ///
-/// A sample is in one [`SetPart`] at a time. It is shared at most once, under a number that counts up without gaps, and
+/// A sample is in one [`SetPart`] at a time. It is shared at most once, under a number that counts up without gaps in the
+/// [life](Self::in_life) of the robot, and
 /// taken in at most once under one name, also after it was forgotten. After [`keep`](Self::keep) and
 /// [`receive`](Self::receive) at most `capacity` samples are held: the [`Forgetting`] rule says which one goes.
 ///
@@ -91,14 +65,15 @@ pub enum RestoreError {
 /// Everything that can be asked is asked through [`HeldSamples`], which the set dereferences to.
 #[derive(Debug)]
 pub struct TrainingSet {
-    me: RobotId,
+    /// Under which this robot shares.
+    series: SampleSeries,
     capacity: usize,
     selection: Box<dyn Selection>,
     forgetting: Box<dyn Forgetting>,
     samples: HeldSamples,
     seen: SeenSamples,
+    shares: Shares,
     next_key: u64,
-    next_number: u32,
 }
 
 impl Deref for TrainingSet {
@@ -119,26 +94,35 @@ impl TrainingSet {
         forgetting: Box<dyn Forgetting>,
     ) -> Self {
         Self {
-            me,
+            series: SampleSeries { author: me, life: 0 },
             capacity: capacity.max(1),
             selection,
             forgetting,
             samples: HeldSamples::default(),
             seen: SeenSamples::default(),
+            shares: Shares::default(),
             next_key: 1,
-            next_number: 1,
         }
     }
 
-    /// The numbers of what this robot shares begin there, unless they are further already: for a robot that does not know
-    /// which it used before.
-    pub fn number_from(&mut self, first: u32) {
-        self.next_number = self.next_number.max(first);
+    /// The same set, that shares under the number which this life of the robot drew at random: whatever it knows or forgot
+    /// of the samples of earlier lives, it gives no name twice.
+    #[must_use]
+    pub fn in_life(mut self, life: u32) -> Self {
+        self.series.life = life;
+        self
+    }
+
+    /// These other robots are alive now. From then on no author's samples push out those of the others when the set is full,
+    /// and when more series were seen than are kept track of, those of robots that are not there give way: each other robot
+    /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
+    /// Gives those that were not alive before.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.shares.meet(self.me(), alive)
     }
 
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
-    /// was seen, the next key and the next share number. If more samples were stored than the capacity,
-    /// [`trim`](Self::trim) brings them down.
+    /// was seen, and the next key. If more samples were stored than the capacity, [`trim`](Self::trim) brings them down.
     ///
     /// # Errors
     /// See [`RestoreError`].
@@ -150,16 +134,10 @@ impl TrainingSet {
         samples: Vec<HeldSample>,
         seen: SeenSamples,
         next_key: u64,
-        next_number: u32,
     ) -> Result<(), RestoreError> {
         assert!(self.samples.is_empty(), "a stored set is taken up before anything is added");
         if next_key > LAST_KEY {
             return Err(RestoreError::NextKey(next_key));
-        }
-        if let Some(&(_, last)) = seen.intervals(self.me).last()
-            && last >= next_number
-        {
-            return Err(RestoreError::NumberAhead(SampleId { author: self.me, number: last }));
         }
         let mut restored = HeldSamples::default();
         for sample in samples {
@@ -195,7 +173,6 @@ impl TrainingSet {
         self.samples = restored;
         self.seen = seen;
         self.next_key = next_key.max(1);
-        self.next_number = next_number.max(1);
         Ok(())
     }
 
@@ -222,18 +199,17 @@ impl TrainingSet {
         as_sent: &dyn Fn(&[f32]) -> Vec<f32>,
         rng: &mut dyn Rng,
     ) -> Vec<SetChange> {
-        let mut changes = Vec::new();
-        while changes.len() < n {
+        let mut changes = self.make_room(self.series);
+        let room = changes.len();
+        while changes.len() < room + n {
             let Some(key) = self.selection.select(&self.samples, classifier, rng) else { break };
             let Some(sample) = self.samples.get(key).filter(|sample| sample.part == SetPart::Personal) else {
                 break;
             };
-            let id = SampleId { author: self.me, number: self.next_number };
-            let Some(following) = self.next_number.checked_add(1) else { break };
+            let id = self.series.sample(self.next_number());
             if self.seen.insert(id) != Ok(true) {
                 break;
             }
-            self.next_number = following;
             let vector = Arc::from(as_sent(&sample.vector));
             self.replace(HeldSample { part: SetPart::Shared, id: Some(id), vector, ..sample.clone() });
             changes.push(SetChange::Shared(key, id));
@@ -243,8 +219,8 @@ impl TrainingSet {
 
     /// Takes a shared sample in, unless it was seen before. Then forgets while there are more than the capacity.
     ///
-    /// Another's sample becomes external. A robot that lost its memory gets its own samples back this way: they
-    /// become shared, and its next number lies beyond them.
+    /// Another's sample becomes external. A robot that lost its memory gets its own samples of earlier lives back this
+    /// way: they become shared.
     pub fn receive(
         &mut self,
         id: SampleId,
@@ -253,27 +229,65 @@ impl TrainingSet {
         vector: Vec<f32>,
         rng: &mut dyn Rng,
     ) -> SampleReceipt {
-        // A place is kept for this robot, or the names of strangers could keep it from sharing.
-        let stranger = id.author != self.me && self.seen.intervals(id.author).is_empty();
-        if stranger
-            && self.seen.intervals(self.me).is_empty()
-            && self.seen.authors().count() >= MAX_AUTHORS - 1
-        {
-            return SampleReceipt::Refused(SeenError::TooManyAuthors(id));
+        if let Err(error) = self.may_receive(id) {
+            return SampleReceipt::Refused(error);
         }
-        // Whoever could push this robot's numbers up to the last one could keep it from sharing.
-        if id.author == self.me && id.number.saturating_sub(self.next_number) > FAR_AHEAD {
-            return SampleReceipt::Refused(SeenError::FarAhead(id));
-        }
+        let mut changes = self.make_room(id.series());
         match self.seen.insert(id) {
             Err(error) => return SampleReceipt::Refused(error),
             Ok(false) => return SampleReceipt::Known,
             Ok(true) => {}
         }
-        if id.author == self.me {
-            self.next_number = self.next_number.max(id.number.saturating_add(1));
+        changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
+        SampleReceipt::New(changes)
+    }
+
+    /// Whether there is no room for that series, which is new. A place is kept for this robot's own.
+    fn is_full_for(&self, series: SampleSeries) -> bool {
+        let spoke = series == self.series || !self.seen.intervals(self.series).is_empty();
+        self.seen.series().len() >= MAX_SERIES - usize::from(!spoke)
+    }
+
+    /// Where a series is one too many, forgets the one of which the least is held, and what that is: of its author's other
+    /// lives, or, for a robot that is alive, of those that are not.
+    fn make_room(&mut self, series: SampleSeries) -> Vec<SetChange> {
+        if !self.seen.intervals(series).is_empty() {
+            return Vec::new();
         }
-        SampleReceipt::New(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng))
+        let may_go: Vec<SampleSeries> = if self.seen.lives(series.author).count() >= MAX_LIVES {
+            self.seen.lives(series.author).filter(|life| *life != self.series).collect()
+        } else if self.is_full_for(series) {
+            let stays = |robot| robot == self.me() || self.shares.is_alive(robot);
+            self.seen.series().filter(|series| !stays(series.author)).collect()
+        } else {
+            Vec::new()
+        };
+        let mut held: BTreeMap<SampleSeries, Vec<u64>> =
+            may_go.into_iter().map(|series| (series, Vec::new())).collect();
+        for sample in self.samples.iter() {
+            if let Some(keys) = sample.id.and_then(|id| held.get_mut(&id.series())) {
+                keys.push(sample.key);
+            }
+        }
+        let Some((least, keys)) = held.into_iter().min_by_key(|(_, keys)| keys.len()) else {
+            return Vec::new();
+        };
+        self.seen.forget(least);
+        let gone = keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed);
+        gone.chain([SetChange::Unseen(least)]).collect()
+    }
+
+    fn may_receive(&self, id: SampleId) -> Result<(), SeenError> {
+        // Whoever could speak under the name of this very life could keep this robot from sharing.
+        if id.series() == self.series && id.number >= self.next_number() {
+            return Err(SeenError::NeverShared(id));
+        }
+        // So could the names of strangers.
+        let stranger = self.seen.intervals(id.series()).is_empty();
+        if stranger && self.is_full_for(id.series()) && !self.shares.is_alive(id.author) {
+            return Err(SeenError::TooManyAuthors(id));
+        }
+        Ok(())
     }
 
     /// Takes a shared sample in again that was [retracted](Self::retract), under the class it turned out to have. One
@@ -290,6 +304,11 @@ impl TrainingSet {
             return Vec::new();
         }
         self.add(self.part_of(id), Some(id), class, round, vector, rng)
+    }
+
+    /// Notes how the author of a sample shared it.
+    pub fn note_told(&mut self, id: SampleId, told: ToldAs) {
+        self.samples.note_told(id, told);
     }
 
     /// Gives all samples of a round another class, whatever part they are in.
@@ -320,8 +339,14 @@ impl TrainingSet {
         let mut changes = Vec::new();
         while self.samples.len() > self.capacity {
             let oldest = self.samples.iter().next().map(|sample| sample.key);
-            let named = self.forgetting.victim(&self.samples, rng).filter(|key| self.get(*key).is_some());
-            let Some(victim) = named.or(oldest).and_then(|key| self.remove(key)) else { break };
+            let victim = self.shares.above(&self.samples, self.capacity).or_else(|| {
+                let named = self.forgetting.victim(&self.samples, rng).or(oldest);
+                let named = named.and_then(|key| self.samples.get(key));
+                let instead =
+                    named.and_then(|named| self.shares.in_place_of(named, &self.samples, self.capacity));
+                instead.or(named.map(|named| named.key)).or(oldest)
+            });
+            let Some(victim) = victim.and_then(|key| self.remove(key)) else { break };
             changes.push(SetChange::Removed(victim));
         }
         changes
@@ -348,7 +373,17 @@ impl TrainingSet {
     /// The number of the next sample that this robot shares.
     #[must_use]
     pub fn next_number(&self) -> u32 {
-        self.next_number
+        self.seen.intervals(self.series).last().map_or(1, |(_, last)| last.saturating_add(1))
+    }
+
+    /// Under which this robot shares.
+    #[must_use]
+    pub fn series(&self) -> SampleSeries {
+        self.series
+    }
+
+    fn me(&self) -> RobotId {
+        self.series.author
     }
 
     fn of_round(&self, round: RoundId) -> impl Iterator<Item = &HeldSample> {
@@ -356,7 +391,7 @@ impl TrainingSet {
     }
 
     fn part_of(&self, id: SampleId) -> SetPart {
-        if id.author == self.me { SetPart::Shared } else { SetPart::External }
+        if id.author == self.me() { SetPart::Shared } else { SetPart::External }
     }
 
     fn add(
@@ -370,7 +405,7 @@ impl TrainingSet {
     ) -> Vec<SetChange> {
         let key = self.next_key;
         self.next_key += 1;
-        let sample = HeldSample { key, part, id, class, round, vector };
+        let sample = HeldSample { key, part, id, class, round, vector, told: None };
         self.selection.inserted(&sample);
         self.forgetting.inserted(&sample);
         self.samples.insert(sample);

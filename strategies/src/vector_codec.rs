@@ -10,7 +10,7 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
-    /// IEEE single precision: 4 bytes a component, exact.
+    /// IEEE single precision: 4 bytes a component, exact within ±10σ of that component.
     F32,
     /// IEEE half precision: 2 bytes a component, a relative error of at most 2⁻¹¹.
     F16,
@@ -45,10 +45,17 @@ pub enum VectorError {
     /// With a component that is infinite, or no number.
     #[error("component {0} of a vector is not finite")]
     NotFinite(usize),
+    /// With a component further out than any robot sends.
+    #[error("component {0} of a vector lies beyond {FURTHEST} standard deviations")]
+    FarOut(usize),
 }
 
 /// Components are cut off at this many standard deviations.
 const REACH: f32 = 4.0;
+
+/// Further out than so many standard deviations nothing travels: what lies there is no hand, and no other sample's like,
+/// so it would never be forgotten for being redundant.
+const FURTHEST: f32 = 10.0;
 
 impl Precision {
     /// All of them, from the longest to the shortest.
@@ -57,6 +64,12 @@ impl Precision {
     /// Coordinates in `space` as they travel.
     #[must_use]
     pub fn encode(self, coordinates: &[f32], space: &FeatureSpace) -> Vector {
+        let within: Vec<f32> = within(coordinates, space).collect();
+        self.encode_again(&within, space)
+    }
+
+    /// Coordinates that [`decode_vector`] gave of a vector of this precision, as they came.
+    pub(crate) fn encode_again(self, coordinates: &[f32], space: &FeatureSpace) -> Vector {
         match self {
             Self::F32 => Vector::F32(coordinates.to_vec()),
             Self::F16 => {
@@ -68,6 +81,15 @@ impl Precision {
                 let steps = coordinates.iter().zip(space.spread());
                 Vector::I8(steps.map(|(x, spread)| quantised(*x, *spread)).collect())
             }
+        }
+    }
+
+    /// The one that a vector travels in.
+    pub(crate) fn of(vector: &Vector) -> Self {
+        match vector {
+            Vector::F32(_) => Self::F32,
+            Vector::F16(_) => Self::F16,
+            Vector::I8(_) => Self::I8,
         }
     }
 
@@ -85,7 +107,7 @@ impl Precision {
 /// The coordinates that a received vector stands for in `space`.
 ///
 /// # Errors
-/// [`VectorError::Length`] and [`VectorError::NotFinite`].
+/// [`VectorError::Length`], [`VectorError::NotFinite`] and [`VectorError::FarOut`].
 pub fn decode_vector(vector: &Vector, space: &FeatureSpace) -> Result<Vec<f32>, VectorError> {
     let (found, expected) = (vector.components(), space.components());
     if found != expected {
@@ -102,10 +124,21 @@ pub fn decode_vector(vector: &Vector, space: &FeatureSpace) -> Result<Vec<f32>, 
             .map(|(step, spread)| f32::from(*step) * step_of(*spread))
             .collect(),
     };
-    match coordinates.iter().position(|x| !x.is_finite()) {
-        Some(component) => Err(VectorError::NotFinite(component)),
+    if let Some(component) = coordinates.iter().position(|x| !x.is_finite()) {
+        return Err(VectorError::NotFinite(component));
+    }
+    // A hair more, for what rounding adds.
+    let far = |(x, spread): (&f32, &f32)| x.abs() > FURTHEST * spread * 1.001;
+    match coordinates.iter().zip(space.spread()).position(far) {
+        Some(component) => Err(VectorError::FarOut(component)),
         None => Ok(coordinates),
     }
+}
+
+/// Coordinates, cut off where they lie too far out.
+fn within<'a>(coordinates: &'a [f32], space: &'a FeatureSpace) -> impl Iterator<Item = f32> + 'a {
+    let both = coordinates.iter().zip(space.spread());
+    both.map(|(x, spread)| x.clamp(-FURTHEST * spread, FURTHEST * spread))
 }
 
 fn step_of(spread: f32) -> f32 {
@@ -115,7 +148,7 @@ fn step_of(spread: f32) -> f32 {
 fn quantised(x: f32, spread: f32) -> i8 {
     let step = step_of(spread);
     // A component that never varied says nothing.
-    if step > 0.0 { (x / step).round().clamp(-127.0, 127.0) as i8 } else { 0 }
+    if step > 0.0 { (x / step).round().clamp(-128.0, 127.0) as i8 } else { 0 }
 }
 
 #[cfg(test)]
@@ -156,6 +189,19 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn what_is_passed_on_is_what_came(steps in prop::collection::vec(any::<i8>(), 3), halves in prop::collection::vec(any::<u16>(), 3), exact in prop::collection::vec(-3.0f32..3.0, 3)) {
+            let space = space();
+            let halves = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
+            for vector in [Vector::I8(steps), Vector::F16(halves), Vector::F32(exact)] {
+                if let Ok(coordinates) = decode_vector(&vector, &space) {
+                    prop_assert_eq!(Precision::of(&vector).encode_again(&coordinates, &space), vector);
+                }
+            }
+        }
+    }
+
     #[test]
     fn what_lies_far_out_is_cut_off_and_stays_finite() {
         let space = space();
@@ -178,5 +224,10 @@ mod tests {
             decode_vector(&Vector::F32(vec![0.0, f32::NAN, 0.0]), &space),
             Err(VectorError::NotFinite(1))
         );
+        let beyond = 11.0 * space.spread()[2];
+        for far in [1e30, -1e6, beyond] {
+            let found = decode_vector(&Vector::F32(vec![0.0, 0.0, far]), &space);
+            assert_eq!(found, Err(VectorError::FarOut(2)), "{far}");
+        }
     }
 }

@@ -4,13 +4,15 @@ mod operations;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gestalt_protocol::{ClassId, RobotId, SampleId};
+use gestalt_protocol::{ClassId, RobotId};
 use gestalt_strategies::sample::HeldSamples;
 use gestalt_strategies::{
     Classify, Forgetting, ForgettingRule, HeldSample, RestoreError, SampleReceipt, SeenError, SeenSamples,
     Selection, SelectionRule, SetChange, SetPart, TrainingSet,
 };
-use operations::{ME, Operation, Store, as_is, generator, id, operations, round, rounded, rules, run, set};
+use operations::{
+    ME, OWN, Operation, Store, as_is, generator, id, operations, round, rounded, rules, run, set,
+};
 use proptest::prelude::*;
 use rand::Rng;
 
@@ -38,7 +40,7 @@ proptest! {
             let held: BTreeMap<u64, HeldSample> = set.iter().map(|s| (s.key, s.clone())).collect();
             prop_assert_eq!(&held, &store.samples);
             prop_assert_eq!(set.seen(), &store.seen());
-            prop_assert_eq!(set.seen().digest(), store.seen().digest());
+            prop_assert_eq!(set.seen().digest(7), store.seen().digest(7));
             prop_assert_eq!(set.next_key(), store.last_key + 1);
             prop_assert_eq!(set.next_number(), store.last_number + 1);
 
@@ -79,7 +81,7 @@ proptest! {
             for change in &changes {
                 if let SetChange::Shared(key, id) = change {
                     number += 1;
-                    prop_assert_eq!(*id, SampleId { author: ME, number });
+                    prop_assert_eq!(*id, OWN.sample(number));
                     prop_assert!(shared_keys.insert(*key));
                     let personal = &before.samples[key];
                     prop_assert_eq!(personal.part, SetPart::Personal);
@@ -149,7 +151,7 @@ proptest! {
                     let old = std::mem::replace(&mut robots[i], robot(i));
                     let samples = old.iter().cloned().collect();
                     robots[i]
-                        .restore(samples, old.seen().clone(), old.next_key(), old.next_number())
+                        .restore(samples, old.seen().clone(), old.next_key())
                         .unwrap();
                 }
             }
@@ -207,7 +209,7 @@ fn ten_robots_hold_eighty_four_samples_each() {
             assert_eq!(robot.len(), 84);
             assert_eq!(SetPart::ALL.map(|part| robot.total(part)), [24, 6, 54]);
             assert_eq!(robot.common().count(), 60);
-            assert_eq!(robot.seen().digest(), robots[0].seen().digest());
+            assert_eq!(robot.seen().digest(7), robots[0].seen().digest(7));
         }
     }
 }
@@ -229,7 +231,7 @@ fn the_set_grows_with_the_swarm_and_with_what_it_shares() {
 }
 
 #[test]
-fn a_robot_that_lost_its_memory_gets_its_samples_back_and_numbers_on() {
+fn a_robot_that_lost_its_memory_gets_its_samples_back_and_numbers_under_another_life() {
     let mut rng = generator(1);
     let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
     for number in [2, 5] {
@@ -238,15 +240,15 @@ fn a_robot_that_lost_its_memory_gets_its_samples_back_and_numbers_on() {
         assert_eq!(robot.find(id(0, number)).unwrap().part, SetPart::Shared);
     }
     robot.keep(ClassId(0), round(2), vec![2.0], &mut rng);
-    assert_eq!(robot.share(3, None, &as_is, &mut rng), [SetChange::Shared(3, id(0, 6))]);
-    assert_eq!(robot.receive(id(0, 6), ClassId(0), round(2), vec![2.0], &mut rng), SampleReceipt::Known);
+    assert_eq!(robot.share(3, None, &as_is, &mut rng), [SetChange::Shared(3, OWN.sample(1))]);
+    assert_eq!(robot.receive(OWN.sample(1), ClassId(0), round(2), vec![2.0], &mut rng), SampleReceipt::Known);
 }
 
 #[test]
 fn a_name_beyond_the_bounds_is_refused_and_changes_nothing() {
     let mut rng = generator(1);
     let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
-    for bad in [id(3, 0), id(3, u32::MAX), id(0, u32::MAX)] {
+    for bad in [id(3, 0), id(3, u32::MAX), id(0, u32::MAX), OWN.sample(1), OWN.sample(9)] {
         let receipt = robot.receive(bad, ClassId(1), round(1), vec![1.0], &mut rng);
         assert!(matches!(receipt, SampleReceipt::Refused(_)), "{bad}");
     }
@@ -259,13 +261,99 @@ fn strangers_cannot_keep_a_robot_from_sharing() {
     let mut rng = generator(1);
     let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
     let mut refused = 0;
-    for author in 1..=gestalt_strategies::sample::MAX_AUTHORS as u32 {
+    for author in 1..=gestalt_strategies::sample::MAX_SERIES as u32 {
         let receipt = robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng);
         refused += u32::from(matches!(receipt, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
     }
     assert_eq!(refused, 1);
     robot.keep(ClassId(0), round(1), vec![1.0], &mut rng);
     assert_eq!(robot.share(1, None, &as_is, &mut rng).len(), 1);
+}
+
+#[test]
+fn robots_that_are_there_are_heard_however_many_strangers_were() {
+    let mut rng = generator(1);
+    let mut robot = set(10, SelectionRule::Random, ForgettingRule::Fifo);
+    for author in 1..=gestalt_strategies::sample::MAX_SERIES as u32 {
+        robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    }
+    let alive = [RobotId(70_000), RobotId(70_001)];
+    let refused = robot.receive(id(70_000, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    assert!(matches!(refused, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
+    robot.meet(&alive.into());
+    for author in [70_000, 70_001] {
+        let SampleReceipt::New(changes) =
+            robot.receive(id(author, 1), ClassId(1), round(1), vec![1.0], &mut rng)
+        else {
+            panic!("robot {author} is not heard")
+        };
+        let Some(SetChange::Unseen(gone)) = changes.first() else { panic!("{changes:?}") };
+        assert!(robot.seen().intervals(*gone).is_empty() && gone.author < RobotId(70_000));
+    }
+    let refused = robot.receive(id(80_000, 1), ClassId(1), round(1), vec![1.0], &mut rng);
+    assert!(matches!(refused, SampleReceipt::Refused(SeenError::TooManyAuthors(_))));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn whoever_floods_a_robot_has_no_more_than_its_share_of_a_full_set(
+        sent in prop::collection::vec((0..14_u32, 0..4_u8, any::<u8>()), 300..600),
+        capacity in 20..80_usize, rules in rules(), seed: u64
+    ) {
+        const ALIVE: std::ops::Range<u32> = 1..5;
+        let mut rng = generator(seed);
+        let mut robot = set(capacity, rules.0, rules.1);
+        robot.meet(&ALIVE.map(RobotId).collect());
+        // An author that says more than all others, and strangers beside it.
+        let mut numbers = BTreeMap::new();
+        let mut own = 0;
+        for (who, class, place) in sent {
+            let author = if who < 5 { who } else if who < 10 { 2 } else { 100 + who };
+            let (class, at) = (ClassId(class), vec![f32::from(place), if author == 2 { 1e4 } else { 0.0 }]);
+            if author == 0 {
+                own += 1;
+                robot.keep(class, round(1), at, &mut rng);
+                continue;
+            }
+            let number = numbers.entry(author).and_modify(|n| *n += 1).or_insert(1);
+            robot.receive(id(author, *number), class, round(1), at, &mut rng);
+        }
+        prop_assert_eq!(robot.len(), capacity);
+        let each = 5.max((5 * capacity).div_ceil(20));
+        for author in ALIVE {
+            let held = robot.authors().find(|(a, _)| *a == RobotId(author)).map_or(0, |(_, held)| held);
+            prop_assert!(held <= each, "robot {} has {} of {}", author, held, each);
+        }
+        let strange: usize = robot.authors().filter(|(a, _)| a.0 >= 100).map(|(_, held)| held).sum();
+        prop_assert!(strange <= 5.max(capacity.div_ceil(4)), "strangers have {}", strange);
+        let kept = robot.total(SetPart::Personal) + robot.total(SetPart::Shared);
+        prop_assert!(kept >= own.min(5.max(capacity.div_ceil(5)).min(capacity / 2)), "{} own of {}", kept, own);
+    }
+}
+
+#[test]
+fn a_robot_that_was_started_ever_so_often_still_shares_and_is_heard() {
+    let mut rng = generator(1);
+    let mut hearer = set(100, SelectionRule::Random, ForgettingRule::Fifo);
+    let (mut stored, mut next_key) = (Vec::new(), 1);
+    let mut seen = SeenSamples::default();
+    for life in 1..300 {
+        let mut robot =
+            TrainingSet::new(RobotId(5), 100, SelectionRule::Random.build(), ForgettingRule::Fifo.build());
+        robot = robot.in_life(life * 7919 % 1009);
+        robot.restore(stored, seen, next_key).unwrap();
+        robot.keep(ClassId(0), round(1), vec![life as f32], &mut rng);
+        let changes = robot.share(1, None, &as_is, &mut rng);
+        let [.., SetChange::Shared(key, id)] = &changes[..] else { panic!("{changes:?}") };
+        let sample = robot.get(*key).unwrap();
+        let receipt = hearer.receive(*id, sample.class, sample.round, sample.vector.to_vec(), &mut rng);
+        assert!(matches!(receipt, SampleReceipt::New(_)), "{receipt:?}");
+        (stored, seen, next_key) = (robot.iter().cloned().collect(), robot.seen().clone(), robot.next_key());
+        assert!(seen.series().len() <= gestalt_strategies::sample::MAX_LIVES);
+    }
+    assert_eq!(hearer.len(), gestalt_strategies::sample::MAX_LIVES);
 }
 
 #[test]
@@ -277,9 +365,11 @@ fn a_stored_set_that_contradicts_itself_is_refused() {
         class: ClassId(0),
         round: round(1),
         vector: vec![1.0].into(),
+        told: None,
     };
     let seen = |intervals: &[(u32, u32)]| {
-        SeenSamples::from_intervals([(RobotId(0), intervals.to_vec()), (RobotId(4), vec![(1, 3)])]).unwrap()
+        let (own, other) = (id(0, 1).series(), id(4, 1).series());
+        SeenSamples::from_intervals([(own, intervals.to_vec()), (other, vec![(1, 3)])]).unwrap()
     };
     let (own, other) = (Some(id(0, 1)), Some(id(4, 2)));
     use SetPart::{External, Personal, Shared};
@@ -294,12 +384,11 @@ fn a_stored_set_that_contradicts_itself_is_refused() {
         (vec![sample(1, External, Some(id(4, 4)))], RestoreError::Unseen(id(4, 4))),
     ] {
         let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
-        assert_eq!(robot.restore(samples, seen(&[(1, 2)]), 9, 3), Err(error));
+        assert_eq!(robot.restore(samples, seen(&[(1, 2)]), 9), Err(error));
         assert!(robot.is_empty() && robot.seen() == &SeenSamples::default());
     }
     let mut robot = set(10, SelectionRule::Novelty, ForgettingRule::Redundancy);
-    assert_eq!(robot.restore(vec![], seen(&[(1, 3)]), 9, 3), Err(RestoreError::NumberAhead(id(0, 3))));
-    assert_eq!(robot.restore(vec![], seen(&[]), u64::MAX, 3), Err(RestoreError::NextKey(u64::MAX)));
+    assert_eq!(robot.restore(vec![], seen(&[]), u64::MAX), Err(RestoreError::NextKey(u64::MAX)));
 }
 
 #[test]
@@ -311,7 +400,7 @@ fn a_set_stored_under_a_greater_capacity_is_trimmed() {
     }
     let mut small = set(4, SelectionRule::Random, ForgettingRule::Redundancy);
     let samples = large.iter().cloned().collect();
-    small.restore(samples, large.seen().clone(), large.next_key(), large.next_number()).unwrap();
+    small.restore(samples, large.seen().clone(), large.next_key()).unwrap();
     assert_eq!(small.trim(&mut rng).len(), 6);
     assert_eq!(small.len(), 4);
     assert!(small.trim(&mut rng).is_empty());
@@ -350,7 +439,7 @@ fn the_promises_hold_whatever_a_rule_says() {
     // The first is shared, and then named again.
     let mut robot = TrainingSet::new(ME, 3, Box::new(Stubborn(1)), Box::new(Stubborn(99)));
     robot.keep(ClassId(0), round(1), vec![1.0], &mut rng);
-    assert_eq!(robot.share(5, None, &as_is, &mut rng), [SetChange::Shared(1, id(0, 1))]);
+    assert_eq!(robot.share(5, None, &as_is, &mut rng), [SetChange::Shared(1, OWN.sample(1))]);
 }
 
 #[test]

@@ -182,7 +182,7 @@ pub async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained
     let keys = Keys::new(&school.swarm).unwrap();
     let author = RobotId(9);
     let sample = |author, number, class, vector| SharedSample {
-        id: SampleId { author, number },
+        id: SampleId { author, life: 0, number },
         class: ClassId(class),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector,
@@ -263,7 +263,7 @@ async fn decides_while_training() -> bool {
     // Samples with labels by chance: the hardest there are to tell apart.
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut sample = |number| SharedSample {
-        id: SampleId { author: RobotId(9), number },
+        id: SampleId { author: RobotId(9), life: 0, number },
         class: ClassId((rng.next_u32() % 6) as u8),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::I8((0..8).map(|_| (rng.next_u32() % 200) as i8).collect()),

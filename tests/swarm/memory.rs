@@ -65,7 +65,7 @@ pub async fn killed_at_any_moment_it_remembers_and_shares_nothing_twice() {
     let swarm = unique("memory");
     let ada: InstructorId = "ada".parse().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let (mut boots, mut shared) = (Vec::new(), Vec::<(u64, u64)>::new());
+    let (mut boots, mut shared) = (Vec::new(), Vec::<[u64; 3]>::new());
     // By round, as what it was learned and how many samples of it were acknowledged.
     let mut answered = BTreeMap::<String, (usize, u64)>::new();
     let acknowledged_of = |answered: &BTreeMap<String, (usize, u64)>, class| -> u64 {
@@ -122,7 +122,7 @@ pub async fn killed_at_any_moment_it_remembers_and_shares_nothing_twice() {
                         .as_array()
                         .into_iter()
                         .flatten()
-                        .map(|id| (id["author"].as_u64().unwrap(), id["number"].as_u64().unwrap())),
+                        .map(|id| ["author", "life", "number"].map(|part| id[part].as_u64().unwrap())),
                 ),
                 _ => {}
             }

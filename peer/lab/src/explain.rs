@@ -191,7 +191,7 @@ fn shared(rule: SelectionRule, points: &[Point], learned: &Learned) -> Result<Pa
     for (number, point) in (1..).zip(points) {
         let vector = learned.space.project(&point.at)?;
         if point.common {
-            let id = SampleId { author: RobotId(2), number };
+            let id = SampleId { author: RobotId(2), life: 0, number };
             set.receive(id, point.class, ROUND, vector, &mut rng);
         } else {
             set.keep(point.class, ROUND, vector, &mut rng);

@@ -23,19 +23,27 @@ pub enum Refusal {
     Unclassified,
     /// A sample of another feature space than this robot learns in.
     OtherSpace,
-    /// A sample whose vector has another length, or a component that is not finite.
+    /// A sample whose vector has another length, or a component that is not finite or lies far out.
     BadVector,
     /// A sample of a class that the vocabulary does not have.
     UnknownClass,
     /// A sample with an author or number beyond the bounds of what one robot remembers.
     SampleNumber,
+    /// A lesson on a round of which as many instructors spoke as are kept, or on one older than all that are kept.
+    LessonFull,
+    /// A lesson on a round, or with a count, so far ahead of all known that it is taken for a mistake or a lie.
+    LessonFarAhead,
+    /// A question about what this robot knows, of one that is no neighbour.
+    Stranger,
+    /// A question about what this robot knows, of a neighbour that was told much just now.
+    TooOften,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -49,6 +57,10 @@ impl Refusal {
         Self::BadVector,
         Self::UnknownClass,
         Self::SampleNumber,
+        Self::LessonFull,
+        Self::LessonFarAhead,
+        Self::Stranger,
+        Self::TooOften,
         Self::CountersUsedUp,
     ];
 
@@ -69,6 +81,10 @@ impl Refusal {
             Self::BadVector => "refused_sample_with_bad_vector",
             Self::UnknownClass => "refused_sample_of_unknown_class",
             Self::SampleNumber => "refused_sample_number",
+            Self::LessonFull => "refused_lesson_full",
+            Self::LessonFarAhead => "refused_lesson_far_ahead",
+            Self::Stranger => "refused_question_of_stranger",
+            Self::TooOften => "refused_question_too_often",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

@@ -35,8 +35,8 @@ impl Learning {
             verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
                 for change in names.iter().flat_map(|name| self.set.retract(*name)).collect::<Vec<_>>() {
                     if let SetChange::Removed(sample) = &change {
-                        let HeldSample { part, id, class, round, vector, .. } = sample.clone();
-                        let shared = id.map(|id| (id, class));
+                        let HeldSample { part, id, round, vector, .. } = sample.clone();
+                        let shared = id.map(|id| (id, self.told_as(sample)));
                         self.put_aside(UnresolvedSample { part, shared, round, vector, guess: None });
                     }
                     self.absorb(vec![change]);
@@ -69,8 +69,9 @@ impl Learning {
         let UnresolvedSample { shared, round, vector, .. } = aside;
         match shared {
             None => self.keep(round, class, vector.to_vec()),
-            Some((id, _)) => {
+            Some((id, told)) => {
                 let changes = self.set.take_back(id, class, round, vector, &mut *self.rng);
+                self.set.note_told(id, told);
                 self.absorb(changes);
             }
         }

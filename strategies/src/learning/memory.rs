@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, VocabularyId, Word,
+    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, SampleSeries, VocabularyId,
+    Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
 use super::unresolved::UnresolvedSample;
-use crate::sample::{HeldSample, SeenSamples, SetPart};
+use crate::sample::{HeldSample, SeenSamples, SetPart, ToldAs};
 
 /// One change of a robot's memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,7 +59,7 @@ pub enum MemoryError {
 }
 
 /// The layout of the records; another layout gets another number.
-const LAYOUT: u8 = 2;
+const LAYOUT: u8 = 3;
 
 /// Whose memory it is, and of what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,7 +80,6 @@ impl Owner {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Counters {
     pub next_key: u64,
-    pub next_number: u32,
     pub next_aside: u64,
 }
 
@@ -89,7 +89,7 @@ pub(super) enum Item {
     Owner,
     Counters,
     Sample(u64),
-    Seen(RobotId),
+    Seen(SampleSeries),
     Lessons(RoundId),
     Aside(u64),
 }
@@ -101,16 +101,20 @@ struct StoredSample {
     class: ClassId,
     round: RoundId,
     vector: Vec<f32>,
+    told: Option<ToldAs>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct StoredAside {
     part: u8,
-    shared: Option<(SampleId, ClassId)>,
+    shared: Option<(SampleId, ToldAs)>,
     round: RoundId,
     vector: Vec<f32>,
     guess: Option<ClassId>,
 }
+
+/// An instructor's word on a round, with its count and time.
+type StoredWord = (InstructorId, u64, u64, Word);
 
 impl Item {
     /// The record's key: a byte for the kind, then its number in big-endian order.
@@ -119,7 +123,9 @@ impl Item {
             Self::Owner => vec![0],
             Self::Counters => vec![1],
             Self::Sample(key) => [&[2][..], &key.to_be_bytes()].concat(),
-            Self::Seen(author) => [&[3][..], &author.0.to_be_bytes()].concat(),
+            Self::Seen(SampleSeries { author, life }) => {
+                [&[3][..], [author.0, life].map(u32::to_be_bytes).as_flattened()].concat()
+            }
             Self::Lessons(round) => {
                 let parts = [round.counter, round.opener.0, round.life].map(u32::to_be_bytes);
                 [&[4][..], parts.as_flattened()].concat()
@@ -136,7 +142,10 @@ impl Item {
             0 if number.is_empty() => Some(Self::Owner),
             1 if number.is_empty() => Some(Self::Counters),
             2 => long(number).map(Self::Sample),
-            3 => word(number).map(|author| Self::Seen(RobotId(author))),
+            3 => {
+                let (author, life) = number.split_at_checked(4)?;
+                Some(Self::Seen(SampleSeries { author: RobotId(word(author)?), life: word(life)? }))
+            }
             4 => {
                 let (counter, rest) = number.split_at_checked(4)?;
                 let (opener, life) = rest.split_at_checked(4)?;
@@ -155,13 +164,14 @@ pub(super) fn encode<T: Serialize>(value: &T) -> Vec<u8> {
 }
 
 pub(super) fn encode_sample(sample: &HeldSample) -> Vec<u8> {
-    let HeldSample { part, id, class, round, vector, .. } = sample;
+    let HeldSample { part, id, class, round, vector, told, .. } = sample;
     encode(&StoredSample {
         part: part_number(*part),
         id: *id,
         class: *class,
         round: *round,
         vector: vector.to_vec(),
+        told: *told,
     })
 }
 
@@ -177,8 +187,8 @@ pub(super) fn encode_aside(aside: &UnresolvedSample) -> Vec<u8> {
 }
 
 pub(super) fn encode_lessons(lessons: impl Iterator<Item = Lesson>) -> Vec<u8> {
-    let words: Vec<(InstructorId, u64, Word)> =
-        lessons.map(|lesson| (lesson.instructor, lesson.at, lesson.word)).collect();
+    let words: Vec<StoredWord> =
+        lessons.map(|lesson| (lesson.instructor, lesson.count, lesson.at, lesson.word)).collect();
     encode(&words)
 }
 
@@ -212,7 +222,7 @@ impl RobotMemory {
     /// [`MemoryError::Layout`] and [`MemoryError::Damaged`].
     pub fn read<'a>(records: impl IntoIterator<Item = (&'a [u8], &'a [u8])>) -> Result<Self, MemoryError> {
         let mut memory = Self::default();
-        let mut seen: Vec<(RobotId, Vec<(u32, u32)>)> = Vec::new();
+        let mut seen: Vec<(SampleSeries, Vec<(u32, u32)>)> = Vec::new();
         for (key, value) in records {
             match Item::read(key).ok_or(MemoryError::Damaged("an unknown record"))? {
                 Item::Owner => {
@@ -224,17 +234,18 @@ impl RobotMemory {
                 }
                 Item::Counters => memory.counters = decode(value)?,
                 Item::Sample(key) => {
-                    let StoredSample { part, id, class, round, vector } = decode(value)?;
+                    let StoredSample { part, id, class, round, vector, told } = decode(value)?;
                     let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
                     let vector = Arc::from(finite(vector)?);
-                    memory.samples.push(HeldSample { key, part, id, class, round, vector });
+                    memory.samples.push(HeldSample { key, part, id, class, round, vector, told });
                 }
-                Item::Seen(author) => seen.push((author, decode(value)?)),
+                Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {
-                    let words: Vec<(InstructorId, u64, Word)> = decode(value)?;
-                    memory.lessons.extend(words.into_iter().map(|(instructor, at, word)| Lesson {
+                    let words: Vec<StoredWord> = decode(value)?;
+                    memory.lessons.extend(words.into_iter().map(|(instructor, count, at, word)| Lesson {
                         round,
                         instructor,
+                        count,
                         at,
                         word,
                     }));
@@ -260,11 +271,14 @@ impl RobotMemory {
         self.owner.is_none()
     }
 
-    /// The highest count of a round that anything is remembered of.
+    /// The highest count of a round that this robot saw something of itself, or heard spoken of. What others say they saw is
+    /// not looked at: of that nobody checks the count.
     pub(crate) fn newest_counter(&self) -> Option<u32> {
-        let rounds = self.samples.iter().map(|sample| sample.round);
+        let own = self.samples.iter().filter(|sample| sample.part == SetPart::Personal);
+        let rounds = own.map(|sample| sample.round);
         let rounds = rounds.chain(self.lessons.iter().map(|lesson| lesson.round));
-        rounds.chain(self.aside.iter().map(|(_, aside)| aside.round)).map(|round| round.counter).max()
+        let aside = self.aside.iter().filter(|(_, aside)| aside.part == SetPart::Personal);
+        rounds.chain(aside.map(|(_, aside)| aside.round)).map(|round| round.counter).max()
     }
 
     pub(super) fn check(&self, owner: Owner, components: usize, classes: usize) -> Result<(), MemoryError> {

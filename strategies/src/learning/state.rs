@@ -2,14 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
+use std::hash::Hasher;
 use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Digest, FeatureSpaceId, Fnv1a, LearningStatus, Lesson, RobotId, RoundId, SampleId, SharedSample,
+    ClassId, Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
+    SharedSample, Word,
 };
 use gestalt_rounds::{Follow, Vocabulary};
 use gestalt_svm::FeatureSpace;
+use rand::Rng;
+use siphasher::sip::SipHasher24;
 
 use super::changes::{TrainingChange, inserted};
 use super::config::LearningConfig;
@@ -18,9 +22,18 @@ use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
 use super::unresolved::{self, Unresolved};
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
-use crate::sample::SetPart;
+use crate::sample::{SetPart, ToldAs};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
-use crate::vector_codec::{VectorError, decode_vector};
+use crate::vector_codec::{Precision, VectorError, decode_vector};
+
+/// How far beyond the newest round known one may lie that is spoken of.
+const LEAP: u32 = 64;
+
+/// The most times that a robot shares before the disk has kept up.
+pub(super) const MAX_UNSENT: usize = 64;
+
+/// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
+const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
 /// Why a received sample was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +44,22 @@ pub(crate) enum Declined {
 }
 
 /// What has come of samples and lessons so far.
+///
+/// What it holds is bounded, whatever arrives and however long the robot lives:
+///
+/// | what | at most |
+/// |---|---|
+/// | samples held | [`capacity`](LearningConfig::capacity), of other authors as a full set's [shares](crate::shares) say |
+/// | samples of which it is open what they show | [`aside`](LearningConfig::aside) |
+/// | series of samples seen | 4,096; 64 lives of an author; 16,384 intervals of numbers in all |
+/// | lessons | 1,024 rounds, 16 instructors each; who was heard of first: 256 |
+/// | rounds lived through | 32, with 1,024 names and [`keep`](LearningConfig::keep) looks each |
+/// | shared and not yet on the disk | 64 times of sharing |
+/// | robots met | 4,096, or those alive |
+/// | changes to be trained and remembered | those of one input: they are taken after each |
+///
+/// Beside it, in the mind: what was settled with 64 neighbours (each within the bounds of what is seen, and 64 rounds),
+/// and 64 answers that wait.
 pub(crate) struct Learning {
     pub(super) config: LearningConfig,
     pub(super) me: RobotId,
@@ -42,6 +71,12 @@ pub(crate) struct Learning {
     pub(super) lessons: LessonBook,
     pub(super) recent: RecentRounds,
     pub(super) aside: Unresolved,
+    /// The highest counter of a round that this robot knows of.
+    newest: Option<u32>,
+    digest: Digest,
+    /// From which the keys of the digest follow, and how many were drawn.
+    secret: u64,
+    drawn: u64,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
     /// What is to be trained and remembered, and was not yet said.
@@ -50,7 +85,7 @@ pub(crate) struct Learning {
     pub(super) durable: bool,
     pub(super) revision: u64,
     pub(super) remembered: u64,
-    /// Shared samples that wait until that revision is remembered.
+    /// Shared samples that wait until that revision is remembered: at most [`MAX_UNSENT`] rounds' worth.
     pub(super) unsent: VecDeque<(u64, Vec<SampleId>)>,
 }
 
@@ -64,26 +99,21 @@ impl fmt::Debug for Learning {
 }
 
 impl Learning {
-    /// What that robot learned so far, in its `boot`th life.
-    pub fn new(me: RobotId, boot: u32, setup: LearningSetup) -> Result<Self, LearningError> {
+    /// What that robot learned so far, in the life that drew this number.
+    pub fn new(me: RobotId, life: u32, setup: LearningSetup) -> Result<Self, LearningError> {
         let LearningSetup { config, space, vocabulary, rng, memory, rules } = setup;
         config.validate()?;
         let durable = memory.is_some();
         let memory = memory.unwrap_or_default();
+        let newest = memory.newest_counter();
         let space_id = space.id();
         let owner = Owner::new(me, space_id, vocabulary.id());
         memory.check(owner, space.components(), vocabulary.classes())?;
         let (selection, forgetting) = rules.make(&config);
-        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting);
+        let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
         let fresh = memory.is_empty();
         let RobotMemory { counters, samples, seen, lessons: heard, aside, .. } = memory;
-        if !fresh {
-            set.restore(samples, seen, counters.next_key, counters.next_number)?;
-        } else {
-            // An empty memory proves nothing: a disk may have been lost, with the numbers used before. Boots grow by more
-            // than a robot can share in a life, so these numbers are new, and nobody has to be asked.
-            set.number_from(boot);
-        }
+        set.restore(samples, seen, counters.next_key)?;
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
             lessons.hear(lesson);
@@ -94,7 +124,12 @@ impl Learning {
         });
         let training = set.iter().map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
-        Ok(Self {
+        let mut rng = rng;
+        let secret = rng.next_u64();
+        let mut learning = Self {
+            digest: Digest::default(),
+            secret,
+            drawn: 0,
             aside: Unresolved::new(aside, counters.next_aside, config.aside),
             config,
             me,
@@ -105,6 +140,7 @@ impl Learning {
             set,
             lessons,
             recent: RecentRounds::default(),
+            newest,
             credit: 0.0,
             training,
             dirty,
@@ -112,7 +148,9 @@ impl Learning {
             revision: 0,
             remembered: 0,
             unsent: VecDeque::new(),
-        })
+        };
+        learning.digest = learning.digest_under(secret);
+        Ok(learning)
     }
 
     /// Notes a look at the gesture of a round; says whether it was kept.
@@ -122,6 +160,11 @@ impl Learning {
             self.apply_to_round(round);
             true
         }
+    }
+
+    /// These robots are alive now: their samples come before those of strangers. Gives those that were not alive before.
+    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.set.meet(alive)
     }
 
     /// Whether this robot knows anything of a round.
@@ -152,15 +195,45 @@ impl Learning {
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
     pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
-        let oldest = self.lessons.oldest();
-        let heard = self.lessons.hear(lesson);
+        if lesson.round.counter > self.furthest() {
+            return LessonReceipt::FarAhead;
+        }
+        let recent = &self.recent;
+        let (heard, forgotten) = self.lessons.hear_among(lesson, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.dirty.insert(Item::Lessons(lesson.round));
-            let forgotten = oldest.filter(|round| !self.lessons.contains(*round));
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
         }
         heard
+    }
+
+    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
+    fn furthest(&self) -> u32 {
+        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
+    }
+
+    /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.
+    fn note_counter(&mut self, counter: u32) {
+        if self.newest >= Some(counter) {
+            return;
+        }
+        let first = self.newest.is_none();
+        self.newest = Some(counter);
+        if first {
+            let forgotten = self.lessons.forget_beyond(self.furthest());
+            self.dirty.extend(forgotten.into_iter().map(Item::Lessons));
+        }
+    }
+
+    /// The latest word of an instructor on a round, with its count and time.
+    pub fn latest(&self, round: RoundId, instructor: &InstructorId) -> Option<(u64, u64, Word)> {
+        self.lessons.latest(self.recent.names(round), instructor)
+    }
+
+    /// The count of what is said next of a round.
+    pub fn next_count(&self, round: RoundId) -> u64 {
+        self.lessons.highest_count(self.recent.names(round)).saturating_add(1)
     }
 
     /// Takes in a sample that another robot shared. Says whether it was news.
@@ -177,7 +250,9 @@ impl Learning {
         let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
             SampleReceipt::New(changes) => {
-                self.dirty.insert(Item::Seen(id.author));
+                self.dirty.insert(Item::Seen(id.series()));
+                let told = ToldAs { class: sample.class, precision: Precision::of(&sample.vector) };
+                self.set.note_told(id, told);
                 self.absorb(changes);
                 // A class is what it was taken under; anything else concerns all samples of the round.
                 if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
@@ -203,14 +278,17 @@ impl Learning {
                     self.dirty.insert(Item::Sample(sample.key));
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
+                SetChange::Unseen(series) => {
+                    self.dirty.insert(Item::Seen(series));
+                }
                 SetChange::Relabelled(key) => {
                     self.dirty.insert(Item::Sample(key));
                     self.training.extend(
                         self.set.get(key).map(|sample| TrainingChange::Relabel { key, class: sample.class }),
                     );
                 }
-                SetChange::Shared(key, _) => {
-                    self.dirty.extend([Item::Sample(key), Item::Seen(self.me)]);
+                SetChange::Shared(key, id) => {
+                    self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);
                     self.training.extend(self.set.get(key).map(inserted));
                 }
             }
@@ -246,11 +324,13 @@ impl Learning {
             Item::Owner => Some(memory::encode(&Owner::new(self.me, self.space_id, self.vocabulary.id()))),
             Item::Counters => Some(memory::encode(&Counters {
                 next_key: self.set.next_key(),
-                next_number: self.set.next_number(),
                 next_aside: self.aside.next(),
             })),
             Item::Sample(key) => self.set.get(key).map(memory::encode_sample),
-            Item::Seen(author) => Some(memory::encode(&self.set.seen().intervals(author).to_vec())),
+            Item::Seen(series) => {
+                let intervals = self.set.seen().intervals(series);
+                (!intervals.is_empty()).then(|| memory::encode(&intervals.to_vec()))
+            }
             Item::Lessons(round) => {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
@@ -273,8 +353,25 @@ impl Learning {
         self.remembered >= revision
     }
 
+    /// What it knows, under its own key.
     pub fn digest(&self) -> Digest {
-        Digest { samples: self.set.seen().digest(), lessons: self.lessons.digest() }
+        self.digest
+    }
+
+    /// What it knows, under another's key.
+    pub fn digest_under(&self, key: u64) -> Digest {
+        Digest { key, samples: self.set.seen().digest(key), lessons: self.lessons.digest(key) }
+    }
+
+    /// Draws another key if what it knows has changed since the changes were last taken. Whoever made it change did not
+    /// know that key.
+    pub fn refresh_digest(&mut self) {
+        if self.dirty.iter().any(|item| matches!(item, Item::Seen(_) | Item::Lessons(_))) {
+            self.drawn += 1;
+            let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
+            sip.write(&self.drawn.to_le_bytes());
+            self.digest = self.digest_under(sip.finish());
+        }
     }
 
     /// Where it stands, for the status. What the host knows of memory and training is left to it.
@@ -284,8 +381,8 @@ impl Learning {
         let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
         let mut fnv = Fnv1a::default();
         for (id, class) in common.collect::<BTreeMap<_, _>>() {
-            let number = id.author.0.to_le_bytes().into_iter().chain(id.number.to_le_bytes());
-            fnv.add(number.chain([class.0]));
+            let name = [id.author.0, id.life, id.number].into_iter().flat_map(u32::to_le_bytes);
+            fnv.add(name.chain([class.0]));
         }
         LearningStatus {
             space: self.space_id.to_string(),
@@ -304,12 +401,14 @@ impl Learning {
 
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
+        self.note_counter(round.counter);
         if self.recent.enter(round) {
             self.apply_to_round(round);
         }
     }
 
     fn merged(&mut self, round: RoundId, other: RoundId) {
+        self.note_counter(round.counter);
         if self.recent.merge(round, other) {
             self.apply_to_round(round);
         }

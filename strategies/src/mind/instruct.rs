@@ -48,8 +48,14 @@ impl Mind {
             Instruction::Wrong { of, .. } => class(of).map(Word::Not),
         };
         let Some(word) = word else { return Outcome::UnknownGesture };
-        let again = learning.lessons().word(round, &instructed.by) == Some(word);
-        let lesson = Lesson { round, instructor: instructed.by.clone(), at: instructed.at, word };
+        let latest = learning.latest(round, &instructed.by);
+        let again = latest.is_some_and(|(.., latest)| latest == word);
+        let count = match latest {
+            // A neighbour told of it before it was heard.
+            Some((count, at, _)) if again && at == instructed.at => count,
+            _ => learning.next_count(round),
+        };
+        let lesson = Lesson { round, instructor: instructed.by.clone(), count, at: instructed.at, word };
         match learning.hear(&lesson) {
             LessonReceipt::New if again => Outcome::Known,
             LessonReceipt::New if word != Word::Retracted && learning.held_of(round) == 0 => {
@@ -57,7 +63,7 @@ impl Mind {
             }
             LessonReceipt::New => Outcome::Learned,
             LessonReceipt::Known => Outcome::Known,
-            LessonReceipt::Full => Outcome::UnknownRound,
+            LessonReceipt::Full | LessonReceipt::FarAhead => Outcome::UnknownRound,
         }
     }
 

@@ -9,6 +9,7 @@ use gestalt_rounds::{
 };
 
 use super::answers::Answers;
+use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
 use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory};
@@ -57,17 +58,25 @@ pub struct Mind {
     pub(super) rounds: Rounds,
     pub(super) learning: Option<Learning>,
     pub(super) answers: Answers,
+    pub(super) exchanges: Exchanges,
+    /// Of this life, in the names of its rounds and samples.
+    nonce: u32,
 }
 
 impl Mind {
-    /// The mind of robot `me` in one of its lives. A robot that learns takes the life's `boot` from a clock, in tenths of a second or
-    /// finer, so that it grows also when all that was on the disk is lost, and faster than samples are made: their numbers begin
-    /// there. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides, but gives no evidence.
+    /// The mind of robot `me` in one of its lives, whose `nonce` names the rounds that it opens and the samples that it
+    /// shares. It has no classifier until [`Input::Learned`]: until then it relays, fuses and decides, but gives no evidence.
     ///
     /// # Errors
     /// [`RoundsConfigError`] for a configuration that [`RoundsConfig::validate`] refuses.
     pub fn new(me: RobotId, life: Life, config: RoundsConfig) -> Result<Self, RoundsConfigError> {
-        Ok(Self { rounds: Rounds::new(me, life, config)?, learning: None, answers: Answers::default() })
+        Ok(Self {
+            rounds: Rounds::new(me, life, config)?,
+            learning: None,
+            answers: Answers::default(),
+            exchanges: Exchanges::default(),
+            nonce: life.nonce,
+        })
     }
 
     /// The same mind, in which votes are fused by the user's rule, see [`Rounds::fused_by`].
@@ -90,7 +99,7 @@ impl Mind {
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
         let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
-        self.learning = Some(Learning::new(self.me(), self.rounds.boot(), setup)?);
+        self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
         self.rounds = self.rounds.counting_from(counter);
         Ok(self)
     }
@@ -105,10 +114,17 @@ impl Mind {
             Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };
+        let round = self.rounds.round();
         let done = match &mut self.learning {
-            Some(learning) => self.rounds.handle_with(now, about_rounds, learning),
+            Some(learning) => {
+                learning.refresh_digest();
+                self.rounds.handle_with(now, about_rounds, learning)
+            }
             None => self.rounds.handle(now, about_rounds),
         };
+        if self.rounds.round() != round {
+            self.exchanges.forget_declined_lessons();
+        }
         out.extend(done.into_iter().map(Output::from));
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);
@@ -137,6 +153,12 @@ impl Mind {
             AboutRounds::Received(envelope) if envelope.author != self.me() => {
                 self.on_received(envelope, out);
             }
+            AboutRounds::Alive(robots) => {
+                if let Some(learning) = &mut self.learning {
+                    self.exchanges.readmit(&learning.meet(robots));
+                }
+            }
+            AboutRounds::Neighbours(robots) => self.exchanges.keep(|robot| robots.contains(&robot)),
             _ => {}
         }
         input
@@ -148,7 +170,7 @@ impl Mind {
             Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
             Message::Samples(samples) => self.on_samples(author, samples),
             Message::Know(know) => self.on_know(author, know, out),
-            Message::Lessons(lessons) => self.on_lessons(&lessons.lessons),
+            Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
             Message::Vote(_) | Message::Have(_) | Message::Give(_) => {}
         }
     }
@@ -177,6 +199,7 @@ impl Mind {
     /// Says what is to be trained and remembered, and shares what is remembered as shared.
     fn carry_on_learning(&mut self, out: &mut Vec<Output>) {
         let Some(learning) = &mut self.learning else { return };
+        learning.refresh_digest();
         let changes = learning.take_training();
         if !changes.is_empty() {
             out.push(Output::Train(changes));

@@ -2,6 +2,7 @@
 //! from.
 
 mod answers;
+mod exchanges;
 mod input;
 mod inspect;
 mod instruct;

@@ -4,15 +4,16 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{
-    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, Message, RobotId, RoundId, Samples,
+    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, Message,
+    RobotId, RoundId, Samples,
 };
 use gestalt_rounds::Refusal;
 
 use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Declined;
-use crate::lessons::LessonReceipt;
-use crate::sample::{MAX_GAPS, SeenSamples};
+use crate::lessons::{LessonReceipt, MAX_INSTRUCTORS};
+use crate::sample::{MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_SERIES, SeenSamples};
 use crate::vector_codec::VectorError;
 
 /// About how many bytes of samples one message takes, so that a vote never waits long behind it.
@@ -24,79 +25,130 @@ const MAX_CHUNKS: usize = 32;
 /// The most lessons in one message.
 const MAX_TOLD: usize = 256;
 
-// What is kept of an author can be told.
-const _: () = assert!(MAX_GAPS <= MAX_INTERVALS);
+// What is kept of samples and lessons can be told, all of it in one message: an interval takes 10 bytes at most, a series 11
+// beside its intervals, a round of lessons 25, all else 64.
+const _: () = assert!(MAX_GAPS <= MAX_INTERVALS && MAX_SERIES <= MAX_ROBOTS);
+const _: () = assert!(10 * MAX_INTERVALS_IN_ALL + 11 * MAX_SERIES + 25 * MAX_LESSONS + 64 < MAX_MESSAGE);
 
 impl Mind {
-    /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length.
+    /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length, unless that was
+    /// of no use before.
     pub(super) fn compare_knowledge(&mut self, from: RobotId, theirs: Option<Digest>, out: &mut Vec<Output>) {
         let (Some(theirs), Some(learning)) = (theirs, &self.learning) else { return };
-        if theirs != learning.digest() {
+        let same = learning.digest_under(theirs.key) == theirs;
+        if !same && !self.exchanges.is_at_rest(from, learning.digest(), theirs) && self.may_answer(from) {
+            self.exchanges.spend(from, 1);
             self.tell_know(from, theirs, false, out);
         }
     }
 
     fn tell_know(&mut self, to: RobotId, theirs: Digest, answer: bool, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
-        let mine = learning.digest();
-        let seen = learning.set().seen();
-        let samples = if mine.samples == theirs.samples {
+        let (mine, here) = (learning.digest(), learning.digest_under(theirs.key));
+        let samples = if here.samples == theirs.samples {
             Vec::new()
         } else {
-            let known = |author| Known { author, numbers: seen.intervals(author).to_vec() };
-            seen.authors().map(known).collect()
+            let seen = self.exchanges.told_to(to, learning.set().seen());
+            let known = |series| Known { series, numbers: seen.intervals(series).to_vec() };
+            seen.series().map(known).collect()
         };
-        let lessons =
-            if mine.lessons == theirs.lessons { Vec::new() } else { learning.lessons().rounds().collect() };
-        self.tell(to, Message::Know(Know { samples, lessons, digest: mine, answer }), out);
+        let lessons = if here.lessons == theirs.lessons {
+            Vec::new()
+        } else {
+            let mut rounds: BTreeMap<RoundId, u64> = learning.lessons().rounds(mine.key).collect();
+            rounds.append(&mut self.exchanges.declined_rounds(to, mine.key));
+            rounds.into_iter().rev().take(MAX_LESSONS).collect()
+        };
+        let know = Know { samples, lessons, digest: mine, answer, nothing_for: None };
+        self.tell(to, Message::Know(know), out);
     }
 
     /// A neighbour says what it knows: gives what it lacks, and asks for what this robot lacks.
     pub(super) fn on_know(&mut self, from: RobotId, know: &Know, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
         let mine = learning.digest();
+        if let Some(asked) = know.nothing_for {
+            if asked == mine {
+                self.exchanges.rest(from, mine, know.digest);
+            }
+            return;
+        }
+        let here = learning.digest_under(know.digest.key);
+        if here == know.digest && know.samples.is_empty() && know.lessons.is_empty() {
+            return;
+        }
+        if !self.may_answer(from) {
+            return;
+        }
+        let chunks = self.exchanges.allowance(self.rounds.now(), from).min(MAX_CHUNKS);
+        let Some(learning) = &self.learning else { return };
         let mut lacking_here = false;
         let mut given = Vec::new();
-        if mine.samples != know.digest.samples {
-            let theirs = know.samples.iter().map(|known| (known.author, known.numbers.clone()));
+        if here.samples != know.digest.samples || !know.samples.is_empty() {
+            let theirs = know.samples.iter().map(|known| (known.series, known.numbers.clone()));
             let Ok(theirs) = SeenSamples::from_intervals(theirs) else {
                 return self.rounds.note_refusal(Refusal::SampleNumber);
             };
-            lacking_here |= learning.set().seen().lacks(&theirs);
+            lacking_here |= self.exchanges.told_to(from, learning.set().seen()).lacks(&theirs);
             let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
-            given.extend(lacking.take(MAX_CHUNKS).map(Message::Samples));
+            given.extend(lacking.take(chunks).map(Message::Samples));
         }
-        if mine.lessons != know.digest.lessons {
+        if here.lessons != know.digest.lessons || !know.lessons.is_empty() {
             let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
             let book = learning.lessons();
-            lacking_here |= theirs.iter().any(|(round, digest)| book.digest_of(*round) != *digest);
-            let lacking = book.rounds().filter(|(round, digest)| theirs.get(round) != Some(digest));
-            let lessons: Vec<Lesson> = lacking.flat_map(|(round, _)| book.of(round)).take(MAX_TOLD).collect();
+            let key = know.digest.key;
+            let declined = self.exchanges.declined_rounds(from, key);
+            lacking_here |= theirs.iter().any(|(round, digest)| {
+                book.digest_of(*round, key) != *digest && declined.get(round) != Some(digest)
+            });
+            let lacking = book.rounds(key).filter(|(round, digest)| theirs.get(round) != Some(digest));
+            let mut lessons: Vec<Lesson> = Vec::new();
+            for (round, _) in lacking {
+                // All of a round in one message, so that it is known to be all.
+                if lessons.len() + MAX_INSTRUCTORS > MAX_TOLD {
+                    break;
+                }
+                lessons.extend(book.of(round));
+            }
             if !lessons.is_empty() {
                 given.push(Message::Lessons(Lessons { lessons }));
             }
         }
+        let settled = given.is_empty() && !learning.withholds();
+        self.exchanges.spend(from, given.len() + 1);
         for message in given {
             self.tell(from, message, out);
         }
-        if lacking_here && !know.answer {
+        if settled {
+            let (samples, lessons) = (Vec::new(), Vec::new());
+            let nothing_for = Some(know.digest);
+            let know = Know { samples, lessons, digest: mine, answer: true, nothing_for };
+            self.tell(from, Message::Know(know), out);
+        }
+        if lacking_here && !know.answer && !self.exchanges.is_at_rest(from, mine, know.digest) {
             self.tell_know(from, know.digest, true, out);
         }
     }
 
     /// Takes in samples, from their author or from a neighbour that had them.
     pub(super) fn on_samples(&mut self, from: RobotId, samples: &Samples) {
+        let is_neighbour = self.compares_with(from);
         let Some(learning) = &mut self.learning else { return };
         let mut repaired = false;
         for sample in &samples.samples {
             match learning.receive(samples.space, sample) {
                 Ok(new) => repaired |= new && sample.id.author != from,
-                Err(declined) => self.rounds.note_refusal(match declined {
-                    Declined::Vector(VectorError::Space { .. }) => Refusal::OtherSpace,
-                    Declined::Vector(_) => Refusal::BadVector,
-                    Declined::Class => Refusal::UnknownClass,
-                    Declined::Number => Refusal::SampleNumber,
-                }),
+                Err(declined) => {
+                    if is_neighbour {
+                        self.exchanges.decline(from, sample.id);
+                    }
+                    self.rounds.note_refusal(match declined {
+                        Declined::Vector(VectorError::Space { .. }) => Refusal::OtherSpace,
+                        Declined::Vector(_) => Refusal::BadVector,
+                        Declined::Class => Refusal::UnknownClass,
+                        Declined::Number => Refusal::SampleNumber,
+                    });
+                }
             }
         }
         if repaired {
@@ -105,12 +157,49 @@ impl Mind {
         }
     }
 
+    /// Whether that robot is answered: a neighbour, and not too often. Whoever asks in the name of another brings no flood
+    /// upon it.
+    fn may_answer(&mut self, from: RobotId) -> bool {
+        let refusal = if !self.compares_with(from) {
+            Refusal::Stranger
+        } else if self.exchanges.allowance(self.rounds.now(), from) == 0 {
+            Refusal::TooOften
+        } else {
+            return true;
+        };
+        self.rounds.note_refusal(refusal);
+        false
+    }
+
+    /// Whether that robot is one to compare knowledge with: a neighbour, or anyone while none is known.
+    fn compares_with(&self, robot: RobotId) -> bool {
+        self.rounds.neighbours().is_empty() || self.rounds.neighbours().contains(&robot)
+    }
+
     /// Takes in what instructors said and this robot had not heard.
-    pub(super) fn on_lessons(&mut self, lessons: &[Lesson]) {
+    pub(super) fn on_lessons(&mut self, from: RobotId, lessons: &[Lesson]) {
+        let is_neighbour = self.compares_with(from);
         let Some(learning) = &mut self.learning else { return };
         let mut news = false;
-        for lesson in lessons {
-            news |= learning.hear(lesson) == LessonReceipt::New;
+        for of_round in lessons.chunk_by(|a, b| a.round == b.round) {
+            let mut refused = false;
+            for lesson in of_round {
+                match learning.hear(lesson) {
+                    LessonReceipt::New => news = true,
+                    LessonReceipt::Known => {}
+                    LessonReceipt::Full => {
+                        refused = true;
+                        self.rounds.note_refusal(Refusal::LessonFull);
+                    }
+                    LessonReceipt::FarAhead => {
+                        refused = true;
+                        self.rounds.note_refusal(Refusal::LessonFarAhead);
+                    }
+                }
+            }
+            if refused && is_neighbour {
+                self.exchanges.decline_lessons(from, of_round.iter());
+            }
         }
         if news {
             self.rounds.hurry_repair();

@@ -3,5 +3,5 @@
 mod samples;
 mod seen;
 
-pub use samples::{HeldSample, HeldSamples, SetPart, draw};
-pub use seen::{LAST_NUMBER, MAX_AUTHORS, MAX_GAPS, SeenError, SeenSamples};
+pub use samples::{HeldSample, HeldSamples, SetPart, ToldAs, draw};
+pub use seen::{LAST_NUMBER, MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples};

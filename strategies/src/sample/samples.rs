@@ -3,8 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
 use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+use crate::vector_codec::Precision;
 
 /// The part of a training set that a sample is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,6 +40,25 @@ pub struct HeldSample {
     pub round: RoundId,
     /// Coordinates in the robot's feature space.
     pub vector: Arc<[f32]>,
+    /// How its author shared it, if anybody did: so it is passed on, whatever it is held as.
+    pub told: Option<ToldAs>,
+}
+
+/// How its author shared a sample. Encoded in this precision, its coordinates are the bytes that the author sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ToldAs {
+    /// The gesture that the author was told.
+    pub class: ClassId,
+    /// How its vector travels.
+    pub precision: Precision,
+}
+
+impl HeldSample {
+    /// Who shared it, if anybody did.
+    #[must_use]
+    pub fn author(&self) -> Option<RobotId> {
+        self.id.map(|id| id.author)
+    }
 }
 
 /// The samples held, as selection and forgetting rules see them. Every list is in the order of the keys, so what a
@@ -46,6 +68,8 @@ pub struct HeldSamples {
     held: BTreeMap<u64, HeldSample>,
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
+    /// How many external ones there are, by author.
+    authors: BTreeMap<RobotId, usize>,
     arrivals: u64,
 }
 
@@ -95,6 +119,11 @@ impl HeldSamples {
     #[must_use]
     pub fn arrivals(&self) -> u64 {
         self.arrivals
+    }
+
+    /// The other robots of whom a sample is held, ascending, each with how many.
+    pub fn authors(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
+        self.authors.iter().map(|(author, held)| (*author, *held))
     }
 
     /// How many samples of a class are in a part.
@@ -160,6 +189,9 @@ impl HeldSamples {
         self.arrivals = self.arrivals.max(sample.key);
         if let Some(id) = sample.id {
             self.ids.insert(id, sample.key);
+            if sample.part == SetPart::External {
+                *self.authors.entry(id.author).or_default() += 1;
+            }
         }
         let keys = self.classes.entry(sample.class).or_default();
         for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
@@ -173,6 +205,13 @@ impl HeldSamples {
         let sample = self.held.remove(&key)?;
         if let Some(id) = sample.id {
             self.ids.remove(&id);
+            if let Some(held) = self.authors.get_mut(&id.author).filter(|_| sample.part == SetPart::External)
+            {
+                *held -= 1;
+                if *held == 0 {
+                    self.authors.remove(&id.author);
+                }
+            }
         }
         if let Some(keys) = self.classes.get_mut(&sample.class) {
             for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
@@ -185,6 +224,13 @@ impl HeldSamples {
             }
         }
         Some(sample)
+    }
+
+    /// Notes how the author of a sample shared it.
+    pub(crate) fn note_told(&mut self, id: SampleId, told: ToldAs) {
+        if let Some(sample) = self.ids.get(&id).and_then(|key| self.held.get_mut(key)) {
+            sample.told = Some(told);
+        }
     }
 
     /// Makes up for the samples that came and went before a restart.

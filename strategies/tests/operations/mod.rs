@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId, SampleSeries};
 use gestalt_strategies::{
     Classify, ClassifyError, ForgettingRule, HeldSample, SampleReceipt, SeenSamples, SelectionRule,
     SetChange, TrainingSet, Vocabulary,
@@ -13,6 +13,9 @@ use rand_chacha::rand_core::SeedableRng;
 
 pub const ME: RobotId = RobotId(0);
 
+/// Under which it shares.
+pub const OWN: SampleSeries = SampleSeries { author: ME, life: 0 };
+
 pub fn generator(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
@@ -21,8 +24,11 @@ pub fn round(counter: u32) -> RoundId {
     RoundId { counter, opener: RobotId(1), life: 0 }
 }
 
+/// The life that others share in, and this robot shared in before: the one it is in is 0.
+const LIFE: u32 = 7;
+
 pub fn id(author: u32, number: u32) -> SampleId {
-    SampleId { author: RobotId(author), number }
+    SampleId { author: RobotId(author), life: LIFE, number }
 }
 
 pub fn as_is(vector: &[f32]) -> Vec<f32> {
@@ -84,6 +90,7 @@ impl Store {
                     self.note(sample.id);
                     self.samples.remove(&sample.key);
                 }
+                SetChange::Unseen(series) => self.seen.retain(|id| id.series() != *series),
                 SetChange::Relabelled(key) => {
                     self.samples.insert(*key, set.get(*key).unwrap().clone());
                 }
@@ -98,7 +105,7 @@ impl Store {
     fn note(&mut self, id: Option<SampleId>) {
         if let Some(id) = id {
             self.seen.insert(id);
-            if id.author == ME {
+            if id.series() == OWN {
                 self.last_number = self.last_number.max(id.number);
             }
         }
@@ -114,7 +121,7 @@ impl Store {
 
     pub fn restore_into(&self, set: &mut TrainingSet) {
         let samples = self.samples.values().cloned().collect();
-        set.restore(samples, self.seen(), self.last_key + 1, self.last_number + 1).unwrap();
+        set.restore(samples, self.seen(), self.last_key + 1).unwrap();
     }
 }
 

@@ -105,10 +105,11 @@ fn who_does_not_learn_says_so() {
 fn a_lesson_counts_for_samples_that_come_after_it() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 13);
     let round = swarm.show(1);
-    let lesson = Lesson { round, instructor: "ada".parse().unwrap(), at: 9, word: Word::Was(ClassId(3)) };
+    let lesson =
+        Lesson { round, instructor: "ada".parse().unwrap(), count: 1, at: 9, word: Word::Was(ClassId(3)) };
     swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
     let sample = SharedSample {
-        id: SampleId { author: RobotId(9), number: 1 },
+        id: SampleId { author: RobotId(9), life: 5, number: 1 },
         class: ClassId(1),
         round,
         vector: Vector::F32(vec![0.5; 4]),

@@ -3,6 +3,7 @@
 mod feedback;
 mod knowledge;
 mod refusing;
+mod rest;
 mod sharing;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -76,6 +77,14 @@ struct Swarm {
     answers: Vec<gestalt_protocol::Answer>,
     said: Vec<SharedSample>,
     trained: Vec<BTreeMap<u64, ClassId>>,
+    spaces: Vec<Arc<FeatureSpace>>,
+    vocabularies: Vec<Vocabulary>,
+    /// What the clock says at the next start, if not the truth.
+    boot: Option<u32>,
+    /// Of the latest start.
+    nonce: u32,
+    /// How many messages robots told each other, and their bytes, by kind.
+    told: BTreeMap<&'static str, (usize, usize)>,
 }
 
 impl Swarm {
@@ -95,6 +104,11 @@ impl Swarm {
             answers: Vec::new(),
             said: Vec::new(),
             trained: vec![BTreeMap::new(); n],
+            spaces: vec![space(); n],
+            vocabularies: vec![vocabulary(); n],
+            boot: None,
+            nonce: 0,
+            told: BTreeMap::new(),
         };
         for i in 0..n {
             let mind = swarm.waken(i);
@@ -109,19 +123,20 @@ impl Swarm {
     /// A mind with what its disk holds.
     fn waken(&mut self, i: usize) -> Mind {
         let id = RobotId(i as u32 + 1);
-        let boot = self.now.as_secs() as u32 + 1;
+        let boot = self.boot.unwrap_or(self.now.as_secs() as u32 + 1);
+        self.nonce = self.nonce.wrapping_mul(0x9E37_79B1).wrapping_add(1);
         let config = RoundsConfig { patience: Duration::from_millis(600), ..RoundsConfig::default() };
         let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
         let setup = LearningSetup {
             config: self.config.clone(),
-            space: space(),
-            vocabulary: vocabulary(),
+            space: self.spaces[i].clone(),
+            vocabulary: self.vocabularies[i].clone(),
             rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(id.0) * 1000 + u64::from(boot))),
             memory: Some(RobotMemory::read(records).unwrap()),
             rules: self.rules.clone(),
         };
         self.trained[i].clear();
-        let life = Life { boot, nonce: boot.wrapping_mul(7919) };
+        let life = Life { boot, nonce: self.nonce };
         Mind::new(id, life, config).unwrap().learning(setup).unwrap()
     }
 
@@ -136,6 +151,12 @@ impl Swarm {
         let mind = self.waken(i);
         self.minds[i] = mind;
         self.introduce(i);
+    }
+
+    /// Its disk is gone.
+    fn restart_empty(&mut self, i: usize) {
+        self.disks[i].clear();
+        self.restart(i);
     }
 
     /// All are switched off and on: none finds another that goes on.
@@ -164,6 +185,8 @@ impl Swarm {
                         }
                     }
                     Output::Tell(robot, envelope) => {
+                        let told = self.told.entry(kind(&envelope.message)).or_default();
+                        *told = (told.0 + 1, told.1 + envelope.encode().len());
                         if self.arrives() {
                             due.push_back((robot.0 as usize - 1, Input::Received(envelope)));
                         }
@@ -194,8 +217,9 @@ impl Swarm {
                                 TrainingChange::Insert { key, class, .. } => {
                                     self.trained[i].insert(key, class);
                                 }
+                                // One that went as soon as it came was never told.
                                 TrainingChange::Remove(key) => {
-                                    assert!(self.trained[i].remove(&key).is_some())
+                                    self.trained[i].remove(&key);
                                 }
                                 TrainingChange::Relabel { key, class } => {
                                     assert!(self.trained[i].insert(key, class).is_some());
@@ -284,6 +308,16 @@ impl Swarm {
             assert_eq!(held, kept, "robot {} remembers what it holds", i + 1);
             assert_eq!(&memory.seen, set.seen());
         }
+    }
+}
+
+fn kind(message: &Message) -> &'static str {
+    match message {
+        Message::Have(_) => "have",
+        Message::Know(_) => "know",
+        Message::Samples(_) => "samples",
+        Message::Lessons(_) => "lessons",
+        _ => "other",
     }
 }
 

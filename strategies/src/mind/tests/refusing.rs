@@ -7,7 +7,7 @@ fn a_sample_that_is_none_is_refused_and_counted() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 11);
     let space = space().id();
     let sample = |number, class, vector| SharedSample {
-        id: SampleId { author: RobotId(9), number },
+        id: SampleId { author: RobotId(9), life: 5, number },
         class: ClassId(class),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector,
@@ -64,4 +64,151 @@ fn a_memory_of_another_robot_or_space_is_refused() {
     let other = FeatureSpace::fit("test", rows, ScalingMethod::PerComponent, Components::Count(1), &mut rng);
     let space_error = new(1, setup(Arc::new(other), vocabulary())).unwrap_err();
     assert!(matches!(space_error, LearningError::Memory(MemoryError::Space { .. })));
+}
+
+fn lessons(swarm: &mut Swarm, i: usize, lessons: Vec<Lesson>) {
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    let message = Message::Lessons(gestalt_protocol::Lessons { lessons });
+    swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+}
+
+fn forged(round: RoundId, who: &str, count: u64, word: Word) -> Lesson {
+    Lesson { round, instructor: who.parse().unwrap(), count, at: u64::MAX, word }
+}
+
+#[test]
+fn lessons_on_rounds_to_come_keep_nobody_from_teaching() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 31);
+    let first = swarm.show(1);
+    let to_come = |i| {
+        let round = RoundId { counter: u32::MAX - i, opener: RobotId(1), life: 0 };
+        forged(round, "eve", 1, Word::Was(ClassId(1)))
+    };
+    lessons(&mut swarm, 0, (0..1024).map(to_come).collect());
+    assert_eq!(swarm.minds[0].refusals().count(Refusal::LessonFarAhead), 1024);
+    // As far ahead as may be, under many names.
+    let near = |i: u32| {
+        let round = RoundId { counter: first.counter + i % 64, opener: RobotId(u32::MAX), life: i };
+        forged(round, "eve", 1, Word::Was(ClassId(1)))
+    };
+    for part in 0..4 {
+        lessons(&mut swarm, 0, (0..1024).map(|i| near(1024 * part + i)).collect());
+    }
+    swarm.pass(Duration::from_secs(10));
+    for class in [2, 3] {
+        let round = swarm.show(class);
+        let at = swarm.was(round, class);
+        assert_eq!(swarm.outcome(at), Outcome::Learned);
+        for mind in &swarm.minds {
+            assert_eq!(mind.training_set().unwrap().class_count(ClassId(class)), 6);
+        }
+    }
+    swarm.restart(0);
+    swarm.pass(Duration::from_secs(1));
+    assert!(swarm.show(4).counter <= first.counter + 3 + 64, "the counters are not run up");
+}
+
+#[test]
+fn what_a_newborn_was_told_of_rounds_to_come_is_forgotten_when_it_knows_better() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 32);
+    let far = RoundId { counter: 900_000, opener: RobotId(1), life: 0 };
+    lessons(&mut swarm, 0, vec![forged(far, "eve", 1, Word::Was(ClassId(1)))]);
+    assert_eq!(swarm.minds[0].learned().unwrap().lessons, 1);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect::<Vec<_>>(), [1, 1]);
+    swarm.check();
+}
+
+#[test]
+fn an_instructor_can_correct_whatever_was_said_in_its_name() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 33);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    lessons(&mut swarm, 0, vec![forged(round, "ada", 1 << 32, Word::Retracted)]);
+    lessons(&mut swarm, 0, (0..16).map(|i| forged(round, &format!("eve{i}"), 9, Word::Retracted)).collect());
+    swarm.pass(Duration::from_secs(10));
+    let at = swarm.was(round, 5);
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    swarm.pass(Duration::from_secs(10));
+    for mind in &swarm.minds {
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(5)), 6);
+    }
+}
+
+#[test]
+fn no_clock_orders_the_words_of_an_instructor() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 34);
+    let round = swarm.show(1);
+    for (at, class) in [(u64::MAX, 1), (500, 2), (400, 3)] {
+        let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+        for i in 0..3 {
+            let instructed = Instructed { by: "ada".parse().unwrap(), at, instruction: instruction.clone() };
+            swarm.input(i, Input::Instructed(instructed));
+        }
+        swarm.pass(Duration::from_secs(5));
+        for mind in &swarm.minds {
+            assert_eq!(mind.training_set().unwrap().class_count(ClassId(class)), 6);
+        }
+    }
+}
+
+#[test]
+fn a_question_in_the_name_of_another_brings_no_flood_upon_it() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 35);
+    let sample = |number| SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number },
+        class: ClassId(1),
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
+        vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
+    };
+    let message =
+        Message::Samples(Samples { space: space().id(), samples: (1..=1000).map(sample).collect() });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    for i in 0..3 {
+        swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message: message.clone() }));
+    }
+    swarm.pass(Duration::from_secs(10));
+    let ask = |swarm: &mut Swarm, author| {
+        swarm.told.clear();
+        let digest = gestalt_protocol::Digest { key: 1, samples: 2, lessons: 3 };
+        let (samples, lessons) = (vec![], vec![]);
+        let know = gestalt_protocol::Know { samples, lessons, digest, answer: true, nothing_for: None };
+        for _ in 0..1000 {
+            let message = Message::Know(know.clone());
+            let out = swarm.minds[0].handle(swarm.now, Input::Received(Envelope { author, stamp, message }));
+            let told = out.iter().filter(|output| matches!(output, Output::Tell(..)));
+            swarm.told.entry("all").or_default().0 += told.count();
+        }
+        swarm.told["all"].0
+    };
+    assert_eq!(ask(&mut swarm, RobotId(7)), 0, "no neighbour");
+    assert_eq!(swarm.minds[0].refusals().count(Refusal::Stranger), 1000);
+    let told = ask(&mut swarm, RobotId(2));
+    assert!((1..=128).contains(&told), "{told} messages for 1000 questions");
+    assert!(swarm.minds[0].refusals().count(Refusal::TooOften) > 0);
+    swarm.pass(Duration::from_secs(10));
+    let again = ask(&mut swarm, RobotId(2));
+    assert!((1..=128).contains(&again), "who waited is answered again: {again}");
+}
+
+#[test]
+fn what_was_chosen_to_look_alike_is_found_all_the_same() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 36);
+    let sample = |number| SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number },
+        class: ClassId(1),
+        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
+        vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
+    };
+    // The key that the second robot told last is known; it is not the one that it will compare under.
+    let before = swarm.minds[1].learning.as_ref().unwrap().digest();
+    let message = Message::Samples(Samples { space: space().id(), samples: vec![sample(1)] });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    swarm.input(1, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    let after = swarm.minds[1].learning.as_ref().unwrap().digest();
+    assert_ne!(before.key, after.key);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.sizes(0), [0, 0, 1]);
 }

@@ -92,3 +92,30 @@ fn rules_of_ones_own_choose_what_is_shared_and_what_goes() {
     }
     swarm.check();
 }
+
+#[test]
+fn what_waits_for_a_disk_that_fails_is_bounded() {
+    let swarm = &mut Swarm::new(1, config(1, 1.0), 19);
+    let mind = &mut swarm.minds[0];
+    let mut shared = 0;
+    for second in 1..300 {
+        // Nobody says what was remembered.
+        let now = Duration::from_secs(10 * second);
+        mind.handle(now, Input::Open);
+        let features = (0..8).map(|i| (second * i % 17) as f32 * 0.05).collect();
+        mind.handle(now, Input::Observed(Observation { features, quality: 1.0 }));
+        let round = mind.round().unwrap();
+        let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(1)) };
+        let told = Instructed { by: "ada".parse().unwrap(), at: second, instruction };
+        let out = mind.handle(now, Input::Instructed(told));
+        shared += out
+            .iter()
+            .filter(|out| matches!(out, Output::Broadcast(e) if kind(&e.message) == "samples"))
+            .count();
+        mind.handle(now + Duration::from_secs(8), Input::Tick);
+    }
+    assert_eq!(shared, 0, "nothing is sent that a kill would forget");
+    let set = mind.training_set().unwrap();
+    let [personal, sent] = [SetPart::Personal, SetPart::Shared].map(|part| set.total(part));
+    assert!(sent == 64 && personal > 50, "{personal} wait as personal, {sent} for the disk");
+}

@@ -1,0 +1,87 @@
+//! Whose samples have how much room in a full training set: no author's push out those of the others.
+
+use std::collections::BTreeSet;
+
+use gestalt_protocol::{MAX_ROBOTS, RobotId};
+
+use crate::sample::{HeldSample, HeldSamples, SetPart};
+
+/// However small the share of an author is, so many samples are no flood.
+const LEAST: usize = 5;
+
+/// The shares of a set's room, once it is known who is there. In a swarm of n robots and a set of T samples each other
+/// robot has max(5, ⌈1.25 · T/n⌉); all robots together that were never alive in this life, max(5, ⌈T/4⌉): whoever makes up
+/// names has that at most. Of a robot's own samples max(5, ⌈T/n⌉), but at most half of T, stay whatever others send. All
+/// that matters when the set is full, and not before.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Shares {
+    /// The other robots alive now.
+    alive: BTreeSet<RobotId>,
+    /// Those that were alive at any time in this life: at most [`MAX_ROBOTS`], and those alive now.
+    met: BTreeSet<RobotId>,
+}
+
+impl Shares {
+    /// These robots are alive now. Gives those that were not before.
+    pub fn meet(&mut self, me: RobotId, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        let new = alive.difference(&self.alive).copied().filter(|robot| *robot != me).collect();
+        self.alive.clone_from(alive);
+        self.alive.remove(&me);
+        self.met.extend(&self.alive);
+        if self.met.len() > MAX_ROBOTS {
+            self.met.clone_from(&self.alive);
+        }
+        new
+    }
+
+    pub fn is_alive(&self, robot: RobotId) -> bool {
+        self.alive.contains(&robot)
+    }
+
+    /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
+    /// above, the oldest of the class that it has most of.
+    pub fn above(&self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
+        let n = self.robots()?;
+        let each = LEAST.max((5 * capacity).div_ceil(4 * n));
+        let strangers = LEAST.max(capacity.div_ceil(4));
+        let of_strangers: usize =
+            samples.authors().filter(|(a, _)| !self.met.contains(a)).map(|(_, n)| n).sum();
+        let most = samples.authors().filter(|(a, _)| self.met.contains(a)).max_by_key(|(_, held)| *held);
+        let (author, excess) = most.map_or((None, 0), |(a, held)| (Some(a), held.saturating_sub(each)));
+        let excess_of_strangers = of_strangers.saturating_sub(strangers);
+        if excess == 0 && excess_of_strangers == 0 {
+            return None;
+        }
+        if excess_of_strangers >= excess {
+            oldest_of_most(samples, |robot| !self.met.contains(&robot))
+        } else {
+            oldest_of_most(samples, |robot| Some(robot) == author)
+        }
+    }
+
+    /// The sample to go in place of that one, if it is an own one and no more of them may go: the oldest of another robot,
+    /// of the same class if there is one.
+    pub fn in_place_of(&self, victim: &HeldSample, samples: &HeldSamples, capacity: usize) -> Option<u64> {
+        let n = self.robots().filter(|_| victim.part != SetPart::External)?;
+        let reserve = LEAST.max(capacity.div_ceil(n)).min(capacity / 2);
+        if samples.total(SetPart::Personal) + samples.total(SetPart::Shared) > reserve {
+            return None;
+        }
+        let external = |sample: &&HeldSample| sample.part == SetPart::External;
+        let alike = samples.part_keys(SetPart::External, victim.class).first().copied();
+        alike.or_else(|| samples.iter().find(external).map(|sample| sample.key))
+    }
+
+    /// How many robots there are; `None` for one that knows of no other.
+    fn robots(&self) -> Option<usize> {
+        (!self.alive.is_empty()).then(|| self.alive.len() + 1)
+    }
+}
+
+/// Of the samples of these authors, the oldest of the class that most of them are of.
+fn oldest_of_most(samples: &HeldSamples, of: impl Fn(RobotId) -> bool) -> Option<u64> {
+    let theirs = |key: &&u64| samples.get(**key).and_then(HeldSample::author).is_some_and(&of);
+    let of_class = |class| samples.part_keys(SetPart::External, class).iter().filter(theirs);
+    let most = samples.classes().max_by_key(|class| (of_class(*class).count(), std::cmp::Reverse(*class)))?;
+    of_class(most).next().copied()
+}
