@@ -4,8 +4,8 @@
 use gestalt_protocol::{
     Answer, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId, FusionRule,
     Gesture, Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message, Outcome, RobotId,
-    RoundId, SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word,
-    decode_json,
+    RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote,
+    Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -76,6 +76,16 @@ fn a_vote() {
 }
 
 #[test]
+fn a_signed_vote() {
+    let signature = Some(Signature::from_bytes([0xA5; 64]));
+    let signed = Envelope { signature, ..envelope(Message::Vote(vote())) };
+    // The vote, then the signature's 64 bytes.
+    let bytes = [signed.statement(), vec![0xA5; 64]].concat();
+    assert_eq!((signed.encode(), Envelope::decode(&bytes)), (bytes, Ok(signed.clone())));
+    assert_eq!(signed.statement(), envelope(Message::Vote(vote())).encode());
+}
+
+#[test]
 fn a_null_vote() {
     let null = Vote { evidence: vec![], looks: 0.0, ..vote() };
     travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000"));
@@ -104,10 +114,10 @@ fn what_a_robot_has() {
 fn what_a_robot_gives() {
     let held =
         HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote(), signature: None };
-    // The decision; its certificate: vocabulary, rule, probabilities, one vote as it was said, no others, n, q, time.
+    // The decision; its certificate: vocabulary, rule, probabilities, one vote as it was said, unsigned, no others, n, q, time.
     let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 03 02 e209";
-    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040";
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
+    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00";
     travels_as(
         Message::Give(Give { decision: Some(decision()), votes: vec![held] }),
         &format!("{HEAD} 02 {decided} {votes}").replace("\n", ""),
@@ -195,7 +205,7 @@ fn what_instructors_said() {
 
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0}}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
     let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"rank":{"decided":true,"robots":1,"looks":2.0,"confidence":0.75,"author":4},"guests":[9]}"#;

@@ -69,7 +69,7 @@ fn a_memory_of_another_robot_or_space_is_refused() {
 fn lessons(swarm: &mut Swarm, i: usize, lessons: Vec<Lesson>) {
     let stamp = Stamp { boot: 1, sequence: 1 };
     let message = Message::Lessons(gestalt_protocol::Lessons { lessons });
-    swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
 }
 
 fn forged(round: RoundId, who: &str, count: u64, word: Word) -> Lesson {
@@ -167,7 +167,15 @@ fn a_question_in_the_name_of_another_brings_no_flood_upon_it() {
         Message::Samples(Samples { space: space().id(), samples: (1..=1000).map(sample).collect() });
     let stamp = Stamp { boot: 1, sequence: 1 };
     for i in 0..3 {
-        swarm.input(i, Input::Received(Envelope { author: RobotId(9), stamp, message: message.clone() }));
+        swarm.input(
+            i,
+            Input::Received(Envelope {
+                author: RobotId(9),
+                stamp,
+                message: message.clone(),
+                signature: None,
+            }),
+        );
     }
     swarm.pass(Duration::from_secs(10));
     let ask = |swarm: &mut Swarm, author| {
@@ -177,7 +185,8 @@ fn a_question_in_the_name_of_another_brings_no_flood_upon_it() {
         let know = gestalt_protocol::Know { samples, lessons, digest, answer: true, nothing_for: None };
         for _ in 0..1000 {
             let message = Message::Know(know.clone());
-            let out = swarm.minds[0].handle(swarm.now, Input::Received(Envelope { author, stamp, message }));
+            let out = swarm.minds[0]
+                .handle(swarm.now, Input::Received(Envelope { author, stamp, message, signature: None }));
             let told = out.iter().filter(|output| matches!(output, Output::Tell(..)));
             swarm.told.entry("all").or_default().0 += told.count();
         }
@@ -206,7 +215,7 @@ fn what_was_chosen_to_look_alike_is_found_all_the_same() {
     let before = swarm.minds[1].learning.as_ref().unwrap().digest();
     let message = Message::Samples(Samples { space: space().id(), samples: vec![sample(1)] });
     let stamp = Stamp { boot: 1, sequence: 1 };
-    swarm.input(1, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    swarm.input(1, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
     let after = swarm.minds[1].learning.as_ref().unwrap().digest();
     assert_ne!(before.key, after.key);
     swarm.pass(Duration::from_secs(10));

@@ -68,7 +68,7 @@ fn what_is_left_in_scattered_places_is_all_given() {
     let samples = (0..600).map(|i| sample(1 + 3 * i)).collect();
     let message = Message::Samples(Samples { space: space().id(), samples });
     let stamp = Stamp { boot: 1, sequence: 1 };
-    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message }));
+    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
     swarm.pass(Duration::from_secs(20));
     assert_eq!((swarm.sizes(0), swarm.sizes(1)), ([0, 0, 600], [0, 0, 600]));
     swarm.check_rest();

@@ -103,7 +103,7 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
         (changed(&|d| d.certificate.vocabulary = VocabularyId(77)), Refusal::Vocabulary),
         (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Impossible),
         (changed(&|d| d.certificate.rule = FusionRule::Majority), Refusal::Unfounded),
-        (decision(1, Some(1), 3, 5), Refusal::Unfounded),
+        (decision(1, Some(1), 2, 5), Refusal::Unfounded),
         (changed(&|d| d.class = Some(ClassId(0))), Refusal::Unfounded),
         (changed(&|d| d.confidence = 0.999), Refusal::Unfounded),
         (changed(&|d| d.certificate.probabilities = vec![0.0, 1.0, 0.0]), Refusal::Unfounded),
