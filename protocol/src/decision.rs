@@ -8,8 +8,8 @@ use crate::bounded;
 use crate::fusion_rule::FusionRule;
 use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
-use crate::message::{HeldVote, Vote};
 use crate::signature::Signature;
+use crate::vote::{HeldVote, Vote};
 
 /// More looks than this of one robot make no decision fresher.
 const MAX_LOOKS: f32 = 16.0;

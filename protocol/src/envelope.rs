@@ -6,8 +6,9 @@ use crate::decision::{Certificate, Decision};
 use crate::decode::{DecodeError, encode_versioned, take_versioned};
 use crate::id::{ClassId, RobotId, Stamp};
 use crate::limits::MAX_MESSAGE;
-use crate::message::{HeldVote, Message, Vote};
+use crate::message::Message;
 use crate::signature::Signature;
+use crate::vote::{HeldVote, Vote};
 
 /// A message with its author's name and stamp on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

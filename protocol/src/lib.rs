@@ -28,6 +28,7 @@ mod message;
 mod sample;
 mod signature;
 mod status;
+mod vote;
 
 pub use decision::{Certificate, CountedVote, Decision, Holding, Rank};
 pub use decode::{DecodeError, decode_json};
@@ -43,9 +44,10 @@ pub use instruction::{Answer, Gesture, Instruction, Outcome};
 pub use key::{Keys, SwarmNameError, Topic};
 pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
-pub use message::{Give, Have, HeldVote, Message, Vote};
+pub use message::{Give, Have, Message};
 pub use sample::{
     Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
 pub use signature::Signature;
 pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
+pub use vote::{HeldVote, Vote};

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::bounded;
 use crate::decision::{Decision, Rank};
-use crate::id::{RobotId, RoundId, Stamp, VocabularyId};
-use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::id::{RobotId, RoundId, Stamp};
+use crate::limits::MAX_ROBOTS;
 use crate::sample::{Digest, Know, Lessons, Samples};
-use crate::signature::Signature;
+use crate::vote::{HeldVote, Vote};
 
 /// Everything a robot says to other robots. The variants' order is part of the wire format.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,22 +26,6 @@ pub enum Message {
     Lessons(Lessons),
 }
 
-/// One robot's evidence in one round: the whole sum so far, so that the latest replaces all earlier ones and
-/// loss, repetition and reordering cost freshness, never correctness.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Vote {
-    /// The round this is evidence for.
-    pub round: RoundId,
-    /// The list of gestures the components of `evidence` stand for.
-    pub vocabulary: VocabularyId,
-    /// Centred log-evidence per class (natural logarithm, sums to 0, clipped by the author's ±c); empty when
-    /// the author takes part but has seen nothing.
-    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
-    pub evidence: Vec<f32>,
-    /// The sum of the frames' weights behind the evidence: the number of independent looks, `0.0..`.
-    pub looks: f32,
-}
-
 /// What a robot holds of the newest round it knows, in short.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Have {
@@ -57,19 +41,6 @@ pub struct Have {
     /// Whether this is itself an answer to a [`Have`]; such a one is answered with a [`Give`] only, so that two
     /// robots never talk in circles.
     pub answer: bool,
-}
-
-/// A vote as its author stamped it, passed on by another robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HeldVote {
-    /// Who cast it.
-    pub robot: RobotId,
-    /// The author's stamp on it.
-    pub stamp: Stamp,
-    /// The vote itself.
-    pub vote: Vote,
-    /// The author's signature under the [`Envelope`](crate::Envelope) that it came in.
-    pub signature: Option<Signature>,
 }
 
 /// What a neighbour was found to lack.

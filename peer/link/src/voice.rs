@@ -6,7 +6,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{Answer, ClassId, Envelope, InstructorId, Keys, Message, RobotId, Topic};
 use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
@@ -38,8 +38,8 @@ pub(crate) struct Voice {
     last: Arc<Last>,
     /// What is still to be published on `robot/<me>/decision`, and when.
     unsaid: Option<(Announcement, Vec<RobotId>, Instant)>,
-    /// The round of the decision published last, and when.
-    said: Option<(u32, Instant)>,
+    /// The round and the gesture of what was said last, and when.
+    said: Option<(u32, Option<ClassId>, Instant)>,
 }
 
 impl Voice {
@@ -134,8 +134,8 @@ impl Voice {
     /// among each other would otherwise each say every step of it to all.
     pub fn hold(&mut self, announcement: Announcement, guests: Vec<RobotId>) {
         let round = announcement.decision.round.counter;
-        let before = self.said.filter(|(said, _)| *said == round);
-        let due = before.map_or_else(Instant::now, |(_, at)| at + HOLD_INTERVAL);
+        let before = self.said.filter(|(said, ..)| *said == round);
+        let due = before.map_or_else(Instant::now, |(.., at)| at + HOLD_INTERVAL);
         self.unsaid = Some((announcement, guests, due));
     }
 
@@ -147,9 +147,13 @@ impl Voice {
     /// Says which decision the robot holds, when it is due.
     pub fn publish_hold(&mut self) {
         if let Some((announcement, guests, _)) = self.unsaid.take_if(|(_, _, due)| Instant::now() >= *due) {
-            self.publish("robot_decision", &self.held, &announcement.decision.holding(guests));
+            let (round, class) = (announcement.decision.round.counter, announcement.decision.class);
+            // A greater decision for the same gesture is news to nobody.
+            if self.said.is_none_or(|(said, of, _)| (said, of) != (round, class)) {
+                self.publish("robot_decision", &self.held, &announcement.decision.holding(guests));
+            }
             self.last.set(as_json(&announcement), self.session.new_timestamp());
-            self.said = Some((announcement.decision.round.counter, Instant::now()));
+            self.said = Some((round, class, Instant::now()));
         }
     }
 

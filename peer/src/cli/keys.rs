@@ -15,9 +15,7 @@ const AUTHORITY_FILE: &str = "authority.key";
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt keys --swarm demo --robots 1,2,3 keys
-  gestalt peer --swarm demo --id 1 --cfg trust.keys=keys
-
-A robot needs roster.json and its own key. authority.key can enrol robots: keep it where no robot is.")]
+  gestalt keys --swarm demo --robots 4 keys")]
 pub struct Args {
     /// Name of the swarm
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
@@ -25,7 +23,8 @@ pub struct Args {
     /// Ids of the robots
     #[arg(long, value_delimiter = ',', required = true, value_name = "ID,…")]
     robots: Vec<u32>,
-    /// Folder to write to; keys that are there stay, and the roster names them as well
+    /// Folder to write to; keys that are there stay, and the roster names them as well. A robot needs roster.json and its own key;
+    /// authority.key can enrol robots: keep it where no robot is
     folder: PathBuf,
 }
 

@@ -17,10 +17,9 @@ use crate::proof;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt verify decision.json --roster keys/roster.json
-
-A decision is what robots publish on `gestalt/<swarm>/decision`, as it stands.")]
+  gestalt verify - --roster keys/roster.json --config robot.json5")]
 pub struct Args {
-    /// Decision, JSON; `-` for standard input
+    /// Decision, JSON, as robots publish it on `gestalt/<swarm>/decision`; `-` for standard input
     decision: PathBuf,
     /// Roster of the swarm, as `gestalt keys` writes it
     #[arg(long, value_name = "FILE")]

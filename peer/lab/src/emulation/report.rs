@@ -35,7 +35,7 @@ pub struct Report {
     pub unanimous: Proportion,
     /// Rounds at whose end two robots hold different classes.
     pub conflicts: u64,
-    /// Whether, at the end of the scenario, all robots that are up hold the same decision of the same round.
+    /// Whether, at the end of the scenario, all robots that are up hold the same gesture, or none, of the same round.
     pub agreed_at_the_end: bool,
     /// Milliseconds from the showing to the first robot that holds a class, per decided round.
     pub decided_ms: Mean,
@@ -95,7 +95,8 @@ impl Report {
                 votes.into_iter().map(|vote| vote.class == showing.shown)
             })
             .collect();
-        let mut held = network.up().map(|robot| &record.holds[robot]);
+        let holds = |robot: usize| record.holds[robot].as_ref().map(|held| (held.round, held.class));
+        let mut held = network.up().map(holds);
         let first = held.next();
         let total: Traffic = network.traffic.iter().copied().sum();
         let robots = network.size();

@@ -9,6 +9,7 @@ use gestalt_protocol::{
 };
 
 use super::rounds::{Effects, Rounds};
+use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
 use crate::proof::follows;
 use crate::refusal::Refusal;
@@ -23,13 +24,8 @@ const AHEAD_PER_SECOND: u64 = 2;
 /// Who lacks a decision that another holds asks for it after this long: most have the votes, and conclude it themselves.
 const ASK_AFTER: Duration = Duration::from_millis(100);
 
-/// A decision that is lacking here.
-#[derive(Clone, Debug)]
-pub(super) struct Wanted {
-    pub holder: RobotId,
-    pub holding: Holding,
-    pub due: Duration,
-}
+/// And this many times at most.
+const ASKED: u8 = 4;
 
 impl Rounds {
     pub(super) fn on_received(&mut self, envelope: Envelope, effects: &mut Effects<'_>) {
@@ -69,28 +65,33 @@ impl Rounds {
         });
         if greater && self.lacks(&holding) {
             let due = self.wanted.as_ref().map_or(self.now + ASK_AFTER, |wanted| wanted.due);
-            self.wanted = Some(Wanted { holder: robot, holding, due });
+            self.wanted = Some(Wanted { holder: robot, holding, due, asked: 0 });
         }
     }
 
-    /// Whether that is a decision of a newer round than this robot knows, or a greater one of the newest.
+    /// Whether that is a decision of a newer round than this robot knows, or a greater one of the newest, for another gesture. A greater one
+    /// for the same comes by repair.
     fn lacks(&self, holding: &Holding) -> bool {
         if holding.class.is_none() {
             return false;
         }
         match &self.round {
-            Some(round) if self.is_this_round(holding.round) => round.agreement.rank() < Some(holding.rank),
+            Some(round) if self.is_this_round(holding.round) => {
+                let held = round.agreement.held();
+                held.is_none_or(|held| held.class != holding.class && held.rank() < holding.rank)
+            }
             Some(round) => round.id < holding.round,
             None => true,
         }
     }
 
-    /// Asks for a decision that is lacking here, if it still is when its time has come.
+    /// Asks for a decision that is lacking here, if it still is when its time has come; and again, as a question may be lost.
     pub(super) fn ask_when_due(&mut self, effects: &mut Effects<'_>) {
-        if let Some(wanted) = self.wanted.take_if(|wanted| self.now >= wanted.due)
-            && self.lacks(&wanted.holding)
-        {
+        let Some(wanted) = self.wanted.take_if(|wanted| self.now >= wanted.due) else { return };
+        if self.lacks(&wanted.holding) {
             self.tell_have(wanted.holder, false, effects);
+            let (due, asked) = (self.now + self.config.repair_busy, wanted.asked + 1);
+            self.wanted = (asked < ASKED).then_some(Wanted { due, asked, ..wanted });
         }
     }
 

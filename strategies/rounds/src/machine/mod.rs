@@ -19,6 +19,7 @@ mod rounds;
 #[cfg(test)]
 mod tests;
 mod voting;
+mod wanted;
 
 pub use follow::Follow;
 pub use input::Input;

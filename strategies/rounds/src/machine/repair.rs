@@ -61,6 +61,9 @@ impl Rounds {
         let mut news = Give { decision: None, votes: Vec::new() };
         if let Some(decision) = give.decision {
             let missed = !self.is_this_round(decision.round);
+            let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
+            // A greater one for the gesture that is held anyway goes its way from turn to turn.
+            let says_more = missed || known != Some(decision.class);
             if decision.class.is_some()
                 && self.is_this_round(decision.round)
                 && let Some(round) = &mut self.round
@@ -71,7 +74,7 @@ impl Rounds {
                 if !self.is_open() && missed {
                     self.note_missed_announcement();
                 }
-                news.decision = Some(decision);
+                news.decision = Some(decision).filter(|_| says_more);
             }
         }
         for held in give.votes {

@@ -7,10 +7,10 @@ use std::time::Duration;
 use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Stamp};
 
 use super::follow::Follow;
-use super::hearing::Wanted;
 use super::input::Input;
 use super::output::Output;
 use super::partners::Partners;
+use super::wanted::Wanted;
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
 use crate::electorate::Electorate;

@@ -1,0 +1,37 @@
+//! What a robot says of what it sees.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bounded;
+use crate::id::{RobotId, RoundId, Stamp, VocabularyId};
+use crate::limits::MAX_CLASSES;
+use crate::signature::Signature;
+
+/// One robot's evidence in one round: the whole sum so far, so that the latest replaces all earlier ones and
+/// loss, repetition and reordering cost freshness, never correctness.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Vote {
+    /// The round this is evidence for.
+    pub round: RoundId,
+    /// The list of gestures the components of `evidence` stand for.
+    pub vocabulary: VocabularyId,
+    /// Centred log-evidence per class (natural logarithm, sums to 0, clipped by the author's ±c); empty when
+    /// the author takes part but has seen nothing.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
+    pub evidence: Vec<f32>,
+    /// The sum of the frames' weights behind the evidence: the number of independent looks, `0.0..`.
+    pub looks: f32,
+}
+
+/// A vote as its author stamped it, passed on by another robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldVote {
+    /// Who cast it.
+    pub robot: RobotId,
+    /// The author's stamp on it.
+    pub stamp: Stamp,
+    /// The vote itself.
+    pub vote: Vote,
+    /// The author's signature under the [`Envelope`](crate::Envelope) that it came in.
+    pub signature: Option<Signature>,
+}
