@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use gestalt_protocol::{FusionRule, RobotId};
-use gestalt_strategies::{MindConfig, Quorum, SetPart};
+use gestalt_strategies::{MindConfig, SetPart};
 
 use super::*;
 use crate::shape::NetworkShape;
@@ -112,8 +112,8 @@ fn within_three_seconds_of_calm_all_hold_the_last_decision() {
     };
     let calm_for = Duration::from_secs(3);
     let rounds = 11;
-    // Every part decides, so that no round lasts into the next.
-    let mind = MindConfig { quorum: Quorum::Evidence(1), ..MindConfig::default() };
+    // A round that a part of the swarm cannot decide is over before the next.
+    let mind = MindConfig { deadline: Duration::from_secs(2), ..MindConfig::default() };
     let scenario = Scenario {
         mind,
         interval: (churn.until + calm_for) / (rounds + 1),

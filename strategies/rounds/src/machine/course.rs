@@ -18,6 +18,11 @@ impl Rounds {
         if self.is_open() || self.now < self.refractory_until() {
             return;
         }
+        self.open_next(effects);
+    }
+
+    /// Opens a round under the next count; one that is open is over.
+    pub(super) fn open_next(&mut self, effects: &mut Effects<'_>) {
         match self.highest.map_or(Some(1), |highest| highest.checked_add(1)) {
             Some(counter) => self.join(RoundId { counter, opener: self.me, life: self.nonce }, effects),
             None => self.refusals.add(Refusal::CountersUsedUp),

@@ -126,7 +126,7 @@ impl Rounds {
 
     /// The same, of a round that robots are in; refuses one too far ahead. Rounds opened at the same time
     /// merge here, on the smaller name; of others with equal counters, the greater name is the newer, for all alike.
-    pub(super) fn place(&mut self, id: RoundId, effects: &mut Effects<'_>) -> Option<Ordering> {
+    fn place(&mut self, id: RoundId, this: bool, effects: &mut Effects<'_>) -> Option<Ordering> {
         let (first, began) = self.began;
         let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
         if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
@@ -138,12 +138,42 @@ impl Rounds {
             return None;
         }
         self.highest = self.highest.max(Some(id.counter));
-        let order = self.compare(id);
+        let order = match &self.round {
+            Some(round) if !this => id.cmp(&round.id),
+            _ => self.compare(id),
+        };
         if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
             effects.follower.merged(round.id, id);
             round.id = round.id.min(id);
         }
         Some(order)
+    }
+
+    /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
+    fn is_as_old(&self, decision: &Decision) -> bool {
+        let took = Duration::from_millis(decision.certificate.elapsed_ms.into());
+        self.round.as_ref().is_some_and(|round| {
+            round.id == decision.round
+                || self.now >= (round.since + took).saturating_sub(self.config.patience)
+        })
+    }
+
+    /// Whether this robot opened the round that is open, undecided, under a count which belongs to that earlier round: it did not
+    /// know of it.
+    fn is_displaced_by(&self, earlier: RoundId) -> bool {
+        self.round.as_ref().is_some_and(|round| {
+            let mine = round.id.opener == self.me && round.id.life == self.nonce;
+            mine && round.open && round.id.counter == earlier.counter && round.agreement.held().is_none()
+        })
+    }
+
+    /// Lets a robot that opened a round under a count which belongs to an earlier one know of that.
+    fn answer_displaced(&mut self, held: &HeldVote, effects: &mut Effects<'_>) {
+        let opened = held.vote.round.opener == held.robot && held.vote.evidence.is_empty();
+        let over = |round: &Round| !round.open && round.id.counter == held.vote.round.counter;
+        if opened && self.round.as_ref().is_some_and(over) {
+            self.tell_have(held.robot, false, effects);
+        }
     }
 
     /// Whether that is a newer round that would end the open one, in which others take part, before that had its time.
@@ -176,8 +206,13 @@ impl Rounds {
             self.refusals.add(Refusal::Vocabulary);
             return false;
         }
-        match self.place(vote.round, effects) {
-            None | Some(Ordering::Less) => return false,
+        let this = self.is_this_round(vote.round);
+        match self.place(vote.round, this, effects) {
+            None => return false,
+            Some(Ordering::Less) => {
+                self.answer_displaced(&held, effects);
+                return false;
+            }
             Some(Ordering::Greater) => self.join(vote.round, effects),
             Some(Ordering::Equal) => {}
         }
@@ -202,7 +237,7 @@ impl Rounds {
             self.refusals.add(Refusal::Impossible);
             return Heard::Refused;
         }
-        let this = self.is_this_round(decision.round);
+        let this = self.is_this_round(decision.round) && self.is_as_old(&decision);
         let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
         if held == Some(&decision) {
             return Heard::Known;
@@ -211,8 +246,14 @@ impl Rounds {
             self.refusals.add(refusal);
             return Heard::Refused;
         }
-        match self.place(decision.round, effects) {
+        let displaced = !this && self.is_displaced_by(decision.round);
+        match self.place(decision.round, this, effects) {
             None | Some(Ordering::Less) => return Heard::Refused,
+            // The gesture of a round of this robot's own is still shown.
+            Some(Ordering::Greater) if displaced => {
+                self.open_next(effects);
+                return Heard::Known;
+            }
             // What is decided elsewhere needs no looking.
             Some(Ordering::Greater) => self.enter(decision.round, false, effects),
             Some(Ordering::Equal) => {}

@@ -122,3 +122,36 @@ fn equal_counters_of_rounds_opened_at_other_times_are_two_rounds() {
     assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "the greater one is joined");
     assert!(mind.held().is_none(), "what was decided of the other is not decided of this");
 }
+
+#[test]
+fn a_round_under_a_count_that_was_used_elsewhere_is_opened_anew() {
+    // It was cut off while others had a first round, which they could not decide.
+    let mut late = mind(7);
+    let mut other = mind(9);
+    let lasted = |decision: Decision| {
+        let certificate = gestalt_protocol::Certificate { elapsed_ms: 5000, ..decision.certificate };
+        Decision { certificate, ..decision }
+    };
+    let counted = decision(1, Some(0), 1, 9).certificate.votes;
+    let undecided = lasted(decided(round(1, 9), None, counted, 9));
+    other.handle(ms(0), gives(8, undecided.clone()));
+    let opened = late.handle(ms(60_000), Input::Open);
+    let said = opened.iter().find_map(|output| match output {
+        Output::Broadcast(envelope) => Some(Input::Received(envelope.clone())),
+        _ => None,
+    });
+    let answer = other.handle(ms(60_001), said.expect("a null vote"));
+    let [(7, Message::Have(have))] = &told(&answer)[..] else { panic!("{answer:?}") };
+    let asked = late.handle(ms(60_002), says(9, 1, Message::Have(have.clone())));
+    let have = told(&asked).into_iter().find(|(to, message)| *to == 9 && matches!(message, Message::Have(_)));
+    let Some((9, Message::Have(have))) = have else { panic!("{asked:?}") };
+    let given = other.handle(ms(60_003), says(7, 9, Message::Have(have.clone())));
+    let [(7, Message::Give(give))] = &told(&given)[..] else { panic!("{given:?}") };
+    let out = late.handle(ms(60_004), says(9, 2, Message::Give(give.clone())));
+    assert_eq!((late.round(), late.is_open()), (Some(round(2, 7)), true), "{out:?}");
+    // A decision that came as fast as this round is old may be of it.
+    let mut merges = mind(7);
+    merges.handle(ms(60_000), Input::Open);
+    merges.handle(ms(60_100), gives(9, decision(1, Some(2), 3, 9)));
+    assert_eq!((merges.round(), merges.held().unwrap().class), (Some(round(1, 1)), Some(ClassId(2))));
+}
