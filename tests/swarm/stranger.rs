@@ -13,6 +13,7 @@ use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, agreed, config, start, unique};
 use gestalt_trust::{Identity, Membership, statement};
 use serde_json::Value;
+use zenoh::qos::CongestionControl;
 
 use crate::trouble::{attach, counted, invented};
 
@@ -50,7 +51,11 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     let liar = attach(&locators).await;
     let keys = Keys::new(&swarm).unwrap();
     let vocabulary = Fixed::default().vocabulary().id();
-    let put = async |topic: Topic, bytes: Vec<u8>| liar.put(keys.key(&topic), bytes).await.unwrap();
+    let put = async |topic: Topic, bytes: Vec<u8>| {
+        // All of it arrives.
+        let put = liar.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
+        put.await.unwrap();
+    };
     let vote = |counter: u32, robot: u32| {
         let round = RoundId { counter, opener: RobotId(0), life: 9 };
         let vote = Vote { round, vocabulary, evidence: vec![-1.0, 5.0, -1.0, -1.0, -1.0, -1.0], looks: 16.0 };

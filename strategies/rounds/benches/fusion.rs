@@ -1,6 +1,6 @@
 //! What it costs to fuse the votes of a hundred robots. `cargo bench -p gestalt-strategies --bench fusion`
 
-use gestalt_protocol::{FusionRule, RobotId, RoundId, Stamp, VocabularyId, Vote};
+use gestalt_protocol::{FusionRule, HeldVote, RobotId, RoundId, Stamp, VocabularyId, Vote};
 use gestalt_rounds::{Ballot, Scale};
 
 const SCALE: Scale = Scale { vocabulary: VocabularyId(1), classes: 6 };
@@ -15,7 +15,8 @@ fn ballot(robots: u32) -> Ballot {
         let evidence = (0..6).map(|class| ((robot * 7 + class * 13) as f32).sin() * 4.0).collect();
         let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
         let vote = Vote { round, vocabulary: SCALE.vocabulary, evidence, looks: 3.0 };
-        ballot.cast(RobotId(robot), Stamp { boot: 1, sequence: 1 }, vote);
+        let stamp = Stamp { boot: 1, sequence: 1 };
+        ballot.cast(HeldVote { robot: RobotId(robot), stamp, vote, signature: None });
     }
     ballot
 }

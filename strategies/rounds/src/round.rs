@@ -199,7 +199,7 @@ impl Round {
         let mut robots = view.expected.iter().chain([&view.me]);
         let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
         let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
-        if !late && !(suffice && heard_all) {
+        if !(late || suffice && heard_all) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
