@@ -57,6 +57,13 @@ impl Field {
 
     /// Waits until every robot knows all others to be alive.
     pub fn wait_for_all(&self, patience: Duration) {
+        if let Err(missing) = self.all_known(patience) {
+            panic!("{missing}");
+        }
+    }
+
+    /// The same, or who does not by then.
+    pub fn all_known(&self, patience: Duration) -> Result<(), String> {
         let others = self.robots.len() - 1;
         let deadline = Instant::now() + patience;
         for (node, robot) in self.robots.iter().enumerate() {
@@ -67,19 +74,22 @@ impl Field {
                 (known == others).then_some(())
             });
             let known = || robot.told().into_iter().rfind(|told| told["event"] == "alive");
-            assert!(complete.is_some(), "robot {node} does not know all: {:?}", known());
+            complete.ok_or_else(|| format!("robot {node} does not know all: {:?}", known()))?;
         }
+        Ok(())
     }
 
-    /// The decision of a round that robots hold, as soon as it is over for all of them and all hold the same, certificate and
-    /// all. Each is as the program prints it.
+    /// The decision of a round that robots hold, as soon as it is over for all of them and all hold the same gesture, or none. It is that
+    /// of the first, as the program prints it: a greater one for the same gesture goes its way from neighbour to neighbour.
     pub fn agreed(&self, round: u64, robots: &[usize], patience: Duration) -> Value {
         let deadline = Instant::now() + patience;
         loop {
             let held: Vec<Option<Value>> =
                 robots.iter().map(|i| self.robots[*i].decision(round, Duration::ZERO)).collect();
             if let Some(Some(decision)) = held.first()
-                && held.iter().all(|other| other.as_ref() == Some(decision))
+                && held
+                    .iter()
+                    .all(|other| other.as_ref().is_some_and(|other| other["class"] == decision["class"]))
             {
                 return decision.clone();
             }

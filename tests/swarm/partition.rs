@@ -29,7 +29,7 @@ pub fn the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal() {
     field.namespaces.heal((2, 3));
     let all: Vec<usize> = (0..6).collect();
     let agreed = field.agreed(1, &all, Duration::from_secs(30));
-    assert!(agreed == here || agreed == there, "one of the two wins, as it was: {agreed}");
+    assert!([&here["class"], &there["class"]].contains(&&agreed["class"]), "one of the two wins: {agreed}");
 }
 
 /// Four of nine robots are cut off from the others, while instructors on both sides go on; with `GESTALT_LONG` ten times for 60 s.
