@@ -59,13 +59,16 @@ impl Seal {
 
     /// Who signs for this robot.
     pub(crate) fn signer(&self) -> Arc<dyn Sign> {
-        Arc::new(Signer { identity: self.identity.clone(), swarm: self.roster.swarm_id() })
+        self.signer_with(&self.identity)
     }
 
     /// Who signs for a robot that votes through this one, if its key is here.
     pub(crate) fn signer_of(&self, guest: RobotId) -> Option<Arc<dyn Sign>> {
-        let identity = self.guests.get(&guest)?.clone();
-        Some(Arc::new(Signer { identity, swarm: self.roster.swarm_id() }))
+        Some(self.signer_with(self.guests.get(&guest)?))
+    }
+
+    fn signer_with(&self, identity: &Arc<Identity>) -> Arc<dyn Sign> {
+        Arc::new(Signer { identity: identity.clone(), swarm: self.roster.swarm_id() })
     }
 }
 

@@ -152,7 +152,7 @@ impl Voice {
             if self.said.is_none_or(|(said, of, _)| (said, of) != (round, class)) {
                 self.publish("robot_decision", &self.held, &announcement.decision.holding(guests));
             }
-            self.last.set(as_json(&announcement), self.session.new_timestamp());
+            self.last.set(announcement, self.session.new_timestamp());
             self.said = Some((round, class, Instant::now()));
         }
     }
@@ -169,19 +169,19 @@ fn as_json(said: &impl Serialize) -> String {
         .expect("what is said, with string keys and finite numbers, has a place in JSON")
 }
 
-/// The decision this robot holds, as the queryable on `decision` gives it.
+/// The decision this robot holds, for the queryable on `decision`: written when it is asked for.
 #[derive(Default)]
-struct Last(Mutex<Option<(String, Timestamp)>>);
+struct Last(Mutex<Option<(Announcement, Timestamp)>>);
 
 impl Last {
-    fn set(&self, json: String, at: Timestamp) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((json, at));
+    fn set(&self, announcement: Announcement, at: Timestamp) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((announcement, at));
     }
 
     fn on_query(&self, query: &Query) {
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((json, at)) = last {
-            let key = query.key_expr().clone();
+        if let Some((announcement, at)) = last {
+            let (key, json) = (query.key_expr().clone(), as_json(&announcement));
             // A client that has gone meanwhile is no error of this robot's.
             let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(Some(at)).wait();
         }

@@ -181,10 +181,7 @@ impl Door {
                     vocabulary: Some(self.model.classifier.vocabulary().clone()),
                     learning: None,
                     nonce: fresh_nonce(),
-                    seal: self.config.trust.seal(id).map_err(|error| LinkError::Config {
-                        key: "trust".to_owned(),
-                        cause: error.to_string(),
-                    })?,
+                    seal: self.config.trust.seal(id)?,
                 })
                 .await
             }
