@@ -43,7 +43,8 @@ fn config(id: u32, swarm: &str) -> Config {
 /// What was decided in one round: when each robot heard of it, and what each holds.
 #[derive(Default)]
 struct Heard {
-    opened: Option<Duration>,
+    /// When a robot first took part, and who opened it.
+    opened: Option<(Duration, RobotId)>,
     held: BTreeMap<u32, Option<ClassId>>,
 }
 
@@ -64,7 +65,8 @@ pub async fn gestures_start_rounds_and_all_robots_decide_them_alike() {
                 let mut rounds = rounds.lock().unwrap();
                 match event {
                     Event::Opened(round) => {
-                        rounds.entry(round.counter).or_default().opened.get_or_insert_with(clock);
+                        let round_heard = rounds.entry(round.counter).or_default();
+                        round_heard.opened.get_or_insert_with(|| (clock(), round.opener));
                     }
                     Event::Held(decision) => {
                         rounds.entry(decision.round.counter).or_default().held.insert(id, decision.class);
@@ -86,11 +88,11 @@ pub async fn gestures_start_rounds_and_all_robots_decide_them_alike() {
     let rounds = rounds.lock().unwrap();
     let mut right = 0;
     for (counter, heard) in rounds.iter() {
-        let opened = heard.opened.expect("a round that a robot takes part in");
+        let (opened, by) = heard.opened.expect("a round that a robot takes part in");
         let shown = human.last_shown(opened, &SCHEDULE);
         let (showing, into) = SCHEDULE.divide(opened);
         eprintln!(
-            "round {counter}: showing {} after {into:?}, shown {shown:?}, held {:?}",
+            "round {counter} by {by}: showing {} after {into:?}, shown {shown:?}, held {:?}",
             showing - first,
             heard.held
         );

@@ -94,7 +94,8 @@ pub struct MotionDetector {
     began: Option<Duration>,
     /// Whether a hand was said to be shown that has not left.
     shown: bool,
-    /// The share of the picture that differed from the empty scene when last compared; 0 before.
+    /// The share of the picture that somebody covers: what differed from the empty scene when last compared or, before that is
+    /// known, the most that the movement changed.
     covered: f64,
 }
 
@@ -146,7 +147,8 @@ impl MotionDetector {
             (false, true) => (FINE, self.config.area / 2.0),
         };
         reference.allow(reach)?;
-        let active = self.difference.share(&view, reference, self.config.noise)? > area;
+        let changed = self.difference.share(&view, reference, self.config.noise)?;
+        let active = changed > area;
         let reference = reference.at;
         self.difference.learn_noise(gap);
         let before = self.energy.before().filter(|before| active && !moving && before.at != reference);
@@ -158,6 +160,9 @@ impl MotionDetector {
             None => active,
         };
         self.energy.push(view, active, goes_on);
+        if active && self.background.picture().is_none() {
+            self.covered = if moving { self.covered.max(changed) } else { changed };
+        }
         match self.state {
             MotionState::Moving => self.while_moving(),
             MotionState::Still => self.while_still(),
