@@ -7,6 +7,7 @@ use crate::decode::{DecodeError, encode_versioned, take_versioned};
 use crate::id::{ClassId, RobotId, Stamp};
 use crate::limits::MAX_MESSAGE;
 use crate::message::Message;
+use crate::sample::HeldBatch;
 use crate::signature::Signature;
 use crate::vote::{HeldVote, Vote};
 
@@ -64,6 +65,14 @@ impl From<HeldVote> for Envelope {
     }
 }
 
+impl From<HeldBatch> for Envelope {
+    /// The batch as its author said it.
+    fn from(held: HeldBatch) -> Self {
+        let HeldBatch { robot, stamp, samples, signature } = held;
+        Self { author: robot, stamp, message: Message::Samples(samples), signature }
+    }
+}
+
 impl Message {
     fn check(&self) -> Result<(), DecodeError> {
         match self {
@@ -72,6 +81,7 @@ impl Message {
             Self::Samples(samples) => samples.check(),
             Self::Know(know) => know.check(),
             Self::Lessons(lessons) => lessons.check(),
+            Self::Batches(batches) => batches.batches.iter().try_for_each(HeldBatch::check),
             Self::Give(give) => {
                 give.decision.iter().try_for_each(Decision::check)?;
                 give.votes.iter().try_for_each(|held| held.vote.check())

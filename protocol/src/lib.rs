@@ -46,7 +46,8 @@ pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
 pub use message::{Give, Have, Message};
 pub use sample::{
-    Digest, Know, Known, Lessons, MAX_COMPONENTS, MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
+    Batches, Digest, HeldBatch, Know, Known, Lessons, MAX_BATCH_BYTES, MAX_BATCHES, MAX_COMPONENTS,
+    MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
 pub use signature::Signature;
 pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};

@@ -6,7 +6,7 @@ use crate::bounded;
 use crate::decision::{Decision, Rank};
 use crate::id::{RobotId, RoundId, Stamp};
 use crate::limits::MAX_ROBOTS;
-use crate::sample::{Digest, Know, Lessons, Samples};
+use crate::sample::{Batches, Digest, Know, Lessons, Samples};
 use crate::vote::{HeldVote, Vote};
 
 /// Everything a robot says to other robots. The variants' order is part of the wire format.
@@ -18,12 +18,14 @@ pub enum Message {
     Have(Have),
     /// To one neighbour: what it was found to lack.
     Give(Give),
-    /// To all from their author, or to one neighbour that lacks them: samples to learn from.
+    /// To all from their author: samples to learn from.
     Samples(Samples),
     /// To one neighbour: all samples and lessons that the author has, in short.
     Know(Know),
     /// To one neighbour: what instructors said and it has not heard.
     Lessons(Lessons),
+    /// To one neighbour that lacks them: samples as their authors shared them.
+    Batches(Batches),
 }
 
 /// What a robot holds of the newest round it knows, in short.

@@ -5,15 +5,22 @@ use serde::{Deserialize, Serialize};
 use crate::bounded;
 use crate::decode::DecodeError;
 use crate::fixed;
-use crate::id::{ClassId, FeatureSpaceId, RoundId, SampleId, SampleSeries};
+use crate::id::{ClassId, FeatureSpaceId, RobotId, RoundId, SampleId, SampleSeries, Stamp};
 use crate::lesson::{Lesson, MAX_LESSONS, Word};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::signature::Signature;
 
 /// The most components of a shared vector.
 pub const MAX_COMPONENTS: usize = 2048;
 
-/// The most samples in one message.
-pub const MAX_SAMPLES: usize = 4096;
+/// The most samples in one batch.
+pub const MAX_SAMPLES: usize = 64;
+
+/// The most bytes that the vectors of one batch take.
+pub const MAX_BATCH_BYTES: usize = 32 * 1024;
+
+/// The most batches in one message.
+pub const MAX_BATCHES: usize = 1024;
 
 /// The most intervals of sample numbers that are told of one series.
 pub const MAX_INTERVALS: usize = 256;
@@ -36,6 +43,16 @@ impl Vector {
         match self {
             Self::F32(values) => values.len(),
             Self::F16(bytes) => bytes.len() / 2,
+            Self::I8(values) => values.len(),
+        }
+    }
+
+    /// How many bytes its components take.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::F32(values) => 4 * values.len(),
+            Self::F16(bytes) => bytes.len(),
             Self::I8(values) => values.len(),
         }
     }
@@ -71,7 +88,8 @@ pub struct SharedSample {
     pub vector: Vector,
 }
 
-/// Samples of one feature space. To all from their author, or to one neighbour that lacks them from any.
+/// A batch of samples of one feature space and one series, by ascending numbers; at least one. It is its author's statement:
+/// whoever passes it on does so as a whole, so that the author's signature goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Samples {
     /// What the vectors' components mean.
@@ -82,7 +100,22 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// The name of the first of them, which names the batch.
+    #[must_use]
+    pub fn first(&self) -> Option<SampleId> {
+        self.samples.first().map(|sample| sample.id)
+    }
+
     pub(crate) fn check(&self) -> Result<(), DecodeError> {
+        let of_one_series = |pair: &[SharedSample]| {
+            pair[0].id.series() == pair[1].id.series() && pair[0].id.number < pair[1].id.number
+        };
+        if self.samples.is_empty() || !self.samples.windows(2).all(of_one_series) {
+            return Err(DecodeError::Impossible("a batch of no samples, of several series, or out of order"));
+        }
+        if self.samples.iter().map(|sample| sample.vector.bytes()).sum::<usize>() > MAX_BATCH_BYTES {
+            return Err(DecodeError::Impossible("a batch beyond the largest"));
+        }
         for sample in &self.samples {
             if sample.class.index() >= MAX_CLASSES {
                 return Err(DecodeError::Impossible("a class beyond the largest vocabulary"));
@@ -94,6 +127,41 @@ impl Samples {
         }
         Ok(())
     }
+}
+
+/// A batch of samples as its author stamped it, held and passed on by another robot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldBatch {
+    /// Who shared it: the author of all of them.
+    pub robot: RobotId,
+    /// The author's stamp on it.
+    pub stamp: Stamp,
+    /// The samples.
+    pub samples: Samples,
+    /// The author's signature under the [`Envelope`](crate::Envelope) that it came in.
+    pub signature: Option<Signature>,
+}
+
+impl HeldBatch {
+    /// Whether every value is one that a robot may say, and the samples are the author's.
+    ///
+    /// # Errors
+    /// [`DecodeError::Impossible`] names what is wrong.
+    pub fn check(&self) -> Result<(), DecodeError> {
+        self.samples.check()?;
+        match self.samples.first() {
+            Some(first) if first.author == self.robot => Ok(()),
+            _ => Err(DecodeError::Impossible("samples in another's name")),
+        }
+    }
+}
+
+/// To one neighbour: batches of which it lacks a sample.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Batches {
+    /// Each as its author said it.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_BATCHES>")]
+    pub batches: Vec<HeldBatch>,
 }
 
 /// What a robot knows, in two numbers: if what the reader knows gives the same under that key, there is nothing to tell each

@@ -1,10 +1,11 @@
 //! Reading is total and bounded: any bytes give a value or a typed error.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope, FeatureSpaceId, FusionRule,
-    Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES,
-    MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId,
-    SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope, FeatureSpaceId,
+    FusionRule, Give, Have, HeldBatch, HeldVote, Instruction, Know, Known, Lesson, Lessons, MAX_ALLOCATION,
+    MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, MAX_SAMPLES, Message, PROTOCOL_VERSION,
+    Rank, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
+    Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -120,6 +121,15 @@ fn message() -> impl Strategy<Value = Message> {
         samples().prop_map(Message::Samples),
         know().prop_map(Message::Know),
         prop::collection::vec(lesson(), 0..5).prop_map(|lessons| Message::Lessons(Lessons { lessons })),
+        prop::collection::vec((stamp(), samples()), 0..4).prop_map(|batches| {
+            let held = |(stamp, samples): (Stamp, Samples)| HeldBatch {
+                robot: samples.first().unwrap().author,
+                stamp,
+                samples,
+                signature: None,
+            };
+            Message::Batches(Batches { batches: batches.into_iter().map(held).collect() })
+        }),
     ]
 }
 
@@ -130,16 +140,17 @@ fn samples() -> impl Strategy<Value = Samples> {
             .prop_map(|halves| Vector::F16(halves.into_iter().flat_map(|(low, high)| [low, high]).collect())),
         prop::collection::vec(any::<i8>(), 1..40).prop_map(Vector::I8),
     ];
-    let sample = ((any::<u32>(), any::<u32>(), 1..u32::MAX), 0..MAX_CLASSES as u8, round(), vector).prop_map(
-        |((author, life, number), class, round, vector)| SharedSample {
+    let sample = (0..MAX_CLASSES as u8, round(), vector);
+    let samples = prop::collection::btree_map(1..u32::MAX, sample, 1..5);
+    (any::<u64>(), any::<(u32, u32)>(), samples).prop_map(|(space, (author, life), samples)| {
+        let sample = |(number, (class, round, vector))| SharedSample {
             id: SampleId { author: RobotId(author), life, number },
             class: ClassId(class),
             round,
             vector,
-        },
-    );
-    (any::<u64>(), prop::collection::vec(sample, 0..5))
-        .prop_map(|(space, samples)| Samples { space: FeatureSpaceId(space), samples })
+        };
+        Samples { space: FeatureSpaceId(space), samples: samples.into_iter().map(sample).collect() }
+    })
 }
 
 fn know() -> impl Strategy<Value = Know> {
@@ -334,6 +345,43 @@ fn a_sample_says_only_what_a_robot_can_have_seen() {
     ] {
         assert!(matches!(of(wrong.clone()), Err(DecodeError::Impossible(_))), "{wrong:?}");
     }
+}
+
+#[test]
+fn a_batch_is_of_one_author_in_order_and_bounded() {
+    let sample = |author, life, number| SharedSample {
+        id: SampleId { author: RobotId(author), life, number },
+        class: ClassId(0),
+        round: RoundId { counter: 1, opener: RobotId(1), life: 0 },
+        vector: Vector::I8(vec![0; 4]),
+    };
+    let of = |samples: Vec<SharedSample>| Samples { space: FeatureSpaceId(1), samples };
+    let by = |robot, samples: Vec<SharedSample>| {
+        let held = HeldBatch {
+            robot: RobotId(robot),
+            stamp: Stamp::default(),
+            samples: of(samples),
+            signature: None,
+        };
+        read(Message::Batches(Batches { batches: vec![held] })).map(|_| ())
+    };
+    assert_eq!(by(1, vec![sample(1, 5, 1), sample(1, 5, 3)]), Ok(()));
+    assert_eq!(by(1, (1..=MAX_SAMPLES as u32).map(|number| sample(1, 5, number)).collect()), Ok(()));
+    for wrong in [
+        vec![],
+        vec![sample(2, 5, 1)],
+        vec![sample(1, 5, 1), sample(2, 5, 2)],
+        vec![sample(1, 5, 1), sample(1, 6, 2)],
+        vec![sample(1, 5, 2), sample(1, 5, 1)],
+        vec![sample(1, 5, 2), sample(1, 5, 2)],
+        (1..6)
+            .map(|n| SharedSample { vector: Vector::F32(vec![0.0; MAX_COMPONENTS]), ..sample(1, 5, n) })
+            .collect(),
+    ] {
+        assert!(matches!(by(1, wrong.clone()), Err(DecodeError::Impossible(_))), "{wrong:?}");
+    }
+    let many = (1..=MAX_SAMPLES as u32 + 1).map(|number| sample(1, 5, number)).collect();
+    assert!(matches!(by(1, many), Err(DecodeError::Malformed(_))));
 }
 
 #[test]

@@ -2,10 +2,10 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Answer, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId, FusionRule,
-    Gesture, Give, Have, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message, Outcome, RobotId,
-    RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote,
-    Word, decode_json,
+    Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId,
+    FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message,
+    Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector,
+    VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -138,13 +138,20 @@ fn shared_samples() {
         Vector::I8(vec![127, -128]),
     ];
     // the space (8 bytes); each sample: author, its life (4 bytes), number, class, round, kind of vector, length, components
+    let numbered = |(number, vector)| {
+        let sample = sample(vector);
+        SharedSample { id: SampleId { number, ..sample.id }, ..sample }
+    };
+    let samples = Samples { space, samples: (200..).zip(samples).map(numbered).collect() };
+    let batch = "0201000000000000 03 07b2000000c80103ac0202a101 00 02 0000c03f0000c0bf 07b2000000c90103ac0202a101 01 04 003e00be \
+                 07b2000000ca0103ac0202a101 02 02 7f80";
+    travels_as(Message::Samples(samples.clone()), &format!("{HEAD} 03 {batch}"));
+    // One batch: robot, boot, sequence, the batch as it was said, unsigned.
+    let held =
+        HeldBatch { robot: RobotId(7), stamp: Stamp { boot: 2, sequence: 5 }, samples, signature: None };
     travels_as(
-        Message::Samples(Samples { space, samples: samples.map(sample).to_vec() }),
-        &format!(
-            "{HEAD} 03 0201000000000000 03 07b2000000c80103ac0202a101 00 02 0000c03f0000c0bf 07b2000000c80103ac0202a101 01 04 003e00be \
-             07b2000000c80103ac0202a101 02 02 7f80"
-        )
-        .replace("\n", ""),
+        Message::Batches(Batches { batches: vec![held] }),
+        &format!("{HEAD} 06 01 07 02 05 {batch} 00"),
     );
 }
 

@@ -19,9 +19,7 @@ use rand::Rng;
 pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
-use crate::sample::{
-    HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart, ToldAs,
-};
+use crate::sample::{HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart};
 use crate::selection::Selection;
 use crate::shares::Shares;
 
@@ -306,11 +304,6 @@ impl TrainingSet {
         self.add(self.part_of(id), Some(id), class, round, vector, rng)
     }
 
-    /// Notes how the author of a sample shared it.
-    pub fn note_told(&mut self, id: SampleId, told: ToldAs) {
-        self.samples.note_told(id, told);
-    }
-
     /// Gives all samples of a round another class, whatever part they are in.
     pub fn relabel(&mut self, round: RoundId, class: ClassId) -> Vec<SetChange> {
         let wrong = self.of_round(round).filter(|sample| sample.class != class);
@@ -405,7 +398,7 @@ impl TrainingSet {
     ) -> Vec<SetChange> {
         let key = self.next_key;
         self.next_key += 1;
-        let sample = HeldSample { key, part, id, class, round, vector, told: None };
+        let sample = HeldSample { key, part, id, class, round, vector };
         self.selection.inserted(&sample);
         self.forgetting.inserted(&sample);
         self.samples.insert(sample);

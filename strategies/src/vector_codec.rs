@@ -65,31 +65,17 @@ impl Precision {
     #[must_use]
     pub fn encode(self, coordinates: &[f32], space: &FeatureSpace) -> Vector {
         let within: Vec<f32> = within(coordinates, space).collect();
-        self.encode_again(&within, space)
-    }
-
-    /// Coordinates that [`decode_vector`] gave of a vector of this precision, as they came.
-    pub(crate) fn encode_again(self, coordinates: &[f32], space: &FeatureSpace) -> Vector {
         match self {
-            Self::F32 => Vector::F32(coordinates.to_vec()),
+            Self::F32 => Vector::F32(within),
             Self::F16 => {
                 // Past the largest half would be infinite.
                 let half = |x: &f32| f16::from_f32(x.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()));
-                Vector::F16(coordinates.iter().flat_map(|x| half(x).to_le_bytes()).collect())
+                Vector::F16(within.iter().flat_map(|x| half(x).to_le_bytes()).collect())
             }
             Self::I8 => {
-                let steps = coordinates.iter().zip(space.spread());
+                let steps = within.iter().zip(space.spread());
                 Vector::I8(steps.map(|(x, spread)| quantised(*x, *spread)).collect())
             }
-        }
-    }
-
-    /// The one that a vector travels in.
-    pub(crate) fn of(vector: &Vector) -> Self {
-        match vector {
-            Vector::F32(_) => Self::F32,
-            Vector::F16(_) => Self::F16,
-            Vector::I8(_) => Self::I8,
         }
     }
 
@@ -185,19 +171,6 @@ mod tests {
                 }
                 // What was received and is sent again stays what it is.
                 prop_assert_eq!(precision.encode(&back, &space), vector);
-            }
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn what_is_passed_on_is_what_came(steps in prop::collection::vec(any::<i8>(), 3), halves in prop::collection::vec(any::<u16>(), 3), exact in prop::collection::vec(-3.0f32..3.0, 3)) {
-            let space = space();
-            let halves = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
-            for vector in [Vector::I8(steps), Vector::F16(halves), Vector::F32(exact)] {
-                if let Ok(coordinates) = decode_vector(&vector, &space) {
-                    prop_assert_eq!(Precision::of(&vector).encode_again(&coordinates, &space), vector);
-                }
             }
         }
     }

@@ -365,7 +365,6 @@ fn a_stored_set_that_contradicts_itself_is_refused() {
         class: ClassId(0),
         round: round(1),
         vector: vec![1.0].into(),
-        told: None,
     };
     let seen = |intervals: &[(u32, u32)]| {
         let (own, other) = (id(0, 1).series(), id(4, 1).series());

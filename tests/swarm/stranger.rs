@@ -3,14 +3,16 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::AtomicU8;
 use std::time::Duration;
 
-use gestalt_link::{RobotConfig, Seal};
+use gestalt_link::{Client, LinkConfig, RobotConfig, Seal};
 use gestalt_protocol::{
-    ClassId, Envelope, Give, Have, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote,
+    Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Instruction, Keys, Lesson, Lessons,
+    Message, Outcome, RobotId, RoundId, Stamp, Topic, Vote, Word,
 };
 use gestalt_strategies::Classify;
-use gestalt_tests::{Fixed, agreed, config, start, unique};
+use gestalt_tests::{Fixed, Watched, agreed, config, learning, short_rounds, start, start_learning, unique};
 use gestalt_trust::{Identity, Membership, statement};
 use serde_json::Value;
 use zenoh::qos::CongestionControl;
@@ -116,6 +118,103 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     assert_eq!((second.round.counter, second.round.life), (2, first.round.life), "{second:?}");
     assert_eq!((second.class, second.certificate.robots), (Some(ClassId(4)), 3), "{second:?}");
     liar.close().await.unwrap();
+    for robot in robots {
+        robot.stop().await;
+    }
+}
+
+pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_said_it() {
+    let swarm = unique("sealed-school");
+    let robots = (0..4).map(|id| (RobotId(id), key(id).public_key())).collect();
+    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let shown = Arc::new(AtomicU8::new(3));
+    let pupil = |id, connect: &[String]| {
+        let learning = Some(learning(2, 1.0, None));
+        start_learning(
+            RobotConfig { mind: short_rounds(), learning, ..sealed(id, &members, connect) },
+            shown.clone(),
+        )
+    };
+    let mut robots = vec![pupil(0, &[]).await];
+    let locators = robots[0].robot.locators().to_vec();
+    robots.push(pupil(1, &locators).await);
+    robots.push(pupil(2, &locators).await);
+    for robot in &robots {
+        assert!(robot.sees_alive(2, PATIENCE).await);
+    }
+    let keys = Keys::new(&swarm).unwrap();
+    let liar = attach(&locators).await;
+    let heard = liar.declare_subscriber(keys.key(&Topic::Sample(RobotId(1)))).await.unwrap();
+    let link = LinkConfig { connect: locators.clone(), ..LinkConfig::default() };
+    let client = Client::open(&swarm, &link).await.unwrap();
+    let ada = "ada".parse().unwrap();
+    client.instruct(&ada, &Instruction::Open).await.unwrap();
+    let round = agreed(&mut robots, 1, PATIENCE).await.round;
+    let was = Instruction::Was { round, class: Gesture::Class(ClassId(3)) };
+    assert_eq!(
+        client.teach(&ada, &was, PATIENCE).await.unwrap().expect("an answer").outcome,
+        Outcome::Learned
+    );
+    // Two samples of each.
+    let knows = async |robot: &Watched, samples: [usize; 2]| {
+        let deadline = tokio::time::Instant::now() + PATIENCE;
+        loop {
+            let learned = robot.robot.status().learning.expect("it learns");
+            let held = [&learned.shared, &learned.external].map(|of| (of.iter().sum(), of[3]));
+            if held == samples.map(|all: usize| (all, all)) {
+                return learned.common;
+            }
+            assert!(tokio::time::Instant::now() < deadline, "{samples:?}, and they are threes: {learned:?}");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let common = knows(&robots[0], [2, 4]).await;
+    let true_batch =
+        tokio::time::timeout(PATIENCE, heard.recv_async()).await.expect("robot 1 shares").unwrap();
+    let true_batch = Envelope::decode(&true_batch.payload().to_bytes()).unwrap();
+    let Message::Samples(samples) = true_batch.message.clone() else { panic!("{true_batch:?}") };
+
+    let put = async |topic: Topic, envelope: Envelope| {
+        let put = liar.put(keys.key(&topic), envelope.encode()).congestion_control(CongestionControl::Block);
+        put.await.unwrap();
+    };
+    let of_another_class = |by: u32| {
+        let mut samples = samples.clone();
+        samples.samples.iter_mut().for_each(|sample| {
+            sample.class = ClassId(5);
+            sample.id.number += by;
+        });
+        samples
+    };
+    let stamp = Stamp { boot: u32::MAX, sequence: 1 };
+    let said = |message| Envelope { author: RobotId(1), stamp, message, signature: None };
+    let give = |samples, signature| {
+        let held = HeldBatch { robot: RobotId(1), stamp: true_batch.stamp, samples, signature };
+        said(Message::Batches(Batches { batches: vec![held] }))
+    };
+    // The next ones in its name, its own under another label, and what nobody said.
+    put(Topic::Sample(RobotId(1)), said(Message::Samples(of_another_class(100)))).await;
+    put(Topic::Repair(RobotId(0)), give(of_another_class(200), None)).await;
+    put(Topic::Repair(RobotId(0)), give(of_another_class(0), true_batch.signature)).await;
+    let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word };
+    let lessons = vec![word(2, Word::Was(ClassId(5))), word(3, Word::Retracted)];
+    put(Topic::Repair(RobotId(0)), said(Message::Lessons(Lessons { lessons }))).await;
+    // What is true is true whoever says it, and nothing new.
+    put(Topic::Repair(RobotId(0)), give(samples.clone(), true_batch.signature)).await;
+    for (counter, least) in
+        [("refused_sample_unsigned", 1), ("refused_repair_unsigned", 2), ("refused_repair_forged", 1)]
+    {
+        counted(&robots[0], counter, least).await;
+    }
+    assert_eq!(knows(&robots[0], [2, 4]).await, common);
+
+    // Robot 1 is gone; who comes late has its samples from others, under its signature.
+    robots.remove(1).stop().await;
+    let late = pupil(3, &locators).await;
+    assert_eq!(knows(&late, [0, 6]).await, common);
+    client.close().await;
+    liar.close().await.unwrap();
+    late.stop().await;
     for robot in robots {
         robot.stop().await;
     }

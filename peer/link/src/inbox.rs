@@ -191,7 +191,9 @@ impl Inbox {
         match &envelope.message {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
             Message::Samples(_) if id == self.me => Ok(()),
-            Message::Samples(samples) if samples.samples.iter().all(|sample| sample.id.author == id) => {
+            // All samples of a batch are of one author.
+            Message::Samples(samples) if samples.first().is_some_and(|first| first.author == id) => {
+                self.gate.as_ref().map_or(Ok(()), |gate| gate.envelope(&envelope))?;
                 self.queue(Input::Received(envelope))
             }
             Message::Samples(_) => Err(Refusal::Author),
@@ -204,13 +206,18 @@ impl Inbox {
         if envelope.author == self.me {
             return Err(Refusal::Twin);
         }
-        if matches!(envelope.message, Message::Vote(_)) {
+        if matches!(envelope.message, Message::Vote(_) | Message::Samples(_)) {
             return Err(Refusal::Kind);
         }
-        if let (Message::Give(give), Some(gate)) = (&mut envelope.message, &self.gate)
-            && let Some(distrust) = gate.give(give)
-        {
-            // The rest of it may be true: who passes on what it was told is no liar.
+        if let (Message::Lessons(_), Some(gate)) = (&envelope.message, &self.gate) {
+            gate.envelope(&envelope)?;
+        }
+        let distrust = self.gate.as_ref().and_then(|gate| match &mut envelope.message {
+            Message::Give(give) => gate.give(give),
+            Message::Batches(batches) => gate.batches(batches),
+            _ => None,
+        });
+        if let Some(distrust) = distrust {
             let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
             self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
         }

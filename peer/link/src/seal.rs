@@ -1,16 +1,17 @@
 //! A sealed swarm: its robots sign their votes, and believe those of each other alone.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroU32;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Decision, Envelope, Give, HeldVote, RobotId, Signature};
+use gestalt_protocol::{Batches, Decision, Envelope, Give, HeldVote, Message, RobotId, Signature};
 use gestalt_strategies::Sign;
 use gestalt_trust::{Budget, Distrust, Identity, Roster, SwarmId, Verifier, statement};
 use thiserror::Error;
 
-/// What makes a robot one of a sealed swarm. Votes are signed, so decisions are as well, which are made of them; samples and the words
-/// of instructors are not.
+/// What makes a robot one of a sealed swarm. Its robots sign their votes, and so the decisions that are made of them; their samples, under
+/// which their signature stays whoever passes them on; and what they pass on of instructors, who have no keys.
 #[derive(Clone, Debug)]
 pub struct Seal {
     /// The robot's own key.
@@ -84,21 +85,35 @@ impl Sign for Signer {
     }
 }
 
+/// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows, and a swarm that lies costs it
+/// no more than a part of a core.
+const OF_SAMPLES: Budget = {
+    const fn number(of: u32) -> NonZeroU32 {
+        NonZeroU32::new(of).expect("not zero")
+    }
+    Budget { burst: number(512), per_second: number(64) }
+};
+
 /// Lets in what members of the swarm signed.
 #[derive(Debug)]
 pub(crate) struct Gate {
+    /// For votes and lessons, and for samples: neither keeps the other waiting.
     verifier: Mutex<Verifier>,
+    of_samples: Mutex<Verifier>,
     started: Instant,
 }
 
 impl Gate {
     pub fn new(seal: &Seal, started: Instant) -> Self {
-        Self { verifier: Mutex::new(Verifier::new(seal.roster.clone(), Budget::default())), started }
+        let verifier = |budget| Mutex::new(Verifier::new(seal.roster.clone(), budget));
+        Self { verifier: verifier(Budget::default()), of_samples: verifier(OF_SAMPLES), started }
     }
 
     /// Whether the author said that.
     pub fn envelope(&self, envelope: &Envelope) -> Result<(), Distrust> {
-        let mut verifier = self.verifier.lock().unwrap_or_else(PoisonError::into_inner);
+        let samples = matches!(envelope.message, Message::Samples(_));
+        let verifier = if samples { &self.of_samples } else { &self.verifier };
+        let mut verifier = verifier.lock().unwrap_or_else(PoisonError::into_inner);
         verifier.check(self.started.elapsed(), &envelope.statement(), envelope.signature.as_ref())
     }
 
@@ -109,20 +124,31 @@ impl Gate {
         votes.chain(certificate.others.iter().cloned()).try_for_each(|held| self.held(held))
     }
 
-    /// What of a gift was really said, and why the rest is not believed.
+    /// What of a gift was really said, and why the rest is not believed. The rest of it may be true: who passes on what it was
+    /// told is no liar.
     pub fn give(&self, give: &mut Give) -> Option<Distrust> {
+        let mut refused = self.retain(&mut give.votes);
+        if let Some(Err(distrust)) = give.decision.as_ref().map(|decision| self.decision(decision)) {
+            give.decision = None;
+            refused = Some(distrust);
+        }
+        refused
+    }
+
+    /// Which samples their authors shared, and why the others are not believed.
+    pub fn batches(&self, batches: &mut Batches) -> Option<Distrust> {
+        self.retain(&mut batches.batches)
+    }
+
+    fn retain<T: Clone + Into<Envelope>>(&self, held: &mut Vec<T>) -> Option<Distrust> {
         let mut refused = None;
-        give.votes.retain(|held| match self.held(held.clone()) {
+        held.retain(|held| match self.envelope(&held.clone().into()) {
             Ok(()) => true,
             Err(distrust) => {
                 refused = Some(distrust);
                 false
             }
         });
-        if let Some(Err(distrust)) = give.decision.as_ref().map(|decision| self.decision(decision)) {
-            give.decision = None;
-            refused = Some(distrust);
-        }
         refused
     }
 

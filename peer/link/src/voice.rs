@@ -105,7 +105,11 @@ impl Voice {
     pub fn tell(&self, neighbour: RobotId, envelope: &Envelope) {
         let kind = match &envelope.message {
             Message::Have(_) | Message::Know(_) => "have",
-            Message::Vote(_) | Message::Give(_) | Message::Samples(_) | Message::Lessons(_) => "give",
+            Message::Vote(_)
+            | Message::Give(_)
+            | Message::Samples(_)
+            | Message::Batches(_)
+            | Message::Lessons(_) => "give",
         };
         let key = self.keys.key(&Topic::Repair(neighbour));
         self.outbox.send(Parcel { kind, key, bytes: envelope.encode(), express: true });

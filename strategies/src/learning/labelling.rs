@@ -35,8 +35,7 @@ impl Learning {
             verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
                 for change in names.iter().flat_map(|name| self.set.retract(*name)).collect::<Vec<_>>() {
                     if let SetChange::Removed(sample) = &change {
-                        let HeldSample { part, id, round, vector, .. } = sample.clone();
-                        let shared = id.map(|id| (id, self.told_as(sample)));
+                        let HeldSample { part, id: shared, round, vector, .. } = sample.clone();
                         self.put_aside(UnresolvedSample { part, shared, round, vector, guess: None });
                     }
                     self.absorb(vec![change]);
@@ -69,9 +68,8 @@ impl Learning {
         let UnresolvedSample { shared, round, vector, .. } = aside;
         match shared {
             None => self.keep(round, class, vector.to_vec()),
-            Some((id, told)) => {
+            Some(id) => {
                 let changes = self.set.take_back(id, class, round, vector, &mut *self.rng);
-                self.set.note_told(id, told);
                 self.absorb(changes);
             }
         }
@@ -88,6 +86,7 @@ impl Learning {
     /// Notes that a sample is aside no longer.
     fn note_not_aside(&mut self, number: u64, aside: &UnresolvedSample) {
         self.dirty.insert(Item::Aside(number));
+        self.note_gone(aside.shared);
         if aside.guess.is_some() {
             self.training.push(TrainingChange::Remove(unresolved::training_key(number)));
         }

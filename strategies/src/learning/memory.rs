@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, FeatureSpaceId, InstructorId, Lesson, RobotId, RoundId, SampleId, SampleSeries, VocabularyId,
-    Word,
+    ClassId, Envelope, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, RobotId, RoundId, SampleId,
+    SampleSeries, VocabularyId, Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
 use super::unresolved::UnresolvedSample;
-use crate::sample::{HeldSample, SeenSamples, SetPart, ToldAs};
+use crate::sample::{HeldSample, SeenSamples, SetPart};
 
 /// One change of a robot's memory.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,6 +92,8 @@ pub(super) enum Item {
     Seen(SampleSeries),
     Lessons(RoundId),
     Aside(u64),
+    /// The batch that begins with that sample.
+    Batch(SampleId),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -101,13 +103,12 @@ struct StoredSample {
     class: ClassId,
     round: RoundId,
     vector: Vec<f32>,
-    told: Option<ToldAs>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct StoredAside {
     part: u8,
-    shared: Option<(SampleId, ToldAs)>,
+    shared: Option<SampleId>,
     round: RoundId,
     vector: Vec<f32>,
     guess: Option<ClassId>,
@@ -131,12 +132,20 @@ impl Item {
                 [&[4][..], parts.as_flattened()].concat()
             }
             Self::Aside(number) => [&[5][..], &number.to_be_bytes()].concat(),
+            Self::Batch(SampleId { author, life, number }) => {
+                [&[6][..], [author.0, life, number].map(u32::to_be_bytes).as_flattened()].concat()
+            }
         }
     }
 
     fn read(key: &[u8]) -> Option<Self> {
         let (kind, number) = key.split_first()?;
         let word = |bytes: &[u8]| Some(u32::from_be_bytes(bytes.try_into().ok()?));
+        let three = |bytes: &[u8]| {
+            let (first, rest) = bytes.split_at_checked(4)?;
+            let (second, third) = rest.split_at_checked(4)?;
+            Some([word(first)?, word(second)?, word(third)?])
+        };
         let long = |bytes: &[u8]| Some(u64::from_be_bytes(bytes.try_into().ok()?));
         match kind {
             0 if number.is_empty() => Some(Self::Owner),
@@ -147,13 +156,14 @@ impl Item {
                 Some(Self::Seen(SampleSeries { author: RobotId(word(author)?), life: word(life)? }))
             }
             4 => {
-                let (counter, rest) = number.split_at_checked(4)?;
-                let (opener, life) = rest.split_at_checked(4)?;
-                let round =
-                    RoundId { counter: word(counter)?, opener: RobotId(word(opener)?), life: word(life)? };
-                Some(Self::Lessons(round))
+                let [counter, opener, life] = three(number)?;
+                Some(Self::Lessons(RoundId { counter, opener: RobotId(opener), life }))
             }
             5 => long(number).map(Self::Aside),
+            6 => {
+                let [author, life, number] = three(number)?;
+                Some(Self::Batch(SampleId { author: RobotId(author), life, number }))
+            }
             _ => None,
         }
     }
@@ -164,14 +174,13 @@ pub(super) fn encode<T: Serialize>(value: &T) -> Vec<u8> {
 }
 
 pub(super) fn encode_sample(sample: &HeldSample) -> Vec<u8> {
-    let HeldSample { part, id, class, round, vector, told, .. } = sample;
+    let HeldSample { part, id, class, round, vector, .. } = sample;
     encode(&StoredSample {
         part: part_number(*part),
         id: *id,
         class: *class,
         round: *round,
         vector: vector.to_vec(),
-        told: *told,
     })
 }
 
@@ -213,6 +222,7 @@ pub struct RobotMemory {
     pub(crate) seen: SeenSamples,
     pub(super) lessons: Vec<Lesson>,
     pub(super) aside: Vec<(u64, UnresolvedSample)>,
+    pub(super) batches: Vec<HeldBatch>,
 }
 
 impl RobotMemory {
@@ -234,10 +244,10 @@ impl RobotMemory {
                 }
                 Item::Counters => memory.counters = decode(value)?,
                 Item::Sample(key) => {
-                    let StoredSample { part, id, class, round, vector, told } = decode(value)?;
+                    let StoredSample { part, id, class, round, vector } = decode(value)?;
                     let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
                     let vector = Arc::from(finite(vector)?);
-                    memory.samples.push(HeldSample { key, part, id, class, round, vector, told });
+                    memory.samples.push(HeldSample { key, part, id, class, round, vector });
                 }
                 Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {
@@ -250,6 +260,7 @@ impl RobotMemory {
                         word,
                     }));
                 }
+                Item::Batch(first) => memory.batches.push(decode_batch(first, value)?),
                 Item::Aside(number) => {
                     let StoredAside { part, shared, round, vector, guess } = decode(value)?;
                     let part = part_of(part).ok_or(MemoryError::Damaged("a sample of no part"))?;
@@ -306,6 +317,22 @@ impl RobotMemory {
             return Err(MemoryError::Damaged("a sample of an unknown class"));
         }
         Ok(())
+    }
+}
+
+/// A batch as it would travel, signature and all.
+pub(super) fn encode_batch(batch: &HeldBatch) -> Vec<u8> {
+    Envelope::from(batch.clone()).encode()
+}
+
+fn decode_batch(first: SampleId, bytes: &[u8]) -> Result<HeldBatch, MemoryError> {
+    match Envelope::decode(bytes) {
+        Ok(Envelope { author: robot, stamp, message: Message::Samples(samples), signature })
+            if samples.first() == Some(first) =>
+        {
+            Ok(HeldBatch { robot, stamp, samples, signature })
+        }
+        _ => Err(MemoryError::Damaged("a batch of samples that is none")),
     }
 }
 

@@ -1,17 +1,24 @@
 //! Which samples are told to others, within the bounds of a round, and once they are remembered as shared.
 
-use gestalt_protocol::{ClassId, Envelope, Message, RoundId, SampleId, Samples, SharedSample, Stamp};
+use std::collections::BTreeSet;
+
+use gestalt_protocol::{
+    Batches as BatchesTold, ClassId, Envelope, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message, RoundId,
+    SampleId, Samples, SharedSample, Stamp,
+};
 use gestalt_rounds::Classify;
 
 use super::state::{Learning, MAX_UNSENT};
-use crate::sample::{HeldSample, ToldAs};
 use crate::training_set::SetChange;
 use crate::vector_codec::decode_vector;
 
+/// About how many bytes of vectors one batch takes, so that a vote never waits long behind it.
+const BATCH_BYTES: usize = 16 * 1024;
+
 impl Learning {
-    /// Chooses what to share, within the bounds. While much waits for a disk that does not keep up, nothing: it stays
-    /// personal, and owed.
-    pub fn share(&mut self, classifier: Option<&dyn Classify>) {
+    /// Chooses what to share, within the bounds, in batches that `stamp` makes this robot's statements. While much waits for a disk
+    /// that does not keep up, nothing: it stays personal, and owed.
+    pub fn share(&mut self, classifier: Option<&dyn Classify>, stamp: impl FnMut(Samples) -> HeldBatch) {
         if self.unsent.len() >= MAX_UNSENT {
             return;
         }
@@ -34,16 +41,22 @@ impl Learning {
             SetChange::Shared(_, id) => Some(*id),
             _ => None,
         });
-        let ids: Vec<SampleId> = ids.collect();
-        for id in &ids {
-            if let Some(told) = self.set.find(*id).map(|sample| self.told_as(sample)) {
-                self.set.note_told(*id, told);
-            }
-        }
+        let shared: Vec<SharedSample> = ids.filter_map(|id| self.as_shared(id)).collect();
         self.absorb(changes);
-        if !ids.is_empty() {
-            self.unsent.push_back((self.revision + 1, ids));
+        let each = self.config.precision.bytes() * self.space.components();
+        let fit = (BATCH_BYTES / each.max(1)).clamp(1, MAX_SAMPLES);
+        let batches = shared.chunks(fit).map(|some| Samples { space: self.space_id, samples: some.to_vec() });
+        for batch in batches.map(stamp).collect::<Vec<_>>() {
+            self.unsent.extend(batch.samples.first().map(|first| (self.revision + 1, first)));
+            self.keep_batch(batch);
         }
+    }
+
+    /// A sample of this robot's, as it travels. Its coordinates are already what the others will read.
+    fn as_shared(&self, id: SampleId) -> Option<SharedSample> {
+        let sample = self.set.find(id)?;
+        let vector = self.config.precision.encode(&sample.vector, &self.space);
+        Some(SharedSample { id, class: sample.class, round: sample.round, vector })
     }
 
     /// How many samples fit in the bytes of a round.
@@ -66,59 +79,38 @@ impl Learning {
         (bytes as usize).saturating_sub(empty) / each.max(1)
     }
 
-    /// The samples that may be sent now: shared, and remembered as such.
-    pub fn take_unsent(&mut self) -> Option<Samples> {
-        let (revision, _) = self.unsent.front()?;
-        if *revision > self.remembered {
-            return None;
+    /// A batch that may be sent now: shared, and remembered as such.
+    pub fn take_unsent(&mut self) -> Option<HeldBatch> {
+        while let Some((_, first)) = self.unsent.pop_front_if(|(revision, _)| *revision <= self.remembered) {
+            if let Some(batch) = self.batches.get(first) {
+                return Some(batch.clone());
+            }
         }
-        let (_, ids) = self.unsent.pop_front()?;
-        Some(self.told(ids.iter().filter_map(|id| self.set.find(*id))))
+        None
     }
 
-    /// Samples as they travel.
-    pub fn told<'a>(&self, samples: impl Iterator<Item = &'a HeldSample>) -> Samples {
-        let samples = samples.filter_map(|sample| {
-            Some(self.as_told(sample.id?, self.told_as(sample), sample.round, &sample.vector))
-        });
-        Samples { space: self.space_id, samples: samples.collect() }
-    }
-
-    /// How the author of a sample shared it, or this robot does.
-    pub(super) fn told_as(&self, sample: &HeldSample) -> ToldAs {
-        sample.told.unwrap_or(ToldAs { class: sample.class, precision: self.config.precision })
-    }
-
-    /// A sample as its author shared it, byte for byte, whatever this robot holds it for meanwhile: what was said of its
-    /// round reaches the others as well.
-    fn as_told(&self, id: SampleId, told: ToldAs, round: RoundId, vector: &[f32]) -> SharedSample {
-        let ToldAs { class, precision } = told;
-        SharedSample { id, class, round, vector: precision.encode_again(vector, &self.space) }
-    }
-
-    /// The shared samples held, also those aside, that `lacks` says another robot has not had; in messages of about
-    /// so many bytes.
-    pub fn lacking<'a>(
-        &'a self,
-        lacks: impl Fn(SampleId) -> bool + 'a,
+    /// The batches of which a sample is held, also aside, that `lacks` says another robot has not had; in messages of about so many
+    /// bytes.
+    pub fn lacking(
+        &self,
+        lacks: impl Fn(SampleId) -> bool,
         bytes: usize,
-    ) -> impl Iterator<Item = Samples> + 'a {
-        let held = self.set.common();
-        let held =
-            held.filter_map(|sample| Some((sample.id?, self.told_as(sample), sample.round, &sample.vector)));
-        let aside = self.aside.iter();
-        let aside = aside
-            .filter_map(|(_, aside)| aside.shared.map(|(id, told)| (id, told, aside.round, &aside.vector)));
-        let mut lacking =
-            held.chain(aside).filter(move |(id, ..)| lacks(*id) && self.may_tell(*id)).peekable();
-        let each = 32 + self.space.components() * self.config.precision.bytes();
-        let chunk = (bytes / each).max(1);
+    ) -> impl Iterator<Item = BatchesTold> {
+        let held = self.set.common().filter_map(|sample| sample.id);
+        let aside = self.aside.iter().filter_map(|(_, aside)| aside.shared);
+        let lacking = held.chain(aside).filter(|id| lacks(*id));
+        let firsts: BTreeSet<SampleId> = lacking.filter_map(|id| self.batches.of(id)).collect();
+        let may_tell = firsts.into_iter().filter(|first| self.may_tell(*first));
+        let mut batches = may_tell.filter_map(|first| self.batches.get(first)).peekable();
         std::iter::from_fn(move || {
-            lacking.peek()?;
-            let told = lacking.by_ref().take(chunk);
-            let samples =
-                told.map(|(id, told, round, vector)| self.as_told(id, told, round, vector)).collect();
-            Some(Samples { space: self.space_id, samples })
+            let (mut told, mut length) = (Vec::new(), 0);
+            while let Some(batch) = batches.next_if(|batch| {
+                told.is_empty() || (told.len() < MAX_BATCHES && length + size(batch) <= bytes)
+            }) {
+                length += size(batch);
+                told.push(batch.clone());
+            }
+            (!told.is_empty()).then_some(BatchesTold { batches: told })
         })
     }
 
@@ -127,9 +119,14 @@ impl Learning {
         self.unsent.iter().any(|(revision, _)| *revision > self.remembered)
     }
 
-    /// Whether a sample may be told to others: an own one only once it is remembered as shared.
-    pub fn may_tell(&self, id: SampleId) -> bool {
-        id.author != self.me
-            || !self.unsent.iter().any(|(revision, ids)| *revision > self.remembered && ids.contains(&id))
+    /// Whether a batch may be told to others: an own one only once it is remembered as shared.
+    fn may_tell(&self, first: SampleId) -> bool {
+        !self.unsent.iter().any(|(revision, unsent)| *revision > self.remembered && *unsent == first)
     }
+}
+
+/// About how many bytes a batch takes.
+fn size(batch: &HeldBatch) -> usize {
+    let samples = &batch.samples.samples;
+    96 + samples.iter().map(|sample| 32 + sample.vector.bytes()).sum::<usize>()
 }

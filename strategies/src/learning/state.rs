@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
-    SharedSample, Word,
+    ClassId, Digest, FeatureSpaceId, Fnv1a, HeldBatch, InstructorId, LearningStatus, Lesson, RobotId,
+    RoundId, SampleId, SharedSample, Word,
 };
 use gestalt_rounds::{Follow, Vocabulary};
 use gestalt_svm::FeatureSpace;
@@ -22,9 +22,9 @@ use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
 use super::unresolved::{self, Unresolved};
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
-use crate::sample::{SetPart, ToldAs};
+use crate::sample::{Batches, SetPart};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
-use crate::vector_codec::{Precision, VectorError, decode_vector};
+use crate::vector_codec::{VectorError, decode_vector};
 
 /// How far beyond the newest round known one may lie that is spoken of.
 const LEAP: u32 = 64;
@@ -51,6 +51,7 @@ pub(crate) enum Declined {
 /// |---|---|
 /// | samples held | [`capacity`](LearningConfig::capacity), of other authors as a full set's [shares](crate::shares) say |
 /// | samples of which it is open what they show | [`aside`](LearningConfig::aside) |
+/// | batches they were shared in | one a sample held, of 32 KiB at most |
 /// | series of samples seen | 4,096; 64 lives of an author; 16,384 intervals of numbers in all |
 /// | lessons | 1,024 rounds, 16 instructors each; who was heard of first: 256 |
 /// | rounds lived through | 32, with 1,024 names and [`keep`](LearningConfig::keep) looks each |
@@ -85,8 +86,11 @@ pub(crate) struct Learning {
     pub(super) durable: bool,
     pub(super) revision: u64,
     pub(super) remembered: u64,
-    /// Shared samples that wait until that revision is remembered: at most [`MAX_UNSENT`] rounds' worth.
-    pub(super) unsent: VecDeque<(u64, Vec<SampleId>)>,
+    /// As their authors said them, and those of which a sample was lately let go of.
+    pub(super) batches: Batches,
+    pub(super) thinned: BTreeSet<SampleId>,
+    /// Batches that wait until that revision is remembered: at most [`MAX_UNSENT`] rounds' worth.
+    pub(super) unsent: VecDeque<(u64, SampleId)>,
 }
 
 impl fmt::Debug for Learning {
@@ -112,7 +116,7 @@ impl Learning {
         let (selection, forgetting) = rules.make(&config);
         let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
         let fresh = memory.is_empty();
-        let RobotMemory { counters, samples, seen, lessons: heard, aside, .. } = memory;
+        let RobotMemory { counters, samples, seen, lessons: heard, aside, batches: told, .. } = memory;
         set.restore(samples, seen, counters.next_key)?;
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
@@ -124,6 +128,8 @@ impl Learning {
         });
         let training = set.iter().map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
+        let mut batches = Batches::default();
+        let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
         let mut rng = rng;
         let secret = rng.next_u64();
         let mut learning = Self {
@@ -147,6 +153,9 @@ impl Learning {
             durable,
             revision: 0,
             remembered: 0,
+            batches,
+            // What is held and what was told of it may have been written at different times.
+            thinned,
             unsent: VecDeque::new(),
         };
         learning.digest = learning.digest_under(secret);
@@ -251,8 +260,6 @@ impl Learning {
         match self.set.receive(id, class, round, vector, &mut *self.rng) {
             SampleReceipt::New(changes) => {
                 self.dirty.insert(Item::Seen(id.series()));
-                let told = ToldAs { class: sample.class, precision: Precision::of(&sample.vector) };
-                self.set.note_told(id, told);
                 self.absorb(changes);
                 // A class is what it was taken under; anything else concerns all samples of the round.
                 if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
@@ -263,6 +270,44 @@ impl Learning {
             SampleReceipt::Known => Ok(false),
             SampleReceipt::Refused(_) => Err(Declined::Number),
         }
+    }
+
+    /// Keeps a batch some of whose samples were news, while one of them is held.
+    pub fn keep_batch(&mut self, batch: HeldBatch) {
+        if let Some(first) = self.batches.keep(batch) {
+            self.dirty.insert(Item::Batch(first));
+            self.thinned.insert(first);
+        }
+    }
+
+    /// A sample that may have been shared is held no more.
+    pub(super) fn note_gone(&mut self, id: Option<SampleId>) {
+        self.thinned.extend(id.and_then(|id| self.batches.of(id)));
+    }
+
+    /// Lets go of the batches of which nothing is held any more.
+    fn tidy_batches(&mut self) {
+        if self.thinned.is_empty() {
+            return;
+        }
+        let aside: BTreeSet<SampleId> = self.aside.iter().filter_map(|(_, aside)| aside.shared).collect();
+        let set = &self.set;
+        let is_held = |id| set.find(id).is_some() || aside.contains(&id);
+        let gone = self.batches.let_go(std::mem::take(&mut self.thinned), is_held);
+        self.dirty.extend(gone.into_iter().map(Item::Batch));
+    }
+
+    /// Every shared sample held can be passed on, nothing else is kept, and the disk has the same.
+    #[cfg(test)]
+    pub fn check_batches(&self, memory: RobotMemory) {
+        let held = self.set.common().filter_map(|sample| sample.id);
+        let held: BTreeSet<SampleId> =
+            held.chain(self.aside.iter().filter_map(|(_, aside)| aside.shared)).collect();
+        let of: BTreeSet<SampleId> =
+            held.iter().map(|id| self.batches.of(*id).expect("it came in a batch")).collect();
+        let kept: Vec<&HeldBatch> = self.batches.iter().collect();
+        assert_eq!(kept.iter().filter_map(|batch| batch.samples.first()).collect::<BTreeSet<_>>(), of);
+        assert_eq!(memory.batches.iter().collect::<Vec<_>>(), kept);
     }
 
     /// Notes what changed in the training set, for training and memory.
@@ -276,6 +321,7 @@ impl Learning {
                 }
                 SetChange::Removed(sample) => {
                     self.dirty.insert(Item::Sample(sample.key));
+                    self.note_gone(sample.id);
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
                 SetChange::Unseen(series) => {
@@ -303,6 +349,7 @@ impl Learning {
     /// What is to be remembered, since the last time, as which revision. A robot without a memory on disk remembers
     /// at once what little it can.
     pub fn take_changes(&mut self) -> Option<(u64, Vec<RecordChange>)> {
+        self.tidy_batches();
         if !self.durable {
             self.dirty.clear();
             self.revision += 1;
@@ -336,6 +383,7 @@ impl Learning {
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
             }
             Item::Aside(number) => self.aside.get(number).map(memory::encode_aside),
+            Item::Batch(first) => self.batches.get(first).map(memory::encode_batch),
         }
     }
 

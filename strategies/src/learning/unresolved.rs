@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, RoundId, SampleId};
 
-use crate::sample::{SetPart, ToldAs};
+use crate::sample::SetPart;
 
 /// A sample whose class is open.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct UnresolvedSample {
     /// The part of the training set it came from, or would go to.
     pub part: SetPart,
-    /// Its id, once shared, and how it was.
-    pub shared: Option<(SampleId, ToldAs)>,
+    /// Its id, once shared.
+    pub shared: Option<SampleId>,
     pub round: RoundId,
     pub vector: Arc<[f32]>,
     /// The class the robot trains on it as meanwhile, because it is sure itself. Never shared.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, Message, RobotId};
+use gestalt_protocol::{Envelope, HeldBatch, Message, RobotId};
 use gestalt_rounds::{
     Classify, Follow, Fuse, Input as AboutRounds, Life, Rounds, RoundsConfig, RoundsConfigError, Sign,
 };
@@ -86,7 +86,7 @@ impl Mind {
         self
     }
 
-    /// The same mind, that signs its votes, see [`Rounds::signed_by`].
+    /// The same mind, that signs what it stands by, see [`Rounds::signed_by`].
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
         self.rounds = self.rounds.signed_by(signer);
@@ -168,7 +168,13 @@ impl Mind {
         let author = envelope.author;
         match &envelope.message {
             Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
-            Message::Samples(samples) => self.on_samples(author, samples),
+            Message::Samples(samples) => {
+                let Envelope { author: robot, stamp, signature, .. } = *envelope;
+                self.on_batch(author, &HeldBatch { robot, stamp, samples: samples.clone(), signature });
+            }
+            Message::Batches(batches) => {
+                batches.batches.iter().for_each(|batch| self.on_batch(author, batch));
+            }
             Message::Know(know) => self.on_know(author, know, out),
             Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
             Message::Vote(_) | Message::Have(_) | Message::Give(_) => {}
@@ -191,8 +197,13 @@ impl Mind {
     /// Chooses samples to share, as far as the bounds allow.
     pub(super) fn share(&mut self) {
         if let Some(learning) = &mut self.learning {
-            let classifier = self.rounds.classifier().map(|classifier| &**classifier);
-            learning.share(classifier);
+            let classifier = self.rounds.classifier().cloned();
+            let rounds = &mut self.rounds;
+            learning.share(classifier.as_deref(), |samples| {
+                let Envelope { author: robot, stamp, signature, .. } =
+                    rounds.stamped(Message::Samples(samples.clone()));
+                HeldBatch { robot, stamp, samples, signature }
+            });
         }
     }
 
@@ -207,10 +218,8 @@ impl Mind {
         if let Some((revision, changes)) = learning.take_changes() {
             out.push(Output::Remember { revision, changes });
         }
-        while let Some(samples) = learning.take_unsent() {
-            if !samples.samples.is_empty() {
-                out.push(Output::Broadcast(self.rounds.stamped(Message::Samples(samples))));
-            }
+        while let Some(batch) = learning.take_unsent() {
+            out.push(Output::Broadcast(batch.into()));
         }
     }
 

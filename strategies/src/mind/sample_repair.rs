@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{
-    Digest, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, Message,
-    RobotId, RoundId, Samples,
+    Digest, HeldBatch, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS,
+    Message, RobotId, RoundId,
 };
 use gestalt_rounds::Refusal;
 
@@ -91,7 +91,7 @@ impl Mind {
             };
             lacking_here |= self.exchanges.told_to(from, learning.set().seen()).lacks(&theirs);
             let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
-            given.extend(lacking.take(chunks).map(Message::Samples));
+            given.extend(lacking.take(chunks).map(Message::Batches));
         }
         if here.lessons != know.digest.lessons || !know.lessons.is_empty() {
             let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
@@ -131,13 +131,13 @@ impl Mind {
     }
 
     /// Takes in samples, from their author or from a neighbour that had them.
-    pub(super) fn on_samples(&mut self, from: RobotId, samples: &Samples) {
+    pub(super) fn on_batch(&mut self, from: RobotId, batch: &HeldBatch) {
         let is_neighbour = self.compares_with(from);
         let Some(learning) = &mut self.learning else { return };
-        let mut repaired = false;
-        for sample in &samples.samples {
-            match learning.receive(samples.space, sample) {
-                Ok(new) => repaired |= new && sample.id.author != from,
+        let mut news = false;
+        for sample in &batch.samples.samples {
+            match learning.receive(batch.samples.space, sample) {
+                Ok(new) => news |= new,
                 Err(declined) => {
                     if is_neighbour {
                         self.exchanges.decline(from, sample.id);
@@ -151,7 +151,10 @@ impl Mind {
                 }
             }
         }
-        if repaired {
+        if news {
+            learning.keep_batch(batch.clone());
+        }
+        if news && batch.robot != from {
             // The other neighbours may lack it too.
             self.rounds.hurry_repair();
         }

@@ -5,9 +5,6 @@ use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
-
-use crate::vector_codec::Precision;
 
 /// The part of a training set that a sample is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,17 +37,6 @@ pub struct HeldSample {
     pub round: RoundId,
     /// Coordinates in the robot's feature space.
     pub vector: Arc<[f32]>,
-    /// How its author shared it, if anybody did: so it is passed on, whatever it is held as.
-    pub told: Option<ToldAs>,
-}
-
-/// How its author shared a sample. Encoded in this precision, its coordinates are the bytes that the author sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ToldAs {
-    /// The gesture that the author was told.
-    pub class: ClassId,
-    /// How its vector travels.
-    pub precision: Precision,
 }
 
 impl HeldSample {
@@ -224,13 +210,6 @@ impl HeldSamples {
             }
         }
         Some(sample)
-    }
-
-    /// Notes how the author of a sample shared it.
-    pub(crate) fn note_told(&mut self, id: SampleId, told: ToldAs) {
-        if let Some(sample) = self.ids.get(&id).and_then(|key| self.held.get_mut(key)) {
-            sample.told = Some(told);
-        }
     }
 
     /// Makes up for the samples that came and went before a restart.

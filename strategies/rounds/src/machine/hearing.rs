@@ -44,7 +44,7 @@ impl Rounds {
             Message::Have(have) => self.on_have(author, &have, effects),
             Message::Give(give) => self.on_give(author, give, effects),
             // Whoever follows the rounds to learn from them takes these in.
-            Message::Samples(_) | Message::Know(_) | Message::Lessons(_) => {}
+            Message::Samples(_) | Message::Batches(_) | Message::Know(_) | Message::Lessons(_) => {}
         }
     }
 

@@ -181,7 +181,7 @@ impl Rounds {
         self
     }
 
-    /// The same rounds, in which this robot signs its votes.
+    /// The same rounds, in which this robot signs what it stands by: votes, samples and what it passes on of instructors.
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
         self.signer = Some(signer);
@@ -270,10 +270,15 @@ impl Rounds {
         self.repair_when_due(effects);
     }
 
-    /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence.
+    /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence. Those that
+    /// others are to believe are signed; the rest are hints, and what they lead to is.
     #[must_use]
     pub fn stamped(&mut self, message: Message) -> Envelope {
         self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-        Envelope { author: self.me, stamp: self.stamp, message, signature: None }
+        let is_hint =
+            matches!(message, Message::Have(_) | Message::Know(_) | Message::Give(_) | Message::Batches(_));
+        let envelope = Envelope { author: self.me, stamp: self.stamp, message, signature: None };
+        let signer = self.signer.as_deref().filter(|_| !is_hint);
+        Envelope { signature: signer.map(|signer| signer.sign(&envelope.statement())), ..envelope }
     }
 }

@@ -292,7 +292,8 @@ fn what_is_passed_on_is_what_its_author_said() {
     swarm.config.precision = Precision::F32;
     swarm.restart(1);
     let learning = swarm.minds[1].learning.as_ref().unwrap();
-    let told: Vec<SharedSample> = learning.lacking(|_| true, 1 << 20).flat_map(|told| told.samples).collect();
+    let batches = learning.lacking(|_| true, 1 << 20).flat_map(|told| told.batches);
+    let told: Vec<SharedSample> = batches.flat_map(|batch| batch.samples.samples).collect();
     assert_eq!(told.len(), 6);
     for sample in told {
         assert!(swarm.said.contains(&sample), "{sample:?}");

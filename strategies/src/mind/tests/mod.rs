@@ -11,8 +11,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Envelope, FeatureSpaceId, Gesture, Instruction, Lesson, Message, Outcome, RobotId, RoundId,
-    SampleId, Samples, SharedSample, Stamp, Vector, Word,
+    ClassId, Envelope, FeatureSpaceId, Gesture, HeldBatch, Instruction, Lesson, Message, Outcome, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Word,
 };
 use gestalt_rounds::{Classify, ClassifyError, Life, Observation, Refusal, RoundsConfig, Vocabulary};
 use gestalt_svm::{Components, FeatureSpace, ScalingMethod};
@@ -307,6 +307,7 @@ impl Swarm {
             let kept: BTreeMap<u64, ClassId> = memory.samples.iter().map(|s| (s.key, s.class)).collect();
             assert_eq!(held, kept, "robot {} remembers what it holds", i + 1);
             assert_eq!(&memory.seen, set.seen());
+            mind.learning.as_ref().unwrap().check_batches(memory);
         }
     }
 }
@@ -315,7 +316,7 @@ fn kind(message: &Message) -> &'static str {
     match message {
         Message::Have(_) => "have",
         Message::Know(_) => "know",
-        Message::Samples(_) => "samples",
+        Message::Samples(_) | Message::Batches(_) => "samples",
         Message::Lessons(_) => "lessons",
         _ => "other",
     }

@@ -65,10 +65,12 @@ fn what_is_left_in_scattered_places_is_all_given() {
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
     };
-    let samples = (0..600).map(|i| sample(1 + 3 * i)).collect();
-    let message = Message::Samples(Samples { space: space().id(), samples });
-    let stamp = Stamp { boot: 1, sequence: 1 };
-    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+    for batch in 0..20 {
+        let samples = (0..30).map(|i| sample(1 + 3 * (30 * batch + i))).collect();
+        let message = Message::Samples(Samples { space: space().id(), samples });
+        let stamp = Stamp { boot: 1, sequence: batch };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+    }
     swarm.pass(Duration::from_secs(20));
     assert_eq!((swarm.sizes(0), swarm.sizes(1)), ([0, 0, 600], [0, 0, 600]));
     swarm.check_rest();

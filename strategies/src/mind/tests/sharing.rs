@@ -42,10 +42,10 @@ fn bytes_bound_what_a_round_shares() {
     swarm.was(round, 1);
     for mind in &swarm.minds {
         let learning = mind.learning.as_ref().unwrap();
-        let own = learning.set().common().filter(|sample| sample.part == SetPart::Shared);
-        let message = Message::Samples(learning.told(own));
-        let stamp = Stamp { boot: 1, sequence: 100 };
-        let length = Envelope { author: mind.me(), stamp, message, signature: None }.encode().len();
+        let own: Vec<HeldBatch> =
+            learning.lacking(|id| id.author == mind.me(), 1 << 20).flat_map(|told| told.batches).collect();
+        let length = Envelope::from(own[0].clone()).encode().len();
+        assert_eq!(own.len(), 1);
         assert!((80..=128).contains(&length), "{length} bytes");
     }
 }

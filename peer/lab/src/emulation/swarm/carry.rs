@@ -49,7 +49,7 @@ impl Swarm<'_> {
             Output::Tell(to, envelope) => {
                 let (envelope, bytes) = over_the_wire(&envelope);
                 let target = to.0 as usize - 1;
-                let samples = matches!(envelope.message, Message::Samples(_));
+                let samples = matches!(envelope.message, Message::Batches(_));
                 let taken = self.network.tell(i, target, bytes, samples);
                 self.note(&Happening::Tell { robot, to, bytes, arrives: taken.is_some() });
                 if let Some(taken) = taken {
