@@ -36,6 +36,8 @@ pub enum Topic {
     Taken(RobotId),
     /// `decision`: the swarm's decision, one message each, JSON; also a queryable for the last one.
     Decision,
+    /// `evidence`: in a sealed swarm, proof that a member said two things; see `gestalt-trust`.
+    Evidence,
     /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON.
     Feedback(InstructorId),
     /// `instructor/<id>/answer`: the swarm's [`Answer`](crate::Answer) to it, JSON.
@@ -72,6 +74,7 @@ impl Keys {
             Topic::Frame(id) => format!("{prefix}robot/{id}/frame"),
             Topic::Taken(id) => format!("{prefix}robot/{id}/taken"),
             Topic::Decision => format!("{prefix}decision"),
+            Topic::Evidence => format!("{prefix}evidence"),
             Topic::Feedback(id) => format!("{prefix}instructor/{id}/feedback"),
             Topic::Answer(id) => format!("{prefix}instructor/{id}/answer"),
         }
@@ -95,6 +98,7 @@ impl Keys {
         let mut chunks = key.strip_prefix(&self.prefix)?.split('/');
         let topic = match (chunks.next()?, chunks.next(), chunks.next()) {
             ("decision", None, None) => Topic::Decision,
+            ("evidence", None, None) => Topic::Evidence,
             ("robot", Some(id), Some(what)) => {
                 let id = id.parse().ok()?;
                 match what {
@@ -134,6 +138,7 @@ mod tests {
             Topic::Frame(RobotId(5)),
             Topic::Taken(RobotId(6)),
             Topic::Decision,
+            Topic::Evidence,
             Topic::Feedback("ada".parse().unwrap()),
             Topic::Answer("ada".parse().unwrap()),
         ];

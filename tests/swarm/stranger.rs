@@ -22,13 +22,13 @@ use crate::trouble::{attach, counted, invented};
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The key of robot `id`; any other number is somebody's too.
-fn key(id: u32) -> Identity {
+pub fn key(id: u32) -> Identity {
     let mut secret = [7; 32];
     secret[..4].copy_from_slice(&id.to_le_bytes());
     Identity::from_bytes(&secret)
 }
 
-fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
+pub fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
     let roster = members.clone().sign(&key(1000)).expect("a roster");
     let seal = Seal { identity: Arc::new(key(id)), roster, guests: std::collections::BTreeMap::new() };
     RobotConfig { seal: Some(seal), ..config(id, &members.swarm, connect) }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{DecodeError, Reported, Status};
-use gestalt_trust::Distrust;
+use gestalt_protocol::{DecodeError, Reported, RobotId, Status};
+use gestalt_trust::{Distrust, EvidenceError};
 
 const MAX_ERRORS: usize = 16;
 const MAX_ERROR_LENGTH: usize = 400;
@@ -74,6 +74,14 @@ impl Account {
         self.error(&Refusal::Twin.to_string());
     }
 
+    /// A member is proven to have said two things. Counted once, however often it is told again.
+    pub(super) fn convicted(&self, robot: RobotId) {
+        self.set(&format!("convicted_{robot}"), 1);
+        self.error(&format!(
+            "robot {robot} said two things under one stamp: it lies, or its key is in two hands; enrol it anew with a new key"
+        ));
+    }
+
     /// Sets a counter that is kept elsewhere.
     pub(super) fn set(&self, name: &str, value: u64) {
         self.lock().counters.insert(name.to_owned(), value);
@@ -137,6 +145,8 @@ pub(super) enum Refusal {
     Twin,
     #[error(transparent)]
     Distrust(#[from] Distrust),
+    #[error(transparent)]
+    Evidence(#[from] EvidenceError),
 }
 
 impl Refusal {
@@ -154,6 +164,7 @@ impl Refusal {
             Self::Time => "time",
             Self::Full => "full",
             Self::Twin => "twin",
+            Self::Evidence(_) => "false",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
         }
     }

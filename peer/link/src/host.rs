@@ -60,6 +60,7 @@ impl Host {
                     for input in inbox.take() {
                         self.step(input);
                     }
+                    self.voice.accuse();
                 }
                 command = self.commands.recv() => match command {
                     Some(input) => self.step(input),

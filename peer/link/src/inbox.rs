@@ -8,6 +8,7 @@ use gestalt_protocol::{
     Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
+use gestalt_trust::{Distrust, Evidence};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tokio::sync::{Notify, watch};
@@ -138,6 +139,7 @@ impl Inbox {
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
             Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(id, sample)),
             Some(Topic::Decision) => ("decision", self.on_decision(sample)),
+            Some(Topic::Evidence) => ("evidence", self.on_evidence(sample)),
             Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
             Some(Topic::Answer(to)) => ("answer", self.on_answer(to, sample)),
             _ => ("other", Err(Refusal::Key)),
@@ -148,7 +150,13 @@ impl Inbox {
                 self.account.received(kind, bytes);
                 self.ready.notify_one();
             }
-            Err(cause) => self.account.refused(kind, key, bytes, &cause),
+            Err(cause) => {
+                let found = matches!(cause, Refusal::Distrust(Distrust::Convicted));
+                self.account.refused(kind, key, bytes, &cause);
+                if found {
+                    self.ready.notify_one();
+                }
+            }
         }
     }
 
@@ -231,6 +239,21 @@ impl Inbox {
         self.queue(Input::Announced(announcement.decision))
     }
 
+    fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
+        let gate = self.gate.as_ref().ok_or(Refusal::Kind)?;
+        let evidence = Evidence::decode(&payload(sample, Evidence::MAX_LENGTH)?)?;
+        if let Some(robot) = gate.evidence(evidence)? {
+            self.account.convicted(robot);
+        }
+        Ok(())
+    }
+
+    /// Evidence against members that is to be told to all, each once.
+    pub(super) fn untold(&self) -> Vec<Evidence> {
+        let untold = self.gate.as_ref().map(Gate::untold).unwrap_or_default().into_iter();
+        untold.inspect(|(robot, _)| self.account.convicted(*robot)).map(|(_, evidence)| evidence).collect()
+    }
+
     fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
         self.queue(Input::Heard(id, decode_json(&payload(sample, MAX_JSON)?)?))
     }
@@ -273,6 +296,10 @@ impl Inbox {
             SampleKind::Delete => state.alive.remove(&id),
         };
         if changed {
+            // Whoever comes listens before it says that it is there.
+            if let (SampleKind::Put, Some(gate)) = (sample.kind(), &self.gate) {
+                gate.tell_again();
+            }
             state.alive_changed = true;
             self.ready.notify_one();
             self.unrest.notify_one();

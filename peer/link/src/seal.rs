@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{Batches, Decision, Envelope, Give, HeldVote, Message, RobotId, Signature};
 use gestalt_strategies::Sign;
-use gestalt_trust::{Budget, Distrust, Identity, Roster, SwarmId, Verifier, statement};
+use gestalt_trust::{
+    Budget, Conviction, Distrust, Evidence, EvidenceError, Identity, Roster, SwarmId, Verifier, Witness,
+    statement,
+};
 use thiserror::Error;
 
 /// What makes a robot one of a sealed swarm. Its robots sign their votes, and so the decisions that are made of them; their samples, under
@@ -85,36 +88,94 @@ impl Sign for Signer {
     }
 }
 
-/// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows, and a swarm that lies costs it
-/// no more than a part of a core.
+/// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows.
 const OF_SAMPLES: Budget = {
     const fn number(of: u32) -> NonZeroU32 {
         NonZeroU32::new(of).expect("not zero")
     }
-    Budget { burst: number(512), per_second: number(64) }
+    Budget { burst: number(512), per_second: number(64), spare: number(1000) }
 };
 
-/// Lets in what members of the swarm signed.
+/// Lets in what members of the swarm signed, and finds out who of them says two things.
 #[derive(Debug)]
 pub(crate) struct Gate {
-    /// For votes and lessons, and for samples: neither keeps the other waiting.
-    verifier: Mutex<Verifier>,
-    of_samples: Mutex<Verifier>,
+    judge: Mutex<Judge>,
     started: Instant,
+}
+
+#[derive(Debug)]
+struct Judge {
+    /// For votes and lessons, and for samples: neither keeps the other waiting.
+    verifier: Verifier,
+    of_samples: Verifier,
+    witness: Witness,
+    /// Against whom, as it is told to others; those found here are yet to be.
+    evidence: BTreeMap<RobotId, Evidence>,
+    untold: Vec<RobotId>,
+}
+
+impl Judge {
+    fn check(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Distrust> {
+        let statement = envelope.statement();
+        let signature = envelope.signature.as_ref().ok_or(Distrust::Unsigned)?;
+        let samples = matches!(envelope.message, Message::Samples(_));
+        let verifier = if samples { &mut self.of_samples } else { &mut self.verifier };
+        verifier.check(now, &statement, Some(signature))?;
+        let Some(evidence) = self.witness.observe(&statement, signature) else { return Ok(()) };
+        // What proves nothing is no reason to refuse it.
+        let Ok(conviction) = self.convict(now, evidence) else { return Ok(()) };
+        self.untold.push(conviction.robot);
+        Err(Distrust::Convicted)
+    }
+
+    fn convict(&mut self, now: Duration, evidence: Evidence) -> Result<Conviction, EvidenceError> {
+        let conviction = self.verifier.convict(now, &evidence)?;
+        self.of_samples.convict(now, &evidence)?;
+        self.evidence.entry(conviction.robot).or_insert(evidence);
+        Ok(conviction)
+    }
 }
 
 impl Gate {
     pub fn new(seal: &Seal, started: Instant) -> Self {
-        let verifier = |budget| Mutex::new(Verifier::new(seal.roster.clone(), budget));
-        Self { verifier: verifier(Budget::default()), of_samples: verifier(OF_SAMPLES), started }
+        let judge = Judge {
+            verifier: Verifier::new(seal.roster.clone(), Budget::default()),
+            of_samples: Verifier::new(seal.roster.clone(), OF_SAMPLES),
+            witness: Witness::new(&seal.roster),
+            evidence: BTreeMap::new(),
+            untold: Vec::new(),
+        };
+        Self { judge: Mutex::new(judge), started }
+    }
+
+    fn judge(&self) -> MutexGuard<'_, Judge> {
+        self.judge.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the author said that.
     pub fn envelope(&self, envelope: &Envelope) -> Result<(), Distrust> {
-        let samples = matches!(envelope.message, Message::Samples(_));
-        let verifier = if samples { &self.of_samples } else { &self.verifier };
-        let mut verifier = verifier.lock().unwrap_or_else(PoisonError::into_inner);
-        verifier.check(self.started.elapsed(), &envelope.statement(), envelope.signature.as_ref())
+        self.judge().check(self.started.elapsed(), envelope)
+    }
+
+    /// Takes in evidence; says against whom, if that is news.
+    pub fn evidence(&self, evidence: Evidence) -> Result<Option<RobotId>, EvidenceError> {
+        let mut judge = self.judge();
+        let known = judge.evidence.len();
+        let conviction = judge.convict(self.started.elapsed(), evidence)?;
+        Ok((judge.evidence.len() > known).then_some(conviction.robot))
+    }
+
+    /// The evidence that was found here and is to be told to all, each once.
+    pub fn untold(&self) -> Vec<(RobotId, Evidence)> {
+        let judge = &mut *self.judge();
+        let untold = std::mem::take(&mut judge.untold).into_iter();
+        untold.filter_map(|robot| Some((robot, judge.evidence.get(&robot)?.clone()))).collect()
+    }
+
+    /// Somebody is here who was not: all evidence is told again.
+    pub fn tell_again(&self) {
+        let judge = &mut *self.judge();
+        judge.untold = judge.evidence.keys().copied().collect();
     }
 
     /// Whether all the votes that a decision rests on were cast.

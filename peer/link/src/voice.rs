@@ -129,6 +129,14 @@ impl Voice {
         self.account.check(put);
     }
 
+    /// Tells all of who was found to lie.
+    pub fn accuse(&self) {
+        for evidence in self.inbox.untold() {
+            let (key, bytes) = (self.keys.key(&Topic::Evidence), evidence.encode());
+            self.outbox.send(Parcel { kind: "evidence", key, bytes, express: true });
+        }
+    }
+
     /// Announces a decision for the swarm.
     pub fn announce(&self, announcement: &Announcement) {
         self.publish("decision", &self.swarm, announcement);

@@ -66,7 +66,9 @@ impl Store {
         }
         let mut store = Self::read(place, robot)?;
         if there {
-            store.boot = first_boot.max(store.boot.saturating_add(1));
+            // Where the clock says less than the memory, the memory may be an old copy: the step is by chance.
+            let step = 1 + (fresh_nonce() >> 48) as u32;
+            store.boot = first_boot.max(store.boot.saturating_add(step));
         }
         store.mark = fresh_nonce();
         guarded(store.place.path(), || {

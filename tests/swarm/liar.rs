@@ -1,0 +1,100 @@
+//! A member of a sealed swarm that lies under its own key.
+
+use std::time::Duration;
+
+use gestalt_protocol::{
+    ClassId, Envelope, Give, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote,
+};
+use gestalt_strategies::Classify;
+use gestalt_tests::{Fixed, agreed, start, unique};
+use gestalt_trust::{Membership, statement};
+use zenoh::qos::CongestionControl;
+
+use crate::stranger::{key, sealed};
+use crate::trouble::{attach, counted};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
+    let swarm = unique("liar");
+    let robots = (0..5).map(|id| (RobotId(id), key(id).public_key())).collect();
+    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let swarm_id = members.clone().sign(&key(1000)).unwrap().swarm_id();
+    let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
+    let locators = robots[0].robot.locators().to_vec();
+    for id in 1..3 {
+        robots.push(start(sealed(id, &members, &locators), Some(ClassId(4))).await);
+    }
+    for robot in &robots {
+        assert!(robot.sees_alive(2, PATIENCE).await);
+    }
+    let keys = Keys::new(&swarm).unwrap();
+    let liar = attach(&locators).await;
+    let put = async |topic: Topic, bytes: Vec<u8>| {
+        let put = liar.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
+        put.await.unwrap();
+    };
+    let vocabulary = Fixed::default().vocabulary().id();
+    let vote = |by: u32, round: RoundId, sequence: u32, for_class: usize| {
+        let mut evidence = vec![-1.0; 6];
+        evidence[for_class] = 5.0;
+        let message = Message::Vote(Vote { round, vocabulary, evidence, looks: 4.0 });
+        let stamp = Stamp { boot: 1, sequence };
+        let said = Envelope { author: RobotId(3), stamp, message, signature: None };
+        Envelope { signature: Some(statement::sign(&key(by), &swarm_id, &said.statement())), ..said }
+    };
+    robots[0].robot.open_round();
+    let first = agreed(&mut robots, 1, PATIENCE).await.round;
+
+    // In its name, but by another key: that proves nothing.
+    put(Topic::Vote(RobotId(3)), vote(77, first, 1, 2).encode()).await;
+    put(Topic::Vote(RobotId(3)), vote(77, first, 1, 5).encode()).await;
+    put(Topic::Evidence, vec![1, 2, 3]).await;
+    counted(&robots[0], "refused_vote_forged", 2).await;
+    counted(&robots[2], "refused_evidence", 1).await;
+    assert!(!robots[0].robot.status().counters.contains_key("convicted_3"));
+
+    // One thing to all, and another to one of them.
+    put(Topic::Vote(RobotId(3)), vote(3, first, 2, 2).encode()).await;
+    let Envelope { author: robot, stamp, message: Message::Vote(other), signature } = vote(3, first, 2, 5)
+    else {
+        unreachable!()
+    };
+    let give = Message::Give(Give {
+        decision: None,
+        votes: vec![HeldVote { robot, stamp, vote: other, signature }],
+    });
+    let stamp = Stamp { boot: 1, sequence: 3 };
+    put(
+        Topic::Repair(RobotId(1)),
+        Envelope { author: RobotId(3), stamp, message: give, signature: None }.encode(),
+    )
+    .await;
+    for robot in &robots {
+        counted(robot, "convicted_3", 1).await;
+    }
+    // Who was not there hears of it.
+    robots.push(start(sealed(4, &members, &locators), None).await);
+    counted(&robots[3], "convicted_3", 1).await;
+    assert!(robots[0].sees_alive(3, PATIENCE).await);
+
+    robots[0].robot.open_round();
+    let round = loop {
+        match robots[0].robot.open() {
+            Some(round) if round.counter == 2 => break round,
+            _ => tokio::time::sleep(Duration::from_millis(1)).await,
+        }
+    };
+    for sequence in 4..20 {
+        put(Topic::Vote(RobotId(3)), vote(3, round, sequence, 2).encode()).await;
+    }
+    let second = agreed(&mut robots, 2, PATIENCE).await;
+    assert!(second.certificate.votes.iter().all(|counted| counted.robot != RobotId(3)), "{second:?}");
+    for robot in &robots {
+        counted(robot, "refused_vote_convicted", 16).await;
+    }
+    liar.close().await.unwrap();
+    for robot in robots {
+        robot.stop().await;
+    }
+}
