@@ -34,6 +34,7 @@ def main() -> None:
 
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
+    config.insert_json5("timestamping/enabled", "true")  # answers name the word that they answer by its time
     config.insert_json5("connect/endpoints", json.dumps([given.connect]))
     prefix = f"gestalt/{given.swarm}"
     feedback = f"{prefix}/instructor/{given.name}/feedback"

@@ -117,7 +117,7 @@ impl Instruction {
 pub struct Answer {
     /// Who answers.
     pub robot: RobotId,
-    /// The time of the word that is answered, in the swarm's own time: the Zenoh timestamp of its message.
+    /// The time of the word that is answered, as NTP64: the Zenoh timestamp of its message, if its client gave it one.
     pub at: u64,
     /// The word that is answered.
     pub to: Instruction,

@@ -17,7 +17,7 @@ pub struct Lesson {
     /// One more than the highest that was known on this round, from whomever, to the robot that heard it said: the higher
     /// replaces the lower. No clock orders words, so none that is wrong, or claimed, can put one beyond correction.
     pub count: u64,
-    /// When, in the swarm's own time (Zenoh's NTP64 timestamp of the message): orders words of one count, which were said
+    /// When, as NTP64: the Zenoh timestamp of the client's message or, where it has none, when it was heard. Orders words of one count, which were said
     /// to robots that did not hear each other.
     pub at: u64,
     /// What was said.

@@ -26,14 +26,14 @@ pub const MAX_BATCHES: usize = 1024;
 pub const MAX_INTERVALS: usize = 256;
 
 /// A feature vector as it travels. How its numbers stand for coordinates is the feature space's matter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Vector {
     /// IEEE single precision, 4 bytes a component.
-    F32(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<f32>),
+    F32(Vec<f32>),
     /// IEEE half precision, 2 bytes a component, the lower one first.
-    F16(#[serde(deserialize_with = "bounded::vec::<_, _, { 2 * MAX_COMPONENTS }>")] Vec<u8>),
+    F16(Vec<u8>),
     /// 1 byte a component, scaled by how far that component spreads in its feature space.
-    I8(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<i8>),
+    I8(Vec<i8>),
 }
 
 impl Vector {
@@ -76,7 +76,7 @@ impl Vector {
 }
 
 /// A labelled feature vector, as shared.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SharedSample {
     /// Whose sample, and which.
     pub id: SampleId,
@@ -91,12 +91,93 @@ pub struct SharedSample {
 /// A batch of samples of one feature space and one series, by ascending numbers; at least one. It is its author's statement:
 /// whoever passes it on does so as a whole, so that the author's signature goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "TravellingSamples", into = "TravellingSamples")]
 pub struct Samples {
     /// What the vectors' components mean.
     pub space: FeatureSpaceId,
     /// The samples.
-    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_SAMPLES>")]
     pub samples: Vec<SharedSample>,
+}
+
+/// A batch as it travels: the series once, and of each sample what differs from the one before.
+#[derive(Clone, Serialize, Deserialize)]
+struct TravellingSamples {
+    space: FeatureSpaceId,
+    series: SampleSeries,
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_SAMPLES>")]
+    samples: Vec<TravellingSample>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+struct TravellingSample {
+    /// By how much its number is higher than that of the one before, or than 0.
+    step: u32,
+    class: ClassId,
+    seen: Seen,
+}
+
+/// The round, if it is not that of the sample before, and the vector. One byte says of both which it is.
+#[derive(Clone, Serialize, Deserialize)]
+enum Seen {
+    SameF32(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<f32>),
+    SameF16(#[serde(deserialize_with = "bounded::vec::<_, _, { 2 * MAX_COMPONENTS }>")] Vec<u8>),
+    SameI8(#[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<i8>),
+    F32(RoundId, #[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<f32>),
+    F16(RoundId, #[serde(deserialize_with = "bounded::vec::<_, _, { 2 * MAX_COMPONENTS }>")] Vec<u8>),
+    I8(RoundId, #[serde(deserialize_with = "bounded::vec::<_, _, MAX_COMPONENTS>")] Vec<i8>),
+}
+
+impl Seen {
+    fn new(round: Option<RoundId>, vector: Vector) -> Self {
+        match (round, vector) {
+            (None, Vector::F32(values)) => Self::SameF32(values),
+            (None, Vector::F16(bytes)) => Self::SameF16(bytes),
+            (None, Vector::I8(values)) => Self::SameI8(values),
+            (Some(round), Vector::F32(values)) => Self::F32(round, values),
+            (Some(round), Vector::F16(bytes)) => Self::F16(round, bytes),
+            (Some(round), Vector::I8(values)) => Self::I8(round, values),
+        }
+    }
+
+    fn into_parts(self) -> (Option<RoundId>, Vector) {
+        match self {
+            Self::SameF32(values) => (None, Vector::F32(values)),
+            Self::SameF16(bytes) => (None, Vector::F16(bytes)),
+            Self::SameI8(values) => (None, Vector::I8(values)),
+            Self::F32(round, values) => (Some(round), Vector::F32(values)),
+            Self::F16(round, bytes) => (Some(round), Vector::F16(bytes)),
+            Self::I8(round, values) => (Some(round), Vector::I8(values)),
+        }
+    }
+}
+
+impl From<Samples> for TravellingSamples {
+    fn from(Samples { space, samples }: Samples) -> Self {
+        let series =
+            samples.first().map_or(SampleSeries { author: RobotId(0), life: 0 }, |first| first.id.series());
+        let (mut number, mut of) = (0, None);
+        let travelling = |SharedSample { id, class, round, vector }: SharedSample| {
+            let step = id.number.wrapping_sub(std::mem::replace(&mut number, id.number));
+            let round = (of.replace(round) != Some(round)).then_some(round);
+            TravellingSample { step, class, seen: Seen::new(round, vector) }
+        };
+        Self { space, series, samples: samples.into_iter().map(travelling).collect() }
+    }
+}
+
+impl From<TravellingSamples> for Samples {
+    /// Numbers that run over are out of order, which the check of the values finds; a first sample without a round is of round 0,
+    /// which no robot opens.
+    fn from(TravellingSamples { space, series, samples }: TravellingSamples) -> Self {
+        let (mut number, mut of) = (0_u32, RoundId { counter: 0, opener: RobotId(0), life: 0 });
+        let shared = |TravellingSample { step, class, seen }: TravellingSample| {
+            let (round, vector) = seen.into_parts();
+            number = number.wrapping_add(step);
+            of = round.unwrap_or(of);
+            SharedSample { id: series.sample(number), class, round: of, vector }
+        };
+        Self { space, samples: samples.into_iter().map(shared).collect() }
+    }
 }
 
 impl Samples {

@@ -137,14 +137,14 @@ fn shared_samples() {
         Vector::F16(vec![0x00, 0x3e, 0x00, 0xbe]),
         Vector::I8(vec![127, -128]),
     ];
-    // the space (8 bytes); each sample: author, its life (4 bytes), number, class, round, kind of vector, length, components
+    // the space (8 bytes), the author and its life (4 bytes); each sample: by how much its number is higher, its class, kind of vector
+    // (and from 3 on its round, which is not that of the one before), length, components
     let numbered = |(number, vector)| {
         let sample = sample(vector);
         SharedSample { id: SampleId { number, ..sample.id }, ..sample }
     };
     let samples = Samples { space, samples: (200..).zip(samples).map(numbered).collect() };
-    let batch = "0201000000000000 03 07b2000000c80103ac0202a101 00 02 0000c03f0000c0bf 07b2000000c90103ac0202a101 01 04 003e00be \
-                 07b2000000ca0103ac0202a101 02 02 7f80";
+    let batch = "0201000000000000 07b2000000 03 c80103 03 ac0202a101 02 0000c03f0000c0bf 0103 01 04 003e00be 0103 02 02 7f80";
     travels_as(Message::Samples(samples.clone()), &format!("{HEAD} 03 {batch}"));
     // One batch: robot, boot, sequence, the batch as it was said, unsigned.
     let held =
@@ -156,7 +156,7 @@ fn shared_samples() {
 }
 
 #[test]
-fn a_sample_of_24_components_takes_at_most_64_bytes() {
+fn a_sample_of_24_components_takes_at_most_64_bytes_and_each_further_one_of_its_round_half_as_many() {
     // The largest ids that a swarm of 4,096 robots, a million rounds and a million samples of one robot in one life come to.
     let sample = SharedSample {
         id: SampleId { author: RobotId(4096), life: u32::MAX, number: 1_000_000 },
@@ -164,12 +164,14 @@ fn a_sample_of_24_components_takes_at_most_64_bytes() {
         round: RoundId { counter: 1_000_000, opener: RobotId(4096), life: u32::MAX },
         vector: Vector::I8(vec![-128; 24]),
     };
-    let samples = Samples { space: FeatureSpaceId(u64::MAX), samples: vec![sample] };
     let stamp = Stamp { boot: 10_000, sequence: 1_000_000 };
-    let bytes =
-        Envelope { author: RobotId(4096), stamp, message: Message::Samples(samples), signature: None }
-            .encode();
-    assert!(bytes.len() <= 64, "{} bytes", bytes.len());
+    let length = |samples: Vec<SharedSample>| {
+        let message = Message::Samples(Samples { space: FeatureSpaceId(u64::MAX), samples });
+        Envelope { author: RobotId(4096), stamp, message, signature: None }.encode().len()
+    };
+    let next = SharedSample { id: SampleId { number: 1_000_001, ..sample.id }, ..sample.clone() };
+    let (one, two) = (length(vec![sample.clone()]), length(vec![sample, next]));
+    assert!(one <= 64 && two - one <= 32, "{one} bytes, {two} of two");
 }
 
 #[test]

@@ -1,41 +1,81 @@
-//! From a vote to the decision at a neighbour, beside a raw Zenoh put of the same size on the same kind of link.
+//! From a vote to the decision at a neighbour, in an open swarm and in a sealed one, beside a raw Zenoh put of the same size on the
+//! same kind of link.
 //!
-//! Each sample of the one is followed by a sample of the other, so that both see the same machine.
+//! Each sample of the one is followed by a sample of the others, so that all see the same machine.
 
-use std::sync::mpsc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
+use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, Seal, fresh_nonce};
 use gestalt_protocol::{Envelope, Keys, Message, RobotId, RoundId, Stamp, Topic, VocabularyId, Vote};
 use gestalt_strategies::MindConfig;
+use gestalt_trust::{Identity, Membership, Roster, statement};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
 const SAMPLES: u32 = 300;
-const SWARM: &str = "bench";
+
+/// A robot that decides on the votes of another, which are put by hand.
+struct Neighbour {
+    robot: Robot,
+    voter: Session,
+    vote_key: String,
+    holds: mpsc::Receiver<Instant>,
+}
+
+impl Neighbour {
+    async fn start(swarm: &str, seal: Option<Seal>) -> Self {
+        let robot = Robot::start(RobotConfig {
+            id: RobotId(1),
+            name: "bench".to_owned(),
+            boot: 1,
+            swarm: swarm.to_owned(),
+            mind: MindConfig::default(),
+            fusion: None,
+            link: LinkConfig { listen: vec!["tcp/127.0.0.1:0".to_owned()], ..LinkConfig::default() },
+            vocabulary: None,
+            learning: None,
+            nonce: fresh_nonce(),
+            seal,
+        })
+        .await
+        .expect("the robot starts");
+        let voter = session(&[], robot.locators()).await;
+        let (held, holds) = mpsc::channel();
+        let mut events = robot.events();
+        std::thread::spawn(move || {
+            while let Ok(event) = events.blocking_recv() {
+                let now = Instant::now();
+                if matches!(event, Event::Held(_)) && held.send(now).is_err() {
+                    break;
+                }
+            }
+        });
+        let vote_key = Keys::new(swarm).expect("a swarm's name").key(&Topic::Vote(RobotId(0)));
+        Self { robot, voter, vote_key, holds }
+    }
+
+    fn decides(&self, vote: Vec<u8>) -> Duration {
+        let began = put(&self.voter, &self.vote_key, vote);
+        let held = self.holds.recv_timeout(Duration::from_secs(5)).expect("the robot decides");
+        std::thread::sleep(Duration::from_millis(10));
+        held - began
+    }
+}
 
 #[tokio::main]
 async fn main() {
-    let robot = Robot::start(RobotConfig {
-        id: RobotId(1),
-        name: "bench".to_owned(),
-        boot: 1,
-        swarm: SWARM.to_owned(),
-        mind: MindConfig::default(),
-        fusion: None,
-        link: LinkConfig { listen: vec!["tcp/127.0.0.1:0".to_owned()], ..LinkConfig::default() },
-        vocabulary: None,
-        learning: None,
-        nonce: fresh_nonce(),
-        seal: None,
-    })
-    .await
-    .expect("the robot starts");
-    let voter = session(&[], robot.locators()).await;
+    let key = |robot: u8| Identity::from_bytes(&[robot + 1; 32]);
+    let robots = (0..2).map(|robot| (RobotId(robot.into()), key(robot).public_key())).collect();
+    let members = Membership { swarm: "sealed".to_owned(), epoch: 1, robots, ..Membership::default() };
+    let roster: Roster = members.sign(&key(100)).expect("a roster");
+    let seal = Seal { identity: Arc::new(key(1)), roster: roster.clone(), guests: BTreeMap::new() };
+    let open = Neighbour::start("open", None).await;
+    let sealed = Neighbour::start("sealed", Some(seal)).await;
     let receiver = session(&["tcp/127.0.0.1:0".to_owned()], &[]).await;
     let locators: Vec<String> = receiver.info().locators().await.iter().map(ToString::to_string).collect();
     let sender = session(&[], &locators).await;
-
     let (arrived, arrivals) = mpsc::channel();
     let _subscriber = receiver
         .declare_subscriber("raw/vote")
@@ -44,34 +84,26 @@ async fn main() {
         })
         .await
         .expect("a subscriber");
-    let (held, holds) = mpsc::channel();
-    let mut events = robot.events();
-    std::thread::spawn(move || {
-        while let Ok(event) = events.blocking_recv() {
-            let now = Instant::now();
-            if matches!(event, Event::Held(_)) && held.send(now).is_err() {
-                break;
-            }
-        }
-    });
-    let vote_key = Keys::new(SWARM).expect("a swarm's name").key(&Topic::Vote(RobotId(0)));
     tokio::time::sleep(Duration::from_secs(1)).await;
 
-    let (mut raw, mut decided) = (Vec::new(), Vec::new());
+    let (mut raw, mut of_open, mut of_sealed) = (Vec::new(), Vec::new(), Vec::new());
     for counter in 1..=SAMPLES {
         let vote = vote(counter);
-        let began = put(&sender, "raw/vote", vote.clone());
+        let signature = Some(statement::sign(&key(0), &roster.swarm_id(), &vote.statement()));
+        let began = put(&sender, "raw/vote", vote.encode());
         raw.push(arrivals.recv_timeout(Duration::from_secs(5)).expect("the put arrives") - began);
         std::thread::sleep(Duration::from_millis(10));
-        let began = put(&voter, &vote_key, vote);
-        decided.push(holds.recv_timeout(Duration::from_secs(5)).expect("the robot decides") - began);
-        std::thread::sleep(Duration::from_millis(10));
+        of_open.push(open.decides(vote.encode()));
+        of_sealed.push(sealed.decides(Envelope { signature, ..vote }.encode()));
     }
-    let (raw, decided) = (median(&mut raw), median(&mut decided));
+    let [raw, of_open, of_sealed] = [raw, of_open, of_sealed].map(|mut times| median(&mut times));
+    let ratio = |time: Duration, to: Duration| time.as_secs_f64() / to.as_secs_f64();
     println!("raw Zenoh put -> callback     median {raw:?} of {SAMPLES}");
-    println!("vote -> decision at neighbour median {decided:?} of {SAMPLES}");
-    println!("ratio {:.2} (promised: at most 2)", decided.as_secs_f64() / raw.as_secs_f64());
-    robot.stop().await;
+    println!("vote -> decision at neighbour median {of_open:?}, sealed {of_sealed:?}");
+    println!("ratio {:.2} (promised: at most 2)", ratio(of_open, raw));
+    println!("sealed to open {:.2}", ratio(of_sealed, of_open));
+    open.robot.stop().await;
+    sealed.robot.stop().await;
 }
 
 async fn session(listen: &[String], connect: &[String]) -> Session {
@@ -81,7 +113,7 @@ async fn session(listen: &[String], connect: &[String]) -> Session {
         ("listen/endpoints", serde_json::json!(listen)),
         ("connect/endpoints", serde_json::json!(connect)),
         ("scouting/multicast/enabled", serde_json::json!(false)),
-        ("timestamping/enabled", serde_json::json!(true)),
+        ("timestamping/enabled", serde_json::json!(false)),
     ] {
         config.insert_json5(key, &value.to_string()).expect("a key of Zenoh's");
     }
@@ -89,7 +121,7 @@ async fn session(listen: &[String], connect: &[String]) -> Session {
 }
 
 /// A vote that suffices, over six classes; each for a round of its own.
-fn vote(counter: u32) -> Vec<u8> {
+fn vote(counter: u32) -> Envelope {
     let vote = Vote {
         round: RoundId { counter, opener: RobotId(0), life: 0 },
         vocabulary: VocabularyId(1),
@@ -97,7 +129,7 @@ fn vote(counter: u32) -> Vec<u8> {
         looks: 3.0,
     };
     let stamp = Stamp { boot: 1, sequence: counter };
-    Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }.encode()
+    Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }
 }
 
 fn put(session: &Session, key: &str, bytes: Vec<u8>) -> Instant {

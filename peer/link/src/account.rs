@@ -135,10 +135,6 @@ pub(super) enum Refusal {
     Author,
     #[error("a message that does not belong on this key")]
     Kind,
-    #[error(
-        "a word without a time: let the router that the client is attached to stamp messages (timestamping)"
-    )]
-    Time,
     #[error("the queue is full; neighbours will repeat what matters")]
     Full,
     #[error("another robot of the swarm has this robot's id: give each its own, then restart one")]
@@ -161,7 +157,6 @@ impl Refusal {
             Self::Key => "key",
             Self::Author => "author",
             Self::Kind => "kind",
-            Self::Time => "time",
             Self::Full => "full",
             Self::Twin => "twin",
             Self::Evidence(_) => "false",

@@ -102,10 +102,11 @@ impl LinkConfig {
             "id": zenoh_id(robot, swarm, nonce),
             "mode": "router",
             "listen/endpoints": self.listen,
+            // Words of instructors have the time that their clients give them; nothing else needs one.
+            "timestamping/enabled": false,
             "connect/timeout_ms": -1,
             "connect/exit_on_failure": false,
             "scouting/delay": 0,
-            "timestamping/enabled": true,
         }))
     }
 
@@ -114,6 +115,7 @@ impl LinkConfig {
         self.with_defaults(&serde_json::json!({
             "mode": "client",
             "listen/endpoints": [],
+            "timestamping/enabled": true,
             "connect/timeout_ms": 5000,
         }))
     }

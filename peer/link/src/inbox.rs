@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
     Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId,
@@ -260,8 +261,8 @@ impl Inbox {
 
     fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
         let instruction: Instruction = decode_json(&payload(sample, MAX_JSON)?)?;
-        // The robot that a client is attached to stamps what the client says.
-        let at = sample.timestamp().ok_or(Refusal::Time)?.get_time().as_u64();
+        let said = sample.timestamp().map(|time| time.get_time().as_u64());
+        let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
         self.queue(Input::Instructed(Instructed { by, at, instruction }))
     }
 
@@ -356,6 +357,13 @@ impl Inbox {
         let state = self.lock();
         state.alive.iter().chain(state.links.values()).copied().collect()
     }
+}
+
+/// The time of a word whose client did not say it, the same at robots whose clocks agree, or nearly so: it tells words apart, and
+/// their counts put them in order.
+fn unsaid_time(now: SystemTime, word: &[u8]) -> u64 {
+    let span = now.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs() / 2 * 2;
+    span << 32 | u64::from(crc32fast::hash(word))
 }
 
 /// The bytes of a payload, looked into only if they are few enough.

@@ -1,0 +1,114 @@
+//! What signatures cost, counted as bytes at a link.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
+use std::time::Duration;
+
+use gestalt_link::{Client, LinkConfig, RobotConfig};
+use gestalt_protocol::{Gesture, Instruction, Outcome, RobotId};
+use gestalt_tests::{Watched, agreed, config, learning, start_learning, unique};
+use gestalt_trust::Membership;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+
+use crate::stranger::{key, sealed};
+
+const PATIENCE: Duration = Duration::from_secs(30);
+const ROBOTS: u32 = 6;
+const ROUNDS: u32 = 9;
+
+/// Forwards between those who connect and a robot, and counts the bytes of both ways. Gives where to connect.
+async fn counting(robot: String, bytes: Arc<AtomicU64>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let at = listener.local_addr().unwrap();
+    tokio::spawn(async move {
+        while let Ok((stream, _)) = listener.accept().await {
+            let (from, to) = stream.into_split();
+            let Ok(robot) = TcpStream::connect(&robot).await else { return };
+            let (back, forth) = robot.into_split();
+            for (mut from, mut to) in [(from, forth), (back, to)] {
+                let bytes = bytes.clone();
+                tokio::spawn(async move {
+                    let mut buffer = vec![0; 1 << 16];
+                    while let Ok(length @ 1..) = from.read(&mut buffer).await {
+                        bytes.fetch_add(length as u64, Ordering::Relaxed);
+                        if to.write_all(&buffer[..length]).await.is_err() {
+                            return;
+                        }
+                    }
+                });
+            }
+        }
+    });
+    format!("tcp/{at}")
+}
+
+/// The bytes of a round that is looked at, decided, taught and shared, at the one link between two halves of a swarm; and those of
+/// a second at rest.
+async fn bytes_of_a_round(is_sealed: bool) -> (f64, f64) {
+    let swarm = unique("cost");
+    let robots = (0..ROBOTS).map(|id| (RobotId(id), key(id).public_key())).collect();
+    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let shown = Arc::new(AtomicU8::new(0));
+    let bytes = Arc::new(AtomicU64::new(0));
+    let mut robots: Vec<Watched> = Vec::new();
+    for id in 0..ROBOTS {
+        let connect = match id {
+            0 => vec![],
+            id if id == ROBOTS / 2 => {
+                let first = robots[0].robot.locators()[0].trim_start_matches("tcp/").to_owned();
+                vec![counting(first, bytes.clone()).await]
+            }
+            id if id < ROBOTS / 2 => robots[0].robot.locators().to_vec(),
+            _ => robots[ROBOTS as usize / 2].robot.locators().to_vec(),
+        };
+        let config = if is_sealed { sealed(id, &members, &connect) } else { config(id, &swarm, &connect) };
+        // Five samples of a round, as in the experiments.
+        let config = RobotConfig { learning: Some(learning(5, 1.0, None)), ..config };
+        robots.push(start_learning(config, shown.clone()).await);
+    }
+    for robot in &robots {
+        assert!(robot.sees_alive(ROBOTS as usize - 1, PATIENCE).await);
+    }
+    let link = LinkConfig { connect: robots[0].robot.locators().to_vec(), ..LinkConfig::default() };
+    let client = Client::open(&swarm, &link).await.unwrap();
+    let ada = "ada".parse().unwrap();
+    let mut of_rounds = 0;
+    for counter in 1..=ROUNDS {
+        let class = (counter % 6) as u8;
+        shown.store(class, Ordering::Relaxed);
+        let before = bytes.load(Ordering::Relaxed);
+        client.instruct(&ada, &Instruction::Open).await.unwrap();
+        let round = agreed(&mut robots, counter, PATIENCE).await.round;
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        let was = Instruction::Was { round, class: Gesture::Class(gestalt_protocol::ClassId(class)) };
+        let answer = client.teach(&ada, &was, PATIENCE).await.unwrap().expect("an answer");
+        assert_eq!(answer.outcome, Outcome::Learned);
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        // The first rounds are those of robots that know no gesture.
+        if counter > 6 {
+            of_rounds += bytes.load(Ordering::Relaxed) - before;
+        }
+    }
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let (before, pause) = (bytes.load(Ordering::Relaxed), Duration::from_secs(10));
+    tokio::time::sleep(pause).await;
+    let idle = (bytes.load(Ordering::Relaxed) - before) as f64 / pause.as_secs_f64();
+    client.close().await;
+    for robot in robots {
+        robot.stop().await;
+    }
+    (of_rounds as f64 / f64::from(ROUNDS - 6), idle)
+}
+
+pub async fn signatures_cost_a_link_less_than_half_as_much_again() {
+    let ((open, open_idle), (sealed, sealed_idle)) =
+        tokio::join!(bytes_of_a_round(false), bytes_of_a_round(true));
+    eprintln!(
+        "a round of {ROBOTS} robots: {open:.0} bytes at a link when open, {sealed:.0} when sealed: {:.2} times as many; at \
+         rest {open_idle:.0} and {sealed_idle:.0} B/s",
+        sealed / open
+    );
+    assert!(sealed <= 1.5 * open, "{sealed} and {open}");
+    assert!(sealed_idle <= 1.1 * open_idle + 5.0, "{sealed_idle} and {open_idle}");
+}
