@@ -8,6 +8,9 @@ use gestalt_protocol::{
 };
 use gestalt_rounds::Classify;
 
+use super::memory::Item;
+#[cfg(test)]
+use super::memory::RobotMemory;
 use super::state::{Learning, MAX_UNSENT};
 use crate::training_set::SetChange;
 use crate::vector_codec::decode_vector;
@@ -112,6 +115,44 @@ impl Learning {
             }
             (!told.is_empty()).then_some(BatchesTold { batches: told })
         })
+    }
+
+    /// Keeps a batch some of whose samples were news, while one of them is held.
+    pub fn keep_batch(&mut self, batch: HeldBatch) {
+        if let Some(first) = self.batches.keep(batch) {
+            self.dirty.insert(Item::Batch(first));
+            self.thinned.insert(first);
+        }
+    }
+
+    /// A sample that may have been shared is held no more.
+    pub(super) fn note_gone(&mut self, id: Option<SampleId>) {
+        self.thinned.extend(id.and_then(|id| self.batches.of(id)));
+    }
+
+    /// Lets go of the batches of which nothing is held any more.
+    pub(super) fn tidy_batches(&mut self) {
+        if self.thinned.is_empty() {
+            return;
+        }
+        let aside: BTreeSet<SampleId> = self.aside.iter().filter_map(|(_, aside)| aside.shared).collect();
+        let set = &self.set;
+        let is_held = |id| set.find(id).is_some() || aside.contains(&id);
+        let gone = self.batches.let_go(std::mem::take(&mut self.thinned), is_held);
+        self.dirty.extend(gone.into_iter().map(Item::Batch));
+    }
+
+    /// Every shared sample held can be passed on, nothing else is kept, and the disk has the same.
+    #[cfg(test)]
+    pub fn check_batches(&self, memory: RobotMemory) {
+        let held = self.set.common().filter_map(|sample| sample.id);
+        let held: BTreeSet<SampleId> =
+            held.chain(self.aside.iter().filter_map(|(_, aside)| aside.shared)).collect();
+        let of: BTreeSet<SampleId> =
+            held.iter().map(|id| self.batches.of(*id).expect("it came in a batch")).collect();
+        let kept: Vec<&HeldBatch> = self.batches.iter().collect();
+        assert_eq!(kept.iter().filter_map(|batch| batch.samples.first()).collect::<BTreeSet<_>>(), of);
+        assert_eq!(memory.batches.iter().collect::<Vec<_>>(), kept);
     }
 
     /// Whether a shared sample is not told to others yet.
