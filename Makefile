@@ -5,7 +5,7 @@ SHELL := /bin/bash
 ifeq ($(shell cargo --version 2>/dev/null),)
 export RUSTUP_TOOLCHAIN := stable
 endif
-.PHONY: demo test bench lint eyes packages test-packages
+.PHONY: demo test attack bench lint eyes packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
@@ -43,6 +43,11 @@ demo: packages
 test: test-packages
 	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
 	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
+
+# Plays every attack of SECURITY.md against emulated swarms and prints what comes of each; fails if one comes to something else
+# than its line says. Needs Rust alone. ATTACKS="A7 17 --seeds 5" plays some.
+attack:
+	cargo run -p gestalt-attack --bin attack -- $(ATTACKS)
 
 # Trains the weights of the learned eyes anew, from the pictures in GESTALT_DATA: about an hour on two cores. Then, what they
 # make of each set when trained without it: EYES="--leave-one-out". See peer/vision/weights/README.md.

@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
     Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId,
     Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
-use gestalt_trust::{Distrust, Evidence};
+use gestalt_trust::{Distrust, Evidence, Judge};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tokio::sync::{Notify, watch};
@@ -19,7 +19,7 @@ use zenoh::session::ZenohId;
 use super::account::{Account, Refusal};
 use super::announcement::Announcement;
 use super::identity::robot_of;
-use super::seal::Gate;
+use super::seal::Seal;
 
 /// The most messages that wait for the mind, votes apart.
 const MAX_QUEUE: usize = 8192;
@@ -39,7 +39,7 @@ pub(super) struct Inbox {
     account: Arc<Account>,
     state: Mutex<State>,
     /// In a sealed swarm: who lets in what its members said.
-    gate: Option<Gate>,
+    judge: Option<Mutex<Judge>>,
     /// For trials: the part of what arrives that is dropped, and the chance that chooses it.
     loss: f64,
     chance: Mutex<ChaCha8Rng>,
@@ -66,7 +66,7 @@ impl Inbox {
         keys: Keys,
         account: Arc<Account>,
         loss: f64,
-        gate: Option<Gate>,
+        seal: Option<&Seal>,
     ) -> Self {
         let state = Mutex::new(State::default());
         Self {
@@ -75,7 +75,7 @@ impl Inbox {
             keys,
             account,
             state,
-            gate,
+            judge: seal.map(|seal| Mutex::new(Judge::new(seal.roster.clone()))),
             loss,
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
@@ -86,6 +86,12 @@ impl Inbox {
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the judge of a sealed swarm says.
+    fn judged<T>(&self, ask: impl FnOnce(&mut Judge, Duration) -> T) -> Option<T> {
+        let judge = self.judge.as_ref()?;
+        Some(ask(&mut judge.lock().unwrap_or_else(PoisonError::into_inner), self.account.started().elapsed()))
     }
 
     /// Waits until there is something to take.
@@ -175,7 +181,7 @@ impl Inbox {
         if !matches!(envelope.message, Message::Vote(_)) {
             return Err(Refusal::Kind);
         }
-        self.gate.as_ref().map_or(Ok(()), |gate| gate.envelope(&envelope))?;
+        self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
         let mut state = self.lock();
         if id == self.me {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
@@ -202,7 +208,7 @@ impl Inbox {
             Message::Samples(_) if id == self.me => Ok(()),
             // All samples of a batch are of one author.
             Message::Samples(samples) if samples.first().is_some_and(|first| first.author == id) => {
-                self.gate.as_ref().map_or(Ok(()), |gate| gate.envelope(&envelope))?;
+                self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
                 self.queue(Input::Received(envelope))
             }
             Message::Samples(_) => Err(Refusal::Author),
@@ -218,15 +224,15 @@ impl Inbox {
         if matches!(envelope.message, Message::Vote(_) | Message::Samples(_)) {
             return Err(Refusal::Kind);
         }
-        if let (Message::Lessons(_), Some(gate)) = (&envelope.message, &self.gate) {
-            gate.envelope(&envelope)?;
+        if matches!(envelope.message, Message::Lessons(_)) {
+            self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
         }
-        let distrust = self.gate.as_ref().and_then(|gate| match &mut envelope.message {
-            Message::Give(give) => gate.give(give),
-            Message::Batches(batches) => gate.batches(batches),
+        let distrust = self.judged(|judge, now| match &mut envelope.message {
+            Message::Give(give) => judge.give(now, give),
+            Message::Batches(batches) => judge.batches(now, batches),
             _ => None,
         });
-        if let Some(distrust) = distrust {
+        if let Some(distrust) = distrust.flatten() {
             let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
             self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
         }
@@ -236,22 +242,20 @@ impl Inbox {
     fn on_decision(&self, sample: &Sample) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
         announcement.decision.check()?;
-        self.gate.as_ref().map_or(Ok(()), |gate| gate.decision(&announcement.decision))?;
+        self.judged(|judge, now| judge.decision(now, &announcement.decision)).unwrap_or(Ok(()))?;
         self.queue(Input::Announced(announcement.decision))
     }
 
     fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
-        let gate = self.gate.as_ref().ok_or(Refusal::Kind)?;
         let evidence = Evidence::decode(&payload(sample, Evidence::MAX_LENGTH)?)?;
-        if let Some(robot) = gate.evidence(evidence)? {
-            self.account.convicted(robot);
-        }
+        let news = self.judged(|judge, now| judge.evidence(now, evidence)).ok_or(Refusal::Kind)??;
+        news.into_iter().for_each(|liar| self.account.convicted(liar));
         Ok(())
     }
 
     /// Evidence against members that is to be told to all, each once.
     pub(super) fn untold(&self) -> Vec<Evidence> {
-        let untold = self.gate.as_ref().map(Gate::untold).unwrap_or_default().into_iter();
+        let untold = self.judged(|judge, _| judge.untold()).unwrap_or_default().into_iter();
         untold.inspect(|(robot, _)| self.account.convicted(*robot)).map(|(_, evidence)| evidence).collect()
     }
 
@@ -291,6 +295,9 @@ impl Inbox {
         let Some(Topic::Alive(id)) = self.keys.parse(sample.key_expr().as_str()) else {
             return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Key);
         };
+        if self.judged(|judge, _| judge.is_member(id)) == Some(false) {
+            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Distrust::Stranger.into());
+        }
         let mut state = self.lock();
         let changed = match sample.kind() {
             SampleKind::Put => state.alive.len() < MAX_ROBOTS && state.alive.insert(id),
@@ -298,8 +305,8 @@ impl Inbox {
         };
         if changed {
             // Whoever comes listens before it says that it is there.
-            if let (SampleKind::Put, Some(gate)) = (sample.kind(), &self.gate) {
-                gate.tell_again();
+            if sample.kind() == SampleKind::Put {
+                self.judged(|judge, _| judge.tell_again());
             }
             state.alive_changed = true;
             self.ready.notify_one();
@@ -313,7 +320,8 @@ impl Inbox {
         let before = state.alive.clone();
         state.alive.retain(|id| !gone.contains(id));
         for robot in present {
-            if state.alive.len() < MAX_ROBOTS {
+            let is_stranger = self.judged(|judge, _| judge.is_member(*robot)) == Some(false);
+            if state.alive.len() < MAX_ROBOTS && !is_stranger {
                 state.alive.insert(*robot);
             }
         }

@@ -26,7 +26,7 @@ use crate::keeper::Keeper;
 use crate::mind::new_mind;
 use crate::outbox::Outbox;
 use crate::presence::Presence;
-use crate::seal::{Gate, Seal};
+use crate::seal::Seal;
 use crate::session::{Node, watch_session};
 use crate::subscriptions::listen;
 use crate::supervisor::{Supervisor, run_apart};
@@ -115,9 +115,14 @@ impl Robot {
         let account = Arc::new(Account::new(status, started));
         let (events, first_events) = broadcast::channel(MAX_EVENTS);
         let supervisor = Supervisor::new(account.clone(), events.clone());
-        let gate = seal.as_deref().map(|seal| Gate::new(seal, started));
-        let inbox =
-            Arc::new(Inbox::new(id, swarm_checksum(&swarm), keys.clone(), account.clone(), link.loss, gate));
+        let inbox = Arc::new(Inbox::new(
+            id,
+            swarm_checksum(&swarm),
+            keys.clone(),
+            account.clone(),
+            link.loss,
+            seal.as_deref(),
+        ));
         let mut first_classifier = None;
         let apprentice = match prepared {
             Some(prepared) => {

@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 /// How many signatures are checked in the name of one author. What is known already costs nothing.
 ///
 /// The default, 16 at once and 8 a second, is twice what an honest robot says at its fastest. A hundred authors who all use theirs
-/// up cost a desktop core 4 % of its time. Beyond that all authors share a spare, by default 2,000 a second, a tenth of a core: who
-/// floods the swarm in the name of one keeps that one's own words from being checked only with more than those.
+/// up cost a desktop core 4 % of its time, and what is spared for those who are flooded as much again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Budget {
@@ -17,15 +16,9 @@ pub struct Budget {
     pub burst: NonZeroU32,
     /// How many more every second. At least 1.
     pub per_second: NonZeroU32,
-    /// How many more every second for all authors together, and at once. At least 1.
+    /// How many every second in all names together, beyond those, for authors whose own are used up: somebody may flood the swarm in
+    /// the name of one that has something to say, and a slower flood than this does not silence it. At least 1.
     pub spare: NonZeroU32,
-}
-
-impl Budget {
-    /// What all authors share beyond their own.
-    pub(crate) fn shared(&self) -> Self {
-        Self { burst: self.spare, per_second: self.spare, spare: self.spare }
-    }
 }
 
 impl Default for Budget {
@@ -33,7 +26,14 @@ impl Default for Budget {
         const fn number(of: u32) -> NonZeroU32 {
             NonZeroU32::new(of).expect("not zero")
         }
-        Self { burst: const { number(16) }, per_second: const { number(8) }, spare: const { number(2000) } }
+        Self { burst: const { number(16) }, per_second: const { number(8) }, spare: const { number(1000) } }
+    }
+}
+
+impl Budget {
+    /// That of all authors together, once their own are used up: a second's worth at once.
+    pub(crate) fn of_all(&self) -> Self {
+        Self { burst: self.spare, per_second: self.spare, ..*self }
     }
 }
 
@@ -117,7 +117,7 @@ mod tests {
             burst in 1..=u32::MAX, per_second in 1..=u32::MAX, times in prop::collection::vec(any::<u64>(), 1..20),
         ) {
             let number = |of| NonZeroU32::new(of).unwrap();
-            let budget = Budget { burst: number(burst), per_second: number(per_second), spare: number(1) };
+            let budget = Budget { burst: number(burst), per_second: number(per_second), ..Budget::default() };
             let mut bucket = Bucket::new(&budget, Duration::ZERO);
             prop_assert!(bucket.take(&budget, Duration::ZERO));
             for time in times {

@@ -64,6 +64,7 @@ mod evidence;
 #[cfg(any(test, feature = "fake"))]
 mod fake;
 mod identity;
+mod judge;
 mod key_file;
 mod membership;
 mod public_key;
@@ -84,6 +85,7 @@ pub use evidence::{Conviction, Evidence, EvidenceError};
 #[cfg(feature = "fake")]
 pub use fake::Fake;
 pub use identity::Identity;
+pub use judge::Judge;
 pub use key_file::KeyFileError;
 pub use membership::{MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
 pub use public_key::PublicKey;

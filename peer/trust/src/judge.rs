@@ -1,0 +1,183 @@
+//! What a robot of a sealed swarm lets in, message by message.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+use std::time::Duration;
+
+use gestalt_protocol::{Batches, CountedVote, Decision, Envelope, Give, Message, RobotId};
+
+use crate::budget::Budget;
+use crate::distrust::Distrust;
+use crate::evidence::{Evidence, EvidenceError};
+use crate::roster::Roster;
+use crate::scheme::{Ed25519, Scheme};
+use crate::verify::Verifier;
+use crate::witness::Witness;
+
+/// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows.
+const OF_SAMPLES: Budget = {
+    const fn number(of: u32) -> NonZeroU32 {
+        NonZeroU32::new(of).expect("not zero")
+    }
+    Budget { burst: number(512), per_second: number(64), spare: number(1000) }
+};
+
+/// Lets in what members of the swarm signed, and finds out who of them says two things. Pure: time is an argument.
+#[derive(Clone, Debug)]
+pub struct Judge<S: Scheme = Ed25519> {
+    /// For votes and lessons, and for samples: neither keeps the other waiting.
+    verifier: Verifier<S>,
+    of_samples: Verifier<S>,
+    witness: Witness,
+    /// Against whom, as it is told to others; those found here are yet to be.
+    evidence: BTreeMap<RobotId, Evidence>,
+    untold: Vec<RobotId>,
+}
+
+impl<S: Scheme> Judge<S> {
+    /// One that goes by that roster.
+    #[must_use]
+    pub fn new(roster: Roster<S>) -> Self {
+        Self {
+            witness: Witness::new(&roster),
+            verifier: Verifier::new(roster.clone(), Budget::default()),
+            of_samples: Verifier::new(roster, OF_SAMPLES),
+            evidence: BTreeMap::new(),
+            untold: Vec::new(),
+        }
+    }
+
+    /// Whether that robot is a member that is believed.
+    #[must_use]
+    pub fn is_member(&self, robot: RobotId) -> bool {
+        self.verifier.roster().members().robots.contains_key(&robot)
+    }
+
+    /// Whether the author said that: a vote, samples or what it passes on of instructors.
+    ///
+    /// # Errors
+    /// The [`Distrust`] that it meets. Who has just been found to say two things is [`Distrust::Convicted`], and the evidence is
+    /// [`untold`](Self::untold).
+    pub fn envelope(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Distrust> {
+        let statement = envelope.statement();
+        let signature = envelope.signature.as_ref().ok_or(Distrust::Unsigned)?;
+        let samples = matches!(envelope.message, Message::Samples(_));
+        let verifier = if samples { &mut self.of_samples } else { &mut self.verifier };
+        verifier.check(now, &statement, Some(signature))?;
+        let Some(evidence) = self.witness.observe(&statement, signature) else { return Ok(()) };
+        // What proves nothing is no reason to refuse it.
+        let Ok(Some(liar)) = self.evidence(now, evidence) else { return Ok(()) };
+        self.untold.push(liar);
+        Err(Distrust::Convicted)
+    }
+
+    /// Whether all the votes that a decision rests on were cast.
+    ///
+    /// # Errors
+    /// The [`Distrust`] that the first of them meets which was not.
+    pub fn decision(&mut self, now: Duration, decision: &Decision) -> Result<(), Distrust> {
+        let certificate = &decision.certificate;
+        let votes = certificate.votes.iter().map(CountedVote::held);
+        votes.chain(certificate.others.iter().cloned()).try_for_each(|held| self.envelope(now, &held.into()))
+    }
+
+    /// Leaves of a gift what was really said; says why the rest is not believed. What is left may be true: who passes on what it was
+    /// told is no liar.
+    pub fn give(&mut self, now: Duration, give: &mut Give) -> Option<Distrust> {
+        let mut refused = self.retain(now, &mut give.votes);
+        if let Some(Err(distrust)) = give.decision.as_ref().map(|decision| self.decision(now, decision)) {
+            give.decision = None;
+            refused = Some(distrust);
+        }
+        refused
+    }
+
+    /// The same of samples.
+    pub fn batches(&mut self, now: Duration, batches: &mut Batches) -> Option<Distrust> {
+        self.retain(now, &mut batches.batches)
+    }
+
+    fn retain<T: Clone + Into<Envelope>>(&mut self, now: Duration, held: &mut Vec<T>) -> Option<Distrust> {
+        let mut refused = None;
+        held.retain(|held| match self.envelope(now, &held.clone().into()) {
+            Ok(()) => true,
+            Err(distrust) => {
+                refused = Some(distrust);
+                false
+            }
+        });
+        refused
+    }
+
+    /// Takes in evidence; says against whom, if that is news.
+    ///
+    /// # Errors
+    /// [`EvidenceError`] for evidence that proves nothing against any member.
+    pub fn evidence(&mut self, now: Duration, evidence: Evidence) -> Result<Option<RobotId>, EvidenceError> {
+        let liar = self.verifier.convict(now, &evidence)?.robot;
+        self.of_samples.convict(now, &evidence)?;
+        let is_news = !self.evidence.contains_key(&liar);
+        self.evidence.entry(liar).or_insert(evidence);
+        Ok(is_news.then_some(liar))
+    }
+
+    /// The evidence that is to be told to all, each once.
+    pub fn untold(&mut self) -> Vec<(RobotId, Evidence)> {
+        let untold = std::mem::take(&mut self.untold).into_iter();
+        untold.filter_map(|liar| Some((liar, self.evidence.get(&liar)?.clone()))).collect()
+    }
+
+    /// Somebody is here who was not: all evidence is to be told again.
+    pub fn tell_again(&mut self) {
+        self.untold = self.evidence.keys().copied().collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::Signature;
+
+    use super::*;
+    use crate::statement;
+    use crate::testing::{robot, roster, vote};
+
+    const NOW: Duration = Duration::from_secs(1000);
+
+    fn said(author: u32, sequence: u32, evidence: f32) -> Envelope {
+        let unsigned = vote(author, sequence, evidence);
+        let signature: Signature = statement::sign(&robot(author), &roster(5).swarm_id(), &unsigned);
+        Envelope { signature: Some(signature), ..Envelope::decode(&unsigned).unwrap() }
+    }
+
+    #[test]
+    fn who_says_two_things_is_told_of_once_and_again_to_those_who_come() {
+        let (mut here, mut there) = (Judge::new(roster(5)), Judge::new(roster(5)));
+        assert_eq!(here.envelope(NOW, &said(1, 1, 1.0)), Ok(()));
+        assert_eq!(here.envelope(NOW, &said(1, 1, -1.0)), Err(Distrust::Convicted));
+        let told = here.untold();
+        assert_eq!((told.len(), here.untold().len()), (1, 0));
+        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(Some(RobotId(1))));
+        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(None), "no news");
+        assert_eq!(there.envelope(NOW, &said(1, 2, 1.0)), Err(Distrust::Convicted));
+        assert_eq!(there.envelope(NOW, &said(2, 2, 1.0)), Ok(()));
+        assert!(there.untold().is_empty(), "who found it tells it");
+        there.tell_again();
+        assert_eq!(there.untold(), told);
+    }
+
+    #[test]
+    fn of_a_gift_stays_what_was_said() {
+        let mut judge = Judge::new(roster(5));
+        let held = |envelope: Envelope| {
+            let Envelope { author: robot, stamp, message: Message::Vote(vote), signature } = envelope else {
+                unreachable!()
+            };
+            gestalt_protocol::HeldVote { robot, stamp, vote, signature }
+        };
+        let forged = Envelope { signature: said(2, 1, 1.0).signature, ..said(1, 1, 1.0) };
+        let mut give = Give { decision: None, votes: vec![held(forged), held(said(2, 1, 1.0))] };
+        assert_eq!(judge.give(NOW, &mut give), Some(Distrust::Forged));
+        assert_eq!(give.votes, [held(said(2, 1, 1.0))]);
+        assert_eq!(judge.give(NOW, &mut give), None);
+    }
+}

@@ -1,0 +1,373 @@
+//! Decisions that nobody made.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, Decision, HeldVote, Holding, RobotId, Stamp, Topic};
+
+use super::WHOEVER_SAYS_SO;
+use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::beside::{beside, decided_alike, decided_in_time, unmoved};
+use crate::forged;
+use crate::swarm::world::{CLASSES, STRANGER, key};
+use crate::swarm::{Plan, Swarm};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// The gesture that is shown, and the one that the adversary wants.
+const TRUE: u8 = 2;
+const FALSE: u8 = 4;
+const OTHER: u8 = 5;
+
+pub const ALL: &[Attack] = &[
+    Attack {
+        number: "A1",
+        what: "announces a decision of 4,096 made-up votes that does not follow from them, also of the next round",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "nothing",
+        counted: Counted::All(&["refused_unfounded_decision"]),
+        gap: None,
+        play: |seed| beside(&Plan::open(), seed, unfounded, unmoved),
+    },
+    Attack {
+        number: "A1 · 2",
+        what: "announces a decision that follows from 4,096 made-up votes, unsigned and signed by a stranger",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_decision_unsigned", "refused_decision_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| made_up(swarm, &announced_aloud), unmoved),
+    },
+    Attack {
+        number: "A1 · 2",
+        what: "announces a decision that follows from 4,096 made-up votes",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "the true decision stands everywhere",
+        counted: Counted::None("the votes of robots that nobody knows are taken for true"),
+        gap: Some(WHOEVER_SAYS_SO),
+        play: |seed| beside(&Plan::open(), seed, |swarm| made_up(swarm, &announced_aloud), decided_in_time),
+    },
+    Attack {
+        number: "A2",
+        what: "gives that decision to one robot after the other, as a neighbour does",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_unsigned", "refused_repair_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| made_up(swarm, &given), unmoved),
+    },
+    Attack {
+        number: "2",
+        what: "an enrolled robot announces a decision of votes that it made up for the others and signed itself",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_decision_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, in_their_names, unmoved),
+    },
+    Attack {
+        number: "A3",
+        what: "says for f + 1 robots that they hold a greater decision, which nobody has",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nobody holds another; announced within 0.15 s of the usual",
+        counted: Counted::None("what a robot says it holds is a hint: it is asked for, four times at most"),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().withstanding(1), seed, hearsay, decided_in_time),
+    },
+    Attack {
+        number: "A3",
+        what: "says to a robot that was cut off that the others hold what it holds",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "it is not announced as final",
+        counted: Counted::None("hints are believed where finality is counted"),
+        gap: Some(
+            "what a robot says it holds is not signed: only the votes in a decision prove it, not the word `final`",
+        ),
+        play: |seed| beside(&Plan::sealed(), seed, false_finality, final_as_in_peace),
+    },
+    Attack {
+        number: "A4 · 11",
+        what: "an enrolled robot decides on the earliest votes of the others and one of its own, of 16 looks, that it withheld",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "no other gesture is decided",
+        counted: Counted::None(
+            "its own votes and those of the others are true, and so is what follows from them",
+        ),
+        gap: None,
+        play: |seed| beside(&eight(), seed, chosen, same_gesture),
+    },
+    Attack {
+        number: "A4 · 11",
+        what: "an enrolled robot decides on such votes, and claims the gesture that it wants",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_unfounded_decision"]),
+        gap: None,
+        play: |seed| beside(&eight(), seed, underivable, unmoved),
+    },
+    Attack {
+        number: "11",
+        what: "an enrolled robot that claimed what does not follow from its votes goes on voting",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "it is expelled: its votes count no more",
+        counted: Counted::Some(&["refused_unfounded_decision"]),
+        gap: Some(
+            "robots do not sign the decisions they give, so none of them is evidence (E4), and nobody is expelled live",
+        ),
+        play: |seed| beside(&eight(), seed, then_votes, liar_is_out),
+    },
+    Attack {
+        number: "A16",
+        what: "contradicts every 150 ms with a lesser decision that does not follow",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "nothing",
+        counted: Counted::All(&["refused_unfounded_decision"]),
+        gap: None,
+        play: |seed| beside(&Plan::open(), seed, contradicting, unmoved),
+    },
+    Attack {
+        number: "A16",
+        what: "contradicts every 150 ms with a lesser decision of made-up votes",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_decision_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, contradicting, unmoved),
+    },
+    Attack {
+        number: "A16",
+        what: "announces the true decision to the robots alone, as final, before one of them does",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "clients hear of it from a robot, at most 1 s later than usual",
+        counted: Counted::None("the decision is true, and who announces it is nobody's matter"),
+        gap: Some(
+            "announcements are not signed: robots take one for their spokesrobot's, whoever made it and whoever else heard it",
+        ),
+        play: |seed| beside(&Plan::sealed(), seed, announced_to_robots, same_gesture),
+    },
+];
+
+/// Enough honest robots to outvote the liar among them with the margin that one liar needs.
+fn eight() -> Plan {
+    Plan { honest: 8, ..Plan::sealed().liars(1).withstanding(1) }
+}
+
+/// Begins a round, lets the adversary act in its midst, ends it.
+fn amid_a_round(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
+    let began = swarm.now();
+    swarm.begin(TRUE);
+    swarm.pass(50 * MS);
+    if swarm.at_war() {
+        act(swarm);
+    }
+    swarm.end(began);
+}
+
+/// Votes of robots that do not exist.
+fn of_nobody(swarm: &Swarm, robots: u32, signs: bool) -> Vec<HeldVote> {
+    let (round, id) = (swarm.round(), swarm.id());
+    let votes = (0..robots).map(|n| {
+        let vote = forged::vote(round, FALSE, 16.0);
+        let said = forged::said(10_000 + n, Stamp { boot: 1, sequence: 1 }, vote);
+        // Signing all of them would only cost time: the first one that is refused ends it.
+        forged::held(if signs && n == 0 { forged::signed(said, &key(STRANGER), &id) } else { said })
+    });
+    votes.collect()
+}
+
+fn unfounded(swarm: &mut Swarm) {
+    amid_a_round(swarm, &|swarm| {
+        for ahead in 0..2 {
+            let mut round = swarm.round();
+            round.counter += ahead;
+            let mut decision = forged::decision(round, of_nobody(swarm, 4096, false), 0);
+            // They are all for another gesture than it claims.
+            for counted in &mut decision.certificate.votes {
+                counted.vote = forged::vote(round, OTHER, 16.0);
+            }
+            decision.class = Some(ClassId(FALSE));
+            decision.confidence = 1.0;
+            decision.certificate.probabilities = vec![0.0; usize::from(CLASSES)];
+            decision.certificate.probabilities[usize::from(FALSE)] = 1.0;
+            swarm.put_decision(&decision);
+        }
+    });
+}
+
+fn made_up(swarm: &mut Swarm, way: &dyn Fn(&mut Swarm, Vec<HeldVote>)) {
+    amid_a_round(swarm, &|swarm| {
+        for signs in [false, true] {
+            let votes = of_nobody(swarm, 4096, signs);
+            way(swarm, votes);
+        }
+    });
+}
+
+fn announced_aloud(swarm: &mut Swarm, votes: Vec<HeldVote>) {
+    let decision = forged::decision(swarm.round(), votes, 0);
+    swarm.put_decision(&decision);
+}
+
+fn given(swarm: &mut Swarm, votes: Vec<HeldVote>) {
+    let decision = forged::decision(swarm.round(), votes, 0);
+    swarm.give(50, Some(decision), Vec::new());
+}
+
+fn in_their_names(swarm: &mut Swarm) {
+    amid_a_round(swarm, &|swarm| {
+        let (round, id, liar) = (swarm.round(), swarm.id(), key(6));
+        let vote = |robot| forged::said(robot, forged::LAST, forged::vote(round, FALSE, 16.0));
+        let votes = (1..=6).map(|robot| forged::held(forged::signed(vote(robot), &liar, &id)));
+        swarm.put_decision(&forged::decision(round, votes.collect(), 6));
+    });
+}
+
+fn hearsay(swarm: &mut Swarm) {
+    amid_a_round(swarm, &|swarm| {
+        let decision = forged::decision(swarm.round(), of_nobody(swarm, 100, false), 0);
+        for robot in [2, 3] {
+            let holding: Holding = decision.holding(Vec::new());
+            let bytes = serde_json::to_vec(&holding).expect("a holding is JSON");
+            swarm.put(&Topic::RobotDecision(RobotId(robot)), &bytes);
+        }
+    });
+}
+
+/// How many robots have said a vote with evidence.
+fn voted(swarm: &Swarm) -> usize {
+    let votes = swarm.votes().into_iter().filter(|held| !held.vote.evidence.is_empty());
+    votes.map(|held| held.robot).collect::<BTreeSet<_>>().len()
+}
+
+fn announced_to_robots(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(TRUE);
+    while voted(swarm) < 5 && swarm.now() < began + 1000 * MS {
+        swarm.pass(MS);
+    }
+    let votes = swarm.votes().into_iter().filter(|held| !held.vote.evidence.is_empty()).collect();
+    let decision = forged::decision(swarm.round(), votes, 1);
+    swarm.pass(20 * MS);
+    swarm.put_decision(&decision);
+    swarm.end(began);
+}
+
+/// Robot 1 is cut off when all have voted, and before anybody says what it holds.
+fn false_finality(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(TRUE);
+    while voted(swarm) < 5 && swarm.now() < began + 1000 * MS {
+        swarm.pass(MS / 10);
+    }
+    swarm.cut([1]);
+    swarm.pass(50 * MS);
+    if let Some(held) = swarm.mind(1).held().cloned() {
+        let bytes = serde_json::to_vec(&held.holding(Vec::new())).expect("a holding is JSON");
+        for robot in [3, 4, 5] {
+            swarm.put_to(1, &Topic::RobotDecision(RobotId(robot)), &bytes);
+        }
+    }
+    swarm.end(began);
+    swarm.pass(5000 * MS);
+}
+
+fn final_as_in_peace(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    let said = |swarm: &Swarm| -> Vec<bool> {
+        let by_one = swarm.announced().iter().filter(|(_, by, _)| *by == RobotId(1));
+        by_one.map(|(.., decision)| decision.is_final).collect()
+    };
+    match said(war) == said(peace) {
+        true => Ok(()),
+        false => Err(format!("announced as final: {:?}, in peace {:?}", said(war), said(peace))),
+    }
+}
+
+/// What the liar decides by the first vote with evidence of each other.
+fn of_chosen_votes(swarm: &Swarm) -> Decision {
+    let (round, id) = (swarm.round(), swarm.id());
+    let liar = swarm.liar();
+    let own = forged::said(liar, Stamp { boot: 1, sequence: 1 }, forged::vote(round, FALSE, 16.0));
+    let mut votes = vec![forged::held(forged::signed(own, &key(liar), &id))];
+    for held in swarm.votes() {
+        let new = votes.iter().all(|known| known.robot != held.robot);
+        if new && !held.vote.evidence.is_empty() && held.vote.round.counter == round.counter {
+            votes.push(held);
+        }
+    }
+    forged::decision(round, votes, liar)
+}
+
+/// Waits until everybody has voted.
+fn once_all_voted(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
+    let began = swarm.now();
+    swarm.begin(TRUE);
+    swarm.pass(340 * MS);
+    act(swarm);
+    swarm.end(began);
+}
+
+fn chosen(swarm: &mut Swarm) {
+    once_all_voted(swarm, &|swarm| {
+        let decision = of_chosen_votes(swarm);
+        swarm.give(swarm.liar(), Some(decision), Vec::new());
+    });
+}
+
+fn underivable(swarm: &mut Swarm) {
+    once_all_voted(swarm, &|swarm| {
+        let mut decision = of_chosen_votes(swarm);
+        decision.class = Some(ClassId(FALSE));
+        swarm.put_decision(&decision);
+        swarm.give(swarm.liar(), Some(decision), Vec::new());
+    });
+}
+
+fn then_votes(swarm: &mut Swarm) {
+    underivable(swarm);
+    amid_a_round(swarm, &|swarm| {
+        let (round, id) = (swarm.round(), swarm.id());
+        let liar = swarm.liar();
+        let vote = forged::said(liar, Stamp { boot: 1, sequence: 9 }, forged::vote(round, FALSE, 1.0));
+        swarm.put_vote(&forged::signed(vote, &key(liar), &id));
+    });
+}
+
+/// Whether no vote of the liar is in any ballot.
+pub fn liar_is_out(_: &Swarm, war: &Swarm) -> Result<(), String> {
+    let counting = war
+        .minds()
+        .filter(|mind| mind.ballot().is_some_and(|ballot| ballot.stamp(RobotId(war.liar())).is_some()));
+    match counting.count() {
+        0 => Ok(()),
+        robots => Err(format!("its vote is counted by {robots} robots")),
+    }
+}
+
+/// No robot holds another gesture than in peace; which votes it rests on may differ.
+fn same_gesture(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    decided_alike(peace, war, 1000 * MS)
+}
+
+fn contradicting(swarm: &mut Swarm) {
+    amid_a_round(swarm, &|swarm| {
+        for _ in 0..13 {
+            let mut decision = forged::decision(swarm.round(), of_nobody(swarm, 3, false), 99);
+            decision.confidence = 0.96;
+            swarm.put_decision(&decision);
+            swarm.pass(150 * MS);
+        }
+    });
+}

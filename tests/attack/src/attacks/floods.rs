@@ -1,0 +1,117 @@
+//! Saying more than can be checked.
+
+use std::time::Duration;
+
+use gestalt_protocol::{RobotId, Signature, Stamp, Topic};
+
+use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::beside::{beside, decided_in_time};
+use crate::forged;
+use crate::swarm::world::key;
+use crate::swarm::{Plan, Swarm};
+
+const MS: Duration = Duration::from_millis(1);
+
+pub const ALL: &[Attack] = &[
+    Attack {
+        number: "16",
+        what: "an enrolled robot says 4,000 votes a second, each truly signed and different",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "the others decide no later; at most 1,016 are checked at once and 1,008 a second",
+        counted: Counted::Some(&["refused_vote_too_fast"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, own_flood, few_checked),
+    },
+    Attack {
+        number: "17",
+        what: "1,000 votes a second in robot 3's name, with the newest stamps and made-up signatures",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "after 1 s of the round, and of the flood, robot 3 is counted everywhere",
+        counted: Counted::Some(&["refused_vote_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| flood_in_its_name(swarm, 1), third_is_counted),
+    },
+    Attack {
+        number: "17",
+        what: "8,000 votes a second in robot 3's name, with the newest stamps and made-up signatures",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "after 1 s of the round, and of the flood, robot 3 is counted everywhere",
+        counted: Counted::Some(&["refused_vote_forged", "refused_vote_too_fast"]),
+        gap: Some(
+            "before a signature is checked nothing tells the true vote from the false: who says more than 1,000 a second \
+                   in a robot's name leaves it nothing; links that know who speaks would",
+        ),
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| flood_in_its_name(swarm, 8), third_is_counted),
+    },
+];
+
+/// How many votes the enrolled robot says, in half a second.
+const FLOOD: u32 = 2000;
+
+fn own_flood(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    let liar = key(6);
+    for sequence in 1..=FLOOD {
+        swarm.pass(MS / 4);
+        if !swarm.at_war() {
+            continue;
+        }
+        let (round, id) = (swarm.round(), swarm.id());
+        let vote = forged::vote_of(round, 4, 1.0, sequence as f32 / 1e3);
+        let said = forged::said(6, Stamp { boot: 1, sequence }, vote);
+        let bytes = forged::signed(said, &liar, &id).encode();
+        // To one robot: what that checks of it is most of the work.
+        swarm.put_to(1, &Topic::Vote(RobotId(6)), &bytes);
+    }
+    swarm.end(began);
+}
+
+fn few_checked(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    decided_in_time(peace, war)?;
+    let refused = war.refused().get("refused_vote_too_fast").copied().unwrap_or(0);
+    let checked = u64::from(FLOOD) - refused;
+    // 16 + 1,000 at once, and 8 + 1,000 a second.
+    if checked <= 1016 + 504 { Ok(()) } else { Err(format!("{checked} were checked")) }
+}
+
+/// So many votes a millisecond.
+fn flood_in_its_name(swarm: &mut Swarm, rate: u32) {
+    let flood = |swarm: &mut Swarm, from: u32, time: u32| {
+        for n in from * rate..(from + time) * rate {
+            swarm.pass(MS / rate);
+            if !swarm.at_war() {
+                continue;
+            }
+            let vote = forged::vote(swarm.round(), 4, 16.0);
+            let mut said = forged::said(3, Stamp { boot: u32::MAX, sequence: n }, vote);
+            let mut bytes = [0x5a; 64];
+            bytes[..4].copy_from_slice(&n.to_le_bytes());
+            // Below the order of the group, so that all of the check is made.
+            bytes[63] = 0x01;
+            said.signature = Some(Signature::from_bytes(bytes));
+            for robot in [1, 2] {
+                swarm.put_to(robot, &Topic::Vote(RobotId(3)), &said.encode());
+            }
+        }
+    };
+    // It goes on before the round, so that nothing is left of the robot's own burst.
+    flood(swarm, 0, 200);
+    swarm.begin(1);
+    // Where this ends it is looked who is counted.
+    flood(swarm, 200, 1000);
+}
+
+fn third_is_counted(_: &Swarm, war: &Swarm) -> Result<(), String> {
+    let counts = |mind: &gestalt_strategies::Mind| {
+        let votes = mind.held().map(|held| held.certificate.votes.as_slice()).unwrap_or_default();
+        votes.iter().any(|counted| counted.robot == RobotId(3))
+    };
+    match war.minds().filter(|mind| !counts(mind)).count() {
+        0 => Ok(()),
+        robots => Err(format!("{robots} robots of 5 hold a decision in which robot 3 is not counted")),
+    }
+}

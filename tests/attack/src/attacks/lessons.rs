@@ -1,0 +1,173 @@
+//! Lessons that no instructor gave.
+
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, Lesson, Outcome, RobotId, RoundId, Word};
+
+use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::beside::{beside, learned_alike, unmoved};
+use crate::forged;
+use crate::swarm::{Plan, Swarm};
+
+/// Why an enrolled robot is believed what it says that an instructor said.
+const NO_KEYS: &str = "instructors have no keys yet: an enrolled robot may say that it heard what it likes";
+
+pub const ALL: &[Attack] = &[
+    Attack {
+        number: "A9",
+        what: "an enrolled robot tells 1,024 lessons on rounds of the last counters there are",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_lesson_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| last_rounds(swarm, 6), unmoved),
+    },
+    Attack {
+        number: "A9",
+        what: "an enrolled robot tells 4,096 lessons on made-up rounds as far ahead as may be",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "the next true word is learned by all",
+        counted: Counted::None("a round that nobody lived through gives way to one that somebody did"),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| near_rounds(swarm, 6), next_word_counts),
+    },
+    Attack {
+        number: "A9",
+        what: "tells 4,096 lessons on made-up rounds",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| near_rounds(swarm, 50), learned_alike),
+    },
+    Attack {
+        number: "A10 · 3",
+        what: "an enrolled robot takes back in ada's name what she taught, under the last count there is",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_lesson_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| taken_back(swarm, 6, u64::MAX), unmoved),
+    },
+    Attack {
+        number: "A10 · 3",
+        what: "an enrolled robot takes it back under the highest count that is taken, and in 16 made-up names",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "ada's next word counts",
+        counted: Counted::Some(&["refused_lesson_full"]),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::sealed().liars(1), seed, |swarm| taken_back(swarm, 6, 1 << 32), next_word_counts)
+        },
+    },
+    Attack {
+        number: "A10 · 3",
+        what: "takes back in ada's name what she taught, and she says no more",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, taken_back_for_good, learned_alike),
+    },
+    Attack {
+        number: "3",
+        what: "an enrolled robot relabels in ada's name what she taught",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::None("none of it is refused"),
+        gap: Some(NO_KEYS),
+        play: |seed| beside(&Plan::sealed().liars(1), seed, relabelled, learned_alike),
+    },
+];
+
+fn tell(swarm: &mut Swarm, from: u32, lessons: Vec<Lesson>) {
+    for part in lessons.chunks(1024) {
+        swarm.whisper(from, &forged::lessons(part.to_vec()));
+    }
+}
+
+fn show_and_teach(swarm: &mut Swarm, class: u8) -> RoundId {
+    let round = swarm.show(class);
+    swarm.teach(round, class);
+    round
+}
+
+fn last_rounds(swarm: &mut Swarm, from: u32) {
+    show_and_teach(swarm, 1);
+    let of = |n| {
+        let round = RoundId { counter: u32::MAX - n, opener: RobotId(1), life: 0 };
+        forged::lesson(round, "eve", 1, Word::Was(ClassId(4)))
+    };
+    tell(swarm, from, (0..1024).map(of).collect());
+    show_and_teach(swarm, 2);
+}
+
+fn near_rounds(swarm: &mut Swarm, from: u32) {
+    let first = show_and_teach(swarm, 1);
+    let of = |n: u32| {
+        let round = RoundId { counter: first.counter + n % 64, opener: RobotId(u32::MAX), life: n };
+        forged::lesson(round, "eve", 1, Word::Was(ClassId(4)))
+    };
+    tell(swarm, from, (0..4096).map(of).collect());
+    swarm.pass(Duration::from_secs(5));
+    show_and_teach(swarm, 2);
+}
+
+/// The last word of all was learned: what was seen in the last round is labelled by it everywhere.
+fn next_word_counts(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    let of_last = |swarm: &Swarm| -> Vec<Vec<u8>> {
+        let round = swarm.round();
+        let of = |mind: &gestalt_strategies::Mind| -> Vec<u8> {
+            let set = mind.training_set().into_iter().flat_map(|set| set.iter());
+            set.filter(|sample| sample.round == round).map(|sample| sample.class.0).collect()
+        };
+        swarm.minds().map(of).collect()
+    };
+    if !war.answered(Outcome::Learned) {
+        return Err("nothing was answered as learned".to_owned());
+    }
+    match of_last(war) == of_last(peace) {
+        true => Ok(()),
+        false => Err(format!("of the last round {:?}, in peace {:?}", of_last(war), of_last(peace))),
+    }
+}
+
+fn retractions(round: RoundId, count: u64) -> Vec<Lesson> {
+    let names = std::iter::once("ada".to_owned()).chain((0..16).map(|n| format!("eve{n}")));
+    let of = |name: String| {
+        let count = if name == "ada" { count } else { count.min(9) };
+        forged::lesson(round, &name, count, Word::Retracted)
+    };
+    names.map(of).collect()
+}
+
+fn taken_back(swarm: &mut Swarm, from: u32, count: u64) {
+    let round = show_and_teach(swarm, 1);
+    let lessons = match count {
+        u64::MAX => vec![forged::lesson(round, "ada", count, Word::Retracted)],
+        _ => retractions(round, count),
+    };
+    tell(swarm, from, lessons);
+    swarm.pass(Duration::from_secs(5));
+    swarm.teach(round, 5);
+    swarm.pass(Duration::from_secs(5));
+}
+
+fn taken_back_for_good(swarm: &mut Swarm) {
+    let round = show_and_teach(swarm, 1);
+    tell(swarm, 50, vec![forged::lesson(round, "ada", 2, Word::Retracted)]);
+    swarm.pass(Duration::from_secs(5));
+}
+
+fn relabelled(swarm: &mut Swarm) {
+    let round = show_and_teach(swarm, 1);
+    tell(swarm, 6, vec![forged::lesson(round, "ada", 2, Word::Was(ClassId(4)))]);
+    swarm.pass(Duration::from_secs(5));
+}

@@ -1,0 +1,54 @@
+//! All attacks, by what they aim at.
+//!
+//! | file | aims at |
+//! |---|---|
+//! | `decisions` | what the swarm settles on |
+//! | `votes` | what is counted |
+//! | `equivocation` | saying two things at once |
+//! | `floods` | saying too much |
+//! | `rounds` | when a round begins and ends, and who is waited for |
+//! | `lessons` | what instructors said |
+//! | `instructors` | who is an instructor |
+//! | `samples` | what robots learn from |
+//! | `relays` | what passes on samples and lessons |
+//! | `replay` | what was true once |
+//! | `rosters` | who is a member |
+//! | `proofs` | what a client is shown |
+
+mod decisions;
+mod equivocation;
+mod floods;
+mod instructors;
+mod lessons;
+mod proofs;
+mod relays;
+mod replay;
+mod rosters;
+mod rounds;
+mod samples;
+mod votes;
+
+use crate::attack::Attack;
+
+/// Every attack, in the order of the table.
+#[must_use]
+pub fn all() -> Vec<Attack> {
+    let parts = [
+        decisions::ALL,
+        votes::ALL,
+        equivocation::ALL,
+        floods::ALL,
+        rounds::ALL,
+        lessons::ALL,
+        instructors::ALL,
+        samples::ALL,
+        relays::ALL,
+        replay::ALL,
+        rosters::ALL,
+        proofs::ALL,
+    ];
+    parts.concat()
+}
+
+/// What an open swarm cannot withstand.
+const WHOEVER_SAYS_SO: &str = "in an open swarm a robot is whoever says so: seal it";

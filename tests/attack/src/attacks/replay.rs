@@ -1,0 +1,255 @@
+//! What was true once, said again.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
+use gestalt_trust::{Membership, SwarmId, statement};
+
+use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::beside::{beside, decided_in_time, unmoved};
+use crate::forged;
+use crate::swarm::world::{authority, key, members};
+use crate::swarm::{Parcel, Plan, Swarm};
+
+const MS: Duration = Duration::from_millis(1);
+
+/// Why a repeat is not counted.
+const NO_REFUSAL: &str =
+    "robots repeat themselves by design: a true word that is old changes nothing, and is no refusal";
+
+pub const ALL: &[Attack] = &[
+    Attack {
+        number: "7",
+        what: "replays all votes and decisions of two rounds in a later round",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::None(NO_REFUSAL),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, in_a_later_round, unmoved),
+    },
+    Attack {
+        number: "7",
+        what: "replays what robot 3 said before it restarted",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "the rounds after are decided as in peace",
+        counted: Counted::None(NO_REFUSAL),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| after_a_restart(swarm, &[1, 2, 4, 5]), decided_in_time)
+        },
+    },
+    Attack {
+        number: "7",
+        what: "replays an old round to a robot that has just restarted",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "the rounds after are decided as in peace",
+        counted: Counted::None(NO_REFUSAL),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| after_a_restart(swarm, &[3]), decided_in_time),
+    },
+    Attack {
+        number: "7",
+        what: "replays votes of the same robots in another swarm of the same name",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_vote_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, of_another_swarm, unmoved),
+    },
+    Attack {
+        number: "7",
+        what: "replays votes under the keys of samples and of repair",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_sample_kind", "refused_repair_kind"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, under_other_keys, unmoved),
+    },
+    Attack {
+        number: "7",
+        what: "replays the votes of two robots that stayed off, after all lost their memories and count rounds from 1 again",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "no vote of a robot that is off is counted",
+        counted: Counted::None(
+            "rounds of one counter merge while they are open, and the votes of an earlier life with them",
+        ),
+        gap: Some(
+            "a vote is bound to its round by the counter; robots whose memories hold a taught round count on, \
+                   others can be told old votes as new",
+        ),
+        play: |seed| beside(&Plan::sealed(), seed, after_all_forgot, off_are_not_counted),
+    },
+    Attack {
+        number: "8",
+        what: "a thief votes with the last stamp; the robot is enrolled anew with another key, and all start with that roster",
+        tier: Tier::T3,
+        setting: Setting::Sealed,
+        expected: "it counts again from the next round on; the thief does not",
+        counted: Counted::Some(&["refused_vote_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, stolen, enrolled_anew_counts),
+    },
+    Attack {
+        number: "8",
+        what: "a thief votes, and the robot is enrolled anew while the swarm goes on",
+        tier: Tier::T3,
+        setting: Setting::Sealed,
+        expected: "the thief counts no more: what else it says under the last stamp convicts its key",
+        counted: Counted::Some(&["refused_vote_convicted"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, stolen_live, super::decisions::liar_is_out),
+    },
+];
+
+/// Votes and decisions that were said to all.
+fn recorded(swarm: &Swarm) -> Vec<Parcel> {
+    let about = |parcel: &&Parcel| parcel.key.ends_with("/vote") || parcel.key.ends_with("/decision");
+    swarm.air().iter().filter(about).cloned().collect()
+}
+
+fn in_a_later_round(swarm: &mut Swarm) {
+    for class in [1, 2] {
+        swarm.show(class);
+        swarm.pass(6000 * MS);
+    }
+    let old: Vec<Parcel> = recorded(swarm).into_iter().filter(|parcel| parcel.key.contains("vote")).collect();
+    let began = swarm.now();
+    swarm.begin(3);
+    swarm.pass(100 * MS);
+    old.iter().for_each(|parcel| swarm.replay(parcel));
+    swarm.end(began);
+}
+
+fn after_a_restart(swarm: &mut Swarm, to: &[u32]) {
+    let round = swarm.show(1);
+    swarm.teach(round, 1);
+    let old = recorded(swarm);
+    swarm.pass(6000 * MS);
+    swarm.restart(3, false);
+    let say = |swarm: &mut Swarm| {
+        for parcel in &old {
+            let Some(topic) = swarm.topic(&parcel.key) else { continue };
+            to.iter().for_each(|robot| swarm.put_to(*robot, &topic, &parcel.bytes));
+        }
+    };
+    say(swarm);
+    swarm.pass(2000 * MS);
+    let began = swarm.now();
+    swarm.begin(2);
+    swarm.pass(100 * MS);
+    say(swarm);
+    swarm.end(began);
+}
+
+fn of_another_swarm(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(50 * MS);
+    let other = SwarmId::new(&key(2000).public_key(), crate::swarm::world::SWARM);
+    for robot in [1, 2, 3] {
+        let vote = forged::vote(swarm.round(), 4, 16.0);
+        let said = forged::said(robot, Stamp { boot: 1, sequence: 50 }, vote);
+        let signature = Some(statement::sign(&key(robot), &other, &said.statement()));
+        swarm.put_vote(&Envelope { signature, ..said });
+    }
+    swarm.end(began);
+}
+
+fn under_other_keys(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(200 * MS);
+    for held in swarm.votes() {
+        let (robot, bytes) = (held.robot, Envelope::from(held).encode());
+        swarm.put(&Topic::Sample(robot), &bytes);
+        for to in (1..=5).filter(|to| *to != robot.0) {
+            swarm.put_to(to, &Topic::Repair(RobotId(to)), &bytes);
+        }
+    }
+    swarm.end(began);
+}
+
+fn after_all_forgot(swarm: &mut Swarm) {
+    swarm.show(4);
+    let old: Vec<_> = swarm.votes().into_iter().filter(|held| matches!(held.robot.0, 4 | 5)).collect();
+    swarm.pass(10_000 * MS);
+    swarm.restart_all(None, true);
+    swarm.stop([4, 5]);
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(50 * MS);
+    for held in old {
+        swarm.put_vote(&held.into());
+    }
+    swarm.end(began);
+}
+
+fn off_are_not_counted(_: &Swarm, war: &Swarm) -> Result<(), String> {
+    let counted = |mind: &gestalt_strategies::Mind| {
+        let votes = mind.held().map(|held| held.certificate.votes.as_slice()).unwrap_or_default();
+        votes.iter().any(|counted| matches!(counted.robot.0, 4 | 5))
+    };
+    match war.minds().take(3).filter(|mind| counted(mind)).count() {
+        0 => Ok(()),
+        robots => {
+            Err(format!("{robots} robots of 3 count votes of robots that are off, for what was shown before"))
+        }
+    }
+}
+
+/// The thief has robot 6 and its key.
+fn steal(swarm: &mut Swarm, class: u8) {
+    let began = swarm.now();
+    swarm.begin(class);
+    swarm.pass(50 * MS);
+    let (round, id) = (swarm.round(), swarm.id());
+    let said = forged::said(6, forged::LAST, forged::vote(round, 4, 1.0));
+    swarm.put_vote(&forged::signed(said, &key(6), &id));
+    swarm.end(began);
+}
+
+/// The second epoch, in which robot 6 has another key.
+fn second_epoch() -> Membership {
+    let mut members = members(6, 2);
+    members.robots.insert(RobotId(6), key(66).public_key());
+    members.expelled = BTreeMap::from([(RobotId(6), key(6).public_key())]);
+    members
+}
+
+fn stolen(swarm: &mut Swarm) {
+    steal(swarm, 1);
+    swarm.restart_all(second_epoch().sign(&authority()).ok(), false);
+    let began = swarm.now();
+    swarm.begin(2);
+    swarm.pass(50 * MS);
+    let (round, id) = (swarm.round(), swarm.id());
+    let said =
+        |sequence, nats| forged::said(6, Stamp { boot: 2, sequence }, forged::vote_of(round, 2, nats, 1.0));
+    let (thief, robot) = (said(9, 3.0), said(1, 1.0));
+    swarm.put_vote(&forged::signed(thief, &key(6), &id));
+    swarm.put_vote(&forged::signed(robot, &key(66), &id));
+    swarm.end(began);
+}
+
+fn enrolled_anew_counts(_: &Swarm, war: &Swarm) -> Result<(), String> {
+    let own = Some(Stamp { boot: 2, sequence: 1 });
+    let stamp = |mind: &gestalt_strategies::Mind| mind.ballot().and_then(|ballot| ballot.stamp(RobotId(6)));
+    match war.minds().filter(|mind| stamp(mind) != own).count() {
+        0 => Ok(()),
+        robots => Err(format!("{robots} robots do not hold the vote of the robot that was enrolled anew")),
+    }
+}
+
+fn stolen_live(swarm: &mut Swarm) {
+    steal(swarm, 1);
+    // Published here: robots have no key to hear it under.
+    swarm.pass(6000 * MS);
+    steal(swarm, 2);
+}

@@ -1,0 +1,271 @@
+//! When a round begins and ends, and who is waited for.
+
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, Have, Message, Outcome, RobotId, RoundId, Stamp};
+
+use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::beside::{beside, decided_in_time, unmoved};
+use crate::forged;
+use crate::swarm::world::key;
+use crate::swarm::{Plan, Swarm};
+
+const MS: Duration = Duration::from_millis(1);
+
+pub const ALL: &[Attack] = &[
+    Attack {
+        number: "A7",
+        what: "begins another round every 100 ms",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_vote_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| round_after_round(swarm, 50, false), unmoved),
+    },
+    Attack {
+        number: "A7",
+        what: "begins another round every 100 ms",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "each gesture is decided, at most 1 s later",
+        counted: Counted::Some(&["refused_round_too_soon"]),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::open(), seed, |swarm| round_after_round(swarm, 50, false), within_a_second)
+        },
+    },
+    Attack {
+        number: "A7",
+        what: "an enrolled robot begins another round every 100 ms",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "each gesture is decided, at most 1 s later",
+        counted: Counted::Some(&["refused_round_too_soon"]),
+        gap: Some(
+            "who is enrolled is waited for as long as it says that it can see, for 1 s (patience); and a round that others \
+                   are in may be ended by a newer one after 0.5 s (refractory): so none of them is ever decided",
+        ),
+        play: |seed| {
+            beside(&Plan::sealed().liars(1), seed, |swarm| round_after_round(swarm, 6, true), within_a_second)
+        },
+    },
+    Attack {
+        number: "A8",
+        what: "votes and decides in rounds of the last counters there are",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "nothing",
+        counted: Counted::All(&["refused_round_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::open(), seed, |swarm| last_counters(swarm, 50, false), unmoved),
+    },
+    Attack {
+        number: "A8",
+        what: "an enrolled robot votes in rounds of the last counters there are",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_round_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| last_counters(swarm, 6, true), unmoved),
+    },
+    Attack {
+        number: "A8",
+        what: "runs the counter up as far and as fast as is taken, 200 rounds each a million further",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "counters are not used up: the next gesture is decided as ever",
+        counted: Counted::Some(&["refused_round_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::open(), seed, run_up, next_is_decided),
+    },
+    Attack {
+        number: "A8 · A19",
+        what: "says that it has 40 later rounds, up to the last counter",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "a word on the true round is learned; nothing is decided later",
+        counted: Counted::None("what somebody says it has is a hint: it is asked for, and nothing comes"),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, has_later_rounds, decided_and_learned),
+    },
+    Attack {
+        number: "A19",
+        what: "opens the round that is open under 2,000 more names",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_vote_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, many_names, unmoved),
+    },
+    Attack {
+        number: "A19",
+        what: "opens the round that is open under 2,000 more names",
+        tier: Tier::T0,
+        setting: Setting::Open,
+        expected: "it is decided, and a word on it is learned",
+        counted: Counted::None("rounds that open at once merge; a thousand names are kept"),
+        gap: None,
+        play: |seed| beside(&Plan::open(), seed, many_names, learned_anyway),
+    },
+    Attack {
+        number: "A18 · 23",
+        what: "shows 4,090 liveliness tokens of robots that do not exist",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "at most one round is lost; from the second on all is as ever",
+        counted: Counted::Some(&["refused_alive_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, ghosts, all_but_the_first),
+    },
+    Attack {
+        number: "A18 · 23",
+        what: "shows tokens of other robots that do not exist before every round",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "rounds take at most 1.1 times as long",
+        counted: Counted::Some(&["refused_alive_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, other_ghosts, all_but_the_first),
+    },
+];
+
+/// Each gesture was announced, in whichever round, at most a second later than in peace.
+fn within_a_second(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    for (before, after) in peace.shown().iter().zip(war.shown()) {
+        let until = after.began + before.announced.unwrap_or_default() + 1000 * MS;
+        let of_it = war.announced().iter().filter(|(at, ..)| (after.began..=until).contains(at));
+        let classes: Vec<_> = of_it.map(|(.., decision)| decision.class).collect();
+        if !classes.contains(&Some(ClassId(after.class))) {
+            return Err(format!("shown {}, announced {classes:?}", after.class));
+        }
+    }
+    Ok(())
+}
+
+fn say(swarm: &mut Swarm, robot: u32, signs: bool, sequence: u32, round: RoundId) {
+    let said = forged::said(robot, Stamp { boot: 1, sequence }, forged::null_vote(round));
+    let said = if signs { forged::signed(said, &key(robot), &swarm.id()) } else { said };
+    swarm.put_vote(&said);
+}
+
+fn round_after_round(swarm: &mut Swarm, robot: u32, signs: bool) {
+    for class in [1, 2] {
+        let began = swarm.now();
+        swarm.begin(class);
+        for n in 0..25 {
+            swarm.pass(100 * MS);
+            let round = RoundId { counter: swarm.round().counter + 1, opener: RobotId(robot), life: 9 };
+            say(swarm, robot, signs, 100 * u32::from(class) + n, round);
+        }
+        swarm.end(began);
+        swarm.pass(6000 * MS);
+    }
+}
+
+fn last_counters(swarm: &mut Swarm, robot: u32, signs: bool) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(50 * MS);
+    for n in 0..5 {
+        let round = RoundId { counter: u32::MAX - n, opener: RobotId(robot), life: 9 };
+        say(swarm, robot, signs, 1 + n, round);
+        if !signs {
+            let vote =
+                |robot| forged::said(robot, Stamp { boot: 1, sequence: 1 }, forged::vote(round, 4, 1.0));
+            let votes: Vec<_> = (50..60).map(|robot| forged::held(vote(robot))).collect();
+            swarm.put_decision(&forged::decision(round, votes, 50));
+        }
+    }
+    swarm.end(began);
+}
+
+fn run_up(swarm: &mut Swarm) {
+    swarm.show(1);
+    for n in 1..=200 {
+        let round = RoundId { counter: n * 1_000_000, opener: RobotId(50), life: 9 };
+        say(swarm, 50, false, n, round);
+        swarm.pass(20 * MS);
+    }
+    swarm.pass(6000 * MS);
+    swarm.show(2);
+}
+
+fn next_is_decided(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    decided_in_time(peace, war)?;
+    let counter = war.round().counter;
+    if counter < u32::MAX / 2 { Ok(()) } else { Err(format!("the counter stands at {counter}")) }
+}
+
+fn has_later_rounds(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(100 * MS);
+    let first = swarm.round().counter;
+    for n in 1..=40 {
+        let counter = if n == 40 { u32::MAX } else { first + n };
+        let round = Some(RoundId { counter, opener: RobotId(50), life: 9 });
+        let have = Have { round, decision: None, votes: Vec::new(), knowledge: None, answer: false };
+        swarm.whisper(50, &Message::Have(have));
+    }
+    let round = swarm.end(began);
+    swarm.teach(round, 1);
+}
+
+fn learned_anyway(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    decided_in_time(peace, war)?;
+    let samples = |swarm: &Swarm| -> Vec<usize> {
+        swarm.minds().map(|mind| mind.training_set().map_or(0, |set| set.len())).collect()
+    };
+    match samples(war) == samples(peace) && war.answered(Outcome::Learned) {
+        true => Ok(()),
+        false => Err(format!("samples {:?}, in peace {:?}", samples(war), samples(peace))),
+    }
+}
+
+fn decided_and_learned(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    learned_anyway(peace, war)?;
+    crate::beside::learned_alike(peace, war)
+}
+
+fn many_names(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(50 * MS);
+    let counter = swarm.round().counter;
+    for n in 0..2000 {
+        let round = RoundId { counter, opener: RobotId(50 + n), life: n };
+        say(swarm, 50, false, 1 + n, round);
+    }
+    let round = swarm.end(began);
+    swarm.teach(round, 1);
+}
+
+fn ghosts(swarm: &mut Swarm) {
+    swarm.show_tokens(10_000..14_090);
+    for class in [1, 2, 3] {
+        swarm.show(class);
+        swarm.pass(6000 * MS);
+    }
+}
+
+fn other_ghosts(swarm: &mut Swarm) {
+    for class in [1, 2, 3] {
+        let first = 10_000 * u32::from(class);
+        swarm.show_tokens(first..first + 4090);
+        swarm.show(class);
+        swarm.pass(6000 * MS);
+    }
+}
+
+fn all_but_the_first(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    for (n, (before, after)) in peace.shown().iter().zip(war.shown()).enumerate().skip(1) {
+        let usual = before.announced.unwrap_or_default();
+        if before.held != after.held || after.announced.is_none_or(|took| took > usual.mul_f64(1.1)) {
+            return Err(format!("showing {n}: {after:?}, in peace {before:?}"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,156 @@
+//! What can be said without being a robot. In peace all of it is left unsaid.
+
+use std::collections::BTreeSet;
+
+use gestalt_protocol::{Decision, Envelope, Give, HeldVote, Message, RobotId, RoundId, Stamp, Topic};
+use gestalt_strategies::Input;
+use gestalt_trust::SwarmId;
+
+use crate::forged;
+
+use super::network::{Swarm, json};
+use super::port::Parcel;
+use super::world::key;
+
+impl Swarm {
+    /// Whether the adversary acts at all: what it would say in peace need not be made.
+    pub fn at_war(&self) -> bool {
+        !self.peace
+    }
+
+    /// The swarm's identity, which everybody may know.
+    pub fn id(&self) -> SwarmId {
+        self.roster.swarm_id()
+    }
+
+    /// The number of the first liar.
+    pub fn liar(&self) -> u32 {
+        self.plan.honest + 1
+    }
+
+    /// The round that robot 1 knows, which everybody hears of.
+    pub fn round(&self) -> RoundId {
+        self.mind(1).round().unwrap_or(RoundId { counter: 1, opener: RobotId(1), life: 0 })
+    }
+
+    /// All that was said so far, for whoever recorded it.
+    pub fn air(&self) -> &[Parcel] {
+        &self.air
+    }
+
+    /// The key of that topic.
+    pub fn key(&self, topic: &Topic) -> String {
+        self.keys.key(topic)
+    }
+
+    /// What a key is about.
+    pub fn topic(&self, key: &str) -> Option<Topic> {
+        self.keys.parse(key)
+    }
+
+    /// How many messages of the adversary were dropped without a counter naming it.
+    pub fn silent(&self) -> u64 {
+        self.silent
+    }
+
+    /// The votes that were said so far, as their authors said them.
+    pub fn votes(&self) -> Vec<HeldVote> {
+        let envelopes = self.air.iter().filter_map(|parcel| Envelope::decode(&parcel.bytes).ok());
+        let votes = envelopes.filter_map(|Envelope { author, stamp, message, signature }| match message {
+            Message::Vote(vote) => Some(HeldVote { robot: author, stamp, vote, signature }),
+            _ => None,
+        });
+        votes.collect()
+    }
+
+    /// Says these bytes under that key to every robot, before anything else is heard.
+    pub fn put(&mut self, topic: &Topic, bytes: &[u8]) {
+        (1..=self.plan.honest).for_each(|robot| self.put_to(robot, topic, bytes));
+    }
+
+    /// The same to one robot alone.
+    pub fn put_to(&mut self, robot: u32, topic: &Topic, bytes: &[u8]) {
+        self.replay_to(robot, &Parcel { key: self.keys.key(topic), bytes: bytes.to_vec(), at: self.time() });
+    }
+
+    /// Says what was recorded once more.
+    pub fn replay(&mut self, parcel: &Parcel) {
+        (1..=self.plan.honest).for_each(|robot| self.replay_to(robot, parcel));
+    }
+
+    fn replay_to(&mut self, robot: u32, parcel: &Parcel) {
+        if self.peace {
+            return;
+        }
+        let i = robot as usize - 1;
+        let counted = |swarm: &Self| swarm.robots[i].refused().values().sum::<u64>();
+        let before = counted(self);
+        self.arrive(i, parcel);
+        self.silent += u64::from(counted(self) == before);
+    }
+
+    /// Says a vote under the key of its author.
+    pub fn put_vote(&mut self, envelope: &Envelope) {
+        self.put(&Topic::Vote(envelope.author), &envelope.encode());
+    }
+
+    /// Announces a decision.
+    pub fn put_decision(&mut self, decision: &Decision) {
+        self.put(&Topic::Decision, &json(decision));
+    }
+
+    /// Says something as a neighbour does, in that robot's name, to every other robot.
+    pub fn whisper(&mut self, from: u32, message: &Message) {
+        (1..=self.plan.honest).filter(|to| *to != from).for_each(|to| self.whisper_to(to, from, message));
+    }
+
+    /// The same to one robot alone.
+    pub fn whisper_to(&mut self, to: u32, from: u32, message: &Message) {
+        // Two messages under one stamp would convict it.
+        self.whispered += 1;
+        let stamp = Stamp { boot: 10, sequence: self.whispered };
+        let envelope = self.signed_by_liar(Envelope {
+            author: RobotId(from),
+            stamp,
+            message: message.clone(),
+            signature: None,
+        });
+        self.put_to(to, &Topic::Repair(RobotId(to)), &envelope.encode());
+    }
+
+    /// What a liar signs that is enrolled, and stands by what it says.
+    fn signed_by_liar(&self, mut envelope: Envelope) -> Envelope {
+        let by = envelope.author;
+        let is_enrolled = (self.liar()..self.liar() + self.plan.liars).contains(&by.0);
+        if !is_enrolled {
+            return envelope;
+        }
+        if let Message::Batches(batches) = &mut envelope.message {
+            for batch in batches.batches.iter_mut().filter(|batch| batch.robot == by) {
+                batch.signature = forged::signed(batch.clone().into(), &key(by.0), &self.id()).signature;
+            }
+        }
+        match envelope.message {
+            Message::Lessons(_) => forged::signed(envelope, &key(by.0), &self.id()),
+            _ => envelope,
+        }
+    }
+
+    /// Gives a decision and votes as a neighbour does.
+    pub fn give(&mut self, from: u32, decision: Option<Decision>, votes: Vec<HeldVote>) {
+        self.whisper(from, &Message::Give(Give { decision, votes }));
+    }
+
+    /// Shows liveliness tokens of these robots beside the true ones, and takes others that it showed away.
+    pub fn show_tokens(&mut self, ghosts: impl IntoIterator<Item = u32>) {
+        if self.peace {
+            return;
+        }
+        let tokens: BTreeSet<RobotId> =
+            self.tokens.iter().copied().chain(ghosts.into_iter().map(RobotId)).collect();
+        for i in 0..self.robots.len() {
+            let tokens = self.robots[i].port.tokens(&tokens);
+            self.tell(i, Input::Alive(tokens));
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Where a robot hears: what the inbox of `gestalt-link` does with bytes under a key, before the mind hears of it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use gestalt_protocol::{
+    Answer, Decision, DecodeError, Envelope, Holding, Instruction, Keys, MAX_JSON, MAX_MESSAGE, Message,
+    RobotId, Topic, decode_json,
+};
+use gestalt_strategies::{Input, Instructed};
+use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge};
+
+/// How many of its own latest votes a robot recognises when they come back to it.
+const OWN_VOTES: usize = 64;
+
+/// A message on its way: the key that it is under, its bytes, and the time that a router stamped on it.
+#[derive(Clone, Debug)]
+pub struct Parcel {
+    /// The key.
+    pub key: String,
+    /// The payload.
+    pub bytes: Vec<u8>,
+    /// In the swarm's own time.
+    pub at: u64,
+}
+
+/// Where one robot hears, and what it refused there.
+#[derive(Debug)]
+pub struct Port {
+    me: RobotId,
+    keys: Keys,
+    judge: Option<Judge>,
+    own_votes: VecDeque<Vec<u8>>,
+    refused: BTreeMap<String, u64>,
+}
+
+/// Why something that arrives goes no further.
+enum Refusal {
+    Bytes(DecodeError),
+    Key,
+    Author,
+    Kind,
+    Twin,
+    Distrust(Distrust),
+    Evidence,
+}
+
+impl From<EvidenceError> for Refusal {
+    fn from(_: EvidenceError) -> Self {
+        Self::Evidence
+    }
+}
+
+impl From<DecodeError> for Refusal {
+    fn from(error: DecodeError) -> Self {
+        Self::Bytes(error)
+    }
+}
+
+impl From<Distrust> for Refusal {
+    fn from(cause: Distrust) -> Self {
+        Self::Distrust(cause)
+    }
+}
+
+impl Refusal {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Bytes(DecodeError::Empty) => "empty",
+            Self::Bytes(DecodeError::TooLong { .. }) => "too_long",
+            Self::Bytes(DecodeError::Version { .. }) => "version",
+            Self::Bytes(DecodeError::Malformed(_)) => "malformed",
+            Self::Bytes(DecodeError::Trailing(_)) => "trailing",
+            Self::Bytes(DecodeError::Impossible(_)) => "impossible",
+            Self::Key => "key",
+            Self::Author => "author",
+            Self::Kind => "kind",
+            Self::Twin => "twin",
+            Self::Evidence => "false",
+            Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
+        }
+    }
+}
+
+impl Port {
+    /// That of robot `me`, with a judge in a sealed swarm.
+    pub fn new(me: RobotId, keys: Keys, judge: Option<Judge>) -> Self {
+        Self { me, keys, judge, own_votes: VecDeque::new(), refused: BTreeMap::new() }
+    }
+
+    /// What was refused here, by counter.
+    pub fn refused(&self) -> &BTreeMap<String, u64> {
+        &self.refused
+    }
+
+    /// Remembers a vote of this robot's own, so that an echo of it is told from a twin's vote.
+    pub fn said(&mut self, vote: Vec<u8>) {
+        if self.own_votes.len() == OWN_VOTES {
+            self.own_votes.pop_front();
+        }
+        self.own_votes.push_back(vote);
+    }
+
+    /// What the mind is to hear of that message, if anything.
+    pub fn take(&mut self, now: Duration, parcel: &Parcel) -> Option<Input> {
+        let (kind, taken) = match self.keys.parse(&parcel.key) {
+            Some(Topic::Vote(id)) => ("vote", self.on_vote(now, id, &parcel.bytes)),
+            Some(Topic::Sample(id)) => ("sample", self.on_shared(now, id, &parcel.bytes)),
+            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(now, &parcel.bytes)),
+            Some(Topic::RobotDecision(id)) => ("robot_decision", on_holding(id, &parcel.bytes)),
+            Some(Topic::Decision) => ("decision", self.on_decision(now, &parcel.bytes)),
+            Some(Topic::Evidence) => ("evidence", self.on_evidence(now, &parcel.bytes)),
+            Some(Topic::Feedback(by)) => {
+                let heard = json::<Instruction>(&parcel.bytes);
+                let word = |instruction| Input::Instructed(Instructed { by, at: parcel.at, instruction });
+                ("feedback", heard.map(|instruction| Some(word(instruction))))
+            }
+            Some(Topic::Answer(to)) => {
+                let heard = json::<Answer>(&parcel.bytes);
+                ("answer", heard.map(|answer| Some(Input::Answered(to, answer.at, answer.robot))))
+            }
+            _ => ("other", Err(Refusal::Key)),
+        };
+        taken.unwrap_or_else(|refusal| {
+            self.refuse(kind, &refusal);
+            None
+        })
+    }
+
+    fn refuse(&mut self, kind: &str, refusal: &Refusal) {
+        *self.refused.entry(format!("refused_{kind}_{}", refusal.name())).or_default() += 1;
+    }
+
+    fn on_vote(&mut self, now: Duration, id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let envelope = decode(bytes)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        if !matches!(envelope.message, Message::Vote(_)) {
+            return Err(Refusal::Kind);
+        }
+        self.judge(now, &envelope)?;
+        if id == self.me {
+            let echo = self.own_votes.iter().any(|own| own == bytes);
+            return if echo { Ok(None) } else { Err(Refusal::Twin) };
+        }
+        Ok(Some(Input::Received(envelope)))
+    }
+
+    fn on_shared(&mut self, now: Duration, id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let envelope = decode(bytes)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        match &envelope.message {
+            Message::Samples(_) if id == self.me => Ok(None),
+            Message::Samples(samples) if samples.first().is_some_and(|first| first.author == id) => {
+                self.judge(now, &envelope)?;
+                Ok(Some(Input::Received(envelope)))
+            }
+            Message::Samples(_) => Err(Refusal::Author),
+            _ => Err(Refusal::Kind),
+        }
+    }
+
+    fn on_repair(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let mut envelope = decode(bytes)?;
+        if envelope.author == self.me {
+            return Err(Refusal::Twin);
+        }
+        match envelope.message {
+            Message::Vote(_) | Message::Samples(_) => return Err(Refusal::Kind),
+            Message::Lessons(_) => self.judge(now, &envelope)?,
+            _ => {}
+        }
+        let distrust = self.judge.as_mut().and_then(|judge| match &mut envelope.message {
+            Message::Give(give) => judge.give(now, give),
+            Message::Batches(batches) => judge.batches(now, batches),
+            _ => None,
+        });
+        if let Some(distrust) = distrust {
+            // The rest of it may be true.
+            self.refuse("repair", &Refusal::Distrust(distrust));
+        }
+        Ok(Some(Input::Received(envelope)))
+    }
+
+    fn on_decision(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let decision: Decision = json(bytes)?;
+        decision.check()?;
+        if let Some(judge) = &mut self.judge {
+            judge.decision(now, &decision)?;
+        }
+        Ok(Some(Input::Announced(decision)))
+    }
+
+    fn on_evidence(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let judge = self.judge.as_mut().ok_or(Refusal::Kind)?;
+        judge.evidence(now, Evidence::decode(bytes)?)?;
+        Ok(None)
+    }
+
+    fn judge(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Refusal> {
+        Ok(self.judge.as_mut().map_or(Ok(()), |judge| judge.envelope(now, envelope))?)
+    }
+
+    /// The evidence that was found here, as it is told to all.
+    pub fn untold(&mut self) -> Vec<Vec<u8>> {
+        let untold = self.judge.as_mut().map(Judge::untold).unwrap_or_default();
+        untold.into_iter().map(|(_, evidence)| evidence.encode()).collect()
+    }
+
+    /// Those of these tokens that it takes for robots': in a sealed swarm members', each other is refused.
+    pub fn tokens(&mut self, shown: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        let Some(judge) = &self.judge else { return shown.clone() };
+        let (members, strangers): (BTreeSet<RobotId>, BTreeSet<RobotId>) =
+            shown.iter().partition(|robot| judge.is_member(**robot));
+        strangers.iter().for_each(|_| self.refuse("alive", &Refusal::Distrust(Distrust::Stranger)));
+        members
+    }
+}
+
+fn on_holding(id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+    Ok(Some(Input::Heard(id, json::<Holding>(bytes)?)))
+}
+
+fn decode(bytes: &[u8]) -> Result<Envelope, Refusal> {
+    within(bytes, MAX_MESSAGE)?;
+    Ok(Envelope::decode(bytes)?)
+}
+
+fn json<T: serde::de::DeserializeOwned>(bytes: &[u8]) -> Result<T, Refusal> {
+    within(bytes, MAX_JSON)?;
+    Ok(decode_json(bytes)?)
+}
+
+/// Bytes are looked into only if they are few enough.
+fn within(bytes: &[u8], limit: usize) -> Result<(), Refusal> {
+    let length = bytes.len();
+    if length > limit { Err(DecodeError::TooLong { length, limit }.into()) } else { Ok(()) }
+}

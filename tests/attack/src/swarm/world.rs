@@ -1,0 +1,94 @@
+//! What all robots of an emulated swarm have in common: their gestures, their feature space, their keys.
+
+use std::sync::{Arc, OnceLock};
+
+use gestalt_protocol::{InstructorId, RobotId};
+use gestalt_strategies::{Classify, ClassifyError, Components, FeatureSpace, ScalingMethod, Vocabulary};
+use gestalt_trust::{Identity, Membership, Roster};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// How many gestures there are.
+pub const CLASSES: u8 = 6;
+
+/// How many features a frame has.
+pub const FEATURES: usize = 8;
+
+/// How probable a robot finds the gesture that it sees in one frame.
+const SURE: f64 = 0.9;
+
+/// The swarm's name.
+pub const SWARM: &str = "attacked";
+
+/// The gestures.
+pub fn vocabulary() -> &'static Vocabulary {
+    static VOCABULARY: OnceLock<Vocabulary> = OnceLock::new();
+    VOCABULARY
+        .get_or_init(|| Vocabulary::new((0..CLASSES).map(|class| class.to_string())).expect("six labels"))
+}
+
+/// The space that samples lie in.
+pub fn space() -> Arc<FeatureSpace> {
+    static SPACE: OnceLock<Arc<FeatureSpace>> = OnceLock::new();
+    let fitted = || {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let rows: Vec<Vec<f32>> = (0..60).map(|n| features(n as u8 % CLASSES, &mut rng)).collect();
+        let rows = rows.iter().map(Vec::as_slice);
+        Arc::new(FeatureSpace::fit("test", rows, ScalingMethod::PerComponent, Components::Count(4), &mut rng))
+    };
+    SPACE.get_or_init(fitted).clone()
+}
+
+/// What a robot sees of that gesture in one frame.
+pub fn features(class: u8, rng: &mut ChaCha8Rng) -> Vec<f32> {
+    let mut features: Vec<f32> = (0..FEATURES).map(|_| rng.random::<f32>() * 0.9).collect();
+    features[0] += f32::from(class);
+    features
+}
+
+/// Tells the gesture from the first feature.
+#[derive(Debug)]
+pub struct ByFirst;
+
+impl Classify for ByFirst {
+    fn vocabulary(&self) -> &Vocabulary {
+        vocabulary()
+    }
+
+    fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+        let seen = features[0] as usize % usize::from(CLASSES);
+        let other = (1.0 - SURE) / f64::from(CLASSES - 1);
+        Ok((0..usize::from(CLASSES)).map(|class| if class == seen { SURE } else { other }).collect())
+    }
+}
+
+/// The key that a robot of that number is enrolled with; any other number is somebody's too.
+pub fn key(number: u32) -> Identity {
+    let mut secret = [7; 32];
+    secret[..4].copy_from_slice(&number.to_le_bytes());
+    Identity::from_bytes(&secret)
+}
+
+/// Who enrols the robots.
+pub fn authority() -> Identity {
+    key(1000)
+}
+
+/// The number of a key that nobody enrolled.
+pub const STRANGER: u32 = 77;
+
+/// So many robots, from 1 on, as members of the swarm in that epoch.
+pub fn members(robots: u32, epoch: u64) -> Membership {
+    let robots = (1..=robots).map(|id| (RobotId(id), key(id).public_key())).collect();
+    Membership { swarm: SWARM.to_owned(), epoch, robots, ..Membership::default() }
+}
+
+/// Those, enrolled.
+pub fn roster(robots: u32) -> Roster {
+    members(robots, 1).sign(&authority()).expect("members that go together")
+}
+
+/// An instructor of that name.
+pub fn instructor(name: &str) -> InstructorId {
+    name.parse().expect("a name")
+}
