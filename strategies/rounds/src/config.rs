@@ -6,7 +6,6 @@ use gestalt_protocol::{FusionRule, MAX_ROBOTS, RuleName};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::fusion::Fusion;
 use crate::quorum::Quorum;
 
 /// Parameters no robot can work with; each names the field and the mend.
@@ -70,8 +69,8 @@ pub struct RoundsConfig {
     /// and neither is to take itself for the whole.
     #[serde(with = "humantime_serde")]
     pub lately: Duration,
-    /// f: how many lying robots a decision must withstand. The margin top − second must exceed what f robots can
-    /// add to it (2·f·c for the log pools), and more than 2·f robots must give evidence.
+    /// f: how many lying robots a decision must withstand. Whichever f votes are left out, the others must decide the same; more than 2·f robots
+    /// must give evidence; and a majority is more than (n + f) / 2 of n robots, all of which gave evidence.
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
@@ -140,7 +139,8 @@ impl RoundsConfig {
     #[must_use]
     pub fn needs(&self, robots: u32) -> u32 {
         match self.quorum {
-            Quorum::Majority => robots / 2 + 1,
+            // Two majorities have an honest robot in common, whatever liars say to each (Malkhi & Reiter 1998).
+            Quorum::Majority => robots.saturating_add(self.liars) / 2 + 1,
             Quorum::Evidence(quorum) => quorum,
         }
     }
@@ -158,16 +158,18 @@ impl RoundsConfig {
     #[must_use]
     pub fn suffice(&self, reached: usize, contributors: usize, robots: u32) -> bool {
         let counted = match self.quorum {
-            Quorum::Majority => reached,
-            Quorum::Evidence(_) => contributors,
+            // What a robot said before it saw anything may be used against it.
+            Quorum::Majority if self.liars == 0 => reached,
+            Quorum::Majority | Quorum::Evidence(_) => contributors,
         };
         counted >= self.needs(robots) as usize && (self.liars == 0 || contributors > 2 * self.liars as usize)
     }
 
-    /// Whether votes that were fused to this decide.
+    /// Whether the top class of a fusion decides that has so much left if as many as are expected lied, see
+    /// [`Fuse::withstands`](crate::Fuse::withstands).
     #[must_use]
-    pub fn convinces(&self, fusion: &Fusion) -> bool {
-        fusion.probabilities[fusion.top.index()] >= 1.0 - self.alpha && fusion.margin > f64::from(self.liars)
+    pub fn convinces(&self, probability: f64) -> bool {
+        probability >= 1.0 - self.alpha
     }
 
     /// Whether a robot can work with these parameters.

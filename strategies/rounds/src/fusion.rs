@@ -46,28 +46,11 @@ pub fn fuse<'a>(
 ) -> Option<Fusion> {
     let mut totals = vec![0.0; classes];
     let mut row = vec![0.0; classes];
-    let mut scratch = vec![0.0; classes];
     let mut robots = 0.0;
     for evidence in rows {
+        part_into(&mut row, rule, clip, evidence)?;
         robots += 1.0;
-        clip_into(&mut row, evidence, clip);
-        match rule {
-            FusionRule::Majority => {
-                if let Some(total) = totals.get_mut(top_of(&row).index()) {
-                    *total += 1.0;
-                }
-            }
-            FusionRule::MeanProbability => {
-                softmax(&mut row);
-                add(&mut totals, &row, 1.0);
-            }
-            FusionRule::LogPool => add(&mut totals, &row, 1.0),
-            FusionRule::ConfidenceWeighted => {
-                scratch.copy_from_slice(&row);
-                add(&mut totals, &row, certainty(&mut scratch));
-            }
-            FusionRule::Other(_) => return None,
-        }
+        totals.iter_mut().zip(&row).for_each(|(total, part)| *total += part);
     }
     if robots == 0.0 || classes < 2 {
         return None;
@@ -113,6 +96,25 @@ pub fn weight(rule: FusionRule, clip: f64, evidence: &[f32]) -> f64 {
     }
 }
 
+/// What one robot's evidence adds to the total of each class; `None` for a rule that is not Gestalt's own.
+pub(crate) fn part_into(row: &mut [f64], rule: FusionRule, clip: f64, evidence: &[f32]) -> Option<()> {
+    clip_into(row, evidence, clip);
+    match rule {
+        FusionRule::Majority => {
+            let top = top_of(row).index();
+            row.iter_mut().enumerate().for_each(|(class, part)| *part = f64::from(u8::from(class == top)));
+        }
+        FusionRule::MeanProbability => softmax(row),
+        FusionRule::LogPool => {}
+        FusionRule::ConfidenceWeighted => {
+            let certainty = certainty(&mut row.to_vec());
+            row.iter_mut().for_each(|part| *part *= certainty);
+        }
+        FusionRule::Other(_) => return None,
+    }
+    Some(())
+}
+
 /// The index of the greatest value; of equals the smaller index.
 pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
     let mut top = 0;
@@ -126,14 +128,9 @@ pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
 }
 
 fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {
+    row.fill(0.0);
     for (value, said) in row.iter_mut().zip(evidence) {
         *value = f64::from(*said).min(clip).max(-clip);
-    }
-}
-
-fn add(totals: &mut [f64], row: &[f64], weight: f64) {
-    for (total, value) in totals.iter_mut().zip(row) {
-        *total += weight * value;
     }
 }
 

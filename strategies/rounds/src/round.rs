@@ -13,6 +13,7 @@ use crate::classify::Classify;
 use crate::config::RoundsConfig;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
+use crate::fusion::Fusion;
 use crate::observation::Observation;
 use crate::sign::Sign;
 
@@ -203,8 +204,11 @@ impl Round {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
-        let class =
-            fusion.as_ref().filter(|fusion| suffice && config.convinces(fusion)).map(|fusion| fusion.top);
+        let convinces = |fusion: &&Fusion| {
+            let scale = scale.filter(|_| suffice);
+            scale.is_some_and(|scale| config.convinces(self.ballot.withstands(rule, config, scale, fusion)))
+        };
+        let class = fusion.as_ref().filter(convinces).map(|fusion| fusion.top);
         if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {
             return;
         }

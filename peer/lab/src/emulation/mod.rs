@@ -27,7 +27,9 @@ pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver
 pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
 pub use rules::Rules;
-pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Order, Scenario, ScenarioError, View};
+pub use scenario::{
+    Churn, Contender, Event, Fault, Group, Lies, LinkModel, Order, Scenario, ScenarioError, View,
+};
 pub use school::School;
 pub use statistics::{Mean, Proportion};
 pub use teaching::{Feedback, Teaching};

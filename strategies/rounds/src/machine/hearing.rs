@@ -57,7 +57,7 @@ impl Rounds {
             && let Some(round) = &mut self.round
         {
             for holder in holding.guests.iter().chain([&robot]) {
-                round.agreement.note_holder(*holder, holding.rank, holding.class);
+                round.agreement.note_holder(*holder, robot, holding.rank, holding.class);
             }
         }
         let greater = self.wanted.as_ref().is_none_or(|wanted| {
@@ -264,8 +264,10 @@ impl Rounds {
                 round.ballot.cast(counted.held());
             }
         }
-        if decision.author != self.me {
-            round.agreement.note_holder(decision.author, decision.rank(), decision.class);
+        // Who is named as its author may not have drawn it.
+        if decision.author != self.me && self.config.liars == 0 {
+            let (author, rank, class) = (decision.author, decision.rank(), decision.class);
+            round.agreement.note_holder(author, author, rank, class);
         }
         if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
     }

@@ -46,7 +46,7 @@ impl Rounds {
             self.round.as_mut().filter(|round| order.is_eq() && round.agreement.rank() == have.decision)
             && let Some((rank, class)) = round.agreement.held().map(|held| (held.rank(), held.class))
         {
-            round.agreement.note_holder(from, rank, class);
+            round.agreement.note_holder(from, from, rank, class);
         }
         if let Some(give) = self.lacking_there(order, have) {
             self.tell(from, Message::Give(give), effects);
@@ -68,7 +68,7 @@ impl Rounds {
                 && self.is_this_round(decision.round)
                 && let Some(round) = &mut self.round
             {
-                round.agreement.note_holder(from, decision.rank(), decision.class);
+                round.agreement.note_holder(from, from, decision.rank(), decision.class);
             }
             if self.hear_decision(decision.clone(), effects) == Heard::News {
                 if !self.is_open() && missed {

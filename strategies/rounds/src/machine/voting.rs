@@ -76,7 +76,8 @@ impl Rounds {
     }
 
     fn is_final(&self, agreement: &Agreement) -> bool {
-        agreement.is_final(self.config.holders(self.electorate.count()), &self.guests)
+        let holders = self.config.holders(self.electorate.count());
+        agreement.is_final(holders, &self.guests, self.config.liars)
     }
 
     pub(super) fn own_scale(&self) -> Option<Scale> {

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ScenarioError;
 pub use fault::{Churn, Event, Fault};
-pub use group::{Group, View};
+pub use group::{Group, Lies, View};
 pub use link_model::LinkModel;
 
 use super::teaching::Teaching;
