@@ -19,6 +19,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 VERSION = 3
 POOLS = ("log_pool", "confidence_weighted")
+ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
 
 
@@ -86,14 +87,14 @@ def fuse(rule: str, votes: list, clip: float) -> tuple:
     """The probability of each class, and what each vote adds to its total."""
     rows = [[min(max(value, -clip), clip) for value in vote] for vote in votes]
     if rule == "majority":
-        parts = [[float(k == max(range(len(row)), key=lambda j: (row[j], -j))) for k in range(len(row))] for row in rows]
-        if any(row.count(max(row)) > 1 for row in rows):
-            raise Refused("a vote without a first choice: this program does not judge it")
+        # Who finds two classes equally likely abstains.
+        parts = [[float(value == max(row)) for value in row] for row in rows if row.count(max(row)) == 1]
+        require(bool(parts), "all abstain")
     else:
         parts = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows,
                  "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
     totals = [sum(column) for column in zip(*parts)]
-    return softmax(totals) if rule in POOLS else [total / len(rows) for total in totals], parts
+    return softmax(totals) if rule in POOLS else [total / len(parts) for total in totals], parts
 
 
 def least(rule: str, parts: list, top: int, liars: int) -> float:
@@ -131,12 +132,12 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require(given.liars == 0 or len(votes) > 2 * given.liars, "too few votes for so many liars")
     rule = certificate["rule"]
     probabilities, parts = fuse(rule, [held["vote"]["evidence"] for held in votes], given.clip)
-    of_class = probabilities[decision["class"]]
+    of_class, alpha = probabilities[decision["class"]], given.alpha or ALPHA.get(rule, 0.5)
     require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
     require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
     require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")
     sure = least(rule, parts, decision["class"], given.liars)
-    require(sure + TOLERANCE >= 1 - given.alpha, "the votes do not suffice")
+    require(sure + TOLERANCE >= 1 - alpha, "the votes do not suffice")
     return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
 
 
@@ -144,7 +145,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON; - for standard input")
     arguments.add_argument("--roster", required=True, help="the swarm's roster.json")
-    arguments.add_argument("--alpha", type=float, default=0.05)
+    arguments.add_argument("--alpha", type=float, help="by default that of the rule: 0.05 for the pools, 0.5 for the others")
     arguments.add_argument("--clip", type=float, default=6.0)
     arguments.add_argument("--liars", type=int, default=0)
     given = arguments.parse_args()

@@ -39,9 +39,6 @@ impl Case {
         scenario.rounds = rounds;
         scenario.mind.rule = self.rule;
         scenario.mind.liars = self.expected;
-        if matches!(self.rule, FusionRule::Majority | FusionRule::MeanProbability) {
-            scenario.mind.alpha = 0.49;
-        }
         scenario
     }
 }
@@ -90,7 +87,7 @@ fn outcomes(cases: &[Case], seeds: u64, rounds: u32, tell: impl Fn(Case, Outcome
 
 fn cases(sizes: &[usize], liars: impl Fn(usize) -> Vec<usize>) -> Vec<Case> {
     let mut cases = Vec::new();
-    for rule in FusionRule::ALL.into_iter().rev() {
+    for rule in FusionRule::ALL {
         for &robots in sizes {
             for f in liars(robots) {
                 for lies in MANNERS {

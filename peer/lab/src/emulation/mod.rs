@@ -199,7 +199,7 @@ pub fn compare(
             reports.push(run(&contending, seed)?);
             ran();
         }
-        summaries.push(Summary::of(contender.rule, contending.mind.alpha, &reports));
+        summaries.push(Summary::of(contender.rule, contending.mind.alpha(), &reports));
     }
     Ok(summaries)
 }

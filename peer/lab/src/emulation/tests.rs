@@ -150,7 +150,7 @@ fn a_robot_that_missed_a_round_is_told_of_it_when_it_is_back() {
 fn votes_cost_at_most_a_kilobyte_a_second() {
     let mut scenario = calm(10, 0, NetworkShape::Random, 3);
     // Nobody is ever sure, so every round lasts until its deadline.
-    scenario.mind.alpha = 1e-12;
+    scenario.mind.alpha = Some(1e-12);
     scenario.robots[0].view = Some(View { fps: 30.0, signal: 0.1, persistence: 0.0 });
     let report = run(&scenario, 1).unwrap();
     assert!((1.0..=1000.0).contains(&report.vote_bytes_per_open_second), "{report:?}");
