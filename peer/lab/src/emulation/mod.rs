@@ -35,7 +35,7 @@ pub use statistics::{Mean, Proportion};
 pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
-use gestalt_strategies::{Classifier, TrainingSet, Vocabulary};
+use gestalt_strategies::{Classifier, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -164,6 +164,12 @@ impl<'a> Emulation<'a> {
     #[must_use]
     pub fn training_set(&self, robot: usize) -> Option<&TrainingSet> {
         self.swarm.mind(robot)?.training_set()
+    }
+
+    /// What a robot has refused so far, by its position; `None` of one that is down, or lies.
+    #[must_use]
+    pub fn refusals(&self, robot: usize) -> Option<&Refusals> {
+        Some(self.swarm.mind(robot)?.refusals())
     }
 
     /// What a robot has sent so far, by its position.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use gestalt_protocol::{FusionRule, RobotId};
-use gestalt_strategies::{MindConfig, SetPart};
+use gestalt_strategies::{MindConfig, Refusal, SetPart};
 
 use super::*;
 use crate::shape::NetworkShape;
@@ -68,6 +68,26 @@ fn a_hundred_robots_with_thirty_percent_loss_decide_a_round() {
     assert_eq!((scenario.swarm_size(), scenario.link.loss), (100, 0.3));
     let report = run(&scenario, 0).unwrap();
     assert_eq!((report.right.hits, report.unanimous.hits), (1, 1));
+}
+
+#[test]
+fn a_hundred_honest_robots_are_refused_nothing_for_being_too_often() {
+    let hundred = Scenario { rounds: 3, ..shipped("hundred.json5") };
+    let calm = Scenario { link: LinkModel::default(), ..hundred.clone() };
+    let churn = Churn {
+        from: Duration::from_secs(3),
+        until: Duration::from_secs(25),
+        period: Duration::from_millis(100),
+    };
+    let cut = Scenario { churn: Some(churn), topology: NetworkShape::Grid, ..calm.clone() };
+    let star = Scenario { topology: NetworkShape::Star, ..hundred.clone() };
+    for scenario in [hundred, calm, cut, star] {
+        let mut emulation = emulation(&scenario, 1);
+        while emulation.show_next() {}
+        let count = |refusal| (0..100).map(|i| emulation.refusals(i).unwrap().count(refusal)).sum::<u64>();
+        let refused = [Refusal::DecisionTooOften, Refusal::HaveTooOften].map(count);
+        assert_eq!(refused, [0, 0], "{:?}, {:?}", scenario.topology, scenario.link);
+    }
 }
 
 #[test]

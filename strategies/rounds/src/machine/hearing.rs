@@ -96,6 +96,9 @@ impl Rounds {
     }
 
     pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
+        if !self.may_hear(&decision, None) {
+            return;
+        }
         let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
         // What nobody would decide, nobody announced.
         if self.hear_decision(decision, effects) != Heard::Refused
@@ -228,6 +231,23 @@ impl Rounds {
                 false
             }
         }
+    }
+
+    /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. `given`: by whom, if it was not announced. The
+    /// one that is held may be repeated.
+    pub(super) fn may_hear(&mut self, decision: &Decision, given: Option<Option<RobotId>>) -> bool {
+        let held = self.round.as_ref().and_then(|round| round.agreement.held());
+        let repeated =
+            held.is_some_and(|held| held.round == decision.round && held.rank() == decision.rank());
+        let allowed = match given {
+            _ if repeated => true,
+            Some(by) => self.given.take(self.now, by),
+            None => self.announced.take(self.now, None),
+        };
+        if !allowed {
+            self.refusals.add(Refusal::DecisionTooOften);
+        }
+        allowed
     }
 
     /// Takes in a decision, by whichever way it came.

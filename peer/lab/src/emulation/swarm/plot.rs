@@ -105,12 +105,16 @@ impl Plot {
             self.said.values().filter_map(|said| said.iter().find(|held| held.vote.evidence.is_empty()));
         // Whoever is not counted takes part at least, if it said so.
         let rest: Vec<HeldVote> = lies.chain(empty.cloned()).collect();
-        (0..=suiting.len()).find_map(|counted| {
+        let reached = liars.len() + self.said.len();
+        let enough = |counted: &usize| config.suffice(reached, liars.len() + counted, robots as u32);
+        let least = (0..=suiting.len()).find(enough)?;
+        // Beyond as many as are needed, none that speaks against it helps.
+        let helps = |counted: &usize| *counted == least || suiting[counted - 1].0 > 0.0;
+        (least..=suiting.len()).take_while(helps).find_map(|counted| {
             let mut ballot = Ballot::default();
-            let chosen = suiting[..counted].iter().map(|(_, held)| held);
-            chosen.chain(&rest).for_each(|held| {
+            for held in suiting[..counted].iter().map(|(_, held)| held).chain(&rest) {
                 ballot.cast(held.clone());
-            });
+            }
             let decision = self.decide(class, &ballot, liars[0], robots, took, config)?;
             follows(&decision, &config.rule, config, robots as u32).then_some(decision)
         })
