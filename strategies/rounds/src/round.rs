@@ -175,6 +175,29 @@ impl Round {
         self.ends.get_or_insert(now + config.patience);
     }
 
+    /// Whether nothing is to be waited for any more. A robot that has not seen anything yet may be about to: its camera may take a frame in half a
+    /// second.
+    fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
+        let mut robots = view.expected.iter().chain([&view.me]);
+        now >= self.since + config.patience || robots.all(|robot| self.ballot.has_spoken(*robot))
+    }
+
+    /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too. Where liars are expected they may have
+    /// chosen what it rests on, and decided before the others had a say.
+    pub fn bears_out(
+        &self,
+        now: Duration,
+        decision: &Decision,
+        view: &View<'_>,
+        rule: &dyn Fuse,
+        config: &RoundsConfig,
+    ) -> bool {
+        let Certificate { vocabulary, probabilities, .. } = &decision.certificate;
+        let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
+        let likeliest = || self.ballot.fuse(rule, config.clip, scale).map(|fusion| fusion.top);
+        (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
+    }
+
     /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline. Who holds the decision of
     /// another goes on to conclude when it knows of more evidence than that rests on.
     pub fn conclude(&mut self, now: Duration, view: &View<'_>, rule: &dyn Fuse, config: &RoundsConfig) {
@@ -196,9 +219,7 @@ impl Round {
         {
             return;
         }
-        // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
-        let mut robots = view.expected.iter().chain([&view.me]);
-        let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
+        let heard_all = self.has_heard_all(now, view, config);
         let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
         if !(late || suffice && heard_all) {
             return;

@@ -13,7 +13,7 @@ use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
 use crate::proof::follows;
 use crate::refusal::Refusal;
-use crate::round::Round;
+use crate::round::{Round, View};
 
 /// Counters may run ahead of what this life of the robot began with by so many, which is two years of gestures without a pause,
 const MAX_AHEAD: u64 = 1 << 24;
@@ -278,11 +278,21 @@ impl Rounds {
             Some(Ordering::Greater) => self.enter(decision.round, false, effects),
             Some(Ordering::Equal) => {}
         }
+        let expected = self.electorate.expected(&self.alive);
+        let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
         for counted in &decision.certificate.votes {
             if counted.robot != self.me {
                 round.ballot.cast(counted.held());
             }
+        }
+        let view = View { me: self.me, expected: &expected, robots, scale };
+        if self.config.liars > 0
+            && decision.class.is_some()
+            && !round.bears_out(self.now, &decision, &view, &*self.fusion, &self.config)
+        {
+            // Its votes were heard; what they are worth, this robot finds itself.
+            return Heard::Known;
         }
         // Who is named as its author may not have drawn it.
         if decision.author != self.me && self.config.liars == 0 {
