@@ -27,7 +27,7 @@ impl Case {
         let text = "{
             robots: [
                 { name: 'liar', count: 1, lies: 'together' },
-                { name: 'robot', count: 1, view: { fps: 4, signal: 3, persistence: 0.5 } },
+                { name: 'robot', count: 1, view: { fps: 4, signal: 4, persistence: 0.5 } },
             ],
             topology: 'random',
             link: { latency: '2ms', jitter: '5ms', loss: 0.02 },

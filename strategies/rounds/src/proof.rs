@@ -12,7 +12,8 @@ const TOLERANCE: f64 = 1e-9;
 /// Whether robots of that configuration, so many of them, decide so on the votes that the decision brings with it, fused by that
 /// rule. What it says of itself counts for nothing. Whether the votes were cast is another question, for `gestalt-trust`.
 ///
-/// A decision without a class claims nothing, and follows from any votes.
+/// A decision without a class claims nothing, and follows from any votes. Its probabilities may be others than those found here by 1e-9, as
+/// exponentials of different platforms are; nothing else may.
 #[must_use]
 pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robots: u32) -> bool {
     let Some(class) = decision.class else { return decision.check().is_ok() };
