@@ -18,6 +18,9 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 VERSION = 3
+POOLS = ("log_pool", "confidence_weighted")
+ALPHA = {rule: 0.05 for rule in POOLS}
+TOLERANCE = 1e-9
 
 
 class Refused(Exception):
@@ -81,20 +84,30 @@ def certainty(row: list) -> float:
 
 
 def fuse(rule: str, votes: list, clip: float) -> tuple:
-    """The probability of each class, and by how many robots' greatest reach the first leads the second."""
+    """The probability of each class, and what each vote adds to its total."""
     rows = [[min(max(value, -clip), clip) for value in vote] for vote in votes]
     if rule == "majority":
-        shares = [[float(k == max(range(len(row)), key=lambda j: (row[j], -j))) for k in range(len(row))] for row in rows]
-        if any(row.count(max(row)) > 1 for row in rows):
-            raise Refused("a vote without a first choice: this program does not judge it")
+        # Who finds two classes equally likely abstains.
+        parts = [[float(value == max(row)) for value in row] for row in rows if row.count(max(row)) == 1]
+        require(bool(parts), "all abstain")
     else:
-        shares = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows,
-                  "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
-    totals = [sum(column) for column in zip(*shares)]
-    pooled = rule in ("log_pool", "confidence_weighted")
-    first, second = sorted(totals, reverse=True)[:2]
-    probabilities = softmax(totals) if pooled else [total / len(rows) for total in totals]
-    return probabilities, (first - second) / (2 * clip if pooled else 1)
+        parts = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows,
+                 "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
+    totals = [sum(column) for column in zip(*parts)]
+    return softmax(totals) if rule in POOLS else [total / len(parts) for total in totals], parts
+
+
+def least(rule: str, parts: list, top: int, liars: int) -> float:
+    """The least probability that a class keeps, whichever so many votes are left out; 0 where another class may lead."""
+    def left(values) -> float:
+        return sum(sorted(values)[:len(parts) - liars])
+
+    leads = [left(part[top] - part[rival] for part in parts) for rival in range(len(parts[0])) if rival != top]
+    if len(parts) <= liars or min(leads) <= 0:
+        return 0.0
+    if rule in POOLS:
+        return 1 / (1 + sum(math.exp(-lead) for lead in leads))
+    return left(part[top] for part in parts) / (len(parts) - liars)
 
 
 def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
@@ -113,14 +126,18 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     classes = len(certificate["probabilities"])
     require(all(len(held["vote"]["evidence"]) == classes for held in votes), "a vote over other gestures")
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
-    require(len(robots) >= certificate["robots"] // 2 + 1, "no majority took part")
+    # What a robot said before it saw anything proves nothing where liars are expected.
+    reached = len(votes) if given.liars else len(robots)
+    require(reached >= (certificate["robots"] + given.liars) // 2 + 1, "no majority took part")
     require(given.liars == 0 or len(votes) > 2 * given.liars, "too few votes for so many liars")
-    probabilities, margin = fuse(certificate["rule"], [held["vote"]["evidence"] for held in votes], given.clip)
-    of_class = probabilities[decision["class"]]
-    require(all(abs(a - b) <= 1e-9 for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
-    require(abs(of_class - decision["confidence"]) <= 1e-9, "another confidence")
-    require(abs(of_class - max(probabilities)) <= 1e-9, "another class is likelier")
-    require(of_class >= 1 - given.alpha and margin > given.liars, "the votes do not suffice")
+    rule = certificate["rule"]
+    probabilities, parts = fuse(rule, [held["vote"]["evidence"] for held in votes], given.clip)
+    of_class, alpha = probabilities[decision["class"]], given.alpha or ALPHA.get(rule, 0.5)
+    require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
+    require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
+    require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")
+    sure = least(rule, parts, decision["class"], given.liars)
+    require(sure + TOLERANCE >= 1 - alpha, "the votes do not suffice")
     return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
 
 
@@ -128,7 +145,7 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON; - for standard input")
     arguments.add_argument("--roster", required=True, help="the swarm's roster.json")
-    arguments.add_argument("--alpha", type=float, default=0.05)
+    arguments.add_argument("--alpha", type=float, help="by default that of the rule: 0.05 for the pools, 0.5 for the others")
     arguments.add_argument("--clip", type=float, default=6.0)
     arguments.add_argument("--liars", type=int, default=0)
     given = arguments.parse_args()

@@ -11,10 +11,18 @@ use gestalt_protocol::{ClassId, Decision, MAX_ROBOTS, Rank, RobotId};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
     best: Option<Decision>,
-    /// What each other robot said that it holds, its greatest. At most [`MAX_ROBOTS`].
-    holders: BTreeMap<RobotId, (Rank, Option<ClassId>)>,
+    /// What each other robot said that it holds, its greatest, or another in its name. At most [`MAX_ROBOTS`].
+    holders: BTreeMap<RobotId, Holder>,
     held: Option<Held>,
     announced: Option<Announced>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Holder {
+    rank: Rank,
+    class: Option<ClassId>,
+    /// Who says so: itself, or whoever it sees for.
+    by: RobotId,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -33,26 +41,34 @@ struct Announced {
 }
 
 impl Agreement {
-    /// Hears which decision a robot says it holds.
-    pub fn note_holder(&mut self, holder: RobotId, rank: Rank, class: Option<ClassId>) {
+    /// Hears from `by` which decision a robot holds. What a robot says of itself counts before what is said in its name.
+    pub fn note_holder(&mut self, holder: RobotId, by: RobotId, rank: Rank, class: Option<ClassId>) {
         if self.holders.len() >= MAX_ROBOTS && !self.holders.contains_key(&holder) {
             return;
         }
-        let held = self.holders.entry(holder).or_insert((rank, class));
-        if rank > held.0 {
-            *held = (rank, class);
+        let said = Holder { rank, class, by };
+        let known = self.holders.entry(holder).or_insert(said);
+        let itself = |said: &Holder| said.by == holder;
+        if (itself(&said), said.rank) > (itself(known), known.rank) {
+            *known = said;
         }
     }
 
-    /// Whether so many robots, this one and its guests among them, are known to hold the class held here.
+    /// Whether so many robots, this one and its guests among them, are known to hold the class held here. Of the others, the so many
+    /// `liars` that speak for most count for one each.
     #[must_use]
-    pub fn is_final(&self, quorum: u32, guests: &BTreeSet<RobotId>) -> bool {
+    pub fn is_final(&self, quorum: u32, guests: &BTreeSet<RobotId>, liars: u32) -> bool {
         let Some(class) = self.held().and_then(|held| held.class) else { return false };
-        let others = self
-            .holders
-            .iter()
-            .filter(|(robot, (_, other))| *other == Some(class) && !guests.contains(robot));
-        1 + guests.len() + others.count() >= quorum as usize
+        let mut speakers = BTreeMap::<RobotId, usize>::new();
+        for (robot, said) in &self.holders {
+            if said.class == Some(class) && !guests.contains(robot) {
+                *speakers.entry(said.by).or_default() += 1;
+            }
+        }
+        let mut spoken_for: Vec<usize> = speakers.into_values().collect();
+        spoken_for.sort_unstable_by(|a, b| b.cmp(a));
+        spoken_for.iter_mut().take(liars as usize).for_each(|robots| *robots = 1);
+        1 + guests.len() + spoken_for.iter().sum::<usize>() >= quorum as usize
     }
 
     /// Takes the greater of this decision and the best known one. A robot's own conclusion needs no witnesses.
@@ -205,14 +221,14 @@ mod tests {
         agreement.settle(at(0), true);
         let holds = |agreement: &mut Agreement, robot, class, robots| {
             let decision = decision(Some(class), robots, 0.96, robot);
-            agreement.note_holder(RobotId(robot), decision.rank(), decision.class);
+            agreement.note_holder(RobotId(robot), RobotId(robot), decision.rank(), decision.class);
         };
         holds(&mut agreement, 2, 1, 2);
         holds(&mut agreement, 2, 1, 3);
         holds(&mut agreement, 3, 0, 2);
         let of = |agreement: &Agreement, guests: &[u32]| {
             let guests = guests.iter().copied().map(RobotId).collect();
-            (2..9).rfind(|quorum| agreement.is_final(*quorum, &guests))
+            (2..9).rfind(|quorum| agreement.is_final(*quorum, &guests, 0))
         };
         assert_eq!(of(&agreement, &[]), Some(2), "one robot counts once");
         holds(&mut agreement, 3, 1, 3);
@@ -223,19 +239,43 @@ mod tests {
     }
 
     #[test]
+    fn who_speaks_for_many_makes_nothing_final_where_liars_are_expected() {
+        let mut agreement = Agreement::default();
+        agreement.believe(decision(Some(1), 3, 0.96, 5));
+        agreement.settle(at(0), true);
+        let rank = agreement.rank().unwrap();
+        let says = |agreement: &mut Agreement, robot, by| {
+            agreement.note_holder(RobotId(robot), RobotId(by), rank, Some(ClassId(1)));
+        };
+        // Robot 9 says that all others hold it too.
+        (2..=9).for_each(|robot| says(&mut agreement, robot, 9));
+        let of = |agreement: &Agreement, liars| {
+            (1..12).rfind(|quorum| agreement.is_final(*quorum, &BTreeSet::new(), liars))
+        };
+        assert_eq!((of(&agreement, 0), of(&agreement, 1)), (Some(9), Some(2)));
+        says(&mut agreement, 2, 2);
+        says(&mut agreement, 3, 3);
+        assert_eq!(of(&agreement, 1), Some(4));
+        // What is said in its name does not make a robot hold anything else than it says.
+        let greater = Rank { robots: 99, ..rank };
+        agreement.note_holder(RobotId(3), RobotId(9), greater, Some(ClassId(0)));
+        assert_eq!(of(&agreement, 1), Some(4));
+    }
+
+    #[test]
     fn what_no_majority_holds_is_announced_late_and_again_when_one_does() {
         let mut agreement = Agreement::default();
         agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(100), true);
         let due = |agreement: &Agreement| {
-            let is_final = agreement.is_final(2, &BTreeSet::new());
+            let is_final = agreement.is_final(2, &BTreeSet::new(), 0);
             agreement.announcement(at(200), is_final, at(5000))
         };
         assert_eq!(due(&agreement), Some(at(5300)));
         agreement.note_announced(at(5300), Some(ClassId(1)), false);
         assert_eq!(due(&agreement), None);
         let held = agreement.held().cloned().unwrap();
-        agreement.note_holder(RobotId(2), held.rank(), held.class);
+        agreement.note_holder(RobotId(2), RobotId(2), held.rank(), held.class);
         assert_eq!(due(&agreement), Some(at(300)), "overdue");
         agreement.note_announced(at(6000), Some(ClassId(1)), true);
         assert_eq!(due(&agreement), None);

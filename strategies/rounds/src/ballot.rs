@@ -5,6 +5,7 @@ use std::collections::btree_map::Entry;
 
 use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
 
+use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 use crate::fusion::{self, Fusion};
 
@@ -119,8 +120,19 @@ impl Ballot {
     /// All evidence on that scale as one distribution; `None` when there is none, or the rule makes none of it.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
-        let votes: Vec<&[f32]> = self.on(scale).map(|held| held.vote.evidence.as_slice()).collect();
-        rule.fuse(clip, scale.classes, &votes).filter(|fusion| fusion.is_sound(scale.classes))
+        rule.fuse(clip, scale.classes, &self.rows(scale)).filter(|fusion| fusion.is_sound(scale.classes))
+    }
+
+    /// How likely the top class of a fusion of this ballot is if as many of the robots lied as are expected.
+    #[must_use]
+    pub(crate) fn withstands(
+        &self,
+        rule: &dyn Fuse,
+        config: &RoundsConfig,
+        scale: Scale,
+        fusion: &Fusion,
+    ) -> f64 {
+        rule.withstands(config.clip, &self.rows(scale), fusion, config.liars)
     }
 
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
@@ -151,6 +163,10 @@ impl Ballot {
     pub(crate) fn confirms(&self, robot: RobotId, stamp: Stamp, vote: &Vote) -> Option<bool> {
         let held = self.votes.get(&robot).filter(|held| held.stamp == stamp)?;
         Some(held.vote.vocabulary == vote.vocabulary && held.vote.evidence == vote.evidence)
+    }
+
+    fn rows(&self, scale: Scale) -> Vec<&[f32]> {
+        self.on(scale).map(|held| held.vote.evidence.as_slice()).collect()
     }
 
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> {

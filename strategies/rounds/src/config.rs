@@ -6,16 +6,23 @@ use gestalt_protocol::{FusionRule, MAX_ROBOTS, RuleName};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::fusion::Fusion;
 use crate::quorum::Quorum;
 
 /// Parameters no robot can work with; each names the field and the mend.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum RoundsConfigError {
-    /// α outside its range.
+    /// α outside its range for a pool.
     #[error("alpha is {0}: choose it above 0 and below 0.5, for example 0.05")]
     Alpha(f64),
+    /// α outside its range for a share.
+    #[error("alpha is {alpha}: for {rule} choose it above 0 and at most 0.5, which is more than half")]
+    Share {
+        /// α.
+        alpha: f64,
+        /// Which rule.
+        rule: FusionRule,
+    },
     /// A rule that Gestalt does not have.
     #[error(
         "the fusion rule '{0}' is none of Gestalt's: take one of majority, mean_probability, log_pool and \
@@ -62,16 +69,21 @@ pub struct RoundsConfig {
     /// How votes are fused: one of Gestalt's rules. One's own is handed in by
     /// [`Rounds::fused_by`](crate::Rounds::fused_by).
     pub rule: FusionRule,
-    /// α: decide once the fused probability of the top class reaches 1 − α. Range `0.0 < α < 0.5`.
-    pub alpha: f64,
+    /// α: decide once the top class has 1 − α, of what the fusion rule gives. `None`: the rule's own default.
+    /// - log pools, and rules of one's own: its probability, so that α is how often a decision may err where the robots' probabilities mean what
+    ///   they say. `0.0 < α < 0.5`, by default 0.05.
+    /// - majority: its share of the robots that have a first choice, so that α of them may be for others. `0.0 < α <= 0.5`, by default 0.5:
+    ///   half of them, and more than for any other class.
+    /// - mean of probabilities: its mean, so that the robots may give the others α on average. As for a majority.
+    pub alpha: Option<f64>,
     /// q: how many robots a decision needs.
     pub quorum: Quorum,
     /// For how long a robot counts for the majority after its last vote: as long as parts of a swarm may be cut off from each other
     /// and neither is to take itself for the whole.
     #[serde(with = "humantime_serde")]
     pub lately: Duration,
-    /// f: how many lying robots a decision must withstand. The margin top − second must exceed what f robots can
-    /// add to it (2·f·c for the log pools), and more than 2·f robots must give evidence.
+    /// f: how many lying robots a decision must withstand. Whichever f votes are left out, the others must decide the same; more than 2·f robots
+    /// must give evidence; and a majority is more than (n + f) / 2 of n robots, all of which gave evidence.
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.
     pub clip: f64,
@@ -115,7 +127,7 @@ impl Default for RoundsConfig {
     fn default() -> Self {
         Self {
             rule: FusionRule::LogPool,
-            alpha: 0.05,
+            alpha: None,
             quorum: Quorum::Majority,
             lately: Duration::from_secs(120),
             liars: 0,
@@ -140,7 +152,8 @@ impl RoundsConfig {
     #[must_use]
     pub fn needs(&self, robots: u32) -> u32 {
         match self.quorum {
-            Quorum::Majority => robots / 2 + 1,
+            // Two majorities have an honest robot in common, whatever liars say to each (Malkhi & Reiter 1998).
+            Quorum::Majority => robots.saturating_add(self.liars) / 2 + 1,
             Quorum::Evidence(quorum) => quorum,
         }
     }
@@ -158,16 +171,28 @@ impl RoundsConfig {
     #[must_use]
     pub fn suffice(&self, reached: usize, contributors: usize, robots: u32) -> bool {
         let counted = match self.quorum {
-            Quorum::Majority => reached,
-            Quorum::Evidence(_) => contributors,
+            // What a robot said before it saw anything may be used against it.
+            Quorum::Majority if self.liars == 0 => reached,
+            Quorum::Majority | Quorum::Evidence(_) => contributors,
         };
         counted >= self.needs(robots) as usize && (self.liars == 0 || contributors > 2 * self.liars as usize)
     }
 
-    /// Whether votes that were fused to this decide.
+    /// Whether the top class of a fusion decides that has so much left if as many as are expected lied, see
+    /// [`Fuse::withstands`](crate::Fuse::withstands).
     #[must_use]
-    pub fn convinces(&self, fusion: &Fusion) -> bool {
-        fusion.probabilities[fusion.top.index()] >= 1.0 - self.alpha && fusion.margin > f64::from(self.liars)
+    pub fn convinces(&self, probability: f64) -> bool {
+        probability >= 1.0 - self.alpha()
+    }
+
+    /// α: the one chosen, or the default of the rule.
+    #[must_use]
+    pub fn alpha(&self) -> f64 {
+        let by_rule = match self.rule {
+            FusionRule::Majority | FusionRule::MeanProbability => 0.5,
+            FusionRule::LogPool | FusionRule::ConfidenceWeighted | FusionRule::Other(_) => 0.05,
+        };
+        self.alpha.unwrap_or(by_rule)
     }
 
     /// Whether a robot can work with these parameters.
@@ -175,8 +200,14 @@ impl RoundsConfig {
     /// # Errors
     /// The first [`RoundsConfigError`] found.
     pub fn validate(&self) -> Result<(), RoundsConfigError> {
-        if !(self.alpha > 0.0 && self.alpha < 0.5) {
-            return Err(RoundsConfigError::Alpha(self.alpha));
+        let alpha = self.alpha();
+        match self.rule {
+            _ if alpha > 0.0 && alpha < 0.5 => {}
+            FusionRule::Majority | FusionRule::MeanProbability if alpha == 0.5 => {}
+            rule @ (FusionRule::Majority | FusionRule::MeanProbability) => {
+                return Err(RoundsConfigError::Share { alpha, rule });
+            }
+            _ => return Err(RoundsConfigError::Alpha(alpha)),
         }
         if let FusionRule::Other(name) = self.rule {
             return Err(RoundsConfigError::Rule(name));
@@ -236,12 +267,24 @@ mod tests {
     }
 
     #[test]
+    fn every_rule_decides_by_an_alpha_of_its_own() {
+        for (rule, alpha) in FusionRule::ALL.into_iter().zip([0.5, 0.5, 0.05, 0.05]) {
+            let config = RoundsConfig { rule, ..RoundsConfig::default() };
+            assert_eq!((config.alpha(), config.validate()), (alpha, Ok(())), "{rule}");
+            assert!(config.convinces(1.0 - alpha) && !config.convinces(0.99 - alpha));
+        }
+        let chosen = RoundsConfig { alpha: Some(0.2), rule: FusionRule::Majority, ..RoundsConfig::default() };
+        assert_eq!(chosen.alpha(), 0.2);
+    }
+
+    #[test]
     fn what_no_robot_can_work_with_is_named() {
         let default = RoundsConfig::default;
         let ms = Duration::from_millis;
         for (config, field) in [
-            (RoundsConfig { alpha: 0.5, ..default() }, "alpha"),
-            (RoundsConfig { alpha: f64::NAN, ..default() }, "alpha"),
+            (RoundsConfig { alpha: Some(0.5), ..default() }, "alpha"),
+            (RoundsConfig { alpha: Some(0.51), rule: FusionRule::Majority, ..default() }, "majority"),
+            (RoundsConfig { alpha: Some(f64::NAN), ..default() }, "alpha"),
             (RoundsConfig { rule: FusionRule::Other("mine".parse().unwrap()), ..default() }, "mine"),
             (RoundsConfig { quorum: Quorum::Evidence(0), ..default() }, "quorum"),
             (RoundsConfig { quorum: Quorum::Evidence(2), liars: 1, ..default() }, "liars"),

@@ -142,12 +142,17 @@ impl Evidence {
         self.weight + self.current.as_ref().map_or(0.0, Current::weight)
     }
 
-    /// The sums as a vote carries them, clipped to ±`clip`; empty when nothing was seen.
+    /// The sums as a vote carries them, within ±`clip`; empty when nothing was seen.
+    ///
+    /// Where the greatest is beyond the clip, all are lowered by what it has too much: a robot that has looked for long is as sure as may be
+    /// of the likeliest class, and not of two.
     #[must_use]
     pub fn clipped(&self, clip: f64) -> Vec<f32> {
         let Some(current) = &self.current else { return Vec::new() };
-        let total = |(class, sum): (usize, &f64)| sum + current.part(class);
-        self.sums.iter().enumerate().map(|sum| total(sum).min(clip).max(-clip) as f32).collect()
+        let totals: Vec<f64> =
+            self.sums.iter().enumerate().map(|(class, sum)| sum + current.part(class)).collect();
+        let excess = totals.iter().map(|total| total - clip).fold(0.0, f64::max);
+        totals.iter().map(|total| (total - excess).min(clip).max(-clip) as f32).collect()
     }
 }
 
@@ -275,6 +280,24 @@ mod tests {
         let half = (FLOOR.ln() / -2.0) as f32;
         assert_eq!(evidence.clipped(100.0), [half, -half]);
         assert_eq!(evidence.clipped(6.0), [6.0, -6.0]);
+    }
+
+    #[test]
+    fn looking_for_long_makes_no_two_classes_equal() {
+        let mut evidence = Evidence::new(4);
+        for t in 0..50 {
+            evidence.add(look(500 * t, &[0.5, 0.3, 0.1, 0.1], 1.0), TAU);
+        }
+        let vote = evidence.clipped(6.0);
+        assert_eq!(vote[0], 6.0);
+        assert_eq!(vote[1..], [-6.0; 3], "50 looks of ln 5/3 are 25 nats");
+        let mut twice = Evidence::new(4);
+        (0..12).for_each(|t| {
+            twice.add(look(500 * t, &[0.5, 0.3, 0.1, 0.1], 1.0), TAU);
+        });
+        let vote = twice.clipped(6.0);
+        let lead = 12.0 * (0.5_f32 / 0.3).ln();
+        assert!((vote[0] - vote[1] - lead).abs() < 1e-3, "{vote:?}");
     }
 
     #[test]

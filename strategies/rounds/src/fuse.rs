@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use gestalt_protocol::FusionRule;
 
 use crate::fusion::{self, Fusion};
+use crate::withstand;
 
 /// Makes one distribution over the classes of the votes of many robots.
 ///
@@ -60,6 +61,13 @@ pub trait Fuse: Debug + Send + Sync {
     /// A result that is no distribution over the classes counts as `None`.
     fn fuse(&self, clip: f64, classes: usize, votes: &[&[f32]]) -> Option<Fusion>;
 
+    /// The least probability that the top class of `fusion`, which these votes gave, has left if so many of the robots lied. `0.0..=1.0`; with
+    /// no liars that of the fusion, and 0 where another class is as likely. By default all of it where the margin exceeds their number, and else 0.
+    fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
+        let _ = (clip, votes);
+        if fusion.margin > f64::from(liars) { fusion.probabilities[fusion.top.index()] } else { 0.0 }
+    }
+
     /// What one robot's vote weighs, for the certificate: `0.0..`, finite; anything else is listed as 0.
     fn weight(&self, clip: f64, evidence: &[f32]) -> f64 {
         let _ = (clip, evidence);
@@ -74,6 +82,14 @@ impl Fuse for FusionRule {
 
     fn fuse(&self, clip: f64, classes: usize, votes: &[&[f32]]) -> Option<Fusion> {
         fusion::fuse(*self, clip, classes, votes.iter().copied())
+    }
+
+    fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
+        match liars {
+            0 if fusion.margin > 0.0 => fusion.probabilities[fusion.top.index()],
+            0 => 0.0,
+            liars => withstand::least(*self, clip, votes, fusion, liars as usize),
+        }
     }
 
     fn weight(&self, clip: f64, evidence: &[f32]) -> f64 {

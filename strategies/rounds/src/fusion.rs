@@ -32,12 +32,13 @@ impl Fusion {
 /// Fuses one row of centred log-evidence per robot, each of `classes` values, after clipping it to ±`clip`.
 ///
 /// With ℓ the clipped evidence of a robot, p its softmax and H the entropy, the total of class k is
-/// - majority: the number of robots with arg max ℓ = k; P is the share of the robots;
+/// - majority: the number of robots with arg max ℓ = k; P is the share of the robots that have one. Who finds two classes equally likely
+///   abstains;
 /// - mean of probabilities: Σ p(k); P is the mean (the linear opinion pool);
 /// - log pool: Σ ℓ(k); P is the softmax (Genest & Zidek 1986, external Bayes, equal weights of 1);
 /// - confidence-weighted: Σ (1 − H(p) / ln K) ℓ(k); P is the softmax.
 ///
-/// `None` when there is no row, and for a rule that is not Gestalt's own. A row of another length is a mistake of the caller; its excess or lack is ignored.
+/// `None` when there is no row, when all abstain, and for a rule that is not Gestalt's own. A row of another length is a mistake of the caller; its excess or lack is ignored.
 pub fn fuse<'a>(
     rule: FusionRule,
     clip: f64,
@@ -46,28 +47,10 @@ pub fn fuse<'a>(
 ) -> Option<Fusion> {
     let mut totals = vec![0.0; classes];
     let mut row = vec![0.0; classes];
-    let mut scratch = vec![0.0; classes];
     let mut robots = 0.0;
     for evidence in rows {
-        robots += 1.0;
-        clip_into(&mut row, evidence, clip);
-        match rule {
-            FusionRule::Majority => {
-                if let Some(total) = totals.get_mut(top_of(&row).index()) {
-                    *total += 1.0;
-                }
-            }
-            FusionRule::MeanProbability => {
-                softmax(&mut row);
-                add(&mut totals, &row, 1.0);
-            }
-            FusionRule::LogPool => add(&mut totals, &row, 1.0),
-            FusionRule::ConfidenceWeighted => {
-                scratch.copy_from_slice(&row);
-                add(&mut totals, &row, certainty(&mut scratch));
-            }
-            FusionRule::Other(_) => return None,
-        }
+        robots += f64::from(u8::from(part_into(&mut row, rule, clip, evidence)?));
+        totals.iter_mut().zip(&row).for_each(|(total, part)| *total += part);
     }
     if robots == 0.0 || classes < 2 {
         return None;
@@ -98,19 +81,51 @@ pub fn fuse<'a>(
     Some(Fusion { probabilities, top, margin })
 }
 
-/// What one robot's row counts in [`fuse`], `0.0..=1.0`: its certainty in a confidence-weighted pool, else 1.
+/// What one robot's row counts in [`fuse`], `0.0..=1.0`: its certainty in a confidence-weighted pool, nothing where it abstains, else 1.
 #[must_use]
 pub fn weight(rule: FusionRule, clip: f64, evidence: &[f32]) -> f64 {
+    let mut row = vec![0.0; evidence.len()];
     match rule {
-        FusionRule::Majority | FusionRule::MeanProbability | FusionRule::LogPool | FusionRule::Other(_) => {
-            1.0
+        FusionRule::Majority => {
+            part_into(&mut row, rule, clip, evidence).map_or(0.0, |counts| f64::from(u8::from(counts)))
         }
         FusionRule::ConfidenceWeighted => {
-            let mut row = vec![0.0; evidence.len()];
             clip_into(&mut row, evidence, clip);
             certainty(&mut row)
         }
+        FusionRule::MeanProbability | FusionRule::LogPool | FusionRule::Other(_) => 1.0,
     }
+}
+
+/// What one robot's evidence adds to the total of each class, and whether the robot counts at all: it abstains from a majority where it
+/// finds two classes equally likely. `None` for a rule that is not Gestalt's own.
+pub(crate) fn part_into(row: &mut [f64], rule: FusionRule, clip: f64, evidence: &[f32]) -> Option<bool> {
+    clip_into(row, evidence, clip);
+    match rule {
+        FusionRule::Majority => {
+            let choice = choice(row);
+            row.fill(0.0);
+            match choice.and_then(|class| row.get_mut(class.index())) {
+                Some(part) => *part = 1.0,
+                None => return Some(false),
+            }
+        }
+        FusionRule::MeanProbability => softmax(row),
+        FusionRule::LogPool => {}
+        FusionRule::ConfidenceWeighted => {
+            let certainty = certainty(&mut row.to_vec());
+            row.iter_mut().for_each(|part| *part *= certainty);
+        }
+        FusionRule::Other(_) => return None,
+    }
+    Some(true)
+}
+
+/// The class that is likelier than all others, if there is one.
+fn choice(row: &[f64]) -> Option<ClassId> {
+    let top = top_of(row);
+    let greatest = row.get(top.index())?;
+    (row.iter().filter(|value| *value >= greatest).count() == 1).then_some(top)
 }
 
 /// The index of the greatest value; of equals the smaller index.
@@ -126,14 +141,9 @@ pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
 }
 
 fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {
+    row.fill(0.0);
     for (value, said) in row.iter_mut().zip(evidence) {
         *value = f64::from(*said).min(clip).max(-clip);
-    }
-}
-
-fn add(totals: &mut [f64], row: &[f64], weight: f64) {
-    for (total, value) in totals.iter_mut().zip(row) {
-        *total += weight * value;
     }
 }
 
@@ -177,6 +187,18 @@ mod tests {
         let fusion = fused(FusionRule::Majority, &[&HALF, &HALF, &[0.0, 6.0, -6.0]]);
         close(&fusion.probabilities, &[2.0 / 3.0, 1.0 / 3.0, 0.0]);
         assert_eq!((fusion.top, fusion.margin), (ClassId(0), 1.0));
+    }
+
+    #[test]
+    fn who_finds_two_classes_equally_likely_abstains_from_a_majority() {
+        let tied: [f32; 3] = [1.0, 1.0, -2.0];
+        // Beyond the clip too.
+        let clipped: [f32; 3] = [-9.0, 7.0, 8.0];
+        let fusion = fused(FusionRule::Majority, &[&tied, &clipped, &[0.0; 3], &OTHER]);
+        close(&fusion.probabilities, &[0.0, 1.0, 0.0]);
+        assert_eq!((fusion.top, fusion.margin), (ClassId(1), 1.0));
+        assert_eq!([&tied, &OTHER].map(|row| weight(FusionRule::Majority, 6.0, row)), [0.0, 1.0]);
+        assert_eq!(fuse(FusionRule::Majority, 6.0, 3, [&tied[..], &[0.0; 3]]), None, "all abstain");
     }
 
     #[test]
@@ -246,7 +268,10 @@ mod tests {
             rows in proptest::collection::vec(proptest::collection::vec(-1e6f32..1e6, 5), 1..20)
         ) {
             for rule in RULES {
-                let fusion = fuse(rule, 6.0, 5, rows.iter().map(Vec::as_slice)).unwrap();
+                let fused = fuse(rule, 6.0, 5, rows.iter().map(Vec::as_slice));
+                let abstain = || rule == FusionRule::Majority && rows.iter().all(|row| weight(rule, 6.0, row) == 0.0);
+                proptest::prop_assert!(fused.is_some() || abstain());
+                let Some(fusion) = fused else { continue };
                 let sum: f64 = fusion.probabilities.iter().sum();
                 proptest::prop_assert!((sum - 1.0).abs() < 1e-9);
                 proptest::prop_assert!(fusion.probabilities.iter().all(|p| (0.0..=1.0).contains(p)));

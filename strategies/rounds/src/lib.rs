@@ -29,6 +29,7 @@ mod round;
 mod sign;
 mod vocabulary;
 mod voter;
+mod withstand;
 
 pub use ballot::{Ballot, Cast, Scale};
 pub use classify::{Classify, ClassifyError};

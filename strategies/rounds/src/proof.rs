@@ -6,13 +6,14 @@ use crate::ballot::Scale;
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 
-/// What the exponentials of two platforms may differ by.
+/// What the exponentials of two platforms may differ by, in a probability: a decision that is one at its author is one everywhere.
 const TOLERANCE: f64 = 1e-9;
 
 /// Whether robots of that configuration, so many of them, decide so on the votes that the decision brings with it, fused by that
 /// rule. What it says of itself counts for nothing. Whether the votes were cast is another question, for `gestalt-trust`.
 ///
-/// A decision without a class claims nothing, and follows from any votes.
+/// A decision without a class claims nothing, and follows from any votes. Its probabilities may be others than those found here by 1e-9, as
+/// exponentials of different platforms are; nothing else may.
 #[must_use]
 pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robots: u32) -> bool {
     let Some(class) = decision.class else { return decision.check().is_ok() };
@@ -39,5 +40,5 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
     fusion.probabilities.iter().zip(probabilities).all(|(a, b)| close(*a, *b))
         && close(likeliest, decision.confidence)
         && close(likeliest, fusion.probabilities[fusion.top.index()])
-        && config.convinces(&fusion)
+        && config.convinces(rule.withstands(config.clip, &rows, &fusion, config.liars) + TOLERANCE)
 }

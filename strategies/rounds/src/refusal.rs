@@ -37,13 +37,17 @@ pub enum Refusal {
     Stranger,
     /// A question about what this robot knows, of a neighbour that was told much just now.
     TooOften,
+    /// A decision beyond the rate at which one robot may give them, or all together announce them.
+    DecisionTooOften,
+    /// A comparison of what is known of a round, beyond the rate at which one robot may ask for it.
+    HaveTooOften,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 20] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -61,6 +65,8 @@ impl Refusal {
         Self::LessonFarAhead,
         Self::Stranger,
         Self::TooOften,
+        Self::DecisionTooOften,
+        Self::HaveTooOften,
         Self::CountersUsedUp,
     ];
 
@@ -85,6 +91,8 @@ impl Refusal {
             Self::LessonFarAhead => "refused_lesson_far_ahead",
             Self::Stranger => "refused_question_of_stranger",
             Self::TooOften => "refused_question_too_often",
+            Self::DecisionTooOften => "refused_decision_too_often",
+            Self::HaveTooOften => "refused_have_too_often",
             Self::CountersUsedUp => "refused_counters_used_up",
         }
     }

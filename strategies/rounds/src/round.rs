@@ -13,6 +13,7 @@ use crate::classify::Classify;
 use crate::config::RoundsConfig;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
+use crate::fusion::Fusion;
 use crate::observation::Observation;
 use crate::sign::Sign;
 
@@ -174,6 +175,29 @@ impl Round {
         self.ends.get_or_insert(now + config.patience);
     }
 
+    /// Whether nothing is to be waited for any more. A robot that has not seen anything yet may be about to: its camera may take a frame in half a
+    /// second.
+    fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
+        let mut robots = view.expected.iter().chain([&view.me]);
+        now >= self.since + config.patience || robots.all(|robot| self.ballot.has_spoken(*robot))
+    }
+
+    /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too. Where liars are expected they may have
+    /// chosen what it rests on, and decided before the others had a say.
+    pub fn bears_out(
+        &self,
+        now: Duration,
+        decision: &Decision,
+        view: &View<'_>,
+        rule: &dyn Fuse,
+        config: &RoundsConfig,
+    ) -> bool {
+        let Certificate { vocabulary, probabilities, .. } = &decision.certificate;
+        let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
+        let likeliest = || self.ballot.fuse(rule, config.clip, scale).map(|fusion| fusion.top);
+        (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
+    }
+
     /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline. Who holds the decision of
     /// another goes on to conclude when it knows of more evidence than that rests on.
     pub fn conclude(&mut self, now: Duration, view: &View<'_>, rule: &dyn Fuse, config: &RoundsConfig) {
@@ -195,16 +219,17 @@ impl Round {
         {
             return;
         }
-        // A robot that has not seen anything yet may be about to: its camera may take a frame in half a second.
-        let mut robots = view.expected.iter().chain([&view.me]);
-        let heard_all = now >= patience || robots.all(|robot| self.ballot.has_spoken(*robot));
+        let heard_all = self.has_heard_all(now, view, config);
         let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
         if !(late || suffice && heard_all) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
-        let class =
-            fusion.as_ref().filter(|fusion| suffice && config.convinces(fusion)).map(|fusion| fusion.top);
+        let convinces = |fusion: &&Fusion| {
+            let scale = scale.filter(|_| suffice);
+            scale.is_some_and(|scale| config.convinces(self.ballot.withstands(rule, config, scale, fusion)))
+        };
+        let class = fusion.as_ref().filter(convinces).map(|fusion| fusion.top);
         if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {
             return;
         }

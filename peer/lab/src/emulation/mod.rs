@@ -27,13 +27,15 @@ pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver
 pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
 pub use rules::Rules;
-pub use scenario::{Churn, Contender, Event, Fault, Group, LinkModel, Order, Scenario, ScenarioError, View};
+pub use scenario::{
+    Churn, Contender, Event, Fault, Group, Lies, LinkModel, Order, Scenario, ScenarioError, View,
+};
 pub use school::School;
 pub use statistics::{Mean, Proportion};
 pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
-use gestalt_strategies::{Classifier, TrainingSet, Vocabulary};
+use gestalt_strategies::{Classifier, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -164,6 +166,12 @@ impl<'a> Emulation<'a> {
         self.swarm.mind(robot)?.training_set()
     }
 
+    /// What a robot has refused so far, by its position; `None` of one that is down, or lies.
+    #[must_use]
+    pub fn refusals(&self, robot: usize) -> Option<&Refusals> {
+        Some(self.swarm.mind(robot)?.refusals())
+    }
+
     /// What a robot has sent so far, by its position.
     #[must_use]
     pub fn traffic(&self, robot: usize) -> Traffic {
@@ -197,7 +205,7 @@ pub fn compare(
             reports.push(run(&contending, seed)?);
             ran();
         }
-        summaries.push(Summary::of(contender.rule, contending.mind.alpha, &reports));
+        summaries.push(Summary::of(contender.rule, contending.mind.alpha(), &reports));
     }
     Ok(summaries)
 }

@@ -12,6 +12,11 @@ pub(super) struct Showing {
     /// The counter of its round; none when no robot opened one.
     pub counter: Option<u32>,
     pub announcements: u32,
+    /// Whether the gesture shown, and whether another, was announced as final.
+    pub finally_right: bool,
+    pub finally_wrong: bool,
+    /// Whether liars made a decision for another gesture that robots believe.
+    pub forged: bool,
     /// When a robot first held a class for it.
     pub first_held: Option<Duration>,
     /// When the last robot came to hold what it holds.
@@ -33,6 +38,8 @@ pub(super) struct Outcome {
 /// Everything a report is made from.
 #[derive(Clone, Debug)]
 pub(super) struct Record {
+    /// Who does not lie.
+    pub honest: Vec<bool>,
     pub showings: Vec<Showing>,
     /// The newest decision each robot holds.
     pub holds: Vec<Option<Decision>>,
@@ -44,8 +51,10 @@ pub(super) struct Record {
 }
 
 impl Record {
-    pub fn new(robots: usize) -> Self {
+    pub fn new(honest: Vec<bool>) -> Self {
+        let robots = honest.len();
         Self {
+            honest,
             showings: Vec::new(),
             holds: vec![None; robots],
             frames: 0,
@@ -61,6 +70,9 @@ impl Record {
             shown,
             counter,
             announcements: 0,
+            finally_right: false,
+            finally_wrong: false,
+            forged: false,
             first_held: None,
             last_held: None,
             outcome: None,
@@ -107,6 +119,18 @@ impl Record {
     pub fn announce(&mut self, decision: &Decision) {
         if let Some(showing) = self.showing(decision.round.counter) {
             showing.announcements += 1;
+            if decision.is_final && decision.class.is_some() {
+                let right = decision.class == Some(showing.shown);
+                showing.finally_right |= right;
+                showing.finally_wrong |= !right;
+            }
+        }
+    }
+
+    /// Liars made a decision that robots believe.
+    pub fn forge(&mut self, decision: &Decision) {
+        if let Some(showing) = self.showing(decision.round.counter) {
+            showing.forged |= decision.class != Some(showing.shown);
         }
     }
 

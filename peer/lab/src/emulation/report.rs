@@ -25,6 +25,12 @@ pub struct Report {
     pub wrong: Proportion,
     /// Rounds in which it did not decide.
     pub undecided: Proportion,
+    /// Rounds in which a robot announced the gesture shown as final.
+    pub finally_right: Proportion,
+    /// Rounds in which a robot announced another gesture as final.
+    pub finally_wrong: Proportion,
+    /// Rounds in which liars made a decision for another gesture out of the votes that were said, which robots believe.
+    pub forged: Proportion,
     /// Rounds in which the likeliest class was the one shown, sure enough for a decision or not.
     pub likeliest_right: Proportion,
     /// Single frames in which the robot that saw it found the gesture shown likeliest.
@@ -96,7 +102,7 @@ impl Report {
             })
             .collect();
         let holds = |robot: usize| record.holds[robot].as_ref().map(|held| (held.round, held.class));
-        let mut held = network.up().map(holds);
+        let mut held = network.up().filter(|robot| record.honest[*robot]).map(holds);
         let first = held.next();
         let total: Traffic = network.traffic.iter().copied().sum();
         let robots = network.size();
@@ -113,6 +119,9 @@ impl Report {
             right: Proportion::new(count(&|s| decided(s) == Some(s.shown)), rounds),
             wrong: Proportion::new(count(&|s| decided(s).is_some_and(|class| class != s.shown)), rounds),
             undecided: Proportion::new(count(&|s| decided(s).is_none()), rounds),
+            finally_right: Proportion::new(count(&|s| s.finally_right), rounds),
+            finally_wrong: Proportion::new(count(&|s| s.finally_wrong), rounds),
+            forged: Proportion::new(count(&|s| s.forged), rounds),
             likeliest_right: Proportion::new(
                 count(&|s| {
                     decision(s)

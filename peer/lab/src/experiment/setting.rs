@@ -151,7 +151,7 @@ impl Setting {
             ..MindConfig::default()
         };
         let scenario = Scenario {
-            robots: vec![Group { name: "robot".to_owned(), count: self.robots, view: None }],
+            robots: vec![Group { name: "robot".to_owned(), count: self.robots, view: None, lies: None }],
             topology: self.topology,
             link: crate::emulation::LinkModel::default(),
             classes,

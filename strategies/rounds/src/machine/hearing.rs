@@ -13,7 +13,7 @@ use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
 use crate::proof::follows;
 use crate::refusal::Refusal;
-use crate::round::Round;
+use crate::round::{Round, View};
 
 /// Counters may run ahead of what this life of the robot began with by so many, which is two years of gestures without a pause,
 const MAX_AHEAD: u64 = 1 << 24;
@@ -57,7 +57,7 @@ impl Rounds {
             && let Some(round) = &mut self.round
         {
             for holder in holding.guests.iter().chain([&robot]) {
-                round.agreement.note_holder(*holder, holding.rank, holding.class);
+                round.agreement.note_holder(*holder, robot, holding.rank, holding.class);
             }
         }
         let greater = self.wanted.as_ref().is_none_or(|wanted| {
@@ -96,6 +96,9 @@ impl Rounds {
     }
 
     pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
+        if !self.may_hear(&decision, None) {
+            return;
+        }
         let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
         // What nobody would decide, nobody announced.
         if self.hear_decision(decision, effects) != Heard::Refused
@@ -230,6 +233,23 @@ impl Rounds {
         }
     }
 
+    /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. `given`: by whom, if it was not announced. The
+    /// one that is held may be repeated.
+    pub(super) fn may_hear(&mut self, decision: &Decision, given: Option<Option<RobotId>>) -> bool {
+        let held = self.round.as_ref().and_then(|round| round.agreement.held());
+        let repeated =
+            held.is_some_and(|held| held.round == decision.round && held.rank() == decision.rank());
+        let allowed = match given {
+            _ if repeated => true,
+            Some(by) => self.given.take(self.now, by),
+            None => self.announced.take(self.now, None),
+        };
+        if !allowed {
+            self.refusals.add(Refusal::DecisionTooOften);
+        }
+        allowed
+    }
+
     /// Takes in a decision, by whichever way it came.
     pub(super) fn hear_decision(&mut self, decision: Decision, effects: &mut Effects<'_>) -> Heard {
         let decision = Decision { is_final: false, ..decision };
@@ -258,14 +278,26 @@ impl Rounds {
             Some(Ordering::Greater) => self.enter(decision.round, false, effects),
             Some(Ordering::Equal) => {}
         }
+        let expected = self.electorate.expected(&self.alive);
+        let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
         for counted in &decision.certificate.votes {
             if counted.robot != self.me {
                 round.ballot.cast(counted.held());
             }
         }
-        if decision.author != self.me {
-            round.agreement.note_holder(decision.author, decision.rank(), decision.class);
+        let view = View { me: self.me, expected: &expected, robots, scale };
+        if self.config.liars > 0
+            && decision.class.is_some()
+            && !round.bears_out(self.now, &decision, &view, &*self.fusion, &self.config)
+        {
+            // Its votes were heard; what they are worth, this robot finds itself.
+            return Heard::Known;
+        }
+        // Who is named as its author may not have drawn it.
+        if decision.author != self.me && self.config.liars == 0 {
+            let (author, rank, class) = (decision.author, decision.rank(), decision.class);
+            round.agreement.note_holder(author, author, rank, class);
         }
         if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
     }

@@ -7,6 +7,7 @@
 //!                  repair (what a neighbour lacks)
 //! ```
 
+mod allowance;
 mod course;
 mod follow;
 mod hearing;

@@ -9,6 +9,7 @@ use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
 use super::hearing::Heard;
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
+use crate::refusal::Refusal;
 
 /// The most votes in one [`Give`], so that it fits in a message whatever the vocabulary; the next one brings more.
 const MAX_GIVEN: usize = 1024;
@@ -21,6 +22,7 @@ impl Rounds {
             return;
         }
         let new = self.partners.change(robots);
+        self.forget_accounts();
         self.hurry_repair();
         for robot in new {
             self.tell_have(robot, false, effects);
@@ -40,13 +42,18 @@ impl Rounds {
 
     /// Hears what a neighbour has: gives what it lacks, and asks for what this robot lacks itself.
     pub(super) fn on_have(&mut self, from: RobotId, have: &Have, effects: &mut Effects<'_>) {
+        let known = self.known(from);
+        if !self.haves.take(self.now, known) {
+            self.refusals.add(Refusal::HaveTooOften);
+            return;
+        }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
         if let Some(round) =
             self.round.as_mut().filter(|round| order.is_eq() && round.agreement.rank() == have.decision)
             && let Some((rank, class)) = round.agreement.held().map(|held| (held.rank(), held.class))
         {
-            round.agreement.note_holder(from, rank, class);
+            round.agreement.note_holder(from, from, rank, class);
         }
         if let Some(give) = self.lacking_there(order, have) {
             self.tell(from, Message::Give(give), effects);
@@ -59,7 +66,8 @@ impl Rounds {
     /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
     pub(super) fn on_give(&mut self, from: RobotId, give: Give, effects: &mut Effects<'_>) {
         let mut news = Give { decision: None, votes: Vec::new() };
-        if let Some(decision) = give.decision {
+        let known = self.known(from);
+        if let Some(decision) = give.decision.filter(|decision| self.may_hear(decision, Some(known))) {
             let missed = !self.is_this_round(decision.round);
             let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
             // A greater one for the gesture that is held anyway goes its way from turn to turn.
@@ -68,7 +76,7 @@ impl Rounds {
                 && self.is_this_round(decision.round)
                 && let Some(round) = &mut self.round
             {
-                round.agreement.note_holder(from, decision.rank(), decision.class);
+                round.agreement.note_holder(from, from, decision.rank(), decision.class);
             }
             if self.hear_decision(decision.clone(), effects) == Heard::News {
                 if !self.is_open() && missed {

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Stamp};
 
+use super::allowance::Allowance;
 use super::follow::Follow;
 use super::input::Input;
 use super::output::Output;
@@ -19,6 +20,12 @@ use crate::life::Life;
 use crate::refusal::Refusals;
 use crate::round::Round;
 use crate::sign::Sign;
+
+/// Decisions are heard this often, in the long run: rounds are no faster.
+const DECISIONS_EVERY: Duration = Duration::from_millis(250);
+
+/// And so many at once, as when a part of the swarm comes back.
+const BURST: u32 = 16;
 
 /// The rounds of one robot: what the world tells it goes in, what it wants done comes out.
 ///
@@ -115,6 +122,12 @@ pub struct Rounds {
     pub(super) turns: u32,
     pub(super) guests: BTreeSet<RobotId>,
     pub(super) partners: Partners,
+    /// How often others may compare what they have with this robot.
+    pub(super) haves: Allowance,
+    /// How often each may give it a decision,
+    pub(super) given: Allowance,
+    /// and how often decisions may be announced, by whomever: nobody stands for their authors.
+    pub(super) announced: Allowance,
     pub(super) refusals: Refusals,
     pub(super) duplicate: Option<Stamp>,
     /// The round for which this robot still looks, though it may be decided: its learning wants more of it.
@@ -154,6 +167,10 @@ impl Rounds {
             turns: 0,
             guests: BTreeSet::new(),
             partners: Partners::new(config.repair_idle),
+            // Who goes by the same configuration turns to a neighbour once in that time, and answers.
+            haves: Allowance::new(config.repair_busy / 4, BURST),
+            given: Allowance::new(DECISIONS_EVERY, BURST),
+            announced: Allowance::new(DECISIONS_EVERY, BURST),
             fusion: Arc::new(config.rule),
             config,
             refusals: Refusals::default(),
@@ -268,6 +285,19 @@ impl Rounds {
         }
         self.ask_when_due(effects);
         self.repair_when_due(effects);
+    }
+
+    /// A robot by its name, if there is reason to believe that there is one.
+    pub(super) fn known(&self, robot: RobotId) -> Option<RobotId> {
+        Some(robot).filter(|robot| self.neighbours().contains(robot) || self.alive.contains(robot))
+    }
+
+    /// Keeps an account of those alone who are there.
+    pub(super) fn forget_accounts(&mut self) {
+        let (now, alive, neighbours) = (self.now, &self.alive, self.partners.neighbours());
+        let known = |robot: RobotId| alive.contains(&robot) || neighbours.contains(&robot);
+        self.haves.forget(now, known);
+        self.given.forget(now, known);
     }
 
     /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence. Those that

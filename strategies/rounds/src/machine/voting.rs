@@ -16,6 +16,7 @@ impl Rounds {
         self.alive = &robots | &self.guests;
         self.alive.remove(&self.me);
         self.electorate.alive(&self.alive, self.now);
+        self.forget_accounts();
         // This robot speaks for its guests too: its turn is that of the smallest of them all.
         let first = self.guests.first().map_or(self.me, |guest| self.me.min(*guest));
         self.turns = u32::try_from(self.alive.range(..first).count()).unwrap_or(u32::MAX);
@@ -76,7 +77,8 @@ impl Rounds {
     }
 
     fn is_final(&self, agreement: &Agreement) -> bool {
-        agreement.is_final(self.config.holders(self.electorate.count()), &self.guests)
+        let holders = self.config.holders(self.electorate.count());
+        agreement.is_final(holders, &self.guests, self.config.liars)
     }
 
     pub(super) fn own_scale(&self) -> Option<Scale> {

@@ -13,6 +13,23 @@ pub struct Group {
     /// What they see; none for robots that only relay, fuse and decide.
     #[serde(default)]
     pub view: Option<View>,
+    /// How they lie, if they do. All liars of a swarm are in league, and have no mind: what they see does not matter.
+    #[serde(default)]
+    pub lies: Option<Lies>,
+}
+
+/// What liars do. They know what is shown, hear what all hear, and vote for the other gesture that has most in its favour, with the
+/// greatest evidence that the clip allows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lies {
+    /// They vote alike.
+    Together,
+    /// They say one thing to every other robot and another to the rest, under one stamp.
+    TwoFaced,
+    /// They vote alike, decide on whichever votes suit them, stale ones among them, and announce it; they say that they and everybody else hold
+    /// it.
+    Choosing,
 }
 
 /// A statistical view: class scores, the shown class raised by `signal`, each with Gaussian noise of variance 1.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use error::ScenarioError;
 pub use fault::{Churn, Event, Fault};
-pub use group::{Group, View};
+pub use group::{Group, Lies, View};
 pub use link_model::LinkModel;
 
 use super::teaching::Teaching;
@@ -81,7 +81,7 @@ pub enum Order {
 pub struct Contender {
     /// Which rule.
     pub rule: FusionRule,
-    /// With which α, when not that of the mind: a share of 5 of 9 votes is a majority, but no probability of .95.
+    /// With which α, when not that of the mind, or the rule's own.
     #[serde(default)]
     pub alpha: Option<f64>,
 }
@@ -141,7 +141,7 @@ impl Scenario {
     pub fn contending(&self, contender: Contender) -> Self {
         let mut scenario = self.clone();
         scenario.mind.rule = contender.rule;
-        scenario.mind.alpha = contender.alpha.unwrap_or(self.mind.alpha);
+        scenario.mind.alpha = contender.alpha.or(self.mind.alpha);
         scenario
     }
 

@@ -40,6 +40,15 @@ impl Scenario {
                 return wrong("robots.view.persistence", format!("is {}: choose 0 to 1", view.persistence));
             }
         }
+        if self.members().all(|group| group.lies.is_some()) {
+            return wrong("robots.lies", "all lie: nobody is left to be deceived".to_owned());
+        }
+        if self.members().any(|group| group.lies.is_some()) && self.learning.is_some() {
+            return wrong(
+                "robots.lies",
+                "robots that learn are not lied to here: leave out learning".to_owned(),
+            );
+        }
         self.mind.validate()?;
         if let Some(teaching) = &self.learning {
             teaching.robots.validate()?;

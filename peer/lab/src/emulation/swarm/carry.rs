@@ -136,6 +136,7 @@ impl Swarm<'_> {
                     waiting.push_back(parcel);
                 }
             }
+            Presence::Up if self.robots[i].lies.is_some() => self.deceive(&parcel),
             Presence::Up => {
                 self.tell_mind(i, parcel.opened());
             }

@@ -32,7 +32,7 @@ impl Swarm<'_> {
             robot.rng = stream(self.seed, frames(n, i));
             robot.observer.show(self.shown, &mut robot.rng);
         }
-        let up: Vec<usize> = self.network.up().collect();
+        let up = self.honest();
         if up.is_empty() {
             return;
         }
@@ -127,7 +127,12 @@ impl Swarm<'_> {
     }
 
     pub(super) fn end_showing(&mut self) {
-        let up: Vec<usize> = self.network.up().collect();
+        let up = self.honest();
         self.record.end_showing(self.now, &up);
+    }
+
+    /// The robots that are up and do not lie.
+    fn honest(&self) -> Vec<usize> {
+        self.network.up().filter(|i| self.robots[*i].lies.is_none()).collect()
     }
 }

@@ -13,6 +13,9 @@ impl Swarm<'_> {
     /// A robot starts, for the first time or again: with what is on its disk, if it learns.
     pub(super) fn start(&mut self, i: usize) {
         let robot = &mut self.robots[i];
+        if robot.lies.is_some() {
+            return;
+        }
         robot.boot += 1;
         robot.looking = false;
         let life = life(self.seed, i, robot.boot);

@@ -7,12 +7,15 @@
 //! | `faults` | what goes wrong? |
 //! | `lives` | who starts, goes on, and knows of whom? |
 //! | `carry` | what does a mind want done, and what becomes of it? |
+//! | `deceive` | what do liars say? |
 
 mod carry;
 mod course;
+mod deceive;
 mod faults;
 mod lives;
 mod parcel;
+mod plot;
 mod queue;
 mod robot;
 mod seed;
@@ -34,6 +37,7 @@ use super::scenario::Scenario;
 use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
+use plot::Plot;
 use queue::{Due, Queue};
 use robot::Robot;
 use seed::{COURSE, NETWORK, stream};
@@ -52,6 +56,7 @@ pub(super) struct Swarm<'a> {
     shown: ClassId,
     /// The gestures still to be shown before all have been.
     turn: Vec<ClassId>,
+    plot: Plot,
     record: Record,
     trace: Trace<'a>,
 }
@@ -69,10 +74,10 @@ impl<'a> Swarm<'a> {
         let network = Network::new(observers.len(), links, scenario.link, rng);
         let learns = school.is_some();
         let robots: Vec<_> = (1..)
-            .zip(observers)
-            .map(|(id, observer)| Robot::new(RobotId(id), observer, seed, learns))
+            .zip(observers.into_iter().zip(scenario.members()))
+            .map(|(id, (observer, group))| Robot::new(RobotId(id), observer, seed, learns, group.lies))
             .collect();
-        let record = Record::new(robots.len());
+        let record = Record::new(robots.iter().map(|robot| robot.lies.is_none()).collect());
         let mut swarm = Self {
             scenario,
             school,
@@ -85,6 +90,7 @@ impl<'a> Swarm<'a> {
             course: stream(seed, COURSE),
             shown: ClassId(0),
             turn: Vec::new(),
+            plot: Plot::default(),
             record,
             trace,
         };

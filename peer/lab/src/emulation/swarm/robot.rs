@@ -11,11 +11,12 @@ use super::parcel::Parcel;
 use super::seed::stream;
 use crate::emulation::observer::Observer;
 use crate::emulation::pupil::Pupil;
+use crate::emulation::scenario::Lies;
 
 pub(super) struct Robot {
     pub id: RobotId,
     pub boot: u32,
-    /// None while it is dead.
+    /// None while it is dead, and of a liar.
     pub mind: Option<Mind>,
     pub observer: Box<dyn Observer>,
     pub rng: ChaCha8Rng,
@@ -28,11 +29,18 @@ pub(super) struct Robot {
     pub pupil: Option<Pupil>,
     /// Whom it believes alive, and whom it believes itself linked to.
     pub knows: (BTreeSet<usize>, Vec<usize>),
+    pub lies: Option<Lies>,
 }
 
 impl Robot {
     /// A robot that was never started.
-    pub fn new(id: RobotId, observer: Box<dyn Observer>, seed: u64, learns: bool) -> Self {
+    pub fn new(
+        id: RobotId,
+        observer: Box<dyn Observer>,
+        seed: u64,
+        learns: bool,
+        lies: Option<Lies>,
+    ) -> Self {
         Self {
             id,
             boot: 0,
@@ -45,6 +53,7 @@ impl Robot {
             waiting: VecDeque::new(),
             pupil: learns.then(Pupil::default),
             knows: Default::default(),
+            lies,
         }
     }
 }

@@ -184,3 +184,54 @@ fn a_robot_without_a_classifier_fuses_what_the_others_saw() {
     assert_eq!(mind.held().unwrap().class, Some(ClassId(1)));
     assert_eq!(mind.held().unwrap().certificate.vocabulary, vocabulary().id());
 }
+
+#[test]
+fn liars_tip_no_balance_that_honest_votes_leave() {
+    let config = RoundsConfig { liars: 1, ..RoundsConfig::default() };
+    let mut mind = mind_with(7, config);
+    mind.handle(ms(0), votes(66, 1, vote(1, 2, 6.0)));
+    // The two others together favour class 2 by a hair: with the liar, by more than one robot could make up for.
+    let nearly = |class, strength| Vote { evidence: evidence(class, strength), ..vote(1, 0, 0.0) };
+    mind.handle(ms(1), votes(1, 1, nearly(0, 4.0)));
+    mind.handle(ms(2), votes(2, 1, nearly(2, 4.1)));
+    live(&mut mind, ms(4000));
+    assert_eq!(mind.held(), None);
+    mind.handle(ms(4100), votes(2, 2, nearly(0, 4.0)));
+    assert_eq!(
+        mind.held().map(|held| held.class),
+        None,
+        "without one of them the other stands against the liar"
+    );
+    for robot in 3..=5 {
+        mind.handle(ms(4200), votes(robot, 1, nearly(0, 4.0)));
+    }
+    assert_eq!(mind.held().unwrap().class, Some(ClassId(0)));
+}
+
+#[test]
+fn where_liars_are_expected_a_decision_that_leaves_out_what_is_known_is_not_believed() {
+    let config = RoundsConfig { liars: 1, ..RoundsConfig::default() };
+    let mut mind = mind_with(7, config);
+    for robot in 1..=9 {
+        mind.handle(ms(0), votes(robot, 1, vote(1, 0, SURE)));
+    }
+    let mut early = mind_with(7, RoundsConfig { liars: 1, ..RoundsConfig::default() });
+    let forged = || gives(66, decision(1, Some(2), 8, 66));
+    mind.handle(ms(1), forged());
+    assert_ne!(mind.held().and_then(|held| held.class), Some(ClassId(2)));
+    // Before all have spoken, too.
+    early.handle(ms(0), Input::Alive(robots([1, 2])));
+    early.handle(ms(0), votes(1, 1, null(1)));
+    early.handle(ms(1), forged());
+    assert_eq!(
+        (early.held(), early.ballot().map(|ballot| ballot.len())),
+        (None, Some(10)),
+        "its votes are heard"
+    );
+    live(&mut early, ms(1500));
+    assert_eq!(early.held().map(|held| (held.class, held.author)), Some((Some(ClassId(2)), RobotId(7))));
+}
+
+fn evidence(class: usize, strength: f32) -> Vec<f32> {
+    (0..3).map(|k| if k == class { strength } else { -strength / 2.0 }).collect()
+}

@@ -2,6 +2,7 @@
 
 mod agreeing;
 mod deciding;
+mod flooding;
 mod opening;
 mod order;
 mod repair;
