@@ -22,4 +22,5 @@ mod targets;
 mod values;
 
 pub use engine::{Fuzzer, attempt, keep};
+pub use robot::taken_in;
 pub use targets::Target;

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use gestalt_fuzz::{Fuzzer, Target, attempt, corpus, keep};
+use gestalt_fuzz::{Fuzzer, Target, attempt, corpus, keep, taken_in};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -62,12 +62,21 @@ fn run(target: &str, options: &[&str]) -> Result<bool, Box<dyn Error>> {
         tried += 1;
         if let Err(input) = fuzzer.step() {
             let path = keep(Path::new(FAILURES), target, &input)?;
-            eprintln!("{target}: input {tried} of seed {seed} fails; again with: fuzz replay {target} {}", path.display());
+            eprintln!(
+                "{target}: input {tried} of seed {seed} fails; again with: fuzz replay {target} {}",
+                path.display()
+            );
             return Ok(false);
         }
     }
     let seconds = began.elapsed().as_secs_f64();
-    println!("{target}: {tried} inputs of seed {seed} in {seconds:.1} s, {:.0} a second", tried as f64 / seconds);
+    println!(
+        "{target}: {tried} inputs of seed {seed} in {seconds:.1} s, {:.0} a second",
+        tried as f64 / seconds
+    );
+    if taken_in() > 0 {
+        println!("{target}: minds took in {} of what was said", taken_in());
+    }
     Ok(true)
 }
 

@@ -1,6 +1,8 @@
 //! An honest robot's mind, that signs its votes and learns.
 
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use gestalt_protocol::{MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, RobotId};
 use gestalt_strategies::sample::MAX_SERIES;
@@ -69,6 +71,14 @@ pub fn frame(class: u8, sure: f32, chance: u8) -> Input {
     Input::Observed(Observation { features: features.to_vec(), quality: 1.0 })
 }
 
+static TAKEN_IN: AtomicU64 = AtomicU64::new(0);
+
+/// How many inputs all minds of this program have taken in.
+#[must_use]
+pub fn taken_in() -> u64 {
+    TAKEN_IN.load(Ordering::Relaxed)
+}
+
 /// A mind, and what it may never do.
 #[derive(Debug)]
 pub struct Robot {
@@ -98,7 +108,7 @@ impl Robot {
         }
         let refusals = mind.refusals().clone();
         let mut robot = Self { mind, refusals, full: false };
-        robot.handle(std::time::Duration::ZERO, Input::Learned(Arc::new(ByFirst)));
+        robot.handle(Duration::ZERO, Input::Learned(Arc::new(ByFirst)));
         robot
     }
 
@@ -116,7 +126,8 @@ impl Robot {
     ///
     /// # Panics
     /// If it wants more done than one input is worth, or says what others could not read, or forgets what it refused.
-    pub fn handle(&mut self, now: std::time::Duration, input: Input) -> Vec<Output> {
+    pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        TAKEN_IN.fetch_add(1, Ordering::Relaxed);
         let outputs = self.mind.handle(now, input);
         assert!(outputs.len() <= MOST_OUTPUTS, "{} outputs for one input", outputs.len());
         for output in &outputs {
@@ -153,7 +164,9 @@ impl Robot {
         }
         if let (Some(set), Some(learned)) = (self.mind.training_set(), self.mind.learned()) {
             assert!(set.len() <= set.capacity() && learned.lessons <= MAX_LESSONS);
-            assert!(set.seen().series().len() <= MAX_SERIES && learned.aside <= LearningConfig::default().aside);
+            assert!(
+                set.seen().series().len() <= MAX_SERIES && learned.aside <= LearningConfig::default().aside
+            );
         }
     }
 }

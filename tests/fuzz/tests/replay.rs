@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use gestalt_fuzz::{Fuzzer, Target, corpus};
+use gestalt_protocol::MAX_JSON;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
@@ -23,7 +24,10 @@ fn stands(target: Target, more: usize) {
     for _ in 0..more {
         if let Err(input) = fuzzer.step() {
             let path = gestalt_fuzz::keep(&std::env::temp_dir(), target, &input).expect("a place to keep it");
-            panic!("{target} fails; again with: cargo run -p gestalt-fuzz --bin fuzz replay {target} {}", path.display());
+            panic!(
+                "{target} fails; again with: cargo run -p gestalt-fuzz --bin fuzz replay {target} {}",
+                path.display()
+            );
         }
     }
 }
@@ -66,6 +70,27 @@ fn whatever_arrives_nobody_but_a_member_votes() {
 #[test]
 fn three_honest_minds_come_to_know_the_same_whatever_a_stranger_says() {
     stands(Target::Mind, 200);
+}
+
+#[test]
+fn the_longest_json_takes_no_more_memory_than_promised() {
+    let _alone = alone();
+    for (before, again, after) in [
+        (r#"{"say":"open","x":["#, "0,", "0]}"),
+        (r#"{"say":"was","class":["#, "[],", "0]}"),
+        (
+            r#"{"robot":1,"at":1,"to":{"say":"open","x":["#,
+            "0,",
+            r#"0]},"outcome":"known","class":null,"samples":1}"#,
+        ),
+        (r#"{"robot":1,"name":"","vocabulary":["#, "\"\",", "0]}"),
+        (r#"{"round":{"counter":1,"opener":1,"life":1},"guests":["#, "0,", "0]}"),
+        (r#"{"certificate":{"votes":["#, "0,", "0]}}"),
+    ] {
+        let times = (MAX_JSON - before.len() - after.len()) / again.len();
+        let json = [before, &again.repeat(times), after].concat();
+        assert!(gestalt_fuzz::attempt(Target::Json, json.as_bytes()).is_ok(), "{before}…");
+    }
 }
 
 #[test]

@@ -96,9 +96,7 @@ impl Inbox {
                 }
                 Input::Received(self.gate.message(self.now, envelope).ok()?)
             }
-            Topic::RobotDecision(id) => {
-                Input::Heard(id, bounded(payload, || decode_json(payload)).ok()?)
-            }
+            Topic::RobotDecision(id) => Input::Heard(id, bounded(payload, || decode_json(payload)).ok()?),
             Topic::Decision => {
                 let mut decision: Decision = bounded(payload, || decode_json(payload)).ok()?;
                 decision.check().ok()?;

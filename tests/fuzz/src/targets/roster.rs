@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{RobotId, hex};
 use gestalt_trust::{
-    Budget, Ed25519, Fake, MAX_ROSTER, Membership, PublicKey, ROSTER_DOMAIN, Roster, RosterError, Scheme, Verifier,
+    Budget, Ed25519, Fake, MAX_ROSTER, Membership, PublicKey, ROSTER_DOMAIN, Roster, RosterError, Scheme,
+    Verifier,
 };
 use serde_json::{Map, Value};
 

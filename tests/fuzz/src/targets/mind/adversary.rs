@@ -114,7 +114,8 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
             // To one or two of them, or to all.
             for robot in (0..ROBOTS).filter(|robot| to & 3 == 3 || to >> robot & 1 == 1) {
                 let by = by.clone();
-                world.input(robot, Input::Instructed(Instructed { by, at, instruction: instruction.clone() }));
+                world
+                    .input(robot, Input::Instructed(Instructed { by, at, instruction: instruction.clone() }));
             }
         }
         // What a stranger says, in any name.
@@ -184,7 +185,11 @@ fn knowledge(world: &mut World, events: &mut Events<'_>) {
         0 => values::have(chance),
         1 => values::know(chance),
         2 => {
-            let id = values::sample_id(values::robot(chance), values::number(chance), values::number(chance).max(1));
+            let id = values::sample_id(
+                values::robot(chance),
+                values::number(chance),
+                values::number(chance).max(1),
+            );
             values::samples(space().id(), vec![values::sample(chance, id, COMPONENTS)])
         }
         _ => values::lessons(vec![values::lesson(chance, round(world, to))]),
@@ -280,7 +285,13 @@ pub fn seed(rng: &mut impl Rng) -> Vec<u8> {
                 0 => events.extend([2, rng.random_range(0..3), rng.random_range(128..255), 5, 26]),
                 1 => events.extend([0, rng.random(), rng.random_range(0..3), rng.random_range(128..255)]),
                 2 => events.extend([5, rng.random()]),
-                _ => events.extend([rng.random_range(0..24), rng.random(), rng.random(), rng.random(), rng.random()]),
+                _ => events.extend([
+                    rng.random_range(0..24),
+                    rng.random(),
+                    rng.random(),
+                    rng.random(),
+                    rng.random(),
+                ]),
             }
         }
         events.extend([5, 255, 14, 3 | rng.random::<u8>() << 2, rng.random(), rng.random(), 5, 200]);
