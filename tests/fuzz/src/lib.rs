@@ -23,4 +23,4 @@ mod values;
 
 pub use engine::{Fuzzer, attempt, keep};
 pub use robot::taken_in;
-pub use targets::Target;
+pub use targets::{Target, contradicts};

@@ -9,6 +9,8 @@ mod mind;
 mod proof;
 mod roster;
 
+pub use self::mind::contradicts;
+
 use std::fmt;
 use std::str::FromStr;
 

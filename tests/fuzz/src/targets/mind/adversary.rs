@@ -84,7 +84,7 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
             world.input(robot, input);
         }
         // What the network does.
-        5 => world.pass(ms(1 + 10 * u64::from(events.byte())), true),
+        PASS => world.pass(ms(1 + 10 * u64::from(events.byte())), true),
         6 => world.pass(ms(1 + 10 * u64::from(events.byte())), false),
         7 => world.arrive(events.place()),
         8 => world.lose(events.place()),
@@ -98,7 +98,7 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
             let (robot, who) = (events.robot(), events.byte());
             let robots: BTreeSet<RobotId> =
                 (0..7).filter(|bit| who >> bit & 1 == 1).map(|bit| RobotId(bit + 1)).collect();
-            world.input(robot, if who & 128 == 0 { Input::Alive(robots) } else { Input::Neighbours(robots) });
+            world.mislead(robot, if who & 128 == 0 { Input::Alive(robots) } else { Input::Neighbours(robots) });
         }
         13 => {
             let (robot, which) = (events.robot(), events.place());
@@ -227,7 +227,7 @@ fn many(world: &mut World, events: &mut Events<'_>) {
         }
         _ => {
             let robots = (0..most * 8).map(RobotId).collect();
-            return world.input(to, Input::Alive(robots));
+            return world.mislead(to, Input::Alive(robots));
         }
     };
     say(world, to, robot(to + 1), message, chance);
@@ -275,26 +275,61 @@ fn altered(world: &mut World, events: &mut Events<'_>) {
     world.hear(to, said);
 }
 
-/// A gesture is shown, seen and taught, and a few things happen meanwhile.
+/// A gesture is shown, seen and taught, and a few things happen meanwhile; or robots that see different ones hear each other late; or
+/// a stranger says what it can of them, and nothing is late.
 pub fn seed(rng: &mut impl Rng) -> Vec<u8> {
     let mut events = Vec::new();
     for _ in 0..rng.random_range(1..4) {
-        events.extend([3, rng.random(), 5, 1]);
-        for _ in 0..rng.random_range(1..8) {
-            match rng.random_range(0..4) {
-                0 => events.extend([2, rng.random_range(0..3), rng.random_range(128..255), 5, 26]),
-                1 => events.extend([0, rng.random(), rng.random_range(0..3), rng.random_range(128..255)]),
-                2 => events.extend([5, rng.random()]),
-                _ => events.extend([
-                    rng.random_range(0..24),
-                    rng.random(),
-                    rng.random(),
-                    rng.random(),
-                    rng.random(),
-                ]),
-            }
+        events.extend([3, rng.random(), PASS, 1]);
+        match rng.random_range(0..3) {
+            0 => (0..rng.random_range(1..8)).for_each(|_| happens(rng, &mut events)),
+            1 => contested(rng, &mut events),
+            _ => slandered(rng, &mut events),
         }
-        events.extend([5, 255, 14, 3 | rng.random::<u8>() << 2, rng.random(), rng.random(), 5, 200]);
+        events.extend([PASS, 255, 14, 3 | rng.random::<u8>() << 2, rng.random(), rng.random(), PASS, 200]);
     }
     events
+}
+
+/// Time passes, and messages arrive.
+const PASS: u8 = 5;
+
+fn happens(rng: &mut impl Rng, events: &mut Vec<u8>) {
+    match rng.random_range(0..4) {
+        0 => events.extend([2, rng.random_range(0..3), rng.random_range(128..255), PASS, 26]),
+        1 => events.extend([0, rng.random(), rng.random_range(0..3), rng.random_range(128..255)]),
+        2 => events.extend([PASS, rng.random()]),
+        _ => events.extend(rng.random::<[u8; 5]>()),
+    }
+}
+
+/// Each robot sees what it sees; what they say of it arrives one by one, late or never.
+fn contested(rng: &mut impl Rng, events: &mut Vec<u8>) {
+    for robot in 0..ROBOTS as u8 {
+        events.extend([0, robot, rng.random_range(0..2), rng.random_range(150..255)]);
+    }
+    for _ in 0..rng.random_range(8..60) {
+        match rng.random_range(0..12) {
+            0..5 => events.extend([7, rng.random_range(0..8)]),
+            5..8 => events.extend([6, rng.random_range(0..40)]),
+            8 => events.extend([PASS, rng.random_range(0..30)]),
+            9 => events.extend([8, rng.random_range(0..8)]),
+            10 => events.extend([11, rng.random(), rng.random()]),
+            _ => events.extend([0, rng.random(), rng.random_range(0..2), rng.random_range(150..255)]),
+        }
+    }
+}
+
+/// Robots see different gestures, and a stranger says what they hold, and again what they said, with a little change.
+fn slandered(rng: &mut impl Rng, events: &mut Vec<u8>) {
+    for _ in 0..rng.random_range(8..60) {
+        match rng.random_range(0..8) {
+            0 | 1 => events.extend([0, rng.random(), rng.random_range(0..2), rng.random_range(150..255)]),
+            2 | 3 => events.extend([PASS, rng.random_range(0..40)]),
+            4 => events.extend([13, rng.random(), rng.random()]),
+            5 => events.extend([20, rng.random(), rng.random(), rng.random()]),
+            6 => events.extend([21, rng.random(), rng.random(), rng.random(), rng.random(), rng.random()]),
+            _ => events.extend([17, rng.random(), rng.random(), rng.random()]),
+        }
+    }
 }

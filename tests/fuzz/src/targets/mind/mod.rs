@@ -16,19 +16,16 @@ const CALM: Duration = Duration::from_secs(60);
 
 /// An input is a list of events, each of a byte and its arguments, see [`adversary::event`].
 ///
-/// Never are two gestures final for one round; no robot panics, forgets what it refused or holds more than it may; and after a
-/// calm period all know the same.
+/// While every message arrives at once, never are two gestures final for one round; no robot panics, forgets what it refused or
+/// holds more than it may; and after a calm period all know the same.
 ///
 /// # Panics
 /// If not.
 pub fn run(bytes: &[u8]) {
-    let mut world = World::new();
-    let mut events = adversary::Events::new(bytes);
-    while adversary::event(&mut world, &mut events).is_some() {}
-    world.robots().iter().for_each(|robot| robot.check());
-    world.introduce();
-    world.pass(CALM, true);
-    world.robots().iter().for_each(|robot| robot.check());
+    let world = live(bytes);
+    if !world.late() {
+        assert_eq!(world.contradiction(), None, "two gestures are final for one round");
+    }
     let minds: Vec<&Mind> = world.robots().iter().map(|robot| robot.mind()).collect();
     for other in &minds[1..] {
         alike(minds[0], other);
@@ -39,6 +36,24 @@ pub fn run(bytes: &[u8]) {
             saw_the_same(minds[one], minds[other]);
         }
     }
+}
+
+/// Whether two gestures become final for one round, however late messages are.
+#[must_use]
+pub fn contradicts(bytes: &[u8]) -> bool {
+    live(bytes).contradiction().is_some()
+}
+
+/// All events, then calm.
+fn live(bytes: &[u8]) -> World {
+    let mut world = World::new();
+    let mut events = adversary::Events::new(bytes);
+    while adversary::event(&mut world, &mut events).is_some() {}
+    world.robots().iter().for_each(|robot| robot.check());
+    world.introduce();
+    world.pass(CALM, true);
+    world.robots().iter().for_each(|robot| robot.check());
+    world
 }
 
 fn alike(one: &Mind, other: &Mind) {

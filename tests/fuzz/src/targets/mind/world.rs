@@ -39,8 +39,10 @@ pub struct World {
     said: VecDeque<Said>,
     /// Whether the link between two robots is cut, by the smaller of them and by the greater.
     cut: BTreeSet<(usize, usize)>,
-    /// What was announced as final.
-    finals: BTreeMap<RoundId, ClassId>,
+    /// What was announced as final, and what was so last.
+    finals: BTreeMap<RoundId, (ClassId, ClassId)>,
+    /// Whether messages were late or lost, or robots did not know of each other.
+    late: bool,
 }
 
 impl World {
@@ -53,6 +55,7 @@ impl World {
             said: VecDeque::new(),
             cut: BTreeSet::new(),
             finals: BTreeMap::new(),
+            late: false,
         };
         world.introduce();
         world
@@ -75,6 +78,7 @@ impl World {
     /// Cuts a link, or mends it.
     pub fn cut(&mut self, one: usize, other: usize, cut: bool) {
         let link = (one.min(other), one.max(other));
+        self.late |= cut;
         if cut {
             self.cut.insert(link);
         } else {
@@ -83,9 +87,6 @@ impl World {
     }
 
     /// A robot takes in something of its own: what it sees, or who is there.
-    ///
-    /// # Panics
-    /// If two gestures are final for one round.
     pub fn input(&mut self, robot: usize, input: Input) {
         let me = RobotId(robot as u32 + 1);
         for output in self.robots[robot].handle(self.now, input) {
@@ -110,8 +111,23 @@ impl World {
 
     fn announced(&mut self, decision: &Decision) {
         let Some(class) = decision.class.filter(|_| decision.is_final) else { return };
-        let first = *self.finals.entry(decision.round).or_insert(class);
-        assert_eq!(first, class, "two gestures are final for {}", decision.round);
+        self.finals.entry(decision.round).or_insert((class, class)).1 = class;
+    }
+
+    /// Whether messages were late or lost, or robots did not know of each other.
+    pub fn late(&self) -> bool {
+        self.late
+    }
+
+    /// A round for which two gestures were final.
+    pub fn contradiction(&self) -> Option<RoundId> {
+        self.finals.iter().find(|(_, (first, last))| first != last).map(|(round, _)| *round)
+    }
+
+    /// Who is there is not what a robot is told.
+    pub fn mislead(&mut self, robot: usize, input: Input) {
+        self.late = true;
+        self.input(robot, input);
     }
 
     fn to_all(&mut self, from: usize, said: Said) {
@@ -172,6 +188,7 @@ impl World {
 
     /// It is lost.
     pub fn lose(&mut self, which: usize) {
+        self.late = true;
         let place = which % self.under_way.len().max(1);
         self.under_way.remove(place);
     }
@@ -202,6 +219,7 @@ impl World {
     /// If a robot wants to be woken without end.
     pub fn pass(&mut self, time: Duration, arriving: bool) {
         let end = self.now + time;
+        self.late |= !arriving;
         let mut left = 100_000;
         loop {
             if arriving {
