@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Every package and the folder of its sources, seen from the root.
-pub const CRATES: [(&str, &str); 13] = [
+pub const CRATES: [(&str, &str); 14] = [
     ("gestalt-protocol", "protocol/src"),
     ("gestalt-rounds", "strategies/rounds/src"),
     ("gestalt-svm", "strategies/svm/src"),
@@ -14,6 +14,7 @@ pub const CRATES: [(&str, &str); 13] = [
     ("gestalt-draw", "peer/draw/src"),
     ("gestalt-lab", "peer/lab/src"),
     ("gestalt-peer", "peer/src"),
+    ("gestalt-fuzz", "tests/fuzz/src"),
     ("gestalt-trials", "tests/trials"),
     ("gestalt-tests", "tests/swarm"),
     ("gestalt-examples", "examples"),

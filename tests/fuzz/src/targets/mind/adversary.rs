@@ -98,7 +98,10 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
             let (robot, who) = (events.robot(), events.byte());
             let robots: BTreeSet<RobotId> =
                 (0..7).filter(|bit| who >> bit & 1 == 1).map(|bit| RobotId(bit + 1)).collect();
-            world.mislead(robot, if who & 128 == 0 { Input::Alive(robots) } else { Input::Neighbours(robots) });
+            world.mislead(
+                robot,
+                if who & 128 == 0 { Input::Alive(robots) } else { Input::Neighbours(robots) },
+            );
         }
         13 => {
             let (robot, which) = (events.robot(), events.place());
@@ -121,11 +124,13 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         // What a stranger says, in any name.
         15 => {
             let (to, mut chance) = (events.robot(), events.chance());
+            world.slander();
             world.hear(to, Said::Message(values::envelope(&mut chance)));
         }
         16 => {
             let (to, length) = (events.robot(), events.place());
             if let Ok(envelope) = Envelope::decode(events.take(length)) {
+                world.slander();
                 world.hear(to, Said::Message(envelope));
             }
         }
@@ -136,6 +141,7 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         21 => altered(world, events),
         22 => {
             let (to, mut chance) = (events.robot(), events.chance());
+            world.slander();
             world.hear(to, Said::Announced(values::decision(&mut chance)));
         }
         _ => {
@@ -182,7 +188,10 @@ fn knowledge(world: &mut World, events: &mut Events<'_>) {
     let (to, kind, mut chance) = (events.robot(), events.byte(), events.chance());
     let chance = &mut chance;
     let message = match kind % 4 {
-        0 => values::have(chance),
+        0 => {
+            world.slander();
+            values::have(chance)
+        }
         1 => values::know(chance),
         2 => {
             let id = values::sample_id(
@@ -238,6 +247,7 @@ fn holding(world: &mut World, events: &mut Events<'_>) {
     let (to, mut chance) = (events.robot(), events.chance());
     let mut holding = values::holding(&mut chance);
     holding.round = round(world, to);
+    world.slander();
     world.hear(to, Said::Holding(values::robot(&mut chance), holding));
 }
 
@@ -246,6 +256,7 @@ fn altered(world: &mut World, events: &mut Events<'_>) {
     let (to, which, what, mut chance) = (events.robot(), events.place(), events.byte(), events.chance());
     let number = values::number(&mut chance);
     let Some(mut said) = world.recall(which) else { return };
+    world.slander();
     match &mut said {
         Said::Announced(decision) => {
             let certificate = &mut decision.certificate;

@@ -41,8 +41,21 @@ pub struct World {
     cut: BTreeSet<(usize, usize)>,
     /// What was announced as final, and what was so last.
     finals: BTreeMap<RoundId, (ClassId, ClassId)>,
-    /// Whether messages were late or lost, or robots did not know of each other.
-    late: bool,
+    /// Who ever held a gesture, by the counter of its round: names of rounds merge.
+    holders: BTreeMap<(u32, ClassId), BTreeSet<usize>>,
+    /// What the robots have to put up with.
+    faults: Faults,
+}
+
+/// What the robots have to put up with.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Faults {
+    /// Messages that come late, or never.
+    pub late: bool,
+    /// Robots that are not told who is there.
+    pub misled: bool,
+    /// A stranger that says what robots hold, which nobody signs.
+    pub slandered: bool,
 }
 
 impl World {
@@ -55,7 +68,8 @@ impl World {
             said: VecDeque::new(),
             cut: BTreeSet::new(),
             finals: BTreeMap::new(),
-            late: false,
+            holders: BTreeMap::new(),
+            faults: Faults::default(),
         };
         world.introduce();
         world
@@ -78,7 +92,7 @@ impl World {
     /// Cuts a link, or mends it.
     pub fn cut(&mut self, one: usize, other: usize, cut: bool) {
         let link = (one.min(other), one.max(other));
-        self.late |= cut;
+        self.faults.late |= cut;
         if cut {
             self.cut.insert(link);
         } else {
@@ -87,6 +101,9 @@ impl World {
     }
 
     /// A robot takes in something of its own: what it sees, or who is there.
+    ///
+    /// # Panics
+    /// If it announces as final what no majority ever held, and nobody told it so.
     pub fn input(&mut self, robot: usize, input: Input) {
         let me = RobotId(robot as u32 + 1);
         for output in self.robots[robot].handle(self.now, input) {
@@ -97,6 +114,9 @@ impl World {
                     self.send(robot, (to.0 as usize).wrapping_sub(1), Said::Message(envelope));
                 }
                 Output::Hold(decision) => {
+                    if let Some(class) = decision.class {
+                        self.holders.entry((decision.round.counter, class)).or_default().insert(robot);
+                    }
                     self.to_all(robot, Said::Holding(me, decision.holding(Vec::new())));
                 }
                 Output::Announce(decision) => {
@@ -111,12 +131,20 @@ impl World {
 
     fn announced(&mut self, decision: &Decision) {
         let Some(class) = decision.class.filter(|_| decision.is_final) else { return };
+        let held_by = self.holders.get(&(decision.round.counter, class)).map_or(0, BTreeSet::len);
+        let known = self.faults.misled || self.faults.slandered || 2 * held_by > ROBOTS;
+        assert!(known, "gesture {class} is final for {}, and was held by {held_by} robots", decision.round);
         self.finals.entry(decision.round).or_insert((class, class)).1 = class;
     }
 
-    /// Whether messages were late or lost, or robots did not know of each other.
-    pub fn late(&self) -> bool {
-        self.late
+    /// What the robots had to put up with.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// From now on robots hear what somebody else said that they hold.
+    pub fn slander(&mut self) {
+        self.faults.slandered = true;
     }
 
     /// A round for which two gestures were final.
@@ -126,7 +154,7 @@ impl World {
 
     /// Who is there is not what a robot is told.
     pub fn mislead(&mut self, robot: usize, input: Input) {
-        self.late = true;
+        self.faults.misled = true;
         self.input(robot, input);
     }
 
@@ -188,7 +216,7 @@ impl World {
 
     /// It is lost.
     pub fn lose(&mut self, which: usize) {
-        self.late = true;
+        self.faults.late = true;
         let place = which % self.under_way.len().max(1);
         self.under_way.remove(place);
     }
@@ -219,7 +247,7 @@ impl World {
     /// If a robot wants to be woken without end.
     pub fn pass(&mut self, time: Duration, arriving: bool) {
         let end = self.now + time;
-        self.late |= !arriving;
+        self.faults.late |= !arriving;
         let mut left = 100_000;
         loop {
             if arriving {
