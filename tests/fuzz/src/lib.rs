@@ -21,6 +21,6 @@ mod swarm;
 mod targets;
 mod values;
 
-pub use engine::{Fuzzer, attempt, keep};
+pub use engine::{Fuzzer, keep, passes};
 pub use robot::taken_in;
 pub use targets::{Target, contradicts};

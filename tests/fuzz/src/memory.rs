@@ -10,18 +10,25 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 const SLACK: usize = 64 * 1024;
 
 /// Reads bytes, and says so if that takes more memory than is promised: [`MAX_ALLOCATION`] in all, and as much less as the message
-/// is shorter than the longest. One thread at a time: memory is that of the whole program.
+/// is shorter than the longest.
 ///
 /// # Panics
 /// If it does.
-pub fn bounded<T>(bytes: &[u8], read: impl FnOnce() -> T) -> T {
-    ALLOCATOR.reset_peak_usage();
-    let before = ALLOCATOR.current_usage();
-    let value = read();
-    let taken = ALLOCATOR.peak_usage().saturating_sub(before);
+pub fn bounded<T>(bytes: &[u8], read: impl Fn() -> T) -> T {
     let most = (SLACK + MAX_ALLOCATION / MAX_MESSAGE * bytes.len()).min(MAX_ALLOCATION);
-    assert!(taken <= most, "reading {} bytes took {taken} bytes of memory, more than {most}", bytes.len());
-    value
+    let mut least = usize::MAX;
+    // Memory is that of the whole program: what another thread took meanwhile, it does not take each time.
+    for _ in 0..3 {
+        ALLOCATOR.reset_peak_usage();
+        let before = ALLOCATOR.current_usage();
+        let value = read();
+        let taken = ALLOCATOR.peak_usage().saturating_sub(before);
+        if taken <= most {
+            return value;
+        }
+        least = least.min(taken);
+    }
+    panic!("reading {} bytes took {least} bytes of memory, more than {most}", bytes.len());
 }
 
 #[cfg(test)]

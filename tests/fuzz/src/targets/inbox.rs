@@ -27,23 +27,32 @@ const ME: RobotId = RobotId(1);
 pub fn run(bytes: &[u8]) {
     let mut inbox = Inbox::new();
     let mut rest = bytes;
-    while let Some((how, key, payload, after)) = next(rest) {
-        inbox.now += Duration::from_millis(u64::from(how & 0x7f) * 20);
-        if let Ok(key) = str::from_utf8(key) {
-            inbox.on_sample(key, payload, how & 0x80 != 0);
+    while let Some(delivery) = Delivery::next(&mut rest) {
+        inbox.now += Duration::from_millis(u64::from(delivery.how & 0x7f) * 20);
+        if let Ok(key) = str::from_utf8(delivery.key) {
+            inbox.on_sample(key, delivery.payload, delivery.how & 0x80 != 0);
         }
-        rest = after;
     }
     inbox.robot.check();
 }
 
-fn next(bytes: &[u8]) -> Option<(u8, &[u8], &[u8], &[u8])> {
-    let (how, rest) = bytes.split_first()?;
-    let (length, rest) = rest.split_first()?;
-    let (key, rest) = rest.split_at_checked(usize::from(*length))?;
-    let (length, rest) = rest.split_first_chunk::<2>()?;
-    let (payload, rest) = rest.split_at(usize::from(u16::from_le_bytes(*length)).min(rest.len()));
-    Some((*how, key, payload, rest))
+/// One message.
+struct Delivery<'a> {
+    how: u8,
+    key: &'a [u8],
+    payload: &'a [u8],
+}
+
+impl<'a> Delivery<'a> {
+    /// Takes one off; the last may be cut short.
+    fn next(bytes: &mut &'a [u8]) -> Option<Self> {
+        let (&[how, length], rest) = bytes.split_first_chunk()?;
+        let (key, rest) = rest.split_at_checked(usize::from(length))?;
+        let (length, rest) = rest.split_first_chunk()?;
+        let (payload, rest) = rest.split_at(usize::from(u16::from_le_bytes(*length)).min(rest.len()));
+        *bytes = rest;
+        Some(Self { how, key, payload })
+    }
 }
 
 struct Inbox {

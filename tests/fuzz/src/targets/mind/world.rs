@@ -108,7 +108,7 @@ impl World {
         let me = RobotId(robot as u32 + 1);
         for output in self.robots[robot].handle(self.now, input) {
             match output {
-                Output::Broadcast(envelope) => self.to_all(robot, Said::Message(envelope)),
+                Output::Broadcast(envelope) => self.tell_all(robot, Said::Message(envelope)),
                 Output::Tell(to, envelope) => {
                     self.remember(Said::Message(envelope.clone()));
                     self.send(robot, (to.0 as usize).wrapping_sub(1), Said::Message(envelope));
@@ -117,13 +117,13 @@ impl World {
                     if let Some(class) = decision.class {
                         self.holders.entry((decision.round.counter, class)).or_default().insert(robot);
                     }
-                    self.to_all(robot, Said::Holding(me, decision.holding(Vec::new())));
+                    self.tell_all(robot, Said::Holding(me, decision.holding(Vec::new())));
                 }
                 Output::Announce(decision) => {
                     self.announced(&decision);
-                    self.to_all(robot, Said::Announced(decision));
+                    self.tell_all(robot, Said::Announced(decision));
                 }
-                Output::Answer(by, answer) => self.to_all(robot, Said::Answered(by, answer.at, me)),
+                Output::Answer(by, answer) => self.tell_all(robot, Said::Answered(by, answer.at, me)),
                 Output::Opened(_) | Output::Closed(_) | Output::Train(_) | Output::Remember { .. } => {}
             }
         }
@@ -158,7 +158,7 @@ impl World {
         self.input(robot, input);
     }
 
-    fn to_all(&mut self, from: usize, said: Said) {
+    fn tell_all(&mut self, from: usize, said: Said) {
         self.remember(said.clone());
         for to in (0..ROBOTS).filter(|to| *to != from) {
             self.send(from, to, said.clone());
