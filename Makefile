@@ -5,7 +5,7 @@ SHELL := /bin/bash
 ifeq ($(shell cargo --version 2>/dev/null),)
 export RUSTUP_TOOLCHAIN := stable
 endif
-.PHONY: demo test attack bench lint eyes packages test-packages
+.PHONY: demo test attack fuzz bench lint eyes packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
@@ -60,6 +60,22 @@ eyes: packages
 # Every speed the README states, with its yardstick in the same run.
 bench: packages
 	cargo bench --workspace
+
+# Each fuzz target for a minute on one core, guided by coverage: libFuzzer, on the stable compiler. What it learns stays in
+# out/fuzz. FUZZ_SECONDS=7200 for longer, FUZZ="mind inbox" for some.
+FUZZ ?= envelope json roster proof key frame inbox mind
+FUZZ_SECONDS ?= 60
+COVERAGE := -C passes=sancov-module -C llvm-args=-sanitizer-coverage-level=4 -C llvm-args=-sanitizer-coverage-pc-table \
+            -C llvm-args=-sanitizer-coverage-inline-8bit-counters -C llvm-args=-sanitizer-coverage-trace-compares
+HOST := $(shell rustc -vV | sed -n 's/^host: //p')
+fuzz: packages
+	RUSTFLAGS="$(COVERAGE) -C codegen-units=1 -C debug-assertions -C overflow-checks" \
+	cargo build --release -p gestalt-fuzz --features libfuzzer --bin guided --target $(HOST)
+	for target in $(FUZZ); do \
+	  mkdir -p out/fuzz/$$target; \
+	  GESTALT_FUZZ=$$target target/$(HOST)/release/guided -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -timeout=10 \
+	    -artifact_prefix=out/fuzz/$$target- -print_final_stats=1 out/fuzz/$$target tests/fuzz/corpus/$$target || exit 1; \
+	done
 
 lint: packages
 	cargo fmt --check

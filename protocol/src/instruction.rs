@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use serde::de::{Deserializer, Error, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
 use crate::id::{ClassId, RobotId, RoundId};
@@ -21,7 +22,7 @@ use crate::id::{ClassId, RobotId, RoundId};
 /// robots that held another decision at that moment understand the same. A later word of the same instructor on the
 /// same round replaces the earlier one; each word but `open` is answered, see [`Answer`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "say", rename_all = "snake_case", from = "Read")]
+#[serde(tag = "say", rename_all = "snake_case", try_from = "Read")]
 pub enum Instruction {
     /// "Look now": open a round. Without effect while one is open, and for half a second after one was opened: a copy
     /// of the request for that one may still be on its way.
@@ -55,7 +56,7 @@ pub enum Instruction {
 }
 
 /// A gesture as people name it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(untagged)]
 pub enum Gesture {
     /// By its index in the vocabulary.
@@ -73,27 +74,78 @@ impl fmt::Display for Gesture {
     }
 }
 
-/// How an [`Instruction`] is read. Its variants have braces because serde lets unknown keys pass beside a variant
-/// without.
-#[derive(Deserialize)]
-#[serde(tag = "say", rename_all = "snake_case", deny_unknown_fields)]
-enum Read {
-    Open {},
-    Was { round: RoundId, class: Gesture },
-    Right { round: RoundId, of: Gesture },
-    Wrong { round: RoundId, of: Gesture },
-    Retract { round: RoundId },
+/// A number or a text. Serde's own reading of what has no tag would first take up whatever stands there, of any size.
+impl<'de> Deserialize<'de> for Gesture {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Named;
+
+        impl Visitor<'_> for Named {
+            type Value = Gesture;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a class from 0 to 255, or a label")
+            }
+
+            fn visit_u64<E: Error>(self, class: u64) -> Result<Gesture, E> {
+                let class =
+                    class.try_into().map_err(|_| E::invalid_value(Unexpected::Unsigned(class), &self));
+                class.map(|class| Gesture::Class(ClassId(class)))
+            }
+
+            fn visit_str<E: Error>(self, label: &str) -> Result<Gesture, E> {
+                Ok(Gesture::Label(label.to_owned()))
+            }
+        }
+
+        deserializer.deserialize_any(Named)
+    }
 }
 
-impl From<Read> for Instruction {
-    fn from(read: Read) -> Self {
-        match read {
-            Read::Open {} => Self::Open,
-            Read::Was { round, class } => Self::Was { round, class },
-            Read::Right { round, of } => Self::Right { round, of },
-            Read::Wrong { round, of } => Self::Wrong { round, of },
-            Read::Retract { round } => Self::Retract { round },
-        }
+/// How an [`Instruction`] is read: key by key, whichever comes first. Serde's own reading of what has a tag among its keys would
+/// take up all of them, of any size, until it has found the tag.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Read {
+    say: Say,
+    #[serde(default, deserialize_with = "given")]
+    round: Option<RoundId>,
+    #[serde(default, deserialize_with = "given")]
+    class: Option<Gesture>,
+    #[serde(default, deserialize_with = "given")]
+    of: Option<Gesture>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Say {
+    Open,
+    Was,
+    Right,
+    Wrong,
+    Retract,
+}
+
+/// Left out or not: `null` is no value.
+fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(deserializer).map(Some)
+}
+
+impl TryFrom<Read> for Instruction {
+    type Error = &'static str;
+
+    fn try_from(read: Read) -> Result<Self, &'static str> {
+        let Read { say, round, class, of } = read;
+        Ok(match (say, round, class, of) {
+            (Say::Open, None, None, None) => Self::Open,
+            (Say::Was, Some(round), Some(class), None) => Self::Was { round, class },
+            (Say::Right, Some(round), None, Some(of)) => Self::Right { round, of },
+            (Say::Wrong, Some(round), None, Some(of)) => Self::Wrong { round, of },
+            (Say::Retract, Some(round), None, None) => Self::Retract { round },
+            (Say::Open, ..) => return Err("open has nothing beside it"),
+            (Say::Was, ..) => return Err("was has round and class beside it"),
+            (Say::Right | Say::Wrong, ..) => return Err("right and wrong have round and of beside them"),
+            (Say::Retract, ..) => return Err("retract has round beside it"),
+        })
     }
 }
 

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bounded;
 use crate::id::{RobotId, RoundId};
+use crate::limits::MAX_CLASSES;
 
 /// A robot's account of itself, JSON: the reply to a query on `robot/<id>/status`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +24,7 @@ pub struct Status {
     /// Whether it signs what it says and believes members of the swarm alone.
     pub sealed: bool,
     /// The labels of the gestures it can tell, by class.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
     pub vocabulary: Vec<String>,
     /// The robots it is directly linked to.
     pub neighbours: Vec<RobotId>,

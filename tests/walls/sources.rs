@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Every package and the folder of its sources, seen from the root.
-pub const CRATES: [(&str, &str); 14] = [
+pub const CRATES: [(&str, &str); 15] = [
     ("gestalt-protocol", "protocol/src"),
     ("gestalt-rounds", "strategies/rounds/src"),
     ("gestalt-svm", "strategies/svm/src"),
@@ -15,6 +15,7 @@ pub const CRATES: [(&str, &str); 14] = [
     ("gestalt-lab", "peer/lab/src"),
     ("gestalt-peer", "peer/src"),
     ("gestalt-attack", "tests/attack/src"),
+    ("gestalt-fuzz", "tests/fuzz/src"),
     ("gestalt-trials", "tests/trials"),
     ("gestalt-tests", "tests/swarm"),
     ("gestalt-examples", "examples"),

@@ -75,10 +75,10 @@ pub const ALL: &[Attack] = &[
         what: "says for f + 1 robots that they hold a greater decision, which nobody has",
         tier: Tier::T0,
         setting: Setting::Sealed,
-        expected: "nobody holds another; announced within 0.15 s of the usual",
+        expected: "nobody holds another; announced within 0.5 s of the usual",
         counted: Counted::None("what a robot says it holds is a hint: it is asked for, four times at most"),
         gap: None,
-        play: |seed| beside(&Plan::sealed().withstanding(1), seed, hearsay, decided_in_time),
+        play: |seed| beside(&Plan::sealed().withstanding(1), seed, hearsay, half_a_second_later),
     },
     Attack {
         number: "A3",
@@ -233,6 +233,11 @@ fn in_their_names(swarm: &mut Swarm) {
         let votes = (1..=6).map(|robot| forged::held(forged::signed(vote(robot), &liar, &id)));
         swarm.put_decision(&forged::decision(round, votes.collect(), 6));
     });
+}
+
+/// Whom the others seem to contradict waits to see whether they do.
+fn half_a_second_later(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    decided_alike(peace, war, Duration::from_millis(500))
 }
 
 fn hearsay(swarm: &mut Swarm) {

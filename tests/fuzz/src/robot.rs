@@ -1,0 +1,172 @@
+//! An honest robot's mind, that signs its votes and learns.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use gestalt_protocol::{MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, RobotId};
+use gestalt_strategies::sample::MAX_SERIES;
+use gestalt_strategies::{
+    Classify, ClassifyError, Components, FeatureSpace, Input, LearningConfig, LearningSetup, Life, Mind,
+    MindConfig, Observation, Output, OwnRules, Refusals, ScalingMethod, Vocabulary,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::gate::{Signer, votes};
+use crate::swarm::roster;
+
+/// How many gestures there are.
+pub const CLASSES: u8 = 3;
+
+/// The features of a frame.
+const FEATURES: usize = 8;
+
+/// How many coordinates a sample has.
+pub const COMPONENTS: usize = 4;
+
+/// The most that a mind may want done after one input: 128 messages are one neighbour's, the rest is its own.
+const MOST_OUTPUTS: usize = 200;
+
+/// The list of gestures.
+pub fn vocabulary() -> &'static Vocabulary {
+    static VOCABULARY: OnceLock<Vocabulary> = OnceLock::new();
+    VOCABULARY.get_or_init(|| Vocabulary::new(["open", "two", "three"]).expect("a vocabulary"))
+}
+
+/// The space that samples lie in.
+pub fn space() -> Arc<FeatureSpace> {
+    static SPACE: OnceLock<Arc<FeatureSpace>> = OnceLock::new();
+    let fit = || {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let rows: Vec<[f32; FEATURES]> = (0..60).map(|_| std::array::from_fn(|_| rng.random())).collect();
+        let rows = rows.iter().map(<[f32; FEATURES]>::as_slice);
+        let keep = Components::Count(COMPONENTS);
+        Arc::new(FeatureSpace::fit("fuzz", rows, ScalingMethod::PerComponent, keep, &mut rng))
+    };
+    SPACE.get_or_init(fit).clone()
+}
+
+/// Tells the gesture from the first feature, as sure as the second says.
+#[derive(Debug)]
+pub struct ByFirst;
+
+impl Classify for ByFirst {
+    fn vocabulary(&self) -> &Vocabulary {
+        vocabulary()
+    }
+
+    fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+        let shown = features[0] as u8 % CLASSES;
+        let sure = f64::from(features[1].clamp(0.34, 0.99));
+        let other = (1.0 - sure) / f64::from(CLASSES - 1);
+        Ok((0..CLASSES).map(|class| if class == shown { sure } else { other }).collect())
+    }
+}
+
+/// A frame that shows that gesture, so surely.
+pub fn frame(class: u8, sure: f32, chance: u8) -> Input {
+    let mut features: [f32; FEATURES] = std::array::from_fn(|place| f32::from(chance ^ place as u8) / 256.0);
+    (features[0], features[1]) = (f32::from(class % CLASSES), sure);
+    Input::Observed(Observation { features: features.to_vec(), quality: 1.0 })
+}
+
+static TAKEN_IN: AtomicU64 = AtomicU64::new(0);
+
+/// How many inputs all minds of this program have taken in.
+#[must_use]
+pub fn taken_in() -> u64 {
+    TAKEN_IN.load(Ordering::Relaxed)
+}
+
+/// A mind, and what it may never do.
+#[derive(Debug)]
+pub struct Robot {
+    mind: Mind,
+    refusals: Refusals,
+    /// Whether it has ever had as many samples as it holds at most, so that it forgot some.
+    full: bool,
+}
+
+impl Robot {
+    /// The mind of a member of the swarm. One that does not learn is made in no time.
+    pub fn new(me: RobotId, learns: bool) -> Self {
+        // Drawn at random: no stranger guesses it.
+        let life = Life { boot: 1, nonce: 0x9E37_79B9_u32.wrapping_mul(me.0) };
+        let mind = Mind::new(me, life, MindConfig::default()).expect("the default is sound");
+        let mut mind = mind.signed_by(Arc::new(Signer(me)));
+        if learns {
+            let setup = LearningSetup {
+                config: LearningConfig::default(),
+                space: space(),
+                vocabulary: vocabulary().clone(),
+                rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
+                memory: None,
+                rules: OwnRules::default(),
+            };
+            mind = mind.learning(setup).expect("a sound setup");
+        }
+        let refusals = mind.refusals().clone();
+        let mut robot = Self { mind, refusals, full: false };
+        robot.handle(Duration::ZERO, Input::Learned(Arc::new(ByFirst)));
+        robot
+    }
+
+    /// The mind.
+    pub fn mind(&self) -> &Mind {
+        &self.mind
+    }
+
+    /// Whether it had to forget samples.
+    pub fn forgot(&self) -> bool {
+        self.full
+    }
+
+    /// Lets it take in one input.
+    ///
+    /// # Panics
+    /// If it wants more done than one input is worth, or says what others could not read, or forgets what it refused.
+    pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        TAKEN_IN.fetch_add(1, Ordering::Relaxed);
+        let outputs = self.mind.handle(now, input);
+        assert!(outputs.len() <= MOST_OUTPUTS, "{} outputs for one input", outputs.len());
+        for output in &outputs {
+            if let Output::Broadcast(envelope) | Output::Tell(_, envelope) = output {
+                let written = envelope.encode();
+                assert!(written.len() <= MAX_MESSAGE);
+                assert_eq!(gestalt_protocol::Envelope::decode(&written).as_ref(), Ok(envelope));
+            }
+        }
+        let refusals = self.mind.refusals();
+        for ((refusal, before), (_, after)) in self.refusals.iter().zip(refusals.iter()) {
+            assert!(after >= before, "{refusal:?} was counted {before} times, and now {after}");
+        }
+        self.refusals = refusals.clone();
+        self.full |= self.mind.training_set().is_some_and(|set| set.len() >= set.capacity());
+        outputs
+    }
+
+    /// Says so if a table is larger than it may be, or holds a vote that its author never signed.
+    ///
+    /// # Panics
+    /// If so.
+    pub fn check(&self) {
+        let signed = |envelope: gestalt_protocol::Envelope| {
+            let by = envelope.signature.expect("in a sealed swarm votes are signed");
+            assert!(roster().check(&envelope.statement(), &by).is_ok(), "a vote of nobody's: {envelope:?}");
+        };
+        if let Some(ballot) = self.mind.ballot() {
+            assert!(ballot.len() <= MAX_ROBOTS);
+            ballot.lacking(&Default::default()).for_each(|held| signed(held.into()));
+        }
+        if let Some(held) = self.mind.held() {
+            votes(held).into_iter().for_each(|held| signed(held.into()));
+        }
+        if let (Some(set), Some(learned)) = (self.mind.training_set(), self.mind.learned()) {
+            assert!(set.len() <= set.capacity() && learned.lessons <= MAX_LESSONS);
+            assert!(
+                set.seen().series().len() <= MAX_SERIES && learned.aside <= LearningConfig::default().aside
+            );
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Three honest minds, a network that does what the input says, and one who means them ill and can say anything, but in whose
+//! name no vote is signed.
+
+mod adversary;
+mod world;
+
+use std::time::Duration;
+
+use gestalt_protocol::RobotId;
+use gestalt_strategies::Mind;
+
+use self::world::{ROBOTS, World};
+
+/// How long nothing bad happens at the end: what a robot lacks is found when its turn comes, every four seconds.
+const CALM: Duration = Duration::from_secs(60);
+
+/// An input is a list of events, each of a byte and its arguments, see [`adversary::event`].
+///
+/// What is final was held by a majority, unless a stranger said so; while every message arrives at once, never are two gestures final
+/// for one round. No robot panics, forgets what it refused or
+/// holds more than it may; and after a calm period all know the same.
+///
+/// # Panics
+/// If not.
+pub fn run(bytes: &[u8]) {
+    let world = live(bytes);
+    if !(world.faults().late || world.faults().misled) {
+        assert_eq!(world.contradiction(), None, "two gestures are final for one round");
+    }
+    let minds: Vec<&Mind> = world.robots().iter().map(|robot| robot.mind()).collect();
+    for other in &minds[1..] {
+        alike(minds[0], other);
+    }
+    // What one has forgotten it gives to nobody.
+    if !world.robots().iter().any(|robot| robot.forgot()) {
+        for (one, other) in [(0, 1), (1, 2), (2, 0)] {
+            saw_the_same(minds[one], minds[other]);
+        }
+    }
+}
+
+/// Whether two gestures become final for one round, however late messages are.
+#[must_use]
+pub fn contradicts(bytes: &[u8]) -> bool {
+    live(bytes).contradiction().is_some()
+}
+
+/// All events, then calm.
+fn live(bytes: &[u8]) -> World {
+    let mut world = World::new();
+    let mut events = adversary::Events::new(bytes);
+    while adversary::event(&mut world, &mut events).is_some() {}
+    world.robots().iter().for_each(|robot| robot.check());
+    world.introduce();
+    world.pass(CALM, true);
+    world.robots().iter().for_each(|robot| robot.check());
+    world
+}
+
+fn alike(one: &Mind, other: &Mind) {
+    let gesture = |mind: &Mind| (mind.round(), mind.held().and_then(|held| held.class));
+    assert_eq!(gesture(one), gesture(other), "robots {} and {}", one.me(), other.me());
+    let lessons = |mind: &Mind| mind.learned().map(|learned| learned.lessons);
+    assert_eq!(lessons(one), lessons(other), "lessons of robots {} and {}", one.me(), other.me());
+}
+
+fn saw_the_same(one: &Mind, other: &Mind) {
+    let (Some(mine), Some(theirs)) = (one.training_set(), other.training_set()) else { return };
+    for series in mine.seen().series() {
+        let (mine, theirs) = (mine.seen().intervals(series), theirs.seen().intervals(series));
+        assert_eq!(mine, theirs, "samples of {series} that robots {} and {} saw", one.me(), other.me());
+    }
+}
+
+/// The robot of that number.
+fn robot(place: usize) -> RobotId {
+    RobotId((place % ROBOTS) as u32 + 1)
+}
+
+/// Events to begin with: a gesture is shown, seen and taught, and something goes wrong.
+pub fn seed(rng: &mut impl rand::Rng) -> Vec<u8> {
+    adversary::seed(rng)
+}

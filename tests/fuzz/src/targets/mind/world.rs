@@ -1,0 +1,272 @@
+//! Three honest robots of a sealed swarm, and the network between them, which may lose, delay, repeat and reorder.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, Decision, Envelope, Holding, InstructorId, RobotId, RoundId};
+use gestalt_strategies::{Input, Output};
+
+use crate::gate::Gate;
+use crate::robot::Robot;
+
+/// Robots 1 to so many are honest.
+pub const ROBOTS: usize = 3;
+
+/// The most messages that are on their way, and the most that are remembered to be said again.
+const MOST: usize = 256;
+
+/// What travels.
+#[derive(Clone, Debug)]
+pub enum Said {
+    /// Between robots.
+    Message(Envelope),
+    /// Which decision a robot holds.
+    Holding(RobotId, Holding),
+    /// For the swarm.
+    Announced(Decision),
+    /// That a robot answered an instructor.
+    Answered(InstructorId, u64, RobotId),
+}
+
+/// The robots and the network.
+pub struct World {
+    pub now: Duration,
+    robots: Vec<Robot>,
+    gates: Vec<Gate>,
+    /// What is on its way, and to whom.
+    under_way: VecDeque<(usize, Said)>,
+    /// All that was said of late.
+    said: VecDeque<Said>,
+    /// Whether the link between two robots is cut, by the smaller of them and by the greater.
+    cut: BTreeSet<(usize, usize)>,
+    /// What was announced as final, and what was so last.
+    finals: BTreeMap<RoundId, (ClassId, ClassId)>,
+    /// Who ever held a gesture, by the counter of its round: names of rounds merge.
+    holders: BTreeMap<(u32, ClassId), BTreeSet<usize>>,
+    /// What the robots have to put up with.
+    faults: Faults,
+}
+
+/// What the robots have to put up with.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Faults {
+    /// Messages that come late, or never.
+    pub late: bool,
+    /// Robots that are not told who is there.
+    pub misled: bool,
+    /// A stranger that says what robots hold, which nobody signs.
+    pub slandered: bool,
+}
+
+impl World {
+    pub fn new() -> Self {
+        let mut world = Self {
+            now: Duration::ZERO,
+            robots: (1..=ROBOTS).map(|id| Robot::new(RobotId(id as u32), true)).collect(),
+            gates: (0..ROBOTS).map(|_| Gate::default()).collect(),
+            under_way: VecDeque::new(),
+            said: VecDeque::new(),
+            cut: BTreeSet::new(),
+            finals: BTreeMap::new(),
+            holders: BTreeMap::new(),
+            faults: Faults::default(),
+        };
+        world.introduce();
+        world
+    }
+
+    /// All links are whole, and all robots know of each other.
+    pub fn introduce(&mut self) {
+        self.cut.clear();
+        let all: BTreeSet<RobotId> = (1..=ROBOTS as u32).map(RobotId).collect();
+        for robot in 0..ROBOTS {
+            self.input(robot, Input::Alive(all.clone()));
+            self.input(robot, Input::Neighbours(all.clone()));
+        }
+    }
+
+    pub fn robots(&self) -> &[Robot] {
+        &self.robots
+    }
+
+    /// Cuts a link, or mends it.
+    pub fn cut(&mut self, one: usize, other: usize, cut: bool) {
+        let link = (one.min(other), one.max(other));
+        self.faults.late |= cut;
+        if cut {
+            self.cut.insert(link);
+        } else {
+            self.cut.remove(&link);
+        }
+    }
+
+    /// A robot takes in something of its own: what it sees, or who is there.
+    ///
+    /// # Panics
+    /// If it announces as final what no majority ever held, and nobody told it so.
+    pub fn input(&mut self, robot: usize, input: Input) {
+        let me = RobotId(robot as u32 + 1);
+        for output in self.robots[robot].handle(self.now, input) {
+            match output {
+                Output::Broadcast(envelope) => self.tell_all(robot, Said::Message(envelope)),
+                Output::Tell(to, envelope) => {
+                    self.remember(Said::Message(envelope.clone()));
+                    self.send(robot, (to.0 as usize).wrapping_sub(1), Said::Message(envelope));
+                }
+                Output::Hold(decision) => {
+                    if let Some(class) = decision.class {
+                        self.holders.entry((decision.round.counter, class)).or_default().insert(robot);
+                    }
+                    self.tell_all(robot, Said::Holding(me, decision.holding(Vec::new())));
+                }
+                Output::Announce(decision) => {
+                    self.announced(&decision);
+                    self.tell_all(robot, Said::Announced(decision));
+                }
+                Output::Answer(by, answer) => self.tell_all(robot, Said::Answered(by, answer.at, me)),
+                Output::Opened(_) | Output::Closed(_) | Output::Train(_) | Output::Remember { .. } => {}
+            }
+        }
+    }
+
+    fn announced(&mut self, decision: &Decision) {
+        let Some(class) = decision.class.filter(|_| decision.is_final) else { return };
+        let held_by = self.holders.get(&(decision.round.counter, class)).map_or(0, BTreeSet::len);
+        let known = self.faults.misled || self.faults.slandered || 2 * held_by > ROBOTS;
+        assert!(known, "gesture {class} is final for {}, and was held by {held_by} robots", decision.round);
+        self.finals.entry(decision.round).or_insert((class, class)).1 = class;
+    }
+
+    /// What the robots had to put up with.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// From now on robots hear what somebody else said that they hold.
+    pub fn slander(&mut self) {
+        self.faults.slandered = true;
+    }
+
+    /// A round for which two gestures were final.
+    pub fn contradiction(&self) -> Option<RoundId> {
+        self.finals.iter().find(|(_, (first, last))| first != last).map(|(round, _)| *round)
+    }
+
+    /// Who is there is not what a robot is told.
+    pub fn mislead(&mut self, robot: usize, input: Input) {
+        self.faults.misled = true;
+        self.input(robot, input);
+    }
+
+    fn tell_all(&mut self, from: usize, said: Said) {
+        self.remember(said.clone());
+        for to in (0..ROBOTS).filter(|to| *to != from) {
+            self.send(from, to, said.clone());
+        }
+    }
+
+    fn send(&mut self, from: usize, to: usize, said: Said) {
+        if to < ROBOTS && !self.cut.contains(&(from.min(to), from.max(to))) {
+            self.under_way.push_back((to, said));
+        }
+        if self.under_way.len() > MOST {
+            self.under_way.pop_front();
+        }
+    }
+
+    fn remember(&mut self, said: Said) {
+        self.said.push_back(said);
+        if self.said.len() > MOST {
+            self.said.pop_front();
+        }
+    }
+
+    /// Something that was said, if anything was.
+    pub fn recall(&self, which: usize) -> Option<Said> {
+        self.said.get(which % self.said.len().max(1)).cloned()
+    }
+
+    /// A robot hears something, whoever said it: it believes what the members signed.
+    pub fn hear(&mut self, robot: usize, said: Said) {
+        let gate = &mut self.gates[robot];
+        let input = match said {
+            Said::Message(envelope) => match gate.message(self.now, envelope) {
+                Ok(envelope) => Input::Received(envelope),
+                Err(_) => return,
+            },
+            Said::Announced(decision) => {
+                if decision.check().is_err() || gate.decision(self.now, &decision).is_err() {
+                    return;
+                }
+                Input::Announced(decision)
+            }
+            Said::Holding(by, holding) => Input::Heard(by, holding),
+            Said::Answered(by, at, robot) => Input::Answered(by, at, robot),
+        };
+        self.input(robot, input);
+    }
+
+    /// What is on its way at that place arrives, if something is; what it causes is then on its way too.
+    pub fn arrive(&mut self, which: usize) {
+        let place = which % self.under_way.len().max(1);
+        if let Some((to, said)) = self.under_way.remove(place) {
+            self.hear(to, said);
+        }
+    }
+
+    /// It is lost.
+    pub fn lose(&mut self, which: usize) {
+        self.faults.late = true;
+        let place = which % self.under_way.len().max(1);
+        self.under_way.remove(place);
+    }
+
+    /// It comes twice.
+    pub fn repeat(&mut self, which: usize) {
+        if let Some(again) = self.under_way.get(which % self.under_way.len().max(1)).cloned() {
+            self.under_way.push_back(again);
+        }
+    }
+
+    /// Everything that is on its way arrives, and all that this causes.
+    ///
+    /// # Panics
+    /// If it never ends.
+    pub fn arrive_all(&mut self) {
+        let mut left = 100_000;
+        while let Some((to, said)) = self.under_way.pop_front() {
+            self.hear(to, said);
+            left -= 1;
+            assert!(left > 0, "the robots talk in circles");
+        }
+    }
+
+    /// Time passes; robots do what is due. Messages arrive at once, or not at all meanwhile.
+    ///
+    /// # Panics
+    /// If a robot wants to be woken without end.
+    pub fn pass(&mut self, time: Duration, arriving: bool) {
+        let end = self.now + time;
+        self.faults.late |= !arriving;
+        let mut left = 100_000;
+        loop {
+            if arriving {
+                self.arrive_all();
+            }
+            let due = self.robots.iter().filter_map(|robot| robot.mind().next_wake()).min();
+            let next = due.map_or(end, |due| due.max(self.now + Duration::from_millis(1)));
+            self.now = next.min(end);
+            for robot in 0..ROBOTS {
+                self.input(robot, Input::Tick);
+            }
+            if self.now >= end {
+                break;
+            }
+            left -= 1;
+            assert!(left > 0, "a robot never rests");
+        }
+        if arriving {
+            self.arrive_all();
+        }
+    }
+}
