@@ -118,6 +118,8 @@ pub struct Holding {
     pub class: Option<ClassId>,
     /// Its place among the decisions of the round.
     pub rank: Rank,
+    /// Whether it held another gesture of this round before: then it counts for none when it is asked whether a majority holds one.
+    pub changed: bool,
     /// The robots that see and vote through this one, and leave deciding to it: they hold what it holds.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub guests: Vec<RobotId>,
@@ -161,9 +163,9 @@ impl Decision {
         }
     }
 
-    /// What a robot that holds it, for itself and for its guests, says of it to all.
+    /// What a robot that holds it, for itself and for its guests, says of it to all; `changed` if it held another gesture before.
     #[must_use]
-    pub fn holding(&self, guests: Vec<RobotId>) -> Holding {
-        Holding { round: self.round, class: self.class, rank: self.rank(), guests }
+    pub fn holding(&self, guests: Vec<RobotId>, changed: bool) -> Holding {
+        Holding { round: self.round, class: self.class, rank: self.rank(), changed, guests }
     }
 }

@@ -35,6 +35,8 @@ pub struct Have {
     pub round: Option<RoundId>,
     /// The rank of the decision the author holds for that round.
     pub decision: Option<Rank>,
+    /// Whether the author held another gesture of that round before.
+    pub changed: bool,
     /// Which votes of that round the author holds; empty once the round is over.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<(RobotId, Stamp)>,

@@ -102,6 +102,7 @@ fn message() -> impl Strategy<Value = Message> {
         .prop_map(|(round, decision, votes, knowledge, answer)| Have {
             round,
             decision: decision.map(|decision| decision.rank()),
+            changed: !answer,
             votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
             knowledge: knowledge.map(|(key, samples, lessons)| Digest { key, samples, lessons }),
             answer,
@@ -313,7 +314,14 @@ fn more_classes_or_robots_than_the_limit_are_refused_by_their_reader() {
     ));
     let have = |robots: usize| {
         let votes = (0..robots as u32).map(|robot| (RobotId(robot), Stamp::default())).collect();
-        read(Message::Have(Have { round: None, decision: None, votes, knowledge: None, answer: false }))
+        read(Message::Have(Have {
+            round: None,
+            decision: None,
+            changed: false,
+            votes,
+            knowledge: None,
+            answer: false,
+        }))
     };
     assert!(have(MAX_ROBOTS).is_ok());
     assert!(matches!(have(MAX_ROBOTS + 1), Err(DecodeError::Malformed(_))));
@@ -479,8 +487,16 @@ fn no_message_takes_more_memory_than_promised() {
         evidence: vec![],
         looks: 0.0,
     };
-    let have =
-        |votes| Message::Have(Have { round: None, decision: None, votes, knowledge: None, answer: false });
+    let have = |votes| {
+        Message::Have(Have {
+            round: None,
+            decision: None,
+            changed: false,
+            votes,
+            knowledge: None,
+            answer: false,
+        })
+    };
     let known = on_the_wire([have(vec![]), have(vec![(RobotId(0), Stamp::default())])]);
     assert!(2 * size_of::<(RobotId, Stamp)>() <= factor * known);
     let give = |votes| Message::Give(Give { decision: None, votes });

@@ -96,18 +96,20 @@ fn what_a_robot_has() {
     let have = Have {
         round: Some(ROUND),
         decision: Some(decision().rank()),
+        changed: true,
         votes: vec![(RobotId(7), Stamp { boot: 1, sequence: 9 })],
         knowledge: Some(digest(300, 1)),
         answer: true,
     };
-    // Some round; Some rank: decided, robots, looks and confidence as f32, author; one vote: robot, boot, sequence; Some digest:
+    // Some round; Some rank: decided, robots, looks and confidence as f32, author; changed; one vote: robot, boot, sequence; Some digest:
     // key, samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 07 01 09 01 {DIGEST} 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 01 07 01 09 01 {DIGEST} 01"),
     );
-    let nothing = Have { round: None, decision: None, votes: vec![], knowledge: None, answer: false };
-    travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00"));
+    let nothing =
+        Have { round: None, decision: None, changed: false, votes: vec![], knowledge: None, answer: false };
+    travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00 00"));
 }
 
 #[test]
@@ -217,8 +219,8 @@ fn a_decision_for_clients() {
     let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"rank":{"decided":true,"robots":1,"looks":2.0,"confidence":0.75,"author":4},"guests":[9]}"#;
-    assert_eq!(serde_json::to_string(&decision().holding(vec![RobotId(9)])).unwrap(), json);
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"rank":{"decided":true,"robots":1,"looks":2.0,"confidence":0.75,"author":4},"changed":true,"guests":[9]}"#;
+    assert_eq!(serde_json::to_string(&decision().holding(vec![RobotId(9)], true)).unwrap(), json);
     let none = Decision { class: None, ..decision() };
     assert!(serde_json::to_string(&none).unwrap().contains(r#""class":null"#));
 }

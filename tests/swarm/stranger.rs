@@ -98,12 +98,16 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
         let counter = 1_000_000_u32.saturating_mul(step + 1);
         put(Topic::Vote(RobotId(1)), vote(counter, 1).encode()).await;
         let round = Some(RoundId { counter, opener: RobotId(0), life: 9 });
-        let have = Have { round, decision: None, votes: vec![], knowledge: None, answer: true };
+        let have =
+            Have { round, decision: None, changed: false, votes: vec![], knowledge: None, answer: true };
         put(Topic::Repair(RobotId(0)), said(2 + step, Message::Have(have))).await;
     }
     // What a robot says it holds is asked for, and nobody has it.
-    put(Topic::RobotDecision(RobotId(1)), serde_json::to_vec(&decision.holding(vec![RobotId(2)])).unwrap())
-        .await;
+    put(
+        Topic::RobotDecision(RobotId(1)),
+        serde_json::to_vec(&decision.holding(vec![RobotId(2)], false)).unwrap(),
+    )
+    .await;
     for (counter, least) in [
         ("refused_vote_unsigned", 4403),
         ("refused_vote_forged", 2),

@@ -206,7 +206,9 @@ impl Host {
                 let mut status = self.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
-                self.voice.hold(self.announcement(&decision), self.guests.present().into_iter().collect());
+                let guests = self.guests.present().into_iter().collect();
+                let holding = decision.holding(guests, self.mind.has_changed());
+                self.voice.hold(self.announcement(&decision), holding);
                 self.tell(Event::Held(decision));
             }
             Output::Announce(decision) => {

@@ -6,7 +6,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, ClassId, Envelope, InstructorId, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{Answer, ClassId, Envelope, Holding, InstructorId, Keys, Message, RobotId, Topic};
 use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
@@ -37,7 +37,7 @@ pub(crate) struct Voice {
     swarm: Publisher<'static>,
     last: Arc<Last>,
     /// What is still to be published on `robot/<me>/decision`, and when.
-    unsaid: Option<(Announcement, Vec<RobotId>, Instant)>,
+    unsaid: Option<(Announcement, Holding, Instant)>,
     /// The round and the gesture of what was said last, and when.
     said: Option<(u32, Option<ClassId>, Instant)>,
 }
@@ -144,11 +144,11 @@ impl Voice {
 
     /// Notes the decision that the robot and its guests hold now; that is said when it is due. Robots that are just settling
     /// among each other would otherwise each say every step of it to all.
-    pub fn hold(&mut self, announcement: Announcement, guests: Vec<RobotId>) {
+    pub fn hold(&mut self, announcement: Announcement, holding: Holding) {
         let round = announcement.decision.round.counter;
         let before = self.said.filter(|(said, ..)| *said == round);
         let due = before.map_or_else(Instant::now, |(.., at)| at + HOLD_INTERVAL);
-        self.unsaid = Some((announcement, guests, due));
+        self.unsaid = Some((announcement, holding, due));
     }
 
     /// When [`publish_hold`](Self::publish_hold) is to be called.
@@ -158,11 +158,11 @@ impl Voice {
 
     /// Says which decision the robot holds, when it is due.
     pub fn publish_hold(&mut self) {
-        if let Some((announcement, guests, _)) = self.unsaid.take_if(|(_, _, due)| Instant::now() >= *due) {
+        if let Some((announcement, holding, _)) = self.unsaid.take_if(|(_, _, due)| Instant::now() >= *due) {
             let (round, class) = (announcement.decision.round.counter, announcement.decision.class);
             // A greater decision for the same gesture is news to nobody.
             if self.said.is_none_or(|(said, of, _)| (said, of) != (round, class)) {
-                self.publish("robot_decision", &self.held, &announcement.decision.holding(guests));
+                self.publish("robot_decision", &self.held, &holding);
             }
             self.last.set(announcement, self.session.new_timestamp());
             self.said = Some((round, class, Instant::now()));

@@ -14,6 +14,8 @@ pub struct Agreement {
     /// What each other robot said that it holds, its greatest, or another in its name. At most [`MAX_ROBOTS`].
     holders: BTreeMap<RobotId, Holder>,
     held: Option<Held>,
+    /// The first gesture held. Whoever counts for one gesture of a round counts for no other, or two could be final.
+    first: Option<ClassId>,
     announced: Option<Announced>,
 }
 
@@ -41,7 +43,8 @@ struct Announced {
 }
 
 impl Agreement {
-    /// Hears from `by` which decision a robot holds. What a robot says of itself counts before what is said in its name.
+    /// Hears from `by` which decision a robot holds, without a class from one that held another before. What a robot says of itself
+    /// counts before what is said in its name.
     pub fn note_holder(&mut self, holder: RobotId, by: RobotId, rank: Rank, class: Option<ClassId>) {
         if self.holders.len() >= MAX_ROBOTS && !self.holders.contains_key(&holder) {
             return;
@@ -68,7 +71,14 @@ impl Agreement {
         let mut spoken_for: Vec<usize> = speakers.into_values().collect();
         spoken_for.sort_unstable_by(|a, b| b.cmp(a));
         spoken_for.iter_mut().take(liars as usize).for_each(|robots| *robots = 1);
-        1 + guests.len() + spoken_for.iter().sum::<usize>() >= quorum as usize
+        let own = if self.has_changed() { 0 } else { 1 + guests.len() };
+        own + spoken_for.iter().sum::<usize>() >= quorum as usize
+    }
+
+    /// Whether another gesture was held before this one.
+    #[must_use]
+    pub fn has_changed(&self) -> bool {
+        self.held().is_some_and(|held| held.class.is_some() && held.class != self.first)
     }
 
     /// Takes the greater of this decision and the best known one. A robot's own conclusion needs no witnesses.
@@ -94,6 +104,7 @@ impl Agreement {
             }
             None => self.held = Some(Held { decision: best.clone(), since: now, unsettled: now }),
         }
+        self.first = self.first.or(best.class);
         self.held()
     }
 

@@ -40,6 +40,13 @@ impl Mind {
         self.rounds.held()
     }
 
+    /// Whether it held another gesture of that round before: what it then says it holds is
+    /// [`changed`](gestalt_protocol::Holding::changed).
+    #[must_use]
+    pub fn has_changed(&self) -> bool {
+        self.rounds.has_changed()
+    }
+
     /// The votes known in that round.
     #[must_use]
     pub fn ballot(&self) -> Option<&Ballot> {

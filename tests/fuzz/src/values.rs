@@ -113,7 +113,7 @@ pub fn decision(rng: &mut impl Rng) -> Decision {
 /// What a robot says it holds.
 pub fn holding(rng: &mut impl Rng) -> Holding {
     let guests = some(rng, 3, |rng| robot(rng));
-    decision(rng).holding(guests)
+    decision(rng).holding(guests, rng.random())
 }
 
 /// A digest.
@@ -195,7 +195,7 @@ pub fn have(rng: &mut impl Rng) -> Message {
     let votes = some(rng, 4, |rng| (robot(rng), stamp(rng)));
     let decision = maybe(rng, |rng| decision(rng).rank());
     let (round, knowledge) = (maybe(rng, round), maybe(rng, digest));
-    Message::Have(Have { round, decision, votes, knowledge, answer: rng.random() })
+    Message::Have(Have { round, decision, changed: rng.random(), votes, knowledge, answer: rng.random() })
 }
 
 /// What a neighbour was found to lack.

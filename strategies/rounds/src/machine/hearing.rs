@@ -57,7 +57,8 @@ impl Rounds {
             && let Some(round) = &mut self.round
         {
             for holder in holding.guests.iter().chain([&robot]) {
-                round.agreement.note_holder(*holder, robot, holding.rank, holding.class);
+                let class = holding.class.filter(|_| !holding.changed);
+                round.agreement.note_holder(*holder, robot, holding.rank, class);
             }
         }
         let greater = self.wanted.as_ref().is_none_or(|wanted| {

@@ -51,6 +51,7 @@ impl Rounds {
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
         if let Some(round) =
             self.round.as_mut().filter(|round| order.is_eq() && round.agreement.rank() == have.decision)
+            && !have.changed
             && let Some((rank, class)) = round.agreement.held().map(|held| (held.rank(), held.class))
         {
             round.agreement.note_holder(from, from, rank, class);
@@ -72,12 +73,6 @@ impl Rounds {
             let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
             // A greater one for the gesture that is held anyway goes its way from turn to turn.
             let says_more = missed || known != Some(decision.class);
-            if decision.class.is_some()
-                && self.is_this_round(decision.round)
-                && let Some(round) = &mut self.round
-            {
-                round.agreement.note_holder(from, from, decision.rank(), decision.class);
-            }
             if self.hear_decision(decision.clone(), effects) == Heard::News {
                 if !self.is_open() && missed {
                     self.note_missed_announcement();
@@ -139,6 +134,7 @@ impl Rounds {
         let have = Have {
             round: self.round(),
             decision: self.round.as_ref().and_then(|round| round.agreement.rank()),
+            changed: self.has_changed(),
             votes: match &self.round {
                 Some(round) if round.open => round.ballot.stamps().collect(),
                 _ => Vec::new(),

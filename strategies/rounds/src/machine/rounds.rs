@@ -79,7 +79,7 @@ const BURST: u32 = 16;
 ///             match output {
 ///                 Output::Broadcast(vote) => inbox.push((1 - robot, Input::Received(vote))),
 ///                 Output::Hold(decision) => {
-///                     inbox.push((1 - robot, Input::Heard(robots[robot], decision.holding(Vec::new()))));
+///                     inbox.push((1 - robot, Input::Heard(robots[robot], decision.holding(Vec::new(), false))));
 ///                 }
 ///                 Output::Announce(decision) => {
 ///                     decided.push(decision.clone());

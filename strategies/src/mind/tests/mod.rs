@@ -192,8 +192,9 @@ impl Swarm {
                         }
                     }
                     Output::Hold(decision) => {
+                        let holding = decision.holding(Vec::new(), self.minds[i].has_changed());
                         for j in (0..self.minds.len()).filter(|j| *j != i) {
-                            due.push_back((j, Input::Heard(me, decision.holding(Vec::new()))));
+                            due.push_back((j, Input::Heard(me, holding.clone())));
                         }
                     }
                     Output::Answer(by, answer) => {

@@ -244,7 +244,7 @@ fn hearsay(swarm: &mut Swarm) {
     amid_a_round(swarm, &|swarm| {
         let decision = forged::decision(swarm.round(), of_nobody(swarm, 100, false), 0);
         for robot in [2, 3] {
-            let holding: Holding = decision.holding(Vec::new());
+            let holding: Holding = decision.holding(Vec::new(), false);
             let bytes = serde_json::to_vec(&holding).expect("a holding is JSON");
             swarm.put(&Topic::RobotDecision(RobotId(robot)), &bytes);
         }
@@ -280,7 +280,7 @@ fn false_finality(swarm: &mut Swarm) {
     swarm.cut([1]);
     swarm.pass(50 * MS);
     if let Some(held) = swarm.mind(1).held().cloned() {
-        let bytes = serde_json::to_vec(&held.holding(Vec::new())).expect("a holding is JSON");
+        let bytes = serde_json::to_vec(&held.holding(Vec::new(), false)).expect("a holding is JSON");
         for robot in [3, 4, 5] {
             swarm.put_to(1, &Topic::RobotDecision(RobotId(robot)), &bytes);
         }

@@ -207,7 +207,8 @@ fn has_later_rounds(swarm: &mut Swarm) {
     for n in 1..=40 {
         let counter = if n == 40 { u32::MAX } else { first + n };
         let round = Some(RoundId { counter, opener: RobotId(50), life: 9 });
-        let have = Have { round, decision: None, votes: Vec::new(), knowledge: None, answer: false };
+        let have =
+            Have { round, decision: None, changed: false, votes: Vec::new(), knowledge: None, answer: false };
         swarm.whisper(50, &Message::Have(have));
     }
     let round = swarm.end(began);

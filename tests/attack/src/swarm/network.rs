@@ -181,7 +181,8 @@ impl Swarm {
             }
             Output::Tell(to, envelope) => self.send(i, to, &envelope),
             Output::Hold(decision) => {
-                self.broadcast(i, &Topic::RobotDecision(me), json(&decision.holding(Vec::new())));
+                let holding = decision.holding(Vec::new(), self.robots[i].mind.has_changed());
+                self.broadcast(i, &Topic::RobotDecision(me), json(&holding));
             }
             Output::Announce(decision) => {
                 self.broadcast(i, &Topic::Decision, json(&decision));

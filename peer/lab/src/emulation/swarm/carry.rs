@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, Message};
-use gestalt_strategies::{Input, Output};
+use gestalt_strategies::{Input, Mind, Output};
 use rand::RngExt;
 
 use super::Swarm;
@@ -59,7 +59,8 @@ impl Swarm<'_> {
             Output::Hold(decision) => {
                 self.note(&Happening::Hold { robot, decision: (&decision).into() });
                 self.record.hold(self.now, i, &decision);
-                let (holding, bytes) = as_json(&decision.holding(Vec::new()));
+                let changed = self.mind(i).is_some_and(Mind::has_changed);
+                let (holding, bytes) = as_json(&decision.holding(Vec::new(), changed));
                 self.broadcast(i, bytes, Kind::Decision, &Parcel::Held(robot, holding));
             }
             Output::Announce(decision) => {

@@ -91,7 +91,7 @@ impl Swarm<'_> {
         let (announced, bytes) = as_json(decision);
         let guests =
             (0..self.robots.len()).filter(|i| !liars.contains(i)).map(|i| self.robots[i].id).collect();
-        let holding: Holding = decision.holding(guests);
+        let holding: Holding = decision.holding(guests, false);
         for i in liars {
             self.broadcast(*i, bytes, Kind::Decision, &Parcel::Announced(announced.clone()));
             let (held, bytes) = as_json(&holding);

@@ -143,7 +143,7 @@ fn outputs(all: Vec<(Duration, Output)>) -> Vec<Output> {
 fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
     let mut mind = mind(7);
     let heard = decision(3, Some(1), 4, 5);
-    let out = mind.handle(ms(0), Input::Heard(RobotId(5), heard.holding(Vec::new())));
+    let out = mind.handle(ms(0), Input::Heard(RobotId(5), heard.holding(Vec::new(), false)));
     assert!(out.is_empty() && mind.held().is_none() && mind.round().is_none());
     assert_eq!(mind.next_wake(), Some(ms(100)), "most conclude it themselves until then");
     let out = mind.handle(ms(100), Input::Tick);
@@ -155,7 +155,7 @@ fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
     let [(7, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
     mind.handle(ms(102), says(5, 2, Message::Give(give.clone())));
     assert_eq!(mind.held(), Some(&heard));
-    let out = mind.handle(ms(103), Input::Heard(RobotId(6), heard.holding(Vec::new())));
+    let out = mind.handle(ms(103), Input::Heard(RobotId(6), heard.holding(Vec::new(), false)));
     assert!(out.is_empty() && told(&outputs(live(&mut mind, ms(3000)))).is_empty(), "it is held");
 }
 
@@ -169,7 +169,7 @@ fn a_gesture_is_final_once_a_majority_is_known_to_hold_it() {
         for holder in holders {
             mind.handle(
                 ms(10),
-                Input::Heard(RobotId(*holder), decision(1, Some(1), 5, 9).holding(Vec::new())),
+                Input::Heard(RobotId(*holder), decision(1, Some(1), 5, 9).holding(Vec::new(), false)),
             );
         }
         let all = live(&mut mind, ms(20_000));

@@ -8,7 +8,14 @@ fn flood(mind: &mut Rounds, from: Duration, input: impl Fn(u32) -> Input) -> Vec
 }
 
 fn have(from: u32, sequence: u32) -> Input {
-    let have = Have { round: None, decision: None, votes: Vec::new(), knowledge: None, answer: false };
+    let have = Have {
+        round: None,
+        decision: None,
+        changed: false,
+        votes: Vec::new(),
+        knowledge: None,
+        answer: false,
+    };
     says(from, sequence, Message::Have(have))
 }
 

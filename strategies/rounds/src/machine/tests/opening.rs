@@ -95,6 +95,7 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
     let have = Have {
         round: Some(round(12, 1)),
         decision: Some(decision(12, Some(1), 2, 1).rank()),
+        changed: false,
         votes: vec![],
         knowledge: None,
         answer: false,

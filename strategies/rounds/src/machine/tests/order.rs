@@ -28,7 +28,7 @@ fn heard() -> impl Strategy<Value = Input> {
         }),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| gives(robot, concluded(counter, n))),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| {
-            Input::Heard(RobotId(robot), concluded(counter, n).holding(Vec::new()))
+            Input::Heard(RobotId(robot), concluded(counter, n).holding(Vec::new(), false))
         }),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(from, counter, n)| {
             let held = HeldVote {

@@ -7,6 +7,7 @@ fn have(counter: u32, known: &[(u32, u32)]) -> Have {
     Have {
         round: Some(round(counter, 1)),
         decision: None,
+        changed: false,
         votes: known.iter().map(|&(robot, sequence)| (RobotId(robot), stamp(sequence))).collect(),
         knowledge: None,
         answer: false,

@@ -117,7 +117,8 @@ impl World {
                     if let Some(class) = decision.class {
                         self.holders.entry((decision.round.counter, class)).or_default().insert(robot);
                     }
-                    self.tell_all(robot, Said::Holding(me, decision.holding(Vec::new())));
+                    let changed = self.robots[robot].mind().has_changed();
+                    self.tell_all(robot, Said::Holding(me, decision.holding(Vec::new(), changed)));
                 }
                 Output::Announce(decision) => {
                     self.announced(&decision);
