@@ -91,7 +91,7 @@ pub struct SharedSample {
 /// A batch of samples of one feature space and one series, by ascending numbers; at least one. It is its author's statement:
 /// whoever passes it on does so as a whole, so that the author's signature goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "TravellingSamples", into = "TravellingSamples")]
+#[serde(try_from = "TravellingSamples", into = "TravellingSamples")]
 pub struct Samples {
     /// What the vectors' components mean.
     pub space: FeatureSpaceId,
@@ -165,18 +165,21 @@ impl From<Samples> for TravellingSamples {
     }
 }
 
-impl From<TravellingSamples> for Samples {
-    /// Numbers that run over are out of order, which the check of the values finds; a first sample without a round is of round 0,
-    /// which no robot opens.
-    fn from(TravellingSamples { space, series, samples }: TravellingSamples) -> Self {
-        let (mut number, mut of) = (0_u32, RoundId { counter: 0, opener: RobotId(0), life: 0 });
+impl TryFrom<TravellingSamples> for Samples {
+    type Error = &'static str;
+
+    fn try_from(
+        TravellingSamples { space, series, samples }: TravellingSamples,
+    ) -> Result<Self, Self::Error> {
+        let (mut number, mut of) = (0_u32, None);
         let shared = |TravellingSample { step, class, seen }: TravellingSample| {
             let (round, vector) = seen.into_parts();
-            number = number.wrapping_add(step);
-            of = round.unwrap_or(of);
-            SharedSample { id: series.sample(number), class, round: of, vector }
+            number = number.checked_add(step).ok_or("a sample beyond the last number")?;
+            of = round.or(of);
+            let round = of.ok_or("a sample of no round")?;
+            Ok(SharedSample { id: series.sample(number), class, round, vector })
         };
-        Self { space, samples: samples.into_iter().map(shared).collect() }
+        Ok(Self { space, samples: samples.into_iter().map(shared).collect::<Result<_, _>>()? })
     }
 }
 

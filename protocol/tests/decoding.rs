@@ -378,7 +378,6 @@ fn a_batch_is_of_one_author_in_order_and_bounded() {
     for wrong in [
         vec![],
         vec![sample(2, 5, 1)],
-        vec![sample(1, 5, 2), sample(1, 5, 1)],
         vec![sample(1, 5, 2), sample(1, 5, 2)],
         (1..6)
             .map(|n| SharedSample { vector: Vector::F32(vec![0.0; MAX_COMPONENTS]), ..sample(1, 5, n) })
@@ -386,6 +385,9 @@ fn a_batch_is_of_one_author_in_order_and_bounded() {
     ] {
         assert!(matches!(by(1, wrong.clone()), Err(DecodeError::Impossible(_))), "{wrong:?}");
     }
+    // Downwards the numbers run over.
+    let downwards = vec![sample(1, 5, 2), sample(1, 5, 1)];
+    assert!(matches!(by(1, downwards), Err(DecodeError::Malformed(_))));
     let many = (1..=MAX_SAMPLES as u32 + 1).map(|number| sample(1, 5, number)).collect();
     assert!(matches!(by(1, many), Err(DecodeError::Malformed(_))));
 }
