@@ -66,7 +66,7 @@ fn main() -> std::process::ExitCode {
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,
         [Waits] stranger::one_who_is_no_member_changes_nothing_and_every_lie_is_named.await,
         [Waits] stranger::what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_said_it.await,
-        [Waits] cost::signatures_cost_a_link_less_than_half_as_much_again.await,
+        [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,

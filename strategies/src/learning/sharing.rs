@@ -84,7 +84,9 @@ impl Learning {
 
     /// A batch that may be sent now: shared, and remembered as such.
     pub fn take_unsent(&mut self) -> Option<HeldBatch> {
-        while let Some((_, first)) = self.unsent.pop_front_if(|(revision, _)| *revision <= self.remembered) {
+        while self.unsent.front().is_some_and(|(revision, _)| *revision <= self.remembered)
+            && let Some((_, first)) = self.unsent.pop_front()
+        {
             if let Some(batch) = self.batches.get(first) {
                 return Some(batch.clone());
             }
