@@ -94,6 +94,11 @@ impl Inbox {
         Some(ask(&mut judge.lock().unwrap_or_else(PoisonError::into_inner), self.account.started().elapsed()))
     }
 
+    /// Whether a member said that; in an open swarm everybody is believed.
+    fn believe(&self, envelope: &Envelope) -> Result<(), Distrust> {
+        self.judged(|judge, now| judge.envelope(now, envelope)).unwrap_or(Ok(()))
+    }
+
     /// Waits until there is something to take.
     pub(super) async fn ready(&self) {
         self.ready.notified().await;
@@ -181,7 +186,7 @@ impl Inbox {
         if !matches!(envelope.message, Message::Vote(_)) {
             return Err(Refusal::Kind);
         }
-        self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
+        self.believe(&envelope)?;
         let mut state = self.lock();
         if id == self.me {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
@@ -208,7 +213,7 @@ impl Inbox {
             Message::Samples(_) if id == self.me => Ok(()),
             // All samples of a batch are of one author.
             Message::Samples(samples) if samples.first().is_some_and(|first| first.author == id) => {
-                self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
+                self.believe(&envelope)?;
                 self.queue(Input::Received(envelope))
             }
             Message::Samples(_) => Err(Refusal::Author),
@@ -225,7 +230,7 @@ impl Inbox {
             return Err(Refusal::Kind);
         }
         if matches!(envelope.message, Message::Lessons(_)) {
-            self.judged(|judge, now| judge.envelope(now, &envelope)).unwrap_or(Ok(()))?;
+            self.believe(&envelope)?;
         }
         let distrust = self.judged(|judge, now| match &mut envelope.message {
             Message::Give(give) => judge.give(now, give),
