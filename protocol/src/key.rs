@@ -60,6 +60,12 @@ impl Keys {
         }
     }
 
+    /// The swarm's name.
+    #[must_use]
+    pub fn swarm(&self) -> &str {
+        self.prefix.strip_prefix("gestalt/").and_then(|it| it.strip_suffix('/')).unwrap_or_default()
+    }
+
     /// The key of a topic.
     #[must_use]
     pub fn key(&self, topic: &Topic) -> String {
@@ -124,6 +130,13 @@ impl Keys {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_know_their_swarm_whatever_its_name() {
+        for name in ["demo", "gestalt", "gestalt-2"] {
+            assert_eq!(Keys::new(name).unwrap().swarm(), name);
+        }
+    }
 
     #[test]
     fn every_topic_comes_back_from_its_key() {

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::bounded;
 use crate::id::{RobotId, RoundId};
-use crate::limits::MAX_CLASSES;
+use crate::limits::{MAX_CLASSES, PROTOCOL_VERSION};
 
 /// A robot's account of itself, JSON: the reply to a query on `robot/<id>/status`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +41,19 @@ pub struct Status {
     pub counters: BTreeMap<String, u64>,
     /// The latest errors, newest last, at most sixteen.
     pub errors: Vec<Reported>,
+    /// The version of the wire that it speaks; 0 from a release that did not say.
+    #[serde(default)]
+    pub protocol: u8,
+    /// Its Zenoh session, hexadecimal: tells two robots of one id apart. Empty from a release that did not say.
+    #[serde(default)]
+    pub session: String,
+    /// Its clock when it answered, in milliseconds since 1970.
+    #[serde(default)]
+    pub clock_ms: Option<u64>,
+    /// How it takes part in rounds: the section `rounds` of its configuration, key by key, as a configuration file writes it.
+    /// The same at all robots of a swarm, but for `decorrelation` and `discount_repeats`, which are a camera's own.
+    #[serde(default)]
+    pub rounds: BTreeMap<String, Value>,
 }
 
 impl Status {
@@ -61,6 +75,10 @@ impl Status {
             learning: None,
             counters: BTreeMap::new(),
             errors: Vec::new(),
+            protocol: PROTOCOL_VERSION,
+            session: String::new(),
+            clock_ms: None,
+            rounds: BTreeMap::new(),
         }
     }
 }
@@ -171,4 +189,21 @@ pub struct Reported {
     pub at_ms: u64,
     /// Cause and mend.
     pub what: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decode::decode_json;
+
+    #[test]
+    fn a_status_of_an_older_release_is_read_and_does_not_say_what_it_did_not_know() {
+        let mut json = serde_json::to_value(Status::new(RobotId(3), "three".to_owned(), 1)).unwrap();
+        for newer in ["protocol", "session", "clock_ms", "rounds"] {
+            json.as_object_mut().unwrap().remove(newer).expect(newer);
+        }
+        let read: Status = decode_json(&serde_json::to_vec(&json).unwrap()).unwrap();
+        assert_eq!((read.protocol, read.session.as_str(), read.clock_ms), (0, "", None));
+        assert!(read.rounds.is_empty());
+    }
 }

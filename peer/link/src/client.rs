@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Answer, DecodeError, Instruction, InstructorId, Keys, Status, Topic, decode_json};
+use gestalt_protocol::{
+    Answer, DecodeError, Instruction, InstructorId, Keys, RobotId, Status, Topic, decode_json,
+};
 use serde::de::DeserializeOwned;
 use zenoh::Session;
 use zenoh::bytes::Encoding;
@@ -12,6 +14,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 
+use super::identity::{robot_of, swarm_checksum};
 use super::{Announcement, LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
@@ -27,6 +30,13 @@ pub struct Client {
 /// The swarm's decisions, as they are announced.
 #[derive(Debug)]
 pub struct Decisions(Subscriber<RingChannelHandler<Sample>>);
+
+/// The swarm's answers to all instructors, as they are given.
+#[derive(Debug)]
+pub struct Answers {
+    heard: Subscriber<RingChannelHandler<Sample>>,
+    keys: Keys,
+}
 
 impl Client {
     /// Attaches to a robot at one of `link.connect`, or to one found by `link.scouting`.
@@ -55,6 +65,20 @@ impl Client {
         Ok(Decisions(subscriber))
     }
 
+    /// Every answer to an instructor, whoever it is, from now on.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn answers(&self) -> Result<Answers, LinkError> {
+        let heard = self
+            .session
+            .declare_subscriber(self.keys.every_instructor("answer"))
+            .with(RingChannel::new(MAX_WAITING))
+            .await
+            .map_err(|error| LinkError::open(&*error))?;
+        Ok(Answers { heard, keys: self.keys.clone() })
+    }
+
     /// Everything that happens in the swarm from now on: decisions, who holds which, robots that come and go.
     ///
     /// # Errors
@@ -71,6 +95,12 @@ impl Client {
         let mut statuses: Vec<Status> = self.ask(&self.keys.every_robot("status"), patience).await?;
         statuses.sort_by_key(|status| status.robot);
         Ok(statuses)
+    }
+
+    /// The robot it is attached to; `None` while it is to none of this swarm.
+    pub async fn attached(&self) -> Option<RobotId> {
+        let swarm = swarm_checksum(self.keys.swarm());
+        self.session.info().routers_zid().await.find_map(|id| robot_of(id, swarm))
     }
 
     /// The last decision of the swarm; `None` when nobody who answers within `patience` knows of one.
@@ -164,5 +194,19 @@ impl Decisions {
     pub async fn next(&mut self) -> Option<Result<Announcement, DecodeError>> {
         let sample = self.0.recv_async().await.ok()?;
         Some(decode_json(&sample.payload().to_bytes()))
+    }
+}
+
+impl Answers {
+    /// Waits for the next answer, and says to whom it is; `None` once the client is closed. What is no answer is passed over.
+    pub async fn next(&mut self) -> Option<(InstructorId, Answer)> {
+        loop {
+            let sample = self.heard.recv_async().await.ok()?;
+            match (self.keys.parse(sample.key_expr()), decode_json(&sample.payload().to_bytes())) {
+                (Some(Topic::Answer(to)), Ok(answer)) => return Some((to, answer)),
+                (_, Err(error)) => tracing::warn!("{}: {error}", sample.key_expr()),
+                (_, Ok(_)) => {}
+            }
+        }
     }
 }

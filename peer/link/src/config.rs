@@ -120,6 +120,18 @@ impl LinkConfig {
         }))
     }
 
+    /// Zenoh's configuration for a session that stands for a whole swarm: clients attach to it as to a robot.
+    pub(super) fn stage(&self) -> Result<zenoh::Config, LinkError> {
+        self.with_defaults(&serde_json::json!({
+            "mode": "router",
+            "listen/endpoints": self.listen,
+            "timestamping/enabled": false,
+            "connect/timeout_ms": -1,
+            "connect/exit_on_failure": false,
+            "scouting/delay": 0,
+        }))
+    }
+
     fn with_defaults(&self, first: &Value) -> Result<zenoh::Config, LinkError> {
         let mut config = zenoh::Config::default();
         let lease = u64::try_from(self.lease.as_millis()).unwrap_or(u64::MAX);

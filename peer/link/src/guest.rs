@@ -49,11 +49,12 @@ impl Robot {
             let signer = seal.signer_of(id).ok_or(LinkError::Seal(SealError::NotEnrolled(id)))?;
             voter = voter.signed_by(signer);
         }
-        let vocabulary = self.account.lock().vocabulary.clone();
+        let Status { vocabulary, rounds, .. } = self.account.lock().clone();
         let status = Status {
             vocabulary,
             neighbours: vec![host],
             sealed: self.seal.is_some(),
+            rounds,
             ..Status::new(id, name, boot)
         };
         let account = Arc::new(Account::new(status, self.started));

@@ -1,7 +1,7 @@
 //! What makes one robot known to the swarm: that it is alive, how it is, and its votes.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{Envelope, Keys, RobotId, Topic};
 use tokio::sync::watch;
@@ -39,6 +39,7 @@ impl Presence {
     ) -> zenoh::Result<Self> {
         let status_key = keys.key(&Topic::Status(me));
         let (of_status, node) = (account.clone(), session.zid().to_string());
+        account.lock().session.clone_from(&node);
         let status = session
             .declare_queryable(&status_key)
             .callback(move |query| on_status(&of_status, &node, &query))
@@ -74,8 +75,13 @@ fn on_status(account: &Account, node: &str, query: &Query) {
     if query.parameters().get("from").is_some_and(|from| from != node) {
         account.twin();
     }
-    let json = serde_json::to_string(&*account.lock())
-        .expect("every field of a status, with string keys and finite numbers, has a place in JSON");
+    let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis();
+    let json = {
+        let mut status = account.lock();
+        status.clock_ms = Some(u64::try_from(clock).unwrap_or(u64::MAX));
+        serde_json::to_string(&*status)
+            .expect("every field of a status, with string keys and finite numbers, has a place in JSON")
+    };
     account.sent("status", json.len());
     let _ = query.reply(query.key_expr().clone(), json).encoding(Encoding::APPLICATION_JSON).wait();
 }

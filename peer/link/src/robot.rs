@@ -1,10 +1,12 @@
 //! A robot of a swarm, as the program around it holds it.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use gestalt_protocol::{Camera, Keys, RobotId, RoundId, Status};
 use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary};
+use serde_json::Value;
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{broadcast, mpsc, watch};
 use tokio::task::JoinHandle;
@@ -110,6 +112,7 @@ impl Robot {
             vocabulary: vocabulary.as_ref().map(|v| v.labels().to_vec()).unwrap_or_default(),
             alive: vec![id],
             sealed: seal.is_some(),
+            rounds: rounds_in_words(mind.config()),
             ..Status::new(id, name, boot)
         };
         let account = Arc::new(Account::new(status, started));
@@ -321,6 +324,18 @@ impl Robot {
         if let Err(error) = self.host.await {
             tracing::error!("the robot's task ended badly: {error}");
         }
+    }
+}
+
+/// The parameters of a robot's rounds, as its status says them.
+///
+/// # Panics
+/// Never: parameters have a place in JSON.
+#[must_use]
+pub fn rounds_in_words(rounds: &MindConfig) -> BTreeMap<String, Value> {
+    match serde_json::to_value(rounds).expect("parameters, with string keys, have a place in JSON") {
+        Value::Object(rounds) => rounds.into_iter().collect(),
+        _ => BTreeMap::new(),
     }
 }
 
