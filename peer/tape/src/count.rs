@@ -1,0 +1,55 @@
+//! Counts votes as a robot does when it concludes.
+
+use gestalt_protocol::{Certificate, ClassId, CountedVote, HeldVote};
+use gestalt_rounds::fusion::Fusion;
+use gestalt_rounds::{Ballot, Fuse, RoundsConfig, Scale};
+
+/// What votes come to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Count {
+    /// All evidence as one distribution; `None` where there is none.
+    pub fusion: Option<Fusion>,
+    /// The votes that it is made of, as a certificate lists them.
+    pub counted: Vec<CountedVote>,
+    /// The gesture, if enough robots voted and it is sure enough.
+    pub class: Option<ClassId>,
+}
+
+/// Counts the votes that are on that scale, of so many robots, by that configuration.
+pub(crate) fn count(ballot: &Ballot, scale: Option<Scale>, robots: u32, config: &RoundsConfig) -> Count {
+    let Some(scale) = scale else { return Count::default() };
+    let (rule, clip) = (&config.rule, config.clip);
+    let Some(fusion) = ballot.fuse(rule, clip, scale) else { return Count::default() };
+    let counted = ballot.counted(rule, clip, scale);
+    let rows: Vec<&[f32]> = counted.iter().map(|counted| counted.vote.evidence.as_slice()).collect();
+    let decides = config.suffice(ballot.len(), counted.len(), robots)
+        && config.convinces(rule.withstands(clip, &rows, &fusion, config.liars));
+    let class = decides.then_some(fusion.top);
+    Count { fusion: Some(fusion), counted, class }
+}
+
+/// All votes of a certificate.
+pub(crate) fn votes(certificate: &Certificate) -> impl Iterator<Item = HeldVote> + '_ {
+    certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned())
+}
+
+/// The scale that the author of a certificate counted on; `None` where no vote was on it.
+pub(crate) fn scale(certificate: &Certificate) -> Option<Scale> {
+    let vocabulary = certificate.vocabulary;
+    let on_it = votes(certificate)
+        .find(|held| held.vote.vocabulary == vocabulary && !held.vote.evidence.is_empty())?;
+    let classes = match certificate.votes.first() {
+        Some(counted) => counted.vote.evidence.len(),
+        None => on_it.vote.evidence.len(),
+    };
+    Some(Scale { vocabulary, classes })
+}
+
+/// A ballot with these votes.
+pub(crate) fn ballot(votes: impl IntoIterator<Item = HeldVote>) -> Ballot {
+    let mut ballot = Ballot::default();
+    for held in votes {
+        ballot.cast(held);
+    }
+    ballot
+}

@@ -1,0 +1,187 @@
+//! What a recorded run proves, and what would have been.
+
+mod made;
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::time::Duration;
+
+use gestalt_protocol::{ClassId, FusionRule, Gesture, Instruction, RobotId, RoundId, Topic};
+use gestalt_rounds::{Quorum, RoundsConfig};
+use gestalt_tape::{Announced, Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
+use made::{BEGIN, SECOND, decisions, json, keys, round, run, said};
+use proptest::prelude::*;
+
+/// These, recorded and read again.
+fn replayed(passed: &[Passing]) -> Run {
+    let mut writer = TapeWriter::new(Vec::new(), BTreeMap::new()).unwrap();
+    for passing in passed {
+        writer.write(&passing.entry(&keys()).unwrap()).unwrap();
+    }
+    let bytes = writer.finish(BTreeMap::new()).unwrap();
+    let mut run = Run::default();
+    read(&mut Cursor::new(bytes), |recorded| run.add(&recorded)).unwrap();
+    run
+}
+
+#[test]
+fn every_decision_is_drawn_again_bit_for_bit() {
+    let run = replayed(&run());
+    assert_eq!((run.showings.len(), run.strange), (3, 0));
+    assert_eq!(run.robots().len(), 4);
+    let proof = prove(&run.showings, &RoundsConfig::default());
+    assert_eq!((proof.reproduced, proof.differences), (3, vec![]));
+    assert!(proof.heard >= 10 && proof.unheard == 0, "{} votes", proof.heard);
+    let classes: Vec<_> = run.showings.iter().map(|showing| showing.decision().unwrap().class).collect();
+    assert_eq!(classes[0], Some(ClassId(2)));
+    assert_eq!(classes[2], None, "one of four has seen something, and is not sure");
+}
+
+/// What is changed in the first decision is found, and named.
+#[test]
+fn the_first_difference_is_named() {
+    type Change = fn(&mut Announced);
+    let changes: [(&str, Change); 8] = [
+        ("the probability of class 1", |it| it.decision.certificate.probabilities[1] += 1e-16),
+        ("the confidence", |it| it.decision.confidence -= 1e-12),
+        ("the class", |it| it.decision.class = Some(ClassId(0))),
+        ("the class", |it| it.decision.class = None),
+        ("the quorum", |it| it.decision.certificate.quorum = 2),
+        ("the probability of class 0", |it| drop(it.decision.certificate.votes.pop())),
+        ("the weight of robot 1", |it| it.decision.certificate.votes[0].weight = 0.5),
+        ("vote 1.", |it| it.decision.certificate.others[0].vote.looks = 3.0),
+    ];
+    let passed = run();
+    let at = passed.iter().position(|passing| passing.topic == Topic::Decision).unwrap();
+    for (named, change) in changes {
+        let mut announced: Announced = serde_json::from_slice(&passed[at].payload).unwrap();
+        change(&mut announced);
+        let mut passed = passed.clone();
+        passed[at].payload = json(&announced);
+        let proof = prove(&replayed(&passed).showings, &RoundsConfig::default());
+        assert_eq!((proof.reproduced, proof.differences.len()), (2, 1), "{named}: {:?}", proof.differences);
+        let words = proof.differences[0].to_string();
+        assert!(words.contains(named) && words.contains("round 1@"), "{words}");
+    }
+}
+
+#[test]
+fn votes_that_passed_the_recorder_by_are_counted_and_take_nothing_from_the_proof() {
+    let only: Vec<Passing> = run().into_iter().filter(|passing| passing.topic == Topic::Decision).collect();
+    let proof = prove(&replayed(&only).showings, &RoundsConfig::default());
+    assert_eq!((proof.reproduced, proof.heard), (3, 0));
+    assert!(proof.unheard >= 10);
+}
+
+#[test]
+fn another_configuration_than_the_swarms_is_suspected_by_name() {
+    let run = replayed(&run());
+    let config = RoundsConfig { quorum: Quorum::Evidence(2), ..RoundsConfig::default() };
+    let words = prove(&run.showings, &config).differences[0].to_string();
+    assert!(words.contains("the quorum is 3") && words.contains("--config"), "{words}");
+    assert_eq!(run.quorum(), Some(Quorum::Majority), "the certificates say it");
+}
+
+#[test]
+fn as_it_was_it_ends_as_it_did() {
+    let run = replayed(&run());
+    let config = RoundsConfig::default();
+    let outcomes = outcomes(&run, &WhatIf::default(), &config);
+    assert!(outcomes.iter().all(|outcome| outcome.would == outcome.happened), "{outcomes:?}");
+    let score = Score::of(&outcomes);
+    assert_eq!(
+        (score.rounds, score.known, score.right, score.wrong, score.undecided),
+        (3, 3, 1, 1, 1),
+        "{score:?}"
+    );
+}
+
+#[test]
+fn each_question_changes_what_it_asks_about_and_nothing_else() {
+    let run = replayed(&run());
+    let was = RoundsConfig::default();
+    let would = |what: WhatIf| -> Vec<Option<u8>> {
+        let config = what.config(&was).unwrap();
+        outcomes(&run, &what, &config).iter().map(|it| it.would.map(|class| class.0)).collect()
+    };
+    let nobody = WhatIf { quorum: Some(Quorum::Evidence(5)), ..WhatIf::default() };
+    assert_eq!(would(nobody), [None; 3], "five of four");
+    let bold = WhatIf {
+        quorum: Some(Quorum::Evidence(1)),
+        alpha: Some(0.49),
+        rule: Some(FusionRule::Majority),
+        ..WhatIf::default()
+    };
+    assert_eq!(would(bold)[2], Some(0), "one robot that leans that way");
+    let early = WhatIf { until: Some(Duration::ZERO), ..WhatIf::default() };
+    assert_eq!(would(early), [None; 3], "nothing was said yet");
+    let late = WhatIf { until: Some(Duration::from_secs(60)), ..WhatIf::default() };
+    assert_eq!(would(late)[0], Some(2));
+    let without = WhatIf { without: (1..=3).map(RobotId).collect(), ..WhatIf::default() };
+    assert_eq!(would(without)[0], None, "who is left saw nothing");
+    assert!(WhatIf { alpha: Some(0.9), ..WhatIf::default() }.config(&was).is_err());
+    let named =
+        WhatIf { quorum: Some(Quorum::Evidence(4)), rule: Some(FusionRule::Majority), ..WhatIf::default() };
+    assert_eq!(named.to_string(), "majority, quorum 4");
+}
+
+#[test]
+fn the_last_word_of_each_person_counts_and_contradiction_is_no_truth() {
+    let name = decisions(&run())[0].round;
+    let truth = |words: &[(&str, Instruction)]| {
+        let mut passed = run();
+        passed.retain(|passing| !matches!(passing.topic, Topic::Feedback(_)));
+        for (i, (by, word)) in (0..).zip(words) {
+            passed.push(said(Topic::Feedback(by.parse().unwrap()), json(word), BEGIN + 2 * SECOND + i));
+        }
+        let run = replayed(&passed);
+        run.truth(&run.showings[0])
+    };
+    let class = |class| Gesture::Class(ClassId(class));
+    let was = |label: &str| Instruction::Was { round: name, class: Gesture::Label(label.to_owned()) };
+    assert_eq!(truth(&[]), None);
+    assert_eq!(truth(&[("ada", was("one")), ("ada", was("palm"))]), Some(Truth::Is(ClassId(2))));
+    assert_eq!(truth(&[("ada", was("one")), ("ada", Instruction::Retract { round: name })]), None);
+    assert_eq!(truth(&[("ada", was("one")), ("bob", was("palm"))]), None);
+    assert_eq!(truth(&[("ada", was("unheard of"))]), None);
+    let (right, wrong) =
+        (Instruction::Right { round: name, of: class(2) }, Instruction::Wrong { round: name, of: class(2) });
+    assert_eq!(truth(&[("ada", right.clone())]), Some(Truth::Is(ClassId(2))));
+    assert_eq!(truth(&[("ada", wrong.clone())]), Some(Truth::IsNot(ClassId(2))));
+    assert_eq!(truth(&[("ada", right), ("bob", wrong.clone())]), None);
+    assert_eq!(truth(&[("ada", wrong), ("bob", was("fist"))]), Some(Truth::Is(ClassId(0))));
+}
+
+#[test]
+fn a_count_that_begins_anew_is_another_showing() {
+    let config = RoundsConfig::default();
+    let sees = [Some([0.1, 0.2, 0.7]); 3];
+    let later = 3600 * SECOND;
+    let mut passed = round(&config, &sees, BEGIN);
+    let again: Vec<Passing> = round(&config, &sees, BEGIN + later + 1);
+    passed.extend(again);
+    let run = replayed(&passed);
+    assert_eq!(run.showings.len(), 2);
+    let counters: Vec<u32> = run.showings.iter().map(|showing| showing.name().unwrap().counter).collect();
+    assert_eq!(counters, [1, 1]);
+    assert!(run.showings[0].rounds.iter().all(|RoundId { counter, .. }| *counter == 1));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn whatever_robots_see_and_however_they_count_their_decisions_are_drawn_again(
+        sees in prop::collection::vec(prop::option::weighted(0.8, [0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0]), 1..7),
+        rule in 0..4usize, liars in 0..2u32, alpha in prop::option::of(0.01f64..0.49),
+    ) {
+        let config = RoundsConfig { rule: FusionRule::ALL[rule], liars, alpha, ..RoundsConfig::default() };
+        let normed = |values: [f32; 3]| values.map(|value| value / values.iter().sum::<f32>());
+        let sees: Vec<_> = sees.into_iter().map(|seen| seen.map(normed)).collect();
+        let run = replayed(&round(&config, &sees, BEGIN));
+        let proof = prove(&run.showings, &config);
+        prop_assert_eq!((proof.reproduced, proof.differences), (1, vec![]));
+        let same = outcomes(&run, &WhatIf::default(), &config);
+        prop_assert!(same.iter().all(|outcome| outcome.would == outcome.happened));
+    }
+}
