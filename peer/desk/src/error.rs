@@ -1,0 +1,36 @@
+//! Why a page cannot be shown.
+
+use std::io;
+
+use gestalt_link::LinkError;
+use thiserror::Error;
+
+/// What keeps a desk from opening. Nothing is left behind.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DeskError {
+    /// A text that is no address.
+    #[error(
+        "'{0}' is no address for the page: write a port (8420), or HOST:PORT (127.0.0.1:8420, robot1.local:8420, [::]:8420)"
+    )]
+    Address(String),
+    /// The address cannot be listened on.
+    #[error("cannot serve the page on {address}: {error}; choose another port, or port 0 for a free one")]
+    Listen {
+        /// Where.
+        address: String,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A token that is too easily guessed.
+    #[error(
+        "the page's token has {0} characters: use at least 16 of the characters A-Z a-z 0-9 _ -, or leave it to be drawn"
+    )]
+    Token(usize),
+    /// The system gives no random numbers to draw a token from.
+    #[error("cannot draw a token for the page: {0}; choose one yourself")]
+    Chance(String),
+    /// The swarm cannot be listened to.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+}

@@ -1,0 +1,53 @@
+//! What was heard, counted: for metrics.
+
+use gestalt_protocol::{Decision, Outcome};
+
+/// Upper bounds of the histogram of decision times, in seconds; the last bucket is everything above.
+pub const SECONDS: [f64; 8] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+
+/// Totals since the view began. They only grow.
+#[derive(Clone, Debug, Default)]
+pub struct Tally {
+    /// Rounds that ended with a gesture, as first heard.
+    pub decided: u64,
+    /// Rounds that ended without one.
+    pub undecided: u64,
+    /// Robots for which there was no room.
+    pub refused: u64,
+    /// Answers to instructors, by [`Tally::OUTCOMES`].
+    pub answers: [u64; 6],
+    /// Rounds by how long they took: one for each of [`SECONDS`] and one for all above, each counted once.
+    pub seconds: [u64; SECONDS.len() + 1],
+    /// The sum of these times, in seconds.
+    pub total_seconds: f64,
+}
+
+impl Tally {
+    /// The outcomes in the order of `answers`, by their names in messages.
+    pub const OUTCOMES: [&'static str; 6] =
+        ["learned", "known", "nothing_seen", "unknown_round", "unknown_gesture", "not_learning"];
+
+    pub(super) fn count_decision(&mut self, decision: &Decision) {
+        if decision.class.is_some() {
+            self.decided += 1;
+        } else {
+            self.undecided += 1;
+        }
+        let seconds = f64::from(decision.certificate.elapsed_ms) / 1000.0;
+        let bucket = SECONDS.iter().position(|most| seconds <= *most).unwrap_or(SECONDS.len());
+        self.seconds[bucket] += 1;
+        self.total_seconds += seconds;
+    }
+
+    pub(super) fn count_answer(&mut self, outcome: Outcome) {
+        let place = match outcome {
+            Outcome::Learned => 0,
+            Outcome::Known => 1,
+            Outcome::NothingSeen => 2,
+            Outcome::UnknownRound => 3,
+            Outcome::UnknownGesture => 4,
+            Outcome::NotLearning => 5,
+        };
+        self.answers[place] += 1;
+    }
+}

@@ -1,0 +1,282 @@
+//! One sentence of the view each, and that order and repetition change nothing.
+
+use gestalt_protocol::{
+    Certificate, ClassId, CountedVote, Decision, FusionRule, Gesture, Instruction, Outcome, Reported, Stamp,
+    Vote,
+};
+use proptest::prelude::*;
+
+use super::*;
+
+const NOW: Duration = Duration::from_secs(100);
+
+fn labels() -> Vec<String> {
+    ["fist", "one", "palm"].map(str::to_owned).to_vec()
+}
+
+fn vocabulary() -> Vocabulary {
+    Vocabulary::new(labels()).unwrap()
+}
+
+fn round(counter: u32) -> RoundId {
+    RoundId { counter, opener: RobotId(1), life: 7 }
+}
+
+fn status(robot: u32) -> Status {
+    let round = Some(round(3));
+    Status { vocabulary: labels(), round, ..Status::new(RobotId(robot), format!("robot {robot}"), 1) }
+}
+
+/// A decision of robots' votes for classes.
+fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
+    let round = round(counter);
+    let vote = |(robot, class): (u32, &u8)| {
+        let mut evidence = vec![-0.5; 3];
+        evidence[usize::from(*class)] = 1.0;
+        CountedVote {
+            robot: RobotId(robot),
+            stamp: Stamp { boot: 1, sequence: 1 },
+            class: ClassId(*class),
+            weight: 1.0,
+            vote: Vote { round, vocabulary: vocabulary().id(), evidence, looks: 2.0 },
+            signature: None,
+        }
+    };
+    let certificate = Certificate {
+        vocabulary: vocabulary().id(),
+        rule: FusionRule::LogPool,
+        probabilities: vec![0.1, 0.2, 0.7],
+        votes: (1..).zip(votes).map(vote).collect(),
+        others: Vec::new(),
+        robots: 4,
+        quorum: 3,
+        elapsed_ms: 480,
+    };
+    let class = class.map(ClassId);
+    let decision =
+        Decision { round, class, confidence: 0.7, author: RobotId(1), is_final: true, certificate };
+    let label = class.map(|class| labels()[class.index()].clone());
+    Announcement { decision, label }
+}
+
+fn was(counter: u32, label: &str, at: u64, outcome: Outcome) -> (InstructorId, Answer) {
+    let to = Instruction::Was { round: round(counter), class: Gesture::Label(label.to_owned()) };
+    let answer = Answer { robot: RobotId(1), at, to, outcome, class: None, samples: 2 };
+    ("ada".parse().unwrap(), answer)
+}
+
+fn answered((by, answer): (InstructorId, Answer)) -> Input {
+    Input::Answered(by, Box::new(answer))
+}
+
+fn after(inputs: impl IntoIterator<Item = Input>) -> View {
+    let mut view = View::default();
+    for input in inputs {
+        view.hear(NOW, input);
+    }
+    view
+}
+
+fn decision(announcement: Announcement) -> Input {
+    Input::Decided(Box::new(announcement))
+}
+
+fn reported(status: Status) -> Input {
+    Input::Status(Box::new(status))
+}
+
+#[test]
+fn a_decision_says_who_voted_for_what_and_who_disagrees() {
+    let view =
+        after([reported(status(1)), Input::Came(RobotId(1)), decision(decided(1, Some(2), &[2, 2, 1]))]);
+    let shown = view.decision().unwrap();
+    assert_eq!(shown.label.as_deref(), Some("palm"));
+    let votes: Vec<_> =
+        shown.votes.iter().map(|vote| (vote.robot.0, vote.label.as_str(), vote.agrees)).collect();
+    assert_eq!(votes, [(1, "palm", true), (2, "palm", true), (3, "one", false)]);
+    // exp(1) / (exp(1) + 2 exp(-1/2))
+    assert!((shown.votes[0].probability - 0.691_438).abs() < 1e-6, "{:?}", shown.votes[0]);
+    assert_eq!(
+        shown.shares.iter().map(|share| share.label.as_str()).collect::<Vec<_>>(),
+        ["fist", "one", "palm"]
+    );
+}
+
+#[test]
+fn who_holds_a_decision_is_counted_until_the_next_is_heard() {
+    let holding =
+        |counter| Box::new(decided(counter, Some(2), &[2]).decision.holding(vec![RobotId(8)], false));
+    let mut view = after([
+        Input::Came(RobotId(1)),
+        Input::Held(RobotId(1), holding(3)),
+        decision(decided(3, Some(2), &[2])),
+    ]);
+    assert_eq!(view.decision().unwrap().held, 2, "a robot and its guest");
+    view.hear(NOW, Input::Held(RobotId(1), holding(4)));
+    assert_eq!(view.decision().unwrap().held, 2);
+    view.hear(NOW, decision(decided(4, Some(2), &[2])));
+    assert_eq!(view.decision().unwrap().held, 2);
+}
+
+#[test]
+fn a_robot_is_there_as_long_as_its_token_and_a_late_answer_does_not_bring_it_back() {
+    let mut view = after([Input::Came(RobotId(1)), reported(status(1)), Input::Came(RobotId(2))]);
+    assert_eq!(view.swarm(NOW).robots.len(), 2);
+    assert_eq!(view.hear(NOW, Input::Left(RobotId(1))), Some(Event::Left(RobotId(1))));
+    assert_eq!(view.hear(NOW, Input::Left(RobotId(1))), None);
+    view.hear(NOW, reported(status(1)));
+    assert_eq!(view.swarm(NOW).robots.iter().map(|robot| robot.id.0).collect::<Vec<_>>(), [2]);
+    // What never had a token is forgotten.
+    view.hear(NOW + 2 * SILENT, Input::Asked(1));
+    assert_eq!(view.robots.len(), 1);
+}
+
+#[test]
+fn who_does_not_answer_is_said_to_be_silent_and_a_swarm_without_answers_is_trouble() {
+    let mut view = after([Input::Came(RobotId(1)), reported(status(1)), Input::Asked(1)]);
+    assert!(view.swarm(NOW + SILENT).robots[0].answers);
+    assert!(!view.swarm(NOW + SILENT + Duration::from_millis(1)).robots[0].answers);
+    view.hear(NOW, Input::Asked(0));
+    assert_eq!(view.swarm(NOW + Duration::from_secs(1)).trouble, None);
+    let trouble = view.swarm(NOW + Duration::from_secs(3)).trouble.unwrap();
+    assert!(trouble.contains("3 s") && trouble.contains("gestalt peer"), "{trouble}");
+    view.hear(NOW, Input::Asked(1));
+    assert_eq!(view.swarm(NOW + Duration::from_secs(9)).trouble, None);
+}
+
+#[test]
+fn the_latest_word_judges_a_round_and_a_word_taken_back_does_not() {
+    let known = || [reported(status(1)), Input::Came(RobotId(1)), decision(decided(1, Some(2), &[2, 2, 1]))];
+    let verdict = |words: Vec<Input>| {
+        let view = after(known().into_iter().chain(words));
+        let round = view.rounds().pop().unwrap();
+        (round.verdict, round.truth, view.curve())
+    };
+    assert_eq!(verdict(vec![]), (Verdict::Unknown, None, vec![]));
+    let wrong = answered(was(1, "one", 5, Outcome::Learned));
+    let third = CurvePoint { round: 1, single: 1.0 / 3.0, swarm: 0.0 };
+    assert_eq!(verdict(vec![wrong.clone()]), (Verdict::Wrong, Some("one".to_owned()), vec![third]));
+    // Said earlier, heard later.
+    let right = answered(was(1, "palm", 4, Outcome::Learned));
+    assert_eq!(verdict(vec![wrong.clone(), right.clone()]).0, Verdict::Wrong);
+    let right_after_all = answered(was(1, "palm", 6, Outcome::Known));
+    assert_eq!(verdict(vec![wrong.clone(), right_after_all]).0, Verdict::Right);
+    let (by, answer) = was(1, "", 7, Outcome::Learned);
+    let undo = Answer { to: Instruction::Retract { round: round(1) }, ..answer };
+    assert_eq!(verdict(vec![wrong, answered((by, undo))]), (Verdict::Unknown, None, vec![]));
+    let unknown = answered(was(1, "one", 8, Outcome::UnknownGesture));
+    assert_eq!(verdict(vec![unknown]).0, Verdict::Unknown, "the swarm did not take it");
+}
+
+#[test]
+fn a_round_in_which_nobody_could_tell_a_gesture_is_judged_by_what_it_was() {
+    let mut blind = decided(1, None, &[]);
+    blind.decision.certificate.vocabulary = VocabularyId::NONE;
+    let word = answered(was(1, "one", 5, Outcome::Learned));
+    let view = after([reported(status(1)), Input::Came(RobotId(1)), decision(blind), word]);
+    let shown = view.rounds().pop().unwrap();
+    assert_eq!((shown.verdict, shown.truth.as_deref()), (Verdict::Wrong, Some("one")));
+    assert_eq!(view.curve(), [CurvePoint { round: 1, single: 0.0, swarm: 0.0 }]);
+}
+
+#[test]
+fn a_round_that_no_robot_comes_near_does_not_stay_the_newest() {
+    let mut view = after([reported(status(1)), Input::Came(RobotId(1)), decision(decided(3, Some(2), &[2]))]);
+    view.hear(NOW, decision(decided(u32::MAX, Some(0), &[0])));
+    assert_eq!(view.latest().unwrap().decision.round.counter, u32::MAX);
+    view.hear(NOW, Input::Asked(1));
+    view.hear(NOW, decision(decided(4, Some(1), &[1])));
+    assert_eq!(view.latest().unwrap().decision.round.counter, 4);
+    assert_eq!(view.rounds().iter().map(|it| it.round.counter).collect::<Vec<_>>(), [3, 4]);
+}
+
+#[test]
+fn nothing_grows_without_bound_whoever_speaks() {
+    let long = "x".repeat(100_000);
+    let mut view = View::default();
+    for n in 0..MAX_ROBOTS as u32 + 100 {
+        view.hear(NOW, Input::Came(RobotId(n)));
+    }
+    assert_eq!((view.robots.len(), view.tally().refused), (MAX_ROBOTS, 100));
+    let mut liar = status(1);
+    liar.name.clone_from(&long);
+    liar.errors = vec![Reported { at_ms: 1, what: long.clone() }; 500];
+    liar.neighbours = (0..100_000).map(RobotId).collect();
+    liar.counters = (0..5_000).map(|n| (format!("made_up_{n}"), 1)).chain([("x\n".to_owned(), 1)]).collect();
+    liar.camera.fps = f32::NAN;
+    view.hear(NOW, reported(liar));
+    let shown = view.swarm(NOW).robots.into_iter().find(|robot| robot.id.0 == 1).unwrap();
+    assert!(serde_json::to_string(&shown).unwrap().len() < 20_000);
+    assert_eq!(shown.camera.fps, 0.0);
+    assert!(view.counters().all(|(_, counters)| counters.len() <= 128 && !counters.contains_key("x\n")));
+    for n in 0..1000 {
+        view.hear(NOW, decision(decided(n, Some(0), &[0])));
+        view.hear(NOW, answered(was(n, &long, u64::from(n), Outcome::Learned)));
+    }
+    assert_eq!((view.rounds().len(), view.said().len()), (MAX_ROUNDS, MAX_SAID));
+    assert!(serde_json::to_string(&view.said()).unwrap().len() < 40_000);
+    for n in 0..100 {
+        let (_, answer) = was(999, "one", n, Outcome::Learned);
+        view.hear(NOW, Input::Answered(format!("made-up-{n}").parse().unwrap(), Box::new(answer)));
+    }
+    assert!(view.rounds.words() <= MAX_ROUNDS * 16);
+}
+
+#[test]
+fn a_decision_of_a_vocabulary_that_nobody_reports_has_numbers_for_names() {
+    let mut made = decided(1, Some(2), &[2, 1]);
+    made.label = None;
+    made.decision.confidence = f64::NAN;
+    let shown = after([decision(made)]).decision().unwrap();
+    assert_eq!((shown.label.as_deref(), shown.confidence), (Some("class 2"), 0.0));
+    assert_eq!(shown.votes[1].label, "class 1");
+}
+
+/// The same with a confidence of its own, for no two decisions of a round are of one rank unless they are one.
+fn ranked(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
+    let mut made = decided(counter, class, votes);
+    let digits = votes.iter().chain(&class).fold(1_u32, |sum, class| sum * 4 + u32::from(*class));
+    made.decision.confidence = 0.5 + f64::from(digits) / 10_000.0;
+    made
+}
+
+/// Anything that can be heard, of a swarm in which each robot reports itself once.
+fn heard() -> impl Strategy<Value = Input> {
+    let robot = || (0_u32..5).prop_map(RobotId);
+    let outcome = prop_oneof![Just(Outcome::Learned), Just(Outcome::Known), Just(Outcome::UnknownRound)];
+    prop_oneof![
+        robot().prop_map(Input::Came),
+        robot().prop_map(|robot| reported(status(robot.0))),
+        (0_u32..6, proptest::option::of(0_u8..3), proptest::collection::vec(0_u8..3, 0..4))
+            .prop_map(|(counter, class, votes)| decision(ranked(counter, class, &votes))),
+        (robot(), 0_u32..6, 0_u8..3).prop_map(|(robot, counter, class)| {
+            let holding = ranked(counter, Some(class), &[class]).decision.holding(Vec::new(), false);
+            Input::Held(robot, Box::new(holding))
+        }),
+        (0_u32..6, 0_usize..3, outcome).prop_map(|(counter, class, outcome)| {
+            // A word is known by its time, so one time has one word.
+            let at = u64::from(counter) * 100 + class as u64 * 10 + outcome as u64;
+            answered(was(counter, &labels()[class], at, outcome))
+        }),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn order_and_repetition_change_nothing(
+        (inputs, other) in proptest::collection::vec(heard(), 0..40)
+            .prop_flat_map(|inputs| (Just(inputs.clone()), Just([inputs.clone(), inputs].concat()).prop_shuffle()))
+    ) {
+        let (view, other) = (after(inputs), after(other));
+        prop_assert_eq!(view.swarm(NOW), other.swarm(NOW));
+        prop_assert_eq!(view.decision(), other.decision());
+        prop_assert_eq!(view.rounds(), other.rounds());
+        prop_assert_eq!(view.curve(), other.curve());
+        let said = |view: &View| {
+            let mut said: Vec<String> = view.said().iter().map(|said| format!("{said:?}")).collect();
+            said.sort();
+            said
+        };
+        prop_assert_eq!(said(&view), said(&other));
+    }
+}
