@@ -10,7 +10,7 @@ endif
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
             libclang1-14 clang pkg-config
-TEST_PACKAGES := iproute2 libsvm-tools
+TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium
 
 # $(call install,PACKAGES): those of them that are missing.
 define install
@@ -31,14 +31,15 @@ test-packages: packages
 	@$(call install,$(TEST_PACKAGES))
 
 # A heterogeneous swarm of real Zenoh peers that knows no gesture looks, decides, is told what it was, and learns.
-# Leaves its pictures in out/.
+# Leaves its pictures and a recording in out/.
 demo: packages
 	cargo build -p gestalt-peer --bin gestalt
 	mkdir -p out
+	rm -f out/run.mcap
 	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
-	  --learn nothing --picture out/round.png --curve out/curve.png
+	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap
 
-# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,data makes failures
+# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data makes failures
 # of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	RUST_TEST_THREADS=$$((2 * $$(nproc))) \

@@ -1,6 +1,8 @@
 //! What the whole-swarm scenarios share: a classifier without pictures, robots that learn, robots in this process,
 //! robots as processes, and network namespaces to put them in.
 
+#[path = "set_up/browser.rs"]
+mod browser;
 #[path = "set_up/classifier.rs"]
 mod classifier;
 #[path = "set_up/learning.rs"]
@@ -14,6 +16,7 @@ mod robots;
 #[path = "set_up/streaming.rs"]
 mod streaming;
 
+pub use browser::Browser;
 pub use classifier::{Fixed, look};
 pub use learning::{gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;

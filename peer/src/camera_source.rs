@@ -9,6 +9,7 @@ use gestalt_vision::source::{
 };
 
 use crate::config::{CameraSection, SourceSection};
+use crate::ros_camera::RosCamera;
 
 /// Who stands in front of the camera of a configuration, if it is a rendered one.
 #[must_use]
@@ -24,6 +25,7 @@ pub(crate) fn describe(camera: &CameraSection) -> String {
     match &camera.source {
         SourceSection::None => "none".to_owned(),
         SourceSection::Stream(_) => "stream".to_owned(),
+        SourceSection::Ros(ros) => format!("ros {}", ros.topic),
         SourceSection::Rendered(_) => "rendered".to_owned(),
         SourceSection::Device(device) => format!("device {}", device.path.display()),
         SourceSection::Images(files) => format!("images {}", files.path.display()),
@@ -54,7 +56,10 @@ pub fn open_source(
                 None => Box::new(source),
             }
         }
-        SourceSection::Device(device) => Box::new(Device::open(&device.path, &properties)?),
+        SourceSection::Ros(ros) => Box::new(RosCamera::open(ros, robot, properties.period())?),
+        SourceSection::Device(device) => {
+            Box::new(Device::open_with(&device.path, &properties, &device.v4l2)?)
+        }
         SourceSection::Images(files) => {
             Box::new(ImageFolder::open(&files.path, properties.period(), files.repeat)?)
         }

@@ -95,9 +95,9 @@ impl Eye {
                     Box::new(move || Ok(Box::new(StreamSource::new(frames_from.clone(), period))));
                 Some(Self { inlet: Some(inlet), ..Self::with(camera, model, open)? })
             }
-            SourceSection::Device(_) => {
+            SourceSection::Device(_) | SourceSection::Ros(_) => {
                 let open = Box::new(move || open_source(&section, robot, clock));
-                // A driver may hang: it is opened where it keeps nobody.
+                // A driver may hang, a router may be late: it is opened where it keeps nobody.
                 Some(Self::new(camera, model, None, open)?)
             }
             _ => Some(Self::with(camera, model, Box::new(move || open_source(&section, robot, clock)))?),

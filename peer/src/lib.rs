@@ -17,9 +17,12 @@ pub mod camera_report;
 #[cfg(feature = "opencv")]
 mod camera_source;
 #[cfg(feature = "opencv")]
+pub mod capture;
+#[cfg(feature = "opencv")]
 pub mod center;
 pub mod cli;
 pub mod config;
+pub mod doctor;
 #[cfg(feature = "opencv")]
 pub mod eye;
 #[cfg(feature = "opencv")]
@@ -29,6 +32,9 @@ pub mod opinion;
 #[cfg(feature = "opencv")]
 pub mod picture;
 pub mod proof;
+pub mod recording;
+#[cfg(feature = "opencv")]
+mod ros_camera;
 #[cfg(feature = "opencv")]
 pub mod stream;
 #[cfg(feature = "opencv")]

@@ -14,6 +14,7 @@ use gestalt_peer::picture::write_png;
 use gestalt_peer::swarm::Members;
 use gestalt_protocol::{Camera, CameraState, Decision, RobotId};
 use gestalt_tests::{model, unique};
+use gestalt_vision::config::DeviceSettings;
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
 use serde_json::json;
@@ -36,7 +37,7 @@ fn rendered() -> SourceSection {
 }
 
 fn device(path: &Path) -> SourceSection {
-    SourceSection::Device(DeviceSection { path: path.into() })
+    SourceSection::Device(DeviceSection { path: path.into(), v4l2: DeviceSettings::default() })
 }
 
 /// Waits until the camera is as it should be.

@@ -6,6 +6,7 @@ mod center;
 mod churn;
 mod clients;
 mod cost;
+mod doctor;
 mod eyes;
 mod field;
 mod in_process;
@@ -16,8 +17,11 @@ mod line;
 mod memory;
 mod mixed;
 mod motion;
+mod page;
 mod partition;
+mod recording;
 mod ring;
+mod ros;
 mod scouting;
 mod stranger;
 mod stream;
@@ -41,9 +45,16 @@ fn main() -> std::process::ExitCode {
         [Waits, Namespaces] partition::a_part_without_the_majority_decides_nothing_and_says_why,
         [Waits, Namespaces] partition::the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal,
         [Waits] trouble::votes_cost_little_while_a_round_is_open_and_nothing_otherwise.await,
+        [Waits] recording::a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise.await,
+        [Waits] recording::a_recorder_that_is_killed_loses_less_than_a_second.await,
+        [Waits, Mount] recording::a_full_disk_ends_the_recorder_and_not_the_swarm.await,
         [Waits, Mount] memory::a_full_disk_is_reported_and_the_robot_votes_on_and_recovers.await,
         [Works, Namespaces] center::foot_bots_and_parrots_of_a_centre_that_decides_are_one_ballot,
         [Works, Namespaces] center::foot_bots_and_parrots_of_a_centre_in_which_they_gossip_are_one_ballot,
+        [Waits] doctor::faults_that_are_planted_are_each_named_with_their_fix.await,
+        [Waits] doctor::a_healthy_swarm_is_found_well_within_five_seconds.await,
+        [Waits] doctor::a_visit_leaves_no_trace_at_the_robots.await,
+        [Waits, Mount] doctor::a_disk_without_room_and_one_that_is_read_only_are_told_apart.await,
         [Waits] cameras::a_robot_whose_camera_is_missing_relays_and_agrees.await,
         [Waits] cameras::a_camera_that_hangs_keeps_nobody.await,
         [Waits] cameras::pictures_that_vanish_and_come_back_are_taken_up_again.await,
@@ -61,11 +72,15 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
         [Waits] stream::nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks.await,
         [Waits] stream::who_is_there_already_and_who_comes_too_many_is_refused_and_counted.await,
+        [Waits] ros::a_ros_system_hears_what_a_swarm_decides_and_teaches_it.await,
+        [Works] ros::a_robot_sees_through_a_camera_that_a_ros_driver_owns.await,
         [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
         [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,
         [Waits] stranger::one_who_is_no_member_changes_nothing_and_every_lie_is_named.await,
         [Waits] stranger::what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_said_it.await,
+        [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
+        [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,

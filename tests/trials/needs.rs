@@ -11,6 +11,8 @@ pub enum Need {
     Namespaces,
     /// The right to mount a file system: root, outside most containers.
     Mount,
+    /// Chromium, to see a page as people do.
+    Browser,
     /// Recordings and photographs, which are not part of the project: see [`data`].
     Data,
 }
@@ -23,7 +25,7 @@ pub fn data() -> PathBuf {
 }
 
 impl Need {
-    const ALL: [Self; 3] = [Self::Namespaces, Self::Mount, Self::Data];
+    const ALL: [Self; 4] = [Self::Namespaces, Self::Mount, Self::Browser, Self::Data];
 
     /// Its name in `GESTALT_REQUIRE`.
     #[must_use]
@@ -31,13 +33,14 @@ impl Need {
         match self {
             Self::Namespaces => "namespaces",
             Self::Mount => "mount",
+            Self::Browser => "browser",
             Self::Data => "data",
         }
     }
 
     /// Why this machine does not have it; `None` when it does. Tried once.
     pub(crate) fn missing(self) -> Option<String> {
-        static TRIED: [OnceLock<Option<String>>; 3] = [const { OnceLock::new() }; 3];
+        static TRIED: [OnceLock<Option<String>>; 4] = [const { OnceLock::new() }; 4];
         TRIED[self as usize].get_or_init(|| self.attempt().err()).clone()
     }
 
@@ -45,6 +48,8 @@ impl Need {
         match self {
             Self::Namespaces => namespaces(),
             Self::Mount => mount(),
+            Self::Browser if done("chromium", &["--version"]) => Ok(()),
+            Self::Browser => Err("needs a browser (chromium)".to_owned()),
             Self::Data if data().is_dir() => Ok(()),
             Self::Data => {
                 Err("needs photographs and recordings (GESTALT_DATA names their folder)".to_owned())
@@ -57,7 +62,9 @@ impl Need {
 pub(crate) fn required(text: Option<&str>) -> Result<Vec<Need>, String> {
     let names = text.unwrap_or_default().split(',').map(str::trim).filter(|name| !name.is_empty());
     let known = |name: &str| Need::ALL.into_iter().find(|need| need.name() == name);
-    names.map(|name| known(name).ok_or(format!("'{name}' is none of namespaces, mount, data"))).collect()
+    names
+        .map(|name| known(name).ok_or(format!("'{name}' is none of namespaces, mount, browser, data")))
+        .collect()
 }
 
 fn done(program: &str, words: &[&str]) -> bool {

@@ -66,6 +66,18 @@ fn swarms_are_emulated_without_a_network_and_without_eyes() {
 }
 
 #[test]
+fn other_languages_get_the_mind_without_a_network_and_without_eyes() {
+    for binding in ["gestalt-mind", "gestalt-c", "gestalt-python"] {
+        knows_none(binding, &["linfa", "zenoh", "opencv", "clap", "tokio"]);
+    }
+}
+
+#[test]
+fn recordings_are_written_and_read_without_a_network_and_without_eyes() {
+    knows_none("gestalt-tape", &["zenoh", "opencv", "clap", "tokio", "zstd-sys", "lz4-sys"]);
+}
+
+#[test]
 fn only_eyes_and_who_uses_them_need_opencv() {
     let seeing: Vec<&str> =
         CRATES.iter().map(|(package, _)| *package).filter(|p| built_with(p).contains("opencv")).collect();

@@ -3,17 +3,23 @@
 use std::path::{Path, PathBuf};
 
 /// Every package and the folder of its sources, seen from the root.
-pub const CRATES: [(&str, &str); 15] = [
+pub const CRATES: [(&str, &str); 21] = [
     ("gestalt-protocol", "protocol/src"),
     ("gestalt-rounds", "strategies/rounds/src"),
     ("gestalt-svm", "strategies/svm/src"),
     ("gestalt-strategies", "strategies/src"),
     ("gestalt-link", "peer/link/src"),
+    ("gestalt-tape", "peer/tape/src"),
     ("gestalt-trust", "peer/trust/src"),
     ("gestalt-vision", "peer/vision/src"),
+    ("gestalt-desk", "peer/desk/src"),
+    ("gestalt-ros", "peer/ros/src"),
     ("gestalt-draw", "peer/draw/src"),
     ("gestalt-lab", "peer/lab/src"),
     ("gestalt-peer", "peer/src"),
+    ("gestalt-mind", "bindings/mind/src"),
+    ("gestalt-c", "bindings/c/src"),
+    ("gestalt-python", "bindings/python/src"),
     ("gestalt-attack", "tests/attack/src"),
     ("gestalt-fuzz", "tests/fuzz/src"),
     ("gestalt-trials", "tests/trials"),

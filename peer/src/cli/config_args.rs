@@ -103,7 +103,11 @@ impl ConfigArgs {
         Ok((config, link))
     }
 
-    fn document(&self, settings: Vec<Setting>) -> Result<Document, ConfigError> {
+    /// The tree of values that the file and the flags describe.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and flags that name no key.
+    pub(super) fn document(&self, settings: Vec<Setting>) -> Result<Document, ConfigError> {
         let mut document = match &self.config {
             Some(path) => Document::read(path)?,
             None => Document::default(),

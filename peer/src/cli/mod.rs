@@ -1,11 +1,14 @@
 //! The verbs of the command line, one file each.
 
 #[cfg(feature = "opencv")]
+mod capture;
+#[cfg(feature = "opencv")]
 mod center;
 #[cfg(feature = "opencv")]
 mod choice;
 mod config;
 mod config_args;
+mod doctor;
 mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
@@ -17,11 +20,14 @@ mod manual;
 #[cfg(feature = "opencv")]
 mod peer;
 mod progress;
+mod record;
+mod replay;
 #[cfg(feature = "opencv")]
 mod report;
 #[cfg(feature = "opencv")]
 mod robot_args;
 mod robots;
+mod ros;
 #[cfg(feature = "opencv")]
 mod score;
 mod show;
@@ -36,8 +42,10 @@ mod teach;
 mod train;
 mod verify;
 mod watch;
+mod web;
+mod word;
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
@@ -75,8 +83,17 @@ enum Verb {
     Swarm(swarm::Args),
     /// Watch the decisions and robots of a running swarm, live
     Watch(watch::Args),
+    /// Record a running swarm into an MCAP file
+    Record(record::Args),
+    /// Prove the decisions of a recording again, and count its votes by other rules
+    Replay(replay::Args),
     /// Teach a running swarm: open rounds and give feedback on its decisions
     Teach(teach::Args),
+    /// Show a swarm to a ROS 2 system, and take an instructor's words from it
+    Ros(ros::Args),
+    /// Take pictures of a gesture for training, each checked
+    #[cfg(feature = "opencv")]
+    Capture(Box<capture::Args>),
     /// Train a classifier on folders of labelled images
     #[cfg(feature = "opencv")]
     Train(Box<train::Args>),
@@ -94,6 +111,8 @@ enum Verb {
     Keys(keys::Args),
     /// Check a decision without the swarm: that every vote it rests on was signed by a member, and that it follows from them
     Verify(verify::Args),
+    /// Say what is wrong with a robot and its swarm, and how to mend it
+    Doctor(Box<doctor::Args>),
     /// Print a commented configuration, or check one
     Config(config::Args),
     /// Print shell completions
@@ -124,7 +143,12 @@ impl Command {
             #[cfg(feature = "opencv")]
             Verb::Swarm(args) => swarm::run(&args),
             Verb::Watch(args) => watch::run(&args),
+            Verb::Record(args) => record::run(&args),
+            Verb::Replay(args) => replay::run(&args),
             Verb::Teach(args) => teach::run(&args),
+            Verb::Ros(args) => ros::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Capture(args) => capture::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Train(args) => train::run(&args),
             #[cfg(feature = "opencv")]
@@ -135,6 +159,7 @@ impl Command {
             Verb::Explain(args) => explain::run(&args),
             Verb::Keys(args) => keys::run(&args),
             Verb::Verify(args) => verify::run(&args),
+            Verb::Doctor(args) => doctor::run(&args),
             Verb::Config(args) => config::run(&args),
             Verb::Completions(args) => manual::completions(&args),
             Verb::Man(args) => manual::man(&args),
@@ -148,7 +173,9 @@ pub fn start_log() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
         EnvFilter::new("error,gestalt_peer=warn,gestalt_link=warn,gestalt_vision=warn,gestalt_lab=warn")
     });
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    // Colours are for a terminal alone.
+    let colours = io::stderr().is_terminal();
+    tracing_subscriber::fmt().with_env_filter(filter).with_ansi(colours).with_writer(io::stderr).init();
 }
 
 /// Zenoh needs a runtime with several threads.

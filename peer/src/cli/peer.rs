@@ -10,11 +10,11 @@ use tokio::sync::broadcast::error::RecvError;
 use super::config_args::ConfigArgs;
 use super::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
 use super::show::{self, Names, line};
+use super::web::WebArgs;
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::Config;
-use gestalt_link::Event;
-use gestalt_link::boot_number;
+use gestalt_link::{Event, LinkConfig, boot_number};
 
 /// Run one robot until Ctrl-C
 #[derive(Debug, clap::Args)]
@@ -41,6 +41,9 @@ pub struct Args {
     /// Open a round at this interval, such as `5s`
     #[arg(long, value_name = "DURATION", value_parser = super::duration)]
     open_every: Option<Duration>,
+
+    #[command(flatten)]
+    web: WebArgs,
 
     /// Print events as JSON Lines, one object per line
     #[arg(long)]
@@ -80,6 +83,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "locators": locators}),
             &format!("robot {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
         )?;
+        // The page is a client of this robot, as others are.
+        let link = LinkConfig { connect: locators.iter().take(1).cloned().collect(), ..LinkConfig::default() };
+        let web = args.web.or(config.web.listen.as_ref());
+        let page = match web.open(&config.swarm.0, &link, args.json).await {
+            Ok(page) => page,
+            Err(error) => {
+                body.stop().await;
+                return Err(error);
+            }
+        };
         let mut schedule = args.open_every.map(tokio::time::interval);
         if let Some(schedule) = &mut schedule {
             schedule.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -96,6 +109,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 failure = body.robot().ended() => break Err(failure.to_string().into()),
             }
         };
+        if let Some(page) = page {
+            page.close().await;
+        }
         body.stop().await;
         ended
     })

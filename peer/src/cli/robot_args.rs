@@ -21,7 +21,8 @@ pub struct IdentityArgs {
 /// What the robot sees with.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct CameraArgs {
-    /// Camera source: a device (/dev/video0), a video, a folder of images (both repeat), `rendered`, or a synthetic hand
+    /// Camera source: a device (/dev/video0), a video, a folder of images (both repeat), a ROS 2 topic
+    /// (`ros:/camera/image_raw/compressed`), `rendered`, or a synthetic hand
     /// seen from elsewhere: `rendered:bearing=-30,elevation=5,distance=1.2,seed=7` (camera.source)
     #[arg(long, value_name = "SOURCE")]
     source: Option<SourceArg>,

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use gestalt_link::Announcement;
-use gestalt_protocol::{Certificate, ClassId, Decision, FusionRule, RobotId, RoundId, Status};
+use gestalt_protocol::{
+    Answer, Certificate, ClassId, Decision, FusionRule, Instruction, RobotId, RoundId, Status,
+};
 use gestalt_strategies::Vocabulary;
 use serde_json::Value;
 
@@ -126,6 +128,19 @@ pub(super) fn announced(announcement: &Announcement, names: &Names) -> String {
 /// `round 18 (opened by robot 1)`.
 pub(super) fn opened(RoundId { counter, opener, .. }: RoundId) -> String {
     format!("round {counter} (opened by robot {opener})")
+}
+
+/// What the swarm says to a word of feedback: `round 5: learned; robot 1 learns from 8 samples of this round`.
+pub(super) fn answer(answer: &Answer) -> String {
+    let samples = match (&answer.to, answer.samples) {
+        (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
+        (_, samples) => {
+            let samples = counted(samples as usize, "sample");
+            format!("robot {} learns from {samples} of this round", answer.robot)
+        }
+    };
+    let round = answer.to.round().map(|round| format!("round {}: ", round.counter)).unwrap_or_default();
+    format!("{round}{}; {samples}", answer.outcome.describe())
 }
 
 /// `1 vote`, `8 votes`.

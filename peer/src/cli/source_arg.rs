@@ -4,17 +4,20 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use gestalt_vision::config::DeviceSettings;
 use gestalt_vision::dataset::has_image_name;
 use gestalt_vision::pose::Pose;
 use thiserror::Error;
 
-use crate::config::{DeviceSection, FilesSection, ModelSection, RenderedSection, SourceSection};
+use crate::config::{DeviceSection, FilesSection, ModelSection, RenderedSection, RosSection, SourceSection};
 
-/// `/dev/video0`, `hand.mp4`, `DIR`, `image.png`, `rendered`, or `rendered:3,bearing=-30,distance=1.2,seed=7`.
+/// `/dev/video0`, `hand.mp4`, `DIR`, `image.png`, `ros:/camera/image_raw`, `rendered`, or `rendered:3,bearing=-30,distance=1.2,seed=7`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceArg {
     /// A synthetic hand.
     Rendered(Rendered),
+    /// A camera topic of a ROS 2 system.
+    Ros(String),
     /// A file, a folder, or a device: by what is there.
     Path(PathBuf),
 }
@@ -68,6 +71,9 @@ impl FromStr for SourceArg {
     type Err = SourceArgError;
 
     fn from_str(text: &str) -> Result<Self, SourceArgError> {
+        if let Some(topic) = text.strip_prefix("ros:") {
+            return Ok(Self::Ros(topic.to_owned()));
+        }
         match text.strip_prefix("rendered") {
             Some("") => Ok(Self::Rendered(Rendered::default())),
             Some(rest) if rest.starts_with(':') => Rendered::read(&rest[1..]).map(Self::Rendered),
@@ -110,7 +116,7 @@ impl SourceArg {
     pub fn usual_model(&self) -> ModelSection {
         match self {
             Self::Rendered(_) => ModelSection::Rendered,
-            Self::Path(_) => ModelSection::Hands,
+            Self::Ros(_) | Self::Path(_) => ModelSection::Hands,
         }
     }
 
@@ -125,10 +131,13 @@ impl SourceArg {
                 let (pose, seed) = (pose.unwrap_or_default(), seed.unwrap_or_default());
                 return Ok(SourceSection::Rendered(RenderedSection { pose, seed, schedule: None }));
             }
+            Self::Ros(topic) => {
+                return Ok(SourceSection::Ros(RosSection { topic: topic.clone(), router: None, domain: 0 }));
+            }
             Self::Path(path) => path.clone(),
         };
         Ok(match kind(&path) {
-            Kind::Device => SourceSection::Device(DeviceSection { path }),
+            Kind::Device => SourceSection::Device(DeviceSection { path, v4l2: DeviceSettings::default() }),
             Kind::Folder => SourceSection::Images(FilesSection { path, repeat: true }),
             Kind::Video => SourceSection::Video(FilesSection { path, repeat: true }),
             Kind::Image => return Err(SourceArgError::Image(path)),

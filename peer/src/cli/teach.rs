@@ -4,12 +4,13 @@ use std::io::BufRead;
 use std::pin::pin;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId, RoundId};
+use gestalt_protocol::{ClassId, InstructorId, RoundId};
 use serde_json::json;
 use tokio::sync::mpsc;
 
 use super::config_args::ConfigArgs;
 use super::show::{self, Names, line};
+use super::word::Word;
 use super::{Failure, interrupted};
 use gestalt_link::{Client, News};
 
@@ -44,55 +45,6 @@ pub struct Args {
     /// Print decisions and answers as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
-}
-
-/// What a line from the keyboard says.
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Word {
-    Open,
-    Was(Gesture),
-    Right,
-    Wrong,
-    Undo,
-    Quit,
-}
-
-impl Word {
-    fn read(words: &[&str]) -> Result<Self, String> {
-        match words {
-            ["open"] => Ok(Self::Open),
-            ["right"] => Ok(Self::Right),
-            ["wrong"] => Ok(Self::Wrong),
-            ["undo"] => Ok(Self::Undo),
-            ["quit" | "exit"] => Ok(Self::Quit),
-            // A bare number may be the label of a gesture, and mostly is.
-            ["was", gesture] => Ok(Self::Was(Gesture::Label((*gesture).to_owned()))),
-            ["class", number] => number
-                .parse()
-                .map(|class| Self::Was(Gesture::Class(ClassId(class))))
-                .map_err(|_| format!("'{number}' is not a class number: write, for example, 'class 3'")),
-            other => Err(format!(
-                "unknown command '{}': use open, was GESTURE, class NUMBER, right, wrong, undo or quit",
-                other.join(" ")
-            )),
-        }
-    }
-
-    /// The word about a round, of which that gesture was decided.
-    fn about(self, round: RoundId, decided: Option<ClassId>) -> Result<Option<Instruction>, String> {
-        let of = || {
-            decided.map(Gesture::Class).ok_or_else(|| {
-                format!("no decision of round {round} is known here to be right or wrong: say 'was GESTURE'")
-            })
-        };
-        Ok(match self {
-            Self::Was(class) => Some(Instruction::Was { round, class }),
-            Self::Right => Some(Instruction::Right { round, of: of()? }),
-            Self::Wrong => Some(Instruction::Wrong { round, of: of()? }),
-            Self::Undo => Some(Instruction::Retract { round }),
-            Self::Open | Self::Quit => None,
-        })
-    }
 }
 
 /// Runs the verb.
@@ -178,15 +130,7 @@ impl Lesson<'_> {
         let timeout = self.args.timeout;
         let answer = self.client.teach(&self.args.instructor, &instruction, timeout).await?;
         let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
-        let samples = match (&instruction, answer.samples) {
-            (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
-            (_, samples) => format!(
-                "robot {} learns from {} of this round",
-                answer.robot,
-                show::counted(samples as usize, "sample")
-            ),
-        };
-        let words = format!("round {}: {}; {samples}", round.counter, answer.outcome.describe());
+        let words = show::answer(&answer);
         line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)
     }
 
@@ -206,29 +150,5 @@ impl Lesson<'_> {
             &json!({"event": "decision", "decision": decided}),
             &show::announced(&decided, &self.names),
         )
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn right_and_wrong_name_what_was_decided() {
-        let round: RoundId = "5@2-3f9a01c7".parse().unwrap();
-        let of = Gesture::Class(ClassId(3));
-        assert_eq!(Word::Wrong.about(round, Some(ClassId(3))), Ok(Some(Instruction::Wrong { round, of })));
-        assert!(Word::Right.about(round, None).unwrap_err().contains("was GESTURE"));
-    }
-
-    #[test]
-    fn words_are_read_as_people_type_them() {
-        let read = |text: &str| Word::read(&text.split_whitespace().collect::<Vec<_>>());
-        assert_eq!(read("was 3"), Ok(Word::Was(Gesture::Label("3".to_owned()))));
-        assert_eq!(read("class 3"), Ok(Word::Was(Gesture::Class(ClassId(3)))));
-        assert_eq!(read(" undo "), Ok(Word::Undo));
-        for wrong in ["it was 3", "class x", "was", "class 300"] {
-            assert!(read(wrong).is_err(), "{wrong}");
-        }
     }
 }

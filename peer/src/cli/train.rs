@@ -188,7 +188,9 @@ fn learn(
     let held_out = all.draw_people(args.test_share, &mut ChaCha8Rng::seed_from_u64(args.split_seed));
     if args.test_share > 0.0 && held_out.is_empty() {
         return Err(
-            "--test-share holds out subjects, but the file names (sNNN_…) identify fewer than two".into()
+            "--test-share holds out subjects, but the file names (sNNN_…) identify fewer than two: name the files s001_a.jpg, s002_a.jpg, \
+             one number per person, as `gestalt capture --person N` does; or leave --test-share out, and the model is cross-validated"
+                .into(),
         );
     }
     let (tested, learned): (Vec<_>, Vec<_>) =

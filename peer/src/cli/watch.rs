@@ -1,7 +1,7 @@
 //! `gestalt watch`: decisions and robots of a running swarm, live.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 use tokio::time::MissedTickBehavior;
@@ -9,13 +9,15 @@ use tokio::time::MissedTickBehavior;
 use super::config_args::ConfigArgs;
 use super::robots::table;
 use super::show::{self, Names, clean, line};
+use super::web::WebArgs;
 use super::{Failure, interrupted};
-use gestalt_link::{Client, Heard, News};
+use gestalt_desk::{Event, View};
+use gestalt_link::{Client, News};
 
 /// Attach to a swarm and print its decisions, and robots joining and leaving, until Ctrl-C
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  gestalt watch -e tcp/192.168.1.5:7447
+  gestalt watch -e tcp/192.168.1.5:7447 --web
   gestalt watch --robots")]
 pub struct Args {
     #[command(flatten)]
@@ -26,12 +28,15 @@ pub struct Args {
     count: Option<u64>,
 
     /// Print the status of each robot once and exit
-    #[arg(long)]
+    #[arg(long, conflicts_with = "web")]
     status: bool,
 
     /// Show a table of all robots, refreshed every second: source, frames per second, latency, motion, opinion
-    #[arg(long, conflicts_with_all = ["status", "count"])]
+    #[arg(long, conflicts_with_all = ["status", "count", "web"])]
     robots: bool,
+
+    #[command(flatten)]
+    web: WebArgs,
 
     /// Print JSON Lines, one object per line
     #[arg(long)]
@@ -55,9 +60,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         } else {
             let mut news = client.news().await?;
+            let page = args.web.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}
                 watched = watch(args, &client, &mut news) => watched?,
+            }
+            if let Some(page) = page {
+                page.close().await;
             }
         }
         client.close().await;
@@ -66,11 +75,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Failure> {
+    let (mut view, began) = (View::default(), Instant::now());
     let mut names = Names::default();
     let mut decisions = 0;
     while let Some(heard) = news.next().await {
-        match heard {
-            Heard::Decided(it) => {
+        match view.hear(began.elapsed(), heard.into()) {
+            Some(Event::Decided(it)) => {
                 if !args.json && !names.cover(&it.decision) {
                     names = Names::reported(&client.statuses(super::ANSWER).await?);
                 }
@@ -81,14 +91,14 @@ async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Fail
                     break;
                 }
             }
-            Heard::Came(robot) => {
+            Some(Event::Came(robot)) => {
                 line(args.json, &json!({"event": "came", "robot": robot}), &format!("robot {robot} joined"))?;
             }
-            Heard::Left(robot) => {
+            Some(Event::Left(robot)) => {
                 line(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
             }
             // What each robot holds is in the decision's own message already.
-            Heard::Held(..) => {}
+            Some(Event::Answered(_)) | None => {}
         }
     }
     Ok(())

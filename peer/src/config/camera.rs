@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
+use gestalt_ros::NodeName;
 use gestalt_vision::camera_model::CameraModel;
-use gestalt_vision::config::{LayerConfig, MotionConfig, Schedule};
+use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, Schedule};
 use gestalt_vision::pose::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +62,8 @@ pub enum SourceSection {
     Video(FilesSection),
     /// What `gestalt stream` sends from another machine.
     Stream(StreamSection),
+    /// A camera topic of a ROS 2 system.
+    Ros(RosSection),
 }
 
 /// A synthetic hand in front of a robot that stands somewhere.
@@ -85,6 +88,9 @@ pub struct RenderedSection {
 pub struct DeviceSection {
     /// Its file, `/dev/video0`.
     pub path: PathBuf,
+    /// How it is set up.
+    #[serde(default)]
+    pub v4l2: DeviceSettings,
 }
 
 /// Frames from the disk.
@@ -106,6 +112,21 @@ pub struct StreamSection {
     pub robot: Option<RobotId>,
 }
 
+/// A camera that a ROS 2 driver owns. It is known to ROS as the node `gestalt_camera_<robot>`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RosSection {
+    /// The topic, from its first slash: of `sensor_msgs/CompressedImage` when it ends in `/compressed`, as image_transport names them,
+    /// otherwise of `sensor_msgs/Image`.
+    pub topic: String,
+    /// The Zenoh router of the ROS system; `null`: the one on this machine, `tcp/localhost:7447`.
+    #[serde(default)]
+    pub router: Option<String>,
+    /// The ROS domain, `ROS_DOMAIN_ID`.
+    #[serde(default)]
+    pub domain: u32,
+}
+
 impl CameraSection {
     /// What its frames are seen with.
     #[cfg(feature = "opencv")]
@@ -123,6 +144,15 @@ impl CameraSection {
             checks.push(pose.validate().map_err(|error| ConfigError::value(key, error)));
             let schedule = schedule.map_or(Ok(()), |schedule| schedule.validate());
             checks.push(schedule.map_err(|cause| ConfigError::value(&format!("{key}.schedule"), cause)));
+        }
+        if let SourceSection::Ros(RosSection { topic, .. }) = &self.source {
+            let named = NodeName::new("/", "gestalt").and_then(|node| node.topic(topic));
+            checks
+                .push(named.map(drop).map_err(|error| ConfigError::value("camera.source.ros.topic", error)));
+        }
+        if let SourceSection::Device(device) = &self.source {
+            let set = device.v4l2.validate();
+            checks.push(set.map_err(|cause| ConfigError::value("camera.source.device.v4l2", cause)));
         }
         checks.into_iter().filter_map(Result::err).collect()
     }

@@ -41,7 +41,7 @@ fn files(config: &Config) -> Vec<ConfigError> {
 }
 
 /// Whether the robot's memory is its own, and fits its model.
-fn memory(config: &Config, model: &RobotModel) -> Result<(), ConfigError> {
+pub(crate) fn memory(config: &Config, model: &RobotModel) -> Result<(), ConfigError> {
     let Some(mut learning) = learning(&config.learning, model) else { return Ok(()) };
     let Some(path) = learning.memory.take() else { return Ok(()) };
     let wrong = |cause: String| Err(ConfigError::value("learning.memory", cause));

@@ -10,6 +10,7 @@ mod learning;
 mod links;
 mod template;
 mod trust;
+mod web;
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -23,16 +24,18 @@ use serde_json::{Map, Value};
 use gestalt_link::{LinkConfig, LinkError, Scouting};
 
 pub use camera::{
-    CameraChoice, CameraSection, DeviceSection, FilesSection, RenderedSection, SourceSection, StreamSection,
+    CameraChoice, CameraSection, DeviceSection, FilesSection, RenderedSection, RosSection, SourceSection,
+    StreamSection,
 };
 pub use center::{CenterSection, Fuse, StreamingSection};
 pub use document::{Document, Override};
 pub use error::ConfigError;
-pub use gestalt_vision::config::{LayerConfig, MotionConfig, MotionConfigError, Schedule};
+pub use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, MotionConfigError, Schedule};
 pub use learning::{LearnFrom, LearningSection};
 pub use links::{LinksSection, ScoutingSection};
 pub use template::TEMPLATE;
 pub use trust::{ROSTER_FILE, TrustSection, key_file};
+pub use web::WebSection;
 
 /// One robot: who it is, what it sees with, how it decides, whom it talks to.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -54,6 +57,8 @@ pub struct Config {
     pub center: CenterSection,
     /// Whom the robot believes.
     pub trust: TrustSection,
+    /// A page to watch and teach the swarm.
+    pub web: WebSection,
     /// How the robot finds others, and how many it links to.
     pub links: LinksSection,
     /// Zenoh's own configuration, verbatim; it takes precedence over what Gestalt sets, key by key.
@@ -118,8 +123,9 @@ impl FromStr for ModelSection {
 
 impl Config {
     /// The names of the sections: what a `--cfg` path can begin with, besides Zenoh's own keys.
-    pub const SECTIONS: &[&str] =
-        &["robot", "swarm", "camera", "model", "learning", "rounds", "center", "trust", "links", "zenoh"];
+    pub const SECTIONS: &[&str] = &[
+        "robot", "swarm", "camera", "model", "learning", "rounds", "center", "trust", "web", "links", "zenoh",
+    ];
 
     /// Reads and checks a configuration file.
     ///
@@ -307,6 +313,11 @@ mod tests {
                 "{camera: {source: {rendered: {pose: {bearing_deg: 0, elevation_deg: 0, distance_m: 0}}}}, model: 'rendered'}",
                 "pose",
                 "0.3",
+            ),
+            (
+                "{camera: {source: {device: {path: '/dev/video0', v4l2: {buffers: 1}}}}, model: 'hands'}",
+                "camera.source.device.v4l2",
+                "2 to 10",
             ),
             ("{camera: {motion: {area: 2}}}", "camera.motion", "0.0002"),
             ("{camera: {motion: {hold: 3}}}", "camera.motion.hold", "duration"),

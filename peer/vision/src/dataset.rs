@@ -27,7 +27,7 @@ pub use folders::{Ignored, NONE, Naming, has_image_name};
 #[derive(Debug, Error)]
 pub enum DatasetError {
     /// It cannot be read.
-    #[error("cannot read the dataset folder {}: {source}", path.display())]
+    #[error("cannot read the dataset folder {}: {source}: check the path; it has one subfolder per gesture", path.display())]
     Io {
         /// The folder.
         path: PathBuf,
@@ -35,7 +35,7 @@ pub enum DatasetError {
         source: io::Error,
     },
     /// It has no folder with images of a gesture in it.
-    #[error("{} holds no images: put them into one folder per gesture, as .jpg, .jpeg or .png", .0.display())]
+    #[error("{} has no subfolders with images: put them into one folder per gesture, as .jpg, .jpeg or .png (convert others)", .0.display())]
     Empty(PathBuf),
     /// Named more than once: it would be learned from and measured on at the same time.
     #[error("{} is given twice: name each dataset once", .0.display())]
@@ -54,7 +54,10 @@ pub enum DatasetError {
     #[error("'{NONE}' holds pictures without a gesture, which nobody learns: leave it out of the gestures")]
     NoGesture,
     /// The folders make no vocabulary.
-    #[error("the folders of {} make no vocabulary: {source}", joined(folders))]
+    #[error(
+        "the folders of {} make no vocabulary: {source}: one subfolder for each gesture, named after it",
+        joined(folders)
+    )]
     Vocabulary {
         /// The datasets.
         folders: Vec<PathBuf>,

@@ -25,7 +25,7 @@ const MAX_BODY: u64 = 2 * MAX_MODEL as u64;
 #[derive(Debug, Error)]
 pub enum ModelFileError {
     /// It cannot be read or written.
-    #[error("cannot {action} the model {}: {source}", path.display())]
+    #[error("cannot {action} the model {}: {source}: check the path; `gestalt train --out FILE` writes one", path.display())]
     Io {
         /// `read` or `write`.
         action: &'static str,

@@ -5,11 +5,13 @@ mod view;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use gestalt_protocol::RobotId;
 use opencv::core::Mat;
 
 use self::view::View;
 use super::Failure;
 use super::source_arg::{Kind, Rendered, SourceArg, kind};
+use crate::camera_source::open_source;
 use crate::config::{CameraChoice, CameraSection, Config, ModelSection, SourceSection};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::model::RobotModel;
@@ -25,8 +27,8 @@ use gestalt_vision::source::{
   gestalt look hand.jpg
   gestalt look /dev/video0 --camera laptop --out stages.png")]
 pub struct Args {
-    /// Image, folder of images, video, device (/dev/video0), or `rendered:3` (a synthetic hand showing 3 fingers;
-    /// `rendered`: an empty scene; `rendered:3,bearing=-30,distance=1.2,seed=7`)
+    /// Image, folder of images, video, device (/dev/video0), ROS 2 topic (`ros:/camera/image_raw`), or `rendered:3` (a
+    /// synthetic hand showing 3 fingers; `rendered`: an empty scene; `rendered:3,bearing=-30,distance=1.2,seed=7`)
     #[arg(value_name = "SOURCE", required_unless_present = "from")]
     source: Option<SourceArg>,
     /// The same as SOURCE
@@ -99,6 +101,7 @@ fn beside(source: &SourceArg) -> PathBuf {
     let stem = match source {
         SourceArg::Rendered(Rendered { fingers: Some(fingers), .. }) => format!("rendered-{fingers}"),
         SourceArg::Rendered(_) => "rendered".to_owned(),
+        SourceArg::Ros(topic) => topic.trim_matches('/').replace('/', "-"),
         SourceArg::Path(path) => {
             path.file_stem().map_or_else(|| "frame".to_owned(), |stem| stem.to_string_lossy().into_owned())
         }
@@ -122,12 +125,21 @@ fn frame(
             };
             let (pose, seed) = (hand.pose.unwrap_or(pose), hand.seed.unwrap_or(seed));
             let camera = camera.cloned().unwrap_or_else(CameraModel::footbot);
-            let rendered = RenderedSource::new(camera, pose, Glove::default(), seed)?;
+            let mut rendered = RenderedSource::new(camera, pose, Glove::default(), seed)?;
             let described = match hand.fingers {
                 None => "synthetic empty scene".to_owned(),
                 Some(fingers) => format!("synthetic hand showing {fingers} fingers"),
             };
-            Ok((skip(rendered, first, &Scene { gesture: hand.fingers, seed })?, described))
+            Ok((skip(&mut rendered, first, &Scene { gesture: hand.fingers, seed })?, described))
+        }
+        SourceArg::Ros(topic) => {
+            let source = source.section().map_err(|error| SourceError::Own(error.to_string()))?;
+            let mut camera = open_source(
+                &CameraSection { source, ..CameraSection::default() },
+                RobotId(0),
+                Duration::ZERO,
+            )?;
+            Ok((skip(camera.as_mut(), first, &Scene::default())?, format!("{topic}, frame {first}")))
         }
         SourceArg::Path(path) => {
             let named = |index: u64| format!("{}, frame {index}", path.display());
@@ -135,13 +147,13 @@ fn frame(
             Ok(match kind(path) {
                 Kind::Image => (read_image(path)?, path.display().to_string()),
                 Kind::Folder => {
-                    (skip(ImageFolder::open(path, Duration::ZERO, false)?, first, &still)?, named(first))
+                    (skip(&mut ImageFolder::open(path, Duration::ZERO, false)?, first, &still)?, named(first))
                 }
-                Kind::Video => (skip(Video::open(path, false)?, first, &still)?, named(first)),
+                Kind::Video => (skip(&mut Video::open(path, false)?, first, &still)?, named(first)),
                 Kind::Device => {
                     let index = index.unwrap_or(WARM_UP);
                     let wanted = camera.cloned().unwrap_or_else(CameraModel::laptop);
-                    (skip(Device::open(path, &wanted)?, index, &still)?, named(index))
+                    (skip(&mut Device::open(path, &wanted)?, index, &still)?, named(index))
                 }
             })
         }
@@ -149,7 +161,7 @@ fn frame(
 }
 
 /// The frame of that index.
-fn skip(mut source: impl Source, index: u64, scene: &Scene) -> Result<Mat, SourceError> {
+fn skip(source: &mut dyn Source, index: u64, scene: &Scene) -> Result<Mat, SourceError> {
     for _ in 0..index {
         source.next_frame(Duration::ZERO, scene)?;
     }

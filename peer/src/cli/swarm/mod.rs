@@ -18,10 +18,14 @@ use serde_json::json;
 use self::showing::Showing;
 use super::keys;
 use super::progress::bar;
+use super::record;
 use super::show::{Names, counted, line};
+use super::web::WebArgs;
 use super::{Failure, interrupted};
 use crate::config::{Config, LearnFrom, ModelSection, Schedule};
+use crate::recording::{Recording, RecordingPlan};
 use crate::swarm::{Members, Roster, Tally};
+use gestalt_desk::Desk;
 use gestalt_lab::shape::NetworkShape;
 use gestalt_link::{Client, LinkConfig, News};
 use gestalt_vision::model::RobotModel;
@@ -86,6 +90,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE.svg|FILE.png", requires = "learn")]
     curve: Option<PathBuf>,
 
+    /// Record the run into a new MCAP file, as `gestalt record` does
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+
     /// Name of the swarm
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
     swarm: String,
@@ -97,6 +105,9 @@ pub struct Args {
     /// An open swarm: robots sign nothing, and are who they say they are
     #[arg(long, conflicts_with = "keys")]
     open: bool,
+
+    #[command(flatten)]
+    web: WebArgs,
 
     /// Print JSON Lines, one object per line
     #[arg(long)]
@@ -150,9 +161,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         };
         // Whatever ended the rounds, what they gave is said.
         let reported = report::all(args, &configs, &tally);
+        if let Some(page) = swarm.page.take() {
+            page.close().await;
+        }
+        let recorded = match (swarm.recording, &args.record) {
+            (Some(recording), Some(file)) => {
+                let ledger = recording.finish().await.map_err(Failure::from);
+                ledger.and_then(|ledger| record::report(args.json, file, &ledger))
+            }
+            _ => Ok(()),
+        };
         swarm.client.close().await;
         swarm.members.stop().await;
-        shown.and(reported)
+        shown.and(reported).and(recorded)
     })
 }
 
@@ -161,6 +182,8 @@ struct Swarm {
     members: Members,
     client: Client,
     news: News,
+    page: Option<Desk>,
+    recording: Option<Recording>,
     /// Holds their keys, and the configurations of robots in processes of their own.
     _folder: tempfile::TempDir,
 }
@@ -186,6 +209,14 @@ async fn start(
     let client = Client::open(&args.swarm, &link).await?;
     let news = client.news().await?;
     wait_for_all(&client, configs.len()).await?;
+    let recording = match &args.record {
+        None => None,
+        Some(file) => {
+            let rounds = configs.first().map(|config| &config.rounds);
+            let plan = RecordingPlan { swarm: &args.swarm, link: &link, file, rounds, frames: false };
+            Some(Recording::start(plan).await?)
+        }
+    };
     let seconds = began.elapsed().as_secs_f64();
     line(
         args.json,
@@ -197,7 +228,8 @@ async fn start(
             endpoints.first().map_or("no endpoint", String::as_str)
         ),
     )?;
-    Ok(Swarm { members, client, news, _folder: folder })
+    let page = args.web.open(&args.swarm, &link, args.json).await?;
+    Ok(Swarm { members, client, news, page, recording, _folder: folder })
 }
 
 /// Waits until every robot knows every other.

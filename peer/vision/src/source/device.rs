@@ -10,6 +10,7 @@ use opencv::videoio::{self, VideoCapture};
 
 use super::{Frame, Scene, Source, SourceError};
 use crate::camera_model::CameraModel;
+use crate::config::DeviceSettings;
 
 /// A V4L2 device, `/dev/videoN`. Reading waits for the camera's next frame, for ever if need be: read it in a thread of
 /// its own ([`Reader`](super::Reader)).
@@ -25,6 +26,19 @@ impl Device {
     /// # Errors
     /// When there is no such file, it may not be read, or is no camera that V4L2 can open.
     pub fn open(path: &Path, model: &CameraModel) -> Result<Self, SourceError> {
+        Self::open_with(path, model, &DeviceSettings::default())
+    }
+
+    /// The same with settings of one's own.
+    ///
+    /// # Errors
+    /// As [`Device::open`]; [`SourceError::Own`] for settings outside their ranges.
+    pub fn open_with(
+        path: &Path,
+        model: &CameraModel,
+        settings: &DeviceSettings,
+    ) -> Result<Self, SourceError> {
+        let wishes = wishes(model, settings)?;
         let about = fs::metadata(path).map_err(|cause| SourceError::io(path, cause))?;
         if about.is_file() || about.is_dir() {
             return Err(SourceError::NotADevice(path.into()));
@@ -34,32 +48,49 @@ impl Device {
         if !capture.is_opened()? {
             return Err(SourceError::NotADevice(path.into()));
         }
-        for (property, value) in wishes(model)? {
+        for Wish { property, name, value } in wishes {
             if !capture.set(property, value)? {
-                tracing::debug!("{}: refuses property {property} = {value}", path.display());
+                tracing::info!("{}: refuses {name} = {value}", path.display());
             }
         }
         Ok(Self { path: path.into(), capture, period: model.period() })
     }
 }
 
-/// What a camera is asked for, in this order. It may refuse each of it.
-fn wishes(model: &CameraModel) -> Result<[(i32, f64); 5], SourceError> {
-    Ok([
-        // Uncompressed, most USB cameras have no room for more than 5 to 10 large frames a second. The format comes first:
-        // sizes and rates depend on it.
-        (videoio::CAP_PROP_FOURCC, f64::from(videoio::VideoWriter::fourcc('M', 'J', 'P', 'G')?)),
-        (videoio::CAP_PROP_FRAME_WIDTH, f64::from(model.width_px)),
-        (videoio::CAP_PROP_FRAME_HEIGHT, f64::from(model.height_px)),
-        (videoio::CAP_PROP_FPS, model.fps),
-        // With one buffer the driver has none to fill while the last frame is converted, and every other frame is lost. None
-        // grows old in the others: they are emptied all the time.
-        (videoio::CAP_PROP_BUFFERSIZE, BUFFERS),
-    ])
+/// Something that a camera is asked for.
+struct Wish {
+    property: i32,
+    name: &'static str,
+    value: f64,
 }
 
-/// Buffers of the driver: one being filled, one waiting, one being converted, and one to spare.
-const BUFFERS: f64 = 4.0;
+/// In V4L2's numbers: the exposure is what is set, and in units of 100 µs.
+const MANUAL: f64 = 1.0;
+const EXPOSURE_UNIT: f64 = 1e-4;
+
+/// What a camera is asked for, in this order. It may refuse each of it.
+fn wishes(model: &CameraModel, settings: &DeviceSettings) -> Result<Vec<Wish>, SourceError> {
+    settings.validate().map_err(SourceError::Own)?;
+    let fourcc = i32::from_le_bytes(settings.fourcc().unwrap_or(*b"MJPG"));
+    let wish = |property, name, value| Wish { property, name, value };
+    let mut wishes = vec![
+        // The format comes first: sizes and rates depend on it.
+        wish(videoio::CAP_PROP_FOURCC, "format", f64::from(fourcc)),
+        wish(videoio::CAP_PROP_FRAME_WIDTH, "width", f64::from(model.width_px)),
+        wish(videoio::CAP_PROP_FRAME_HEIGHT, "height", f64::from(model.height_px)),
+        wish(videoio::CAP_PROP_FPS, "frames per second", model.fps),
+        wish(videoio::CAP_PROP_BUFFERSIZE, "buffers", f64::from(settings.buffers)),
+    ];
+    if let Some(exposure) = settings.exposure {
+        let units = (exposure.as_secs_f64() / EXPOSURE_UNIT).round();
+        wishes.push(wish(videoio::CAP_PROP_AUTO_EXPOSURE, "manual exposure", MANUAL));
+        wishes.push(wish(videoio::CAP_PROP_EXPOSURE, "exposure", units));
+    }
+    if let Some(gain) = settings.gain {
+        wishes.push(wish(videoio::CAP_PROP_GAIN, "gain", f64::from(gain)));
+    }
+    Ok(wishes)
+}
 
 impl Source for Device {
     fn describe(&self) -> String {
@@ -88,13 +119,42 @@ impl Source for Device {
 mod tests {
     use super::*;
 
+    fn asked(settings: &DeviceSettings) -> Vec<(i32, f64)> {
+        let wishes = wishes(&CameraModel::laptop(), settings).unwrap();
+        wishes.into_iter().map(|wish| (wish.property, wish.value)).collect()
+    }
+
     #[test]
     fn a_camera_is_asked_for_compressed_frames_first_and_for_buffers_to_spare() {
-        let wishes = wishes(&CameraModel::laptop()).unwrap();
+        let wishes = asked(&DeviceSettings::default());
         let mjpg = i32::from_le_bytes(*b"MJPG");
         assert_eq!(wishes[0], (videoio::CAP_PROP_FOURCC, f64::from(mjpg)));
         let (_, buffers) = wishes.iter().find(|(wish, _)| *wish == videoio::CAP_PROP_BUFFERSIZE).unwrap();
         assert!((3.0..=4.0).contains(buffers), "{buffers}");
+        assert!(
+            !wishes.iter().any(|(wish, _)| *wish == videoio::CAP_PROP_AUTO_EXPOSURE),
+            "left to the camera"
+        );
+    }
+
+    #[test]
+    fn an_exposure_of_ones_own_is_set_after_the_cameras_own_is_switched_off() {
+        let (exposure, gain) = (Some(Duration::from_millis(10)), Some(32));
+        let settings =
+            DeviceSettings { format: "YUYV".to_owned(), exposure, gain, ..DeviceSettings::default() };
+        let wishes = asked(&settings);
+        assert_eq!(wishes[0].1, f64::from(i32::from_le_bytes(*b"YUYV")));
+        let own = [
+            (videoio::CAP_PROP_AUTO_EXPOSURE, 1.0),
+            (videoio::CAP_PROP_EXPOSURE, 100.0),
+            (videoio::CAP_PROP_GAIN, 32.0),
+        ];
+        assert_eq!(wishes[5..], own);
+        let wrong = DeviceSettings { buffers: 0, ..settings };
+        assert!(matches!(
+            Device::open_with(Path::new("/dev/null"), &CameraModel::laptop(), &wrong),
+            Err(SourceError::Own(_))
+        ));
     }
 
     #[test]

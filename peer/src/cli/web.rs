@@ -1,0 +1,52 @@
+//! The page of a swarm, served by a verb.
+
+use gestalt_desk::{Address, Desk, Door, Token};
+use gestalt_link::{Client, LinkConfig};
+use serde_json::json;
+
+use super::Failure;
+use super::show::line;
+
+/// What chooses the page's token; else one is drawn where one is needed.
+const TOKEN: &str = "GESTALT_WEB_TOKEN";
+
+/// Where a page is served; as flags of a verb.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct WebArgs {
+    /// Serve a page to watch and teach the swarm in a browser, and its metrics at /metrics, and print the address; port 0 is
+    /// any that is free. Elsewhere than on this machine readers need the token that the address ends with
+    /// (GESTALT_WEB_TOKEN chooses it)
+    #[arg(long, value_name = "[HOST:]PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8420")]
+    web: Option<Address>,
+}
+
+impl WebArgs {
+    /// The address that was asked for, or else another.
+    #[cfg(feature = "opencv")]
+    pub(super) fn or(&self, other: Option<&Address>) -> Self {
+        Self { web: self.web.as_ref().or(other).cloned() }
+    }
+
+    /// Serves the page that was asked for, if any, of a swarm that is reached like that, and says where.
+    pub(super) async fn open(
+        &self,
+        swarm: &str,
+        link: &LinkConfig,
+        as_json: bool,
+    ) -> Result<Option<Desk>, Failure> {
+        let Some(address) = &self.web else { return Ok(None) };
+        let mut door = Door::at(address.clone());
+        if let Ok(token) = std::env::var(TOKEN) {
+            door.token = Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?);
+        }
+        let desk = Desk::open(Client::open(swarm, link).await?, swarm, door).await?;
+        let url = desk.url();
+        let from_elsewhere = if desk.address().ip().is_unspecified() {
+            " · from elsewhere with this machine's own address in it"
+        } else {
+            ""
+        };
+        line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{from_elsewhere}"))?;
+        Ok(Some(desk))
+    }
+}

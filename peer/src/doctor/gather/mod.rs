@@ -1,0 +1,106 @@
+//! Gathers what the rules are about: on this machine, and from the robots that answer.
+
+#[cfg(feature = "opencv")]
+mod eye;
+mod files;
+mod network;
+mod statuses;
+
+use std::collections::BTreeSet;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use gestalt_link::rounds_in_words;
+use gestalt_protocol::{RobotId, Status};
+use gestalt_trust::Roster;
+use tokio::task::spawn_blocking;
+
+use super::robot::RobotFacts;
+use super::swarm::SwarmFacts;
+use crate::config::{Config, ROSTER_FILE};
+
+/// What is to be looked at.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The file that describes the robot; `None` when only the way to a swarm is described.
+    pub file: Option<String>,
+    /// Why it cannot be read at all.
+    pub unreadable: Option<String>,
+    /// What it says, as far as it can be understood.
+    pub config: Option<Config>,
+    /// What cannot be understood.
+    pub problems: Vec<String>,
+}
+
+/// Looks at the robot that is described, and at its swarm, at the same time. Takes some three seconds; what hangs is given up.
+pub async fn gather(subject: &Subject) -> (RobotFacts, Option<SwarmFacts>) {
+    let Some(config) = &subject.config else {
+        let facts = RobotFacts {
+            described: subject.file.clone(),
+            unreadable: subject.unreadable.clone(),
+            problems: subject.problems.clone(),
+            ..RobotFacts::new(RobotId(0), since_1970())
+        };
+        return (facts, None);
+    };
+    let ports = network::ports(config);
+    let home = statuses::home(config, &ports).await;
+    let running = home.is_some();
+    let camera = camera(subject, config, running);
+    let swarm = statuses::ask_around(config, home);
+    // A slow disk holds nobody up.
+    let (files, described) = (subject.clone(), config.clone());
+    let files = spawn_blocking(move || files::look(&files, &described, running));
+    let (camera, mut swarm, files) = tokio::join!(camera, swarm, files);
+    let (mut robot, mine) = files.unwrap_or_else(|error| {
+        let unreadable = Some(format!("looking at its files panicked, which is a bug: {error}"));
+        let facts = RobotFacts::new(config.robot.id, since_1970());
+        (RobotFacts { described: subject.file.clone(), unreadable, ..facts }, account(config))
+    });
+    robot.camera = camera;
+    robot.connects = !network::endpoints(config, "connect").is_empty();
+    let answers = |id: RobotId| swarm.parts.iter().flatten().any(|answer| answer.status.robot == id);
+    // One that holds its memory and answers is the one whose memory it is, wherever it listens.
+    let held = robot.memory.as_ref().is_some_and(|memory| memory.held);
+    robot.running = running || held && answers(robot.id);
+    if subject.file.is_some() {
+        robot.ports = if robot.running { Vec::new() } else { ports };
+        swarm.mine = Some(mine);
+    }
+    swarm.running = robot.running;
+    swarm.members = members(config);
+    // Whoever is heard is proof enough.
+    if config.links.scouting.enabled && swarm.parts.is_empty() {
+        robot.multicast = Some(network::multicast(&config.links.scouting));
+    }
+    (robot, Some(swarm))
+}
+
+fn since_1970() -> Duration {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
+}
+
+/// What the robot would say of itself, but for its model.
+fn account(config: &Config) -> Status {
+    Status {
+        sealed: config.trust.keys.is_some(),
+        rounds: rounds_in_words(&config.rounds),
+        ..Status::new(config.robot.id, config.name(), 0)
+    }
+}
+
+fn members(config: &Config) -> Option<BTreeSet<RobotId>> {
+    let roster: Roster = Roster::read(&config.trust.keys.as_ref()?.join(ROSTER_FILE)).ok()?;
+    Some(roster.members().robots.keys().copied().collect())
+}
+
+#[cfg(feature = "opencv")]
+async fn camera(subject: &Subject, config: &Config, running: bool) -> Option<super::robot::CameraFacts> {
+    subject.file.as_ref()?;
+    eye::look(config, running).await
+}
+
+/// Without OpenCV no robot has a camera.
+#[cfg(not(feature = "opencv"))]
+async fn camera(_: &Subject, _: &Config, _: bool) -> Option<super::robot::CameraFacts> {
+    None
+}

@@ -1,0 +1,110 @@
+//! The shell blocks of the documentation.
+
+use std::fmt::Write as _;
+
+use crate::stage::{Stage, root};
+
+const TEXTS: [&str; 9] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "SECURITY.md",
+    "docs/capture.md",
+    "docs/doctor.md",
+    "docs/recording.md",
+    "docs/round.md",
+    "docs/results.md",
+    "docs/glossary.md",
+];
+
+/// Lines that cannot run here, by how they begin, and why.
+const APART: [(&str, &str); 8] = [
+    ("make demo ", "builds and runs the program for a minute"),
+    ("make test ", "is what runs this"),
+    ("pip install eclipse-zenoh", "needs PyPI"),
+    ("gestalt capture --gesture", "needs a camera"),
+    ("gestalt watch --web", "serves until it is stopped"),
+    ("gestalt record run.mcap -e", "records the reader's own swarm until it is stopped"),
+    ("gestalt replay run.mcap --play", "plays to the reader's own clients"),
+    ("python3 examples/subscribe.py", "needs the package of the line before, and listens for ever"),
+];
+
+/// A block of shell.
+struct Block {
+    place: String,
+    lines: Vec<String>,
+}
+
+fn blocks() -> Vec<Block> {
+    let mut found = Vec::new();
+    for text in TEXTS {
+        let content =
+            std::fs::read_to_string(root().join(text)).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let mut open: Option<Block> = None;
+        for (number, line) in content.lines().enumerate() {
+            match (&mut open, line.trim()) {
+                (None, "```sh" | "```bash" | "```shell" | "```console") => {
+                    open = Some(Block { place: format!("{text}:{}", number + 1), lines: Vec::new() });
+                }
+                (Some(_), "```") => found.extend(open.take()),
+                (Some(block), _) => block.lines.push(line.to_owned()),
+                (None, _) => {}
+            }
+        }
+        assert!(open.is_none(), "{text}: a block does not end");
+    }
+    found
+}
+
+fn is_apart(line: &str) -> bool {
+    APART.iter().any(|(begins, _)| line.trim_start().starts_with(begins))
+}
+
+pub fn what_is_not_run_is_still_there() {
+    let blocks = blocks();
+    let lines: Vec<&String> = blocks.iter().flat_map(|block| &block.lines).collect();
+    for (begins, why) in APART {
+        assert!(lines.iter().any(|line| line.starts_with(begins)), "take it off the list: {begins} ({why})");
+    }
+}
+
+pub fn every_shell_block_runs_as_it_is_written() {
+    let mut failed = String::new();
+    let blocks = blocks();
+    assert!(blocks.len() >= 5, "{} blocks", blocks.len());
+    for (number, block) in (0..).zip(&blocks) {
+        let lines: Vec<&str> =
+            block.lines.iter().map(String::as_str).filter(|line| !is_apart(line)).collect();
+        let lines = lines.join("\n");
+        if lines.trim().is_empty() {
+            println!("{}: not run", block.place);
+            continue;
+        }
+        let stage = Stage::new(number);
+        set(&stage, &lines);
+        // What stands for something of the reader's own.
+        let lines = lines.replace("CENTRE:7447", &format!("127.0.0.1:{}", stage.port()));
+        let ran = stage.run(&lines);
+        if !ran.status.success() {
+            let (said, told) = (String::from_utf8_lossy(&ran.stdout), String::from_utf8_lossy(&ran.stderr));
+            let _ = write!(failed, "\n{}: {}\n{lines}\n{said}{told}", block.place, ran.status);
+        }
+    }
+    assert!(failed.is_empty(), "{failed}");
+}
+
+/// What a block speaks of is there.
+fn set(stage: &Stage, lines: &str) {
+    for (name, seed) in [("DIR", 1), ("OTHER", 100)] {
+        if lines.contains(name) {
+            stage.dataset(name, seed);
+        }
+    }
+    if lines.contains("decision.json") {
+        let ran = stage.run("gestalt swarm --robots footbot:3 --rounds 1 --swarm demo --keys keys --json");
+        let told = String::from_utf8_lossy(&ran.stdout).into_owned();
+        let told = told.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
+        let decision =
+            told.filter(|told| told["event"] == "decision").map(|told| told["decision"].clone()).next();
+        std::fs::write(stage.path("decision.json"), decision.expect("a decision").to_string()).unwrap();
+    }
+}

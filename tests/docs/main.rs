@@ -1,0 +1,14 @@
+//! Every shell block of the documentation, run word for word in a folder that has what it speaks of: photographs, a video, the
+//! configurations. And a newcomer's way with real hands. What cannot run is named, with the reason.
+
+mod blocks;
+mod newcomer;
+mod stage;
+
+fn main() -> std::process::ExitCode {
+    gestalt_trials::run(gestalt_trials::trials![
+        [Works] blocks::every_shell_block_runs_as_it_is_written,
+        [Waits] blocks::what_is_not_run_is_still_there,
+        [Works, Data] newcomer::photographs_and_a_video_lead_to_a_model_and_a_robot_that_decides,
+    ])
+}

@@ -1,0 +1,218 @@
+//! The page of a swarm: what it shows and does is what the swarm says and hears.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::time::{Duration, Instant};
+
+use gestalt_desk::{Address, Desk, Door};
+use gestalt_link::{Client, Heard, LinkConfig, RobotConfig};
+use gestalt_protocol::RobotId;
+use gestalt_tests::{Browser, Process, Watched, config, learning, short_rounds, start_learning, unique};
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::time::timeout;
+
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Robots that learn on a line, what is in front of all cameras, and their page.
+struct School {
+    swarm: String,
+    robots: Vec<Watched>,
+    link: LinkConfig,
+    shown: Arc<AtomicU8>,
+    desk: Desk,
+}
+
+impl School {
+    async fn start(robots: u32, name: impl Fn(u32) -> String) -> Self {
+        let swarm = unique("page");
+        let shown = Arc::new(AtomicU8::new(3));
+        let mut line: Vec<Watched> = Vec::new();
+        for id in 0..robots {
+            let connect: Vec<String> =
+                line.last().map(|it| it.robot.locators()[0].clone()).into_iter().collect();
+            let config = RobotConfig {
+                name: name(id),
+                mind: short_rounds(),
+                learning: Some(learning(3, 0.5, None)),
+                ..config(id, &swarm, &connect)
+            };
+            line.push(start_learning(config, shown.clone()).await);
+        }
+        for robot in &line {
+            assert!(robot.sees_alive(robots as usize - 1, PATIENCE).await, "all know all");
+        }
+        let link = LinkConfig { connect: line[0].robot.locators().to_vec(), ..LinkConfig::default() };
+        let desk = desk(&swarm, &link, 0).await;
+        Self { swarm, robots: line, link, shown, desk }
+    }
+
+    async fn client(&self) -> Client {
+        Client::open(&self.swarm, &self.link).await.unwrap()
+    }
+
+    async fn end(self) {
+        self.desk.close().await;
+        for robot in self.robots {
+            robot.stop().await;
+        }
+    }
+}
+
+async fn desk(swarm: &str, link: &LinkConfig, port: u16) -> Desk {
+    let door = Door::at(port.to_string().parse::<Address>().unwrap());
+    Desk::open(Client::open(swarm, link).await.unwrap(), swarm, door).await.unwrap()
+}
+
+/// Whoever reads the page's events, by a plain connection.
+struct Reader {
+    stream: TcpStream,
+    read: String,
+    host: String,
+}
+
+impl Reader {
+    async fn open(desk: &Desk) -> Self {
+        let host = desk.address().to_string();
+        let mut stream = TcpStream::connect(&host).await.unwrap();
+        let request = format!("GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        stream.write_all(request.as_bytes()).await.unwrap();
+        Self { stream, read: String::new(), host }
+    }
+
+    /// Waits until the newest event of that name is as `pick` says; what came before is passed over.
+    async fn wait(&mut self, name: &str, pick: impl Fn(&Value) -> bool) -> Value {
+        let mark = format!("event: {name}\ndata: ");
+        let deadline = tokio::time::Instant::now() + PATIENCE;
+        let mut bytes = vec![0; 65536];
+        loop {
+            let found = self.read.rfind(&mark).map(|at| &self.read[at + mark.len()..]);
+            let found = found.and_then(|rest| serde_json::from_str::<Value>(rest.split_once("\n\n")?.0).ok());
+            if let Some(found) = found.filter(&pick) {
+                return found;
+            }
+            let read = tokio::time::timeout_at(deadline, self.stream.read(&mut bytes)).await;
+            let length = read.unwrap_or_else(|_| panic!("no such {name} in {}", self.read)).unwrap();
+            assert!(length > 0, "the page closed");
+            // Parts of events are told in chunks of HTTP, whose lengths stand on lines of their own.
+            self.read.push_str(&String::from_utf8_lossy(&bytes[..length]));
+        }
+    }
+
+    async fn say(&self, word: &Value) -> Value {
+        let (mut stream, body) = (TcpStream::connect(&self.host).await.unwrap(), word.to_string());
+        let request = format!(
+            "POST /say HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{body}",
+            self.host,
+            body.len()
+        );
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = String::new();
+        timeout(PATIENCE, stream.read_to_string(&mut answer)).await.unwrap().unwrap();
+        let body = answer.split_once("\r\n\r\n").unwrap().1;
+        serde_json::from_str(body).unwrap_or_else(|error| panic!("{error}: {answer}"))
+    }
+}
+
+pub async fn what_the_page_shows_and_says_is_what_the_swarm_says_and_hears() {
+    let school = School::start(4, |id| format!("robot {id}")).await;
+    let client = school.client().await;
+    let (mut decisions, mut news) = (client.decisions().await.unwrap(), client.news().await.unwrap());
+    let mut page = Reader::open(&school.desk).await;
+    let all = |swarm: &Value| swarm["robots"].as_array().is_some_and(|robots| robots.len() == 4);
+    let swarm = page.wait("swarm", |swarm| all(swarm) && swarm["robots"][3]["name"] != "").await;
+    assert_eq!(swarm["vocabulary"], json!(["0", "1", "2", "3", "4", "5"]));
+    // Look: the page shows what Zenoh says.
+    page.say(&json!({"say": "open"})).await;
+    let announced = timeout(PATIENCE, decisions.next()).await.unwrap().unwrap().unwrap();
+    let announced = serde_json::to_value(&announced).unwrap();
+    let shown = page.wait("decision", |shown| shown["round"] == announced["round"]).await;
+    for field in ["class", "confidence", "final", "author", "label"] {
+        assert_eq!(shown[field], announced[field], "{field}");
+    }
+    for field in ["robots", "quorum", "elapsed_ms", "rule"] {
+        assert_eq!(shown[field], announced["certificate"][field], "{field}");
+    }
+    // That was 3: learned, and the curve begins.
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let began = Instant::now();
+    let word = json!({"say": "was", "round": announced["round"], "class": "3"});
+    let answer = page.say(&word).await;
+    assert_eq!(answer["words"], "learned", "{answer}");
+    let rounds = page.wait("rounds", |rounds| rounds["said"][0]["outcome"] == "learned").await;
+    println!("learned and shown after {:?}", began.elapsed());
+    assert_eq!(rounds["rounds"][0]["truth"], "3", "{rounds}");
+    assert_eq!(rounds["curve"].as_array().map(Vec::len), Some(1));
+    // A robot that is killed is gone from the page as its token is.
+    let orders = json!({"id": 9, "swarm": school.swarm, "link": {"listen": ["tcp/127.0.0.1:0"], "connect": school.link.connect}});
+    let mut killed = Process::start(Path::new(env!("CARGO_BIN_EXE_test-robot")), None, &orders);
+    let is_there =
+        |swarm: &Value| swarm["robots"].as_array().is_some_and(|all| all.iter().any(|it| it["id"] == 9));
+    page.wait("swarm", is_there).await;
+    killed.kill();
+    let left = async { while news.next().await.expect("news") != Heard::Left(RobotId(9)) {} };
+    timeout(PATIENCE, left).await.expect("its token goes");
+    let gone = Instant::now();
+    page.wait("swarm", |swarm| !is_there(swarm)).await;
+    println!("gone {:?} after its token", gone.elapsed());
+    assert!(gone.elapsed() < Duration::from_secs(2), "{:?}", gone.elapsed());
+    client.close().await;
+    school.end().await;
+}
+
+pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
+    const EVIL: &str = "<img src=x onerror=alert(1)>";
+    let mut school =
+        School::start(8, |id| if id == 3 { EVIL.to_owned() } else { format!("robot {id}") }).await;
+    let client = school.client().await;
+    let mut decisions = client.decisions().await.unwrap();
+    let url = school.desk.url().to_owned();
+    let began = Instant::now();
+    let mut browser = tokio::task::block_in_place(|| Browser::open(&url));
+    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    see(
+        "document.querySelectorAll('#robots > details').length === 8 && document.querySelector('#live').textContent === 'Live'",
+    );
+    println!("eight robots shown {:?} after the browser began to start", began.elapsed());
+    see(&format!("document.querySelector('#robots').textContent.includes({})", json!(EVIL)));
+    school.shown.store(3, Ordering::Relaxed);
+    tokio::task::block_in_place(|| browser.press("#look"));
+    let announced = timeout(PATIENCE, decisions.next()).await.unwrap().unwrap().unwrap();
+    let label = announced.label.clone().unwrap_or_else(|| "undecided".to_owned());
+    let shown = format!("document.querySelector('#gesture').textContent === {}", json!(label));
+    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    see(&shown);
+    see(&format!(
+        "document.querySelector('#facts').textContent.includes('round {},')",
+        announced.decision.round.counter
+    ));
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    tokio::task::block_in_place(|| browser.press("#gestures [data-key='3']"));
+    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    let took = see("document.querySelector('#answer').textContent.includes('learned')");
+    println!("learned {took:?} after the button");
+    see("document.querySelector('#curve-words').textContent.includes('the swarm in')");
+    let markup = tokio::task::block_in_place(|| {
+        browser.evaluate("document.querySelectorAll('img, script:not([src])').length")
+    });
+    assert_eq!(markup, 0, "a name became a part of the page");
+    let complaints = tokio::task::block_in_place(|| browser.complaints());
+    assert!(complaints.is_empty(), "{complaints:#?}");
+    // The server goes, and comes back.
+    let port = school.desk.address().port();
+    school.desk.close().await;
+    let began = Instant::now();
+    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    see(
+        "document.querySelector('#live').textContent === 'Not live' && !document.querySelector('#lost').hidden",
+    );
+    println!("not live {:?} after the server went", began.elapsed());
+    assert!(began.elapsed() < Duration::from_secs(6), "{:?}", began.elapsed());
+    school.desk = desk(&school.swarm, &school.link, port).await;
+    see("document.querySelector('#live').textContent === 'Live' && document.querySelector('#lost').hidden");
+    tokio::task::block_in_place(|| drop(browser));
+    client.close().await;
+    school.end().await;
+}
