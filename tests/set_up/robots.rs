@@ -126,7 +126,11 @@ pub async fn agreed(robots: &mut [Watched], counter: u32, patience: Duration) ->
     }
     // Who decided early hears of a greater decision later.
     while held.iter().any(|decision| *decision != held[0]) {
-        assert!(Instant::now() < deadline, "round {counter} ended differently: {held:#?}");
+        assert!(
+            Instant::now() < deadline,
+            "round {counter} ended differently: {}",
+            differences(robots, &held)
+        );
         tokio::time::sleep(Duration::from_millis(20)).await;
         for (robot, held) in robots.iter_mut().zip(&mut held) {
             let greater = |event| match event {
@@ -139,6 +143,18 @@ pub async fn agreed(robots: &mut [Watched], counter: u32, patience: Duration) ->
         }
     }
     held.swap_remove(0)
+}
+
+/// Who holds what else than the first robot, and how they are.
+fn differences(robots: &[Watched], held: &[Decision]) -> String {
+    let mut lines = Vec::new();
+    for (robot, decision) in robots.iter().zip(held) {
+        if lines.is_empty() || *decision != held[0] {
+            let (status, rank) = (robot.robot.status(), decision.rank());
+            lines.push(format!("robot {} holds {rank:?}: {decision:?}\n  and is {status:?}", status.robot));
+        }
+    }
+    lines.join("\n")
 }
 
 impl Watched {

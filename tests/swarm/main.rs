@@ -19,6 +19,7 @@ mod mixed;
 mod motion;
 mod page;
 mod partition;
+mod pause;
 mod recording;
 mod ring;
 mod ros;
@@ -44,6 +45,7 @@ fn main() -> std::process::ExitCode {
         [Waits] clients::a_decision_is_announced_once_though_the_spokesrobot_is_killed.await,
         [Waits, Namespaces] partition::a_part_without_the_majority_decides_nothing_and_says_why,
         [Waits, Namespaces] partition::the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal,
+        [Waits, Namespaces] pause::a_line_that_stood_still_agrees_again,
         [Waits] trouble::votes_cost_little_while_a_round_is_open_and_nothing_otherwise.await,
         [Waits] recording::a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise.await,
         [Waits] recording::a_recorder_that_is_killed_loses_less_than_a_second.await,

@@ -20,6 +20,8 @@ pub enum Part {
     Speaking,
     /// Finds other robots and keeps links to some of them. It begins anew.
     Links,
+    /// Makes links anew over which nothing is heard. It begins anew.
+    Deafness,
     /// Asks who is alive after links have changed. It begins anew.
     Census,
     /// Lets others see that this robot is alive. It declares itself anew.
@@ -32,13 +34,14 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Mind,
         Self::Classifier,
         Self::Training,
         Self::Memory,
         Self::Speaking,
         Self::Links,
+        Self::Deafness,
         Self::Census,
         Self::Presence,
         Self::Session,
@@ -55,6 +58,7 @@ impl Part {
             Self::Memory => "memory",
             Self::Speaking => "speaking",
             Self::Links => "links",
+            Self::Deafness => "deafness",
             Self::Census => "census",
             Self::Presence => "presence",
             Self::Session => "session",
@@ -70,7 +74,7 @@ impl Part {
             Self::Training => "it begins anew with all samples; the robot judges as before until then",
             Self::Memory => "it is opened anew, and what waits is written then",
             Self::Speaking => "it goes on with the next; neighbours repeat what is lost",
-            Self::Links | Self::Census | Self::Presence => "it begins anew",
+            Self::Links | Self::Deafness | Self::Census | Self::Presence => "it begins anew",
             Self::Session => "the robot ends: start it again, once its network is up",
             Self::Host => "the guest ends: start it again with its host",
         }

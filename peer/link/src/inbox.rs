@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
     Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId,
@@ -54,6 +54,8 @@ struct State {
     queue: VecDeque<Input>,
     own_votes: VecDeque<u32>,
     links: BTreeMap<ZenohId, RobotId>,
+    /// Since when each of those is linked, and when it last told this robot something.
+    heard: BTreeMap<RobotId, (Instant, Option<Instant>)>,
     alive: BTreeSet<RobotId>,
     links_changed: bool,
     alive_changed: bool,
@@ -229,6 +231,9 @@ impl Inbox {
         if matches!(envelope.message, Message::Vote(_) | Message::Samples(_)) {
             return Err(Refusal::Kind);
         }
+        if let Some((_, last)) = self.lock().heard.get_mut(&envelope.author) {
+            *last = Some(Instant::now());
+        }
         if matches!(envelope.message, Message::Lessons(_)) {
             self.believe(&envelope)?;
         }
@@ -351,8 +356,10 @@ impl Inbox {
         let mut state = self.lock();
         if up {
             state.links.insert(id, robot);
+            state.heard.insert(robot, (Instant::now(), None));
         } else {
             state.links.remove(&id);
+            state.heard.remove(&robot);
             self.lost_links.send_modify(|lost| *lost += 1);
         }
         state.links_changed = true;
@@ -363,6 +370,14 @@ impl Inbox {
     /// The sessions of robots that this one is linked to now.
     pub(super) fn links(&self) -> BTreeMap<ZenohId, RobotId> {
         self.lock().links.clone()
+    }
+
+    /// Since when each session that this one is linked to is, and when that last told this robot something.
+    pub(super) fn hearing(&self) -> Vec<(ZenohId, RobotId, Instant, Option<Instant>)> {
+        let state = self.lock();
+        let heard =
+            state.links.iter().filter_map(|(id, robot)| Some((*id, *robot, *state.heard.get(robot)?)));
+        heard.map(|(id, robot, (since, last))| (id, robot, since, last)).collect()
     }
 
     /// The robots alive by liveliness, or because they are linked to this one.

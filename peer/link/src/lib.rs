@@ -16,6 +16,7 @@ mod boot;
 mod census;
 mod client;
 mod config;
+mod deafness;
 mod error;
 mod event;
 mod failure;

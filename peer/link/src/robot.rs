@@ -16,6 +16,7 @@ use crate::account::Account;
 use crate::apprentice::{Apprentice, Prepared, RobotLearning};
 use crate::census::take_census;
 use crate::config::LinkConfig;
+use crate::deafness::mend_deafness;
 use crate::error::LinkError;
 use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
@@ -157,6 +158,10 @@ impl Robot {
                 Keeper::new(id, &swarm, link.max_links, node, inbox, account, zenoh.clone()).run()
             });
         }
+        let (linked, heard, mended, idle) =
+            (node.clone(), inbox.clone(), account.clone(), rounds.repair_idle);
+        supervisor
+            .keep(Part::Deafness, move || mend_deafness(linked.clone(), heard.clone(), mended.clone(), idle));
         let (of_census, of_keys, counted) = (node.clone(), keys.clone(), inbox.clone());
         supervisor
             .keep(Part::Census, move || take_census(of_census.clone(), of_keys.clone(), counted.clone()));

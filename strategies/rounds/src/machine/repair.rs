@@ -21,7 +21,7 @@ impl Rounds {
         if robots == *self.neighbours() {
             return;
         }
-        let new = self.partners.change(robots);
+        let new = self.partners.change(self.now, robots);
         self.forget_accounts();
         self.hurry_repair();
         for robot in new {
@@ -59,7 +59,8 @@ impl Rounds {
         if let Some(give) = self.lacking_there(order, have) {
             self.tell(from, Message::Give(give), effects);
         }
-        if !have.answer && self.lacking_here(order, have) {
+        let owes = self.partners.owes(self.now, from, self.config.repair_idle);
+        if !have.answer && (owes || self.lacking_here(order, have)) {
             self.tell_have(from, true, effects);
         }
     }
@@ -67,17 +68,19 @@ impl Rounds {
     /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
     pub(super) fn on_give(&mut self, from: RobotId, give: Give, effects: &mut Effects<'_>) {
         let mut news = Give { decision: None, votes: Vec::new() };
+        let mut greater = false;
         let known = self.known(from);
         if let Some(decision) = give.decision.filter(|decision| self.may_hear(decision, Some(known))) {
             let missed = !self.is_this_round(decision.round);
             let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
-            // A greater one for the gesture that is held anyway goes its way from turn to turn.
+            // Of a greater one for the gesture that is held anyway the others are told, and ask for it if they lack it.
             let says_more = missed || known != Some(decision.class);
             if self.hear_decision(decision.clone(), effects) == Heard::News {
                 if !self.is_open() && missed {
                     self.note_missed_announcement();
                 }
                 news.decision = Some(decision).filter(|_| says_more);
+                greater = !says_more && !self.is_open();
             }
         }
         for held in give.votes {
@@ -85,12 +88,22 @@ impl Rounds {
                 news.votes.push(held);
             }
         }
-        if news.decision.is_none() && news.votes.is_empty() {
+        let is_news = news.decision.is_some() || !news.votes.is_empty();
+        if !is_news && !greater {
             return;
+        }
+        if greater {
+            // What is told next is what is held then.
+            self.decide(effects);
         }
         let others: Vec<RobotId> = self.neighbours().iter().copied().filter(|r| *r != from).collect();
         for robot in others {
-            self.tell(robot, Message::Give(news.clone()), effects);
+            if is_news {
+                self.tell(robot, Message::Give(news.clone()), effects);
+            }
+            if greater {
+                self.tell_have(robot, false, effects);
+            }
         }
     }
 
@@ -131,6 +144,7 @@ impl Rounds {
     }
 
     pub(super) fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
+        self.partners.tell(self.now, robot);
         let have = Have {
             round: self.round(),
             decision: self.round.as_ref().and_then(|round| round.agreement.rank()),

@@ -97,3 +97,34 @@ fn an_idle_mind_says_one_small_message_per_idle_period() {
 fn a_mind_with_nothing_to_do_wants_no_wake() {
     assert_eq!(mind(7).next_wake(), None);
 }
+
+#[test]
+fn the_others_are_told_of_a_greater_decision_for_the_same_gesture_and_ask_for_it() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Neighbours(robots([3, 4])));
+    mind.handle(
+        ms(0),
+        says(3, 1, Message::Give(Give { decision: Some(decision(1, Some(1), 3, 5)), votes: vec![] })),
+    );
+    let greater = decision(1, Some(1), 4, 5);
+    let give =
+        |sequence| says(3, sequence, Message::Give(Give { decision: Some(greater.clone()), votes: vec![] }));
+    let out = mind.handle(ms(100), give(2));
+    assert_eq!(holds(&out), [Some(1)]);
+    let [(4, Message::Have(have))] = &told(&out)[..] else { panic!("{out:?}") };
+    assert_eq!((have.decision, have.answer), (Some(greater.rank()), false));
+    assert!(told(&mind.handle(ms(110), give(3))).is_empty(), "a rumour dies where it is known");
+}
+
+#[test]
+fn who_has_just_been_met_is_answered_so_that_each_knows_that_it_is_heard() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Neighbours(robots([3])));
+    let nothing = || Message::Have(Have { round: None, ..have(1, &[]) });
+    let out = mind.handle(ms(9000), says(3, 1, nothing()));
+    let answered =
+        told(&out).iter().any(|(_, message)| matches!(message, Message::Have(have) if have.answer));
+    assert!(answered, "{out:?}");
+    let out = mind.handle(ms(10_001), says(3, 2, nothing()));
+    assert!(!told(&out).iter().any(|(_, message)| matches!(message, Message::Have(have) if have.answer)));
+}
