@@ -84,8 +84,11 @@ impl Message {
             Self::Batches(batches) => batches.batches.iter().try_for_each(HeldBatch::check),
             Self::Give(give) => {
                 give.decision.iter().try_for_each(Decision::check)?;
-                give.votes.iter().try_for_each(|held| held.vote.check())
+                give.votes.iter().try_for_each(|held| held.vote.check())?;
+                give.holders.iter().try_for_each(|holder| holder.holding.check())
             }
+            Self::Holding(holding) => holding.check(),
+            Self::Announced(announced) => announced.decision.check(),
         }
     }
 }
