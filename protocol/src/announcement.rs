@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::decision::{Certificate, Decision};
-use crate::envelope::Envelope;
 use crate::id::{ClassId, RobotId, RoundId, Stamp};
-use crate::message::Message;
 use crate::signature::Signature;
 
 /// A decision as a robot announces it for the swarm: the JSON on `decision`.
@@ -24,7 +22,7 @@ pub struct Announcement {
     pub announcer: RobotId,
     /// The announcer's stamp on it.
     pub stamp: Stamp,
-    /// The announcer's signature under the [`Envelope`] that it is; robots of an open swarm sign nothing.
+    /// The announcer's signature under the [`Envelope`](crate::Envelope) that it is; robots of an open swarm sign nothing.
     pub signature: Option<Signature>,
 }
 
@@ -60,26 +58,4 @@ pub struct Announced {
     pub decision: Decision,
     /// The label of its class.
     pub label: Option<String>,
-}
-
-impl Announcement {
-    /// What was said, by the robot that said it; `None` for another message.
-    #[must_use]
-    pub fn of(said: Envelope) -> Option<Self> {
-        let Envelope { author: announcer, stamp, message: Message::Announced(announced), signature } = said
-        else {
-            return None;
-        };
-        let Announced { decision, label } = announced;
-        Some(Self { decision, label, announcer, stamp, signature })
-    }
-}
-
-impl From<Announcement> for Envelope {
-    /// The announcement as its announcer signed it.
-    fn from(announcement: Announcement) -> Self {
-        let Announcement { decision, label, announcer, stamp, signature } = announcement;
-        let message = Message::Announced(Announced { decision, label });
-        Self { author: announcer, stamp, message, signature }
-    }
 }

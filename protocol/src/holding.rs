@@ -4,9 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::decision::{Decision, Rank};
 use crate::decode::DecodeError;
-use crate::envelope::Envelope;
 use crate::id::{ClassId, RobotId, RoundId, Stamp};
-use crate::message::Message;
 use crate::signature::Signature;
 
 /// Which decision a robot holds, in short: the decision itself is for those who lack it, and ask.
@@ -34,7 +32,7 @@ pub struct Holder {
     pub stamp: Stamp,
     /// The word itself.
     pub holding: Holding,
-    /// That robot's signature under the [`Envelope`] that it came in.
+    /// That robot's signature under the [`Envelope`](crate::Envelope) that it came in.
     pub signature: Option<Signature>,
 }
 
@@ -51,13 +49,5 @@ impl Holding {
         let Rank { looks, confidence, .. } = self.rank;
         let possible = looks.is_finite() && looks >= 0.0 && (0.0..=1.0).contains(&confidence);
         if possible { Ok(()) } else { Err(DecodeError::Impossible("a rank that no decision has")) }
-    }
-}
-
-impl From<Holder> for Envelope {
-    /// The word as its robot said it.
-    fn from(holder: Holder) -> Self {
-        let Holder { robot, stamp, holding, signature } = holder;
-        Self { author: robot, stamp, message: Message::Holding(holding), signature }
     }
 }
