@@ -4,8 +4,8 @@
     pip install cryptography
     python3 examples/verify.py decision.json --roster keys/roster.json
 
-Every vote that the decision rests on must be signed by a member of the roster, and the decision must follow from them. `--alpha`, `--clip` and
-`--liars` are those of the swarm's `rounds`.
+A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--alpha`,
+`--clip` and `--liars` are those of the swarm's `rounds`.
 """
 import argparse
 import hashlib
@@ -17,8 +17,9 @@ import sys
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-VERSION = 3
+VERSION, VOTE, ANNOUNCED = 3, 0, 8
 POOLS = ("log_pool", "confidence_weighted")
+RULES = ("majority", "mean_probability", *POOLS)
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
 
@@ -56,22 +57,63 @@ def members(roster: dict) -> bytes:
         entries = [write(name) + bytes.fromhex(key) for name, key in sorted(of.items(), key=order)]
         return varint(len(entries)) + b"".join(entries)
 
-    number, name = (lambda item: int(item[0])), (lambda item: item[0])
+    by_number, by_name = (lambda item: int(item[0])), (lambda item: item[0])
     body = bytes.fromhex(roster["authority"]) + text(roster["swarm"]) + varint(roster["epoch"])
-    body += keys(roster["robots"], lambda robot: varint(int(robot)), number)
-    body += keys(roster.get("instructors", {}), text, name)
-    body += keys(roster.get("expelled", {}), lambda robot: varint(int(robot)), number)
+    body += keys(roster["robots"], lambda robot: varint(int(robot)), by_number)
+    body += keys(roster.get("instructors", {}), text, by_name)
+    body += keys(roster.get("expelled", {}), lambda robot: varint(int(robot)), by_number)
     verify(roster["authority"], b"gestalt-roster-1\0" + body, roster["signature"])
     return hashlib.sha256(b"gestalt-swarm-1" + bytes.fromhex(roster["authority"]) + roster["swarm"].encode()).digest()
 
 
+def name(of: dict) -> bytes:
+    """A round's."""
+    return varint(of["counter"]) + varint(of["opener"]) + varint(of["life"])
+
+
+def number(of: dict) -> bytes:
+    """A stamp's."""
+    return varint(of["boot"]) + varint(of["sequence"])
+
+
+def vector(values: list, kind: str) -> bytes:
+    return varint(len(values)) + struct.pack(f"<{len(values)}{kind}", *values)
+
+
+def maybe(value, write) -> bytes:
+    return b"\0" if value is None else b"\1" + write(value)
+
+
+def the_vote(vote: dict) -> bytes:
+    return name(vote["round"]) + varint(vote["vocabulary"]) + vector(vote["evidence"], "f") + struct.pack("<f", vote["looks"])
+
+
 def statement(held: dict) -> bytes:
     """The vote as its robot said and signed it."""
-    vote, stamp = held["vote"], held["stamp"]
-    name = vote["round"]
-    numbers = [held["robot"], stamp["boot"], stamp["sequence"], 0, name["counter"], name["opener"], name["life"]]
-    body = b"".join(map(varint, [*numbers, vote["vocabulary"], len(vote["evidence"])]))
-    return bytes([VERSION]) + body + struct.pack(f"<{len(vote['evidence']) + 1}f", *vote["evidence"], vote["looks"])
+    return bytes([VERSION]) + varint(held["robot"]) + number(held["stamp"]) + varint(VOTE) + the_vote(held["vote"])
+
+
+def counted(held: dict) -> bytes:
+    beside = bytes([held["class"]]) + struct.pack("<f", held["weight"])
+    signature = maybe(held["signature"], bytes.fromhex)
+    return varint(held["robot"]) + number(held["stamp"]) + beside + the_vote(held["vote"]) + signature
+
+
+def other(held: dict) -> bytes:
+    return varint(held["robot"]) + number(held["stamp"]) + the_vote(held["vote"]) + maybe(held["signature"], bytes.fromhex)
+
+
+def aloud(said: dict) -> bytes:
+    """The decision as its announcer said and signed it, with all that is beside the votes."""
+    certificate = said["certificate"]
+    votes, others = certificate["votes"], certificate["others"]
+    body = name(said["round"]) + maybe(said["class"], lambda one: bytes([one])) + struct.pack("<d", said["confidence"])
+    body += varint(said["author"]) + bytes([said["final"] is True]) + varint(certificate["vocabulary"])
+    body += varint(RULES.index(certificate["rule"])) + vector(certificate["probabilities"], "d")
+    body += varint(len(votes)) + b"".join(map(counted, votes)) + varint(len(others)) + b"".join(map(other, others))
+    body += varint(certificate["robots"]) + varint(certificate["quorum"]) + varint(certificate["elapsed_ms"])
+    body += maybe(said["label"], text)
+    return bytes([VERSION]) + varint(said["announcer"]) + number(said["stamp"]) + varint(ANNOUNCED) + body
 
 
 def softmax(row: list) -> list:
@@ -110,29 +152,50 @@ def least(rule: str, parts: list, top: int, liars: int) -> float:
     return left(part[top] for part in parts) / (len(parts) - liars)
 
 
+def decides(rule: str, evidence: list, given: argparse.Namespace, alpha: float) -> bool:
+    """Whether votes that are enough make a gesture likely enough."""
+    try:
+        probabilities, parts = fuse(rule, evidence, given.clip)
+    except Refused:
+        return False
+    top = probabilities.index(max(probabilities))
+    return least(rule, parts, top, given.liars) - TOLERANCE >= 1 - alpha
+
+
 def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     swarm, certificate = members(roster), decision["certificate"]
     votes, others = certificate["votes"], certificate["others"]
+
+    def signed(by: int, said: bytes, signature: str, what: str) -> None:
+        require(str(by) in roster["robots"], f"robot {by} is no member")
+        require(bool(signature), f"{what} of robot {by} is not signed")
+        verify(roster["robots"][str(by)], b"gestalt-statement-1\0" + swarm + said, signature)
+
+    require(decision["final"] in (True, False), "neither final nor not")
+    signed(decision["announcer"], aloud(decision), decision["signature"], "the announcement")
     robots = [held["robot"] for held in votes + others]
     require(len(set(robots)) == len(robots), "a robot is counted twice")
     for held in votes + others:
-        require(str(held["robot"]) in roster["robots"], f"robot {held['robot']} is no member")
-        require(held["signature"], f"the vote of robot {held['robot']} is not signed")
         require(held["vote"]["round"]["counter"] == decision["round"]["counter"], "a vote of another round")
-        key = roster["robots"][str(held["robot"])]
-        verify(key, b"gestalt-statement-1\0" + swarm + statement(held), held["signature"])
-    if decision["class"] is None:
-        return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
+        signed(held["robot"], statement(held), held["signature"], "the vote")
     classes = len(certificate["probabilities"])
     require(all(len(held["vote"]["evidence"]) == classes for held in votes), "a vote over other gestures")
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
     # What a robot said before it saw anything proves nothing where liars are expected.
     reached = len(votes) if given.liars else len(robots)
-    require(reached >= (certificate["robots"] + given.liars) // 2 + 1, "no majority took part")
-    require(given.liars == 0 or len(votes) > 2 * given.liars, "too few votes for so many liars")
+    majority = reached >= (certificate["robots"] + given.liars) // 2 + 1
+    enough = given.liars == 0 or len(votes) > 2 * given.liars
     rule = certificate["rule"]
-    probabilities, parts = fuse(rule, [held["vote"]["evidence"] for held in votes], given.clip)
-    of_class, alpha = probabilities[decision["class"]], given.alpha or ALPHA.get(rule, 0.5)
+    alpha = given.alpha or ALPHA.get(rule, 0.5)
+    evidence = [held["vote"]["evidence"] for held in votes]
+    if decision["class"] is None:
+        if majority and enough and votes:
+            require(not decides(rule, evidence, given, alpha), "the votes suffice for a gesture")
+        return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
+    require(majority, "no majority took part")
+    require(enough, "too few votes for so many liars")
+    probabilities, parts = fuse(rule, evidence, given.clip)
+    of_class = probabilities[decision["class"]]
     require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
     require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
     require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")

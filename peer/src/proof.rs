@@ -1,6 +1,6 @@
 //! Whether a decision was really made: checked offline, by whoever has the roster.
 
-use gestalt_protocol::{CountedVote, Decision, Envelope, FusionRule, RobotId};
+use gestalt_protocol::{Announcement, CountedVote, Decision, Envelope, FusionRule, RobotId};
 use gestalt_strategies::{MindConfig, follows};
 use gestalt_trust::{Distrust, Roster};
 use thiserror::Error;
@@ -8,6 +8,14 @@ use thiserror::Error;
 /// What keeps a decision from being one.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Unproven {
+    /// No member of the roster announced it, or not so.
+    #[error("it is not what robot {robot} announced: {cause}")]
+    Announcement {
+        /// In whose name it stands.
+        robot: RobotId,
+        /// Why it is not believed.
+        cause: Distrust,
+    },
     /// A vote that no member of the roster cast.
     #[error("the vote of robot {robot}: {cause}")]
     Vote {
@@ -29,12 +37,21 @@ pub enum Unproven {
     Follows,
 }
 
-/// Whether every vote that a decision rests on was signed by a member of the swarm, and the decision follows from them by the rounds of that
-/// configuration. Its author, its duration and what was announced of it are nobody's word.
+/// Whether a member of the swarm announced that, to the last word; every vote that it rests on was signed by a member, and it follows from
+/// them by the rounds of that configuration. Who drew it, how long that took and whether it is final is its announcer's word alone.
 ///
 /// # Errors
 /// The first [`Unproven`] found.
-pub fn check(decision: &Decision, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
+pub fn check(announcement: &Announcement, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
+    let robot = announcement.announcer;
+    let said = Envelope::from(announcement.clone());
+    let signature = said.signature.ok_or(Unproven::Announcement { robot, cause: Distrust::Unsigned })?;
+    let checked = roster.check(&said.statement(), &signature);
+    checked.map_err(|cause| Unproven::Announcement { robot, cause })?;
+    check_votes(&announcement.decision, roster, rounds)
+}
+
+fn check_votes(decision: &Decision, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
     let certificate = &decision.certificate;
     let votes = certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned());
     for held in votes {
@@ -58,7 +75,7 @@ mod tests {
     use std::sync::Arc;
     use std::time::Duration;
 
-    use gestalt_protocol::{ClassId, Message, Signature};
+    use gestalt_protocol::{ClassId, Message, Signature, decode_json};
     use gestalt_strategies::{
         Classify, ClassifyError, Input, Life, Mind, Observation, Output, Sign, Vocabulary,
     };
@@ -136,15 +153,15 @@ mod tests {
         let rounds = MindConfig::default();
         assert_eq!((decision.class, decision.certificate.votes.len()), (Some(ClassId(1)), 3));
         assert_eq!(decision.certificate.others.len(), 1, "who saw nothing took part");
-        assert_eq!(check(&decision, &roster, &rounds), Ok(()));
-        // What its author says of itself is not part of it.
+        assert_eq!(check_votes(&decision, &roster, &rounds), Ok(()));
+        // What its author says of itself is not part of that.
         let mut vain = decision.clone();
         (vain.author, vain.certificate.elapsed_ms, vain.is_final) = (RobotId(4), 0, true);
-        assert_eq!(check(&vain, &roster, &rounds), Ok(()));
+        assert_eq!(check_votes(&vain, &roster, &rounds), Ok(()));
         let unproven = |change: &dyn Fn(&mut Decision)| {
             let mut decision = decision.clone();
             change(&mut decision);
-            check(&decision, &roster, &rounds).unwrap_err()
+            check_votes(&decision, &roster, &rounds).unwrap_err()
         };
         assert_eq!(unproven(&|d| d.class = Some(ClassId(0))), Unproven::Follows);
         assert_eq!(unproven(&|d| d.confidence += 1e-6), Unproven::Follows);
@@ -155,6 +172,48 @@ mod tests {
         assert_eq!(unsigned, Unproven::Vote { robot: RobotId(1), cause: Distrust::Unsigned });
         let stranger = unproven(&|d| d.certificate.votes[2].robot = RobotId(5));
         assert_eq!(stranger, Unproven::Vote { robot: RobotId(5), cause: Distrust::Stranger });
+    }
+
+    #[test]
+    fn what_is_beside_the_votes_is_its_announcers_word() {
+        let (decision, roster) = decided();
+        let rounds = MindConfig::default();
+        let said = |decision: Decision, by: u8| {
+            let (announcer, stamp) = (RobotId(2), gestalt_protocol::Stamp { boot: 1, sequence: 900 });
+            let label = Some("b".to_owned());
+            let unsigned = Announcement { decision, label, announcer, stamp, signature: None };
+            let signer = Signer(Identity::from_bytes(&[by; 32]), roster.swarm_id());
+            let signature = Some(signer.sign(&Envelope::from(unsigned.clone()).statement()));
+            Announcement { signature, ..unsigned }
+        };
+        let announced = said(decision.clone(), 2);
+        assert_eq!(check(&announced, &roster, &rounds), Ok(()));
+        // As a client reads it.
+        let json = serde_json::to_vec(&announced).unwrap();
+        assert_eq!(check(&decode_json(&json).unwrap(), &roster, &rounds), Ok(()));
+        let robot = RobotId(2);
+        let refused = |cause| Err(Unproven::Announcement { robot, cause });
+        assert_eq!(check(&said(decision.clone(), 3), &roster, &rounds), refused(Distrust::Forged));
+        let unsigned = Announcement { signature: None, ..announced.clone() };
+        assert_eq!(check(&unsigned, &roster, &rounds), refused(Distrust::Unsigned));
+        type Change = fn(&mut Decision);
+        let changes: [Change; 7] = [
+            |d| d.is_final ^= true,
+            |d| d.author = RobotId(4),
+            |d| d.round.life ^= 1,
+            |d| d.certificate.elapsed_ms += 1,
+            |d| d.certificate.quorum += 1,
+            |d| d.certificate.votes[0].weight += 1.0,
+            |d| d.class = None,
+        ];
+        for change in changes {
+            let mut changed = announced.clone();
+            change(&mut changed.decision);
+            assert_eq!(check(&changed, &roster, &rounds), refused(Distrust::Forged), "{changed:?}");
+        }
+        // Nor can a member say that votes which decide decide nothing.
+        let undecided = said(Decision { class: None, ..decision }, 2);
+        assert_eq!(check(&undecided, &roster, &rounds), Err(Unproven::Follows));
     }
 
     #[test]
@@ -177,7 +236,7 @@ mod tests {
                 (counted.robot, counted.stamp, counted.vote, counted.signature) =
                     (author, stamp, said, signature);
                 assert!(
-                    check(&forged, &roster, &MindConfig::default()).is_err(),
+                    check_votes(&forged, &roster, &MindConfig::default()).is_err(),
                     "byte {place} of vote {vote}"
                 );
             }

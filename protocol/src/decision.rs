@@ -109,22 +109,6 @@ pub struct Rank {
     pub author: RobotId,
 }
 
-/// Which decision a robot holds, in short, in JSON: the decision itself is for those who lack it, and ask.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Holding {
-    /// The round it ends.
-    pub round: RoundId,
-    /// The gesture.
-    pub class: Option<ClassId>,
-    /// Its place among the decisions of the round.
-    pub rank: Rank,
-    /// Whether it held another gesture of this round before: then it counts for none when it is asked whether a majority holds one.
-    pub changed: bool,
-    /// The robots that see and vote through this one, and leave deciding to it: they hold what it holds.
-    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
-    pub guests: Vec<RobotId>,
-}
-
 impl Ord for Rank {
     fn cmp(&self, other: &Self) -> Ordering {
         self.decided
@@ -161,11 +145,5 @@ impl Decision {
             confidence: self.confidence as f32,
             author: self.author,
         }
-    }
-
-    /// What a robot that holds it, for itself and for its guests, says of it to all; `changed` if it held another gesture before.
-    #[must_use]
-    pub fn holding(&self, guests: Vec<RobotId>, changed: bool) -> Holding {
-        Holding { round: self.round, class: self.class, rank: self.rank(), changed, guests }
     }
 }

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::announcement::{Announced, Announcement};
 use crate::decision::{Certificate, Decision};
 use crate::decode::{DecodeError, encode_versioned, take_versioned};
+use crate::holding::Holder;
 use crate::id::{ClassId, RobotId, Stamp};
 use crate::limits::MAX_MESSAGE;
 use crate::message::Message;
@@ -73,6 +75,36 @@ impl From<HeldBatch> for Envelope {
     }
 }
 
+impl From<Holder> for Envelope {
+    /// The word as its robot said it.
+    fn from(holder: Holder) -> Self {
+        let Holder { robot, stamp, holding, signature } = holder;
+        Self { author: robot, stamp, message: Message::Holding(holding), signature }
+    }
+}
+
+impl Announcement {
+    /// What was said, by the robot that said it; `None` for another message.
+    #[must_use]
+    pub fn of(said: Envelope) -> Option<Self> {
+        let Envelope { author: announcer, stamp, message: Message::Announced(announced), signature } = said
+        else {
+            return None;
+        };
+        let Announced { decision, label } = announced;
+        Some(Self { decision, label, announcer, stamp, signature })
+    }
+}
+
+impl From<Announcement> for Envelope {
+    /// The announcement as its announcer signed it.
+    fn from(announcement: Announcement) -> Self {
+        let Announcement { decision, label, announcer, stamp, signature } = announcement;
+        let message = Message::Announced(Announced { decision, label });
+        Self { author: announcer, stamp, message, signature }
+    }
+}
+
 impl Message {
     fn check(&self) -> Result<(), DecodeError> {
         match self {
@@ -84,8 +116,11 @@ impl Message {
             Self::Batches(batches) => batches.batches.iter().try_for_each(HeldBatch::check),
             Self::Give(give) => {
                 give.decision.iter().try_for_each(Decision::check)?;
-                give.votes.iter().try_for_each(|held| held.vote.check())
+                give.votes.iter().try_for_each(|held| held.vote.check())?;
+                give.holders.iter().try_for_each(|holder| holder.holding.check())
             }
+            Self::Holding(holding) => holding.check(),
+            Self::Announced(announced) => announced.decision.check(),
         }
     }
 }

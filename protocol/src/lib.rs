@@ -1,6 +1,6 @@
 //! What the robots of a Gestalt swarm say to each other, and where.
 //!
-//! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Decision`],
+//! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Announcement`],
 //! [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
 //! of it travels.
 //!
@@ -10,6 +10,7 @@
 //! Decoding is total and bounded: any bytes give a value or a [`DecodeError`], never a panic, and never an
 //! allocation above [`MAX_ALLOCATION`] bytes.
 
+mod announcement;
 mod bounded;
 mod decision;
 mod decode;
@@ -19,6 +20,7 @@ mod fnv;
 mod frame;
 mod fusion_rule;
 pub mod hex;
+mod holding;
 mod id;
 mod instruction;
 mod key;
@@ -30,12 +32,14 @@ mod signature;
 mod status;
 mod vote;
 
-pub use decision::{Certificate, CountedVote, Decision, Holding, Rank};
+pub use announcement::{Announced, Announcement};
+pub use decision::{Certificate, CountedVote, Decision, Rank};
 pub use decode::{DecodeError, decode_json};
 pub use envelope::Envelope;
 pub use fnv::Fnv1a;
 pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
 pub use fusion_rule::{FusionRule, RuleName, RuleNameError};
+pub use holding::{Holder, Holding};
 pub use id::{
     ClassId, FeatureSpaceId, IdError, InstructorId, RobotId, RoundId, SampleId, SampleSeries, Stamp,
     VocabularyId,

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::announcement::Announced;
 use crate::bounded;
 use crate::decision::{Decision, Rank};
+use crate::holding::{Holder, Holding};
 use crate::id::{RobotId, RoundId, Stamp};
 use crate::limits::MAX_ROBOTS;
 use crate::sample::{Batches, Digest, Know, Lessons, Samples};
@@ -26,6 +28,10 @@ pub enum Message {
     Lessons(Lessons),
     /// To one neighbour that lacks them: samples as their authors shared them.
     Batches(Batches),
+    /// To all: which decision the author holds.
+    Holding(Holding),
+    /// To the swarm and its clients: a decision, in JSON. This is what its announcer signs of it.
+    Announced(Announced),
 }
 
 /// What a robot holds of the newest round it knows, in short.
@@ -35,8 +41,8 @@ pub struct Have {
     pub round: Option<RoundId>,
     /// The rank of the decision the author holds for that round.
     pub decision: Option<Rank>,
-    /// Whether the author held another gesture of that round before.
-    pub changed: bool,
+    /// A digest of the words on what robots hold for that round, as far as the author knows them.
+    pub holders: u16,
     /// Which votes of that round the author holds; empty once the round is over.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<(RobotId, Stamp)>,
@@ -55,4 +61,7 @@ pub struct Give {
     /// Votes the neighbour lacks or has only older versions of.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<HeldVote>,
+    /// What robots said that they hold for that round, those words that the neighbour lacks among them.
+    #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
+    pub holders: Vec<Holder>,
 }

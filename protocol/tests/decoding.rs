@@ -1,11 +1,11 @@
 //! Reading is total and bounded: any bytes give a value or a typed error.
 
 use gestalt_protocol::{
-    Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope, FeatureSpaceId,
-    FusionRule, Give, Have, HeldBatch, HeldVote, Instruction, Know, Known, Lesson, Lessons, MAX_ALLOCATION,
-    MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, MAX_SAMPLES, Message, PROTOCOL_VERSION,
-    Rank, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
-    Word, decode_json,
+    Announced, Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope,
+    FeatureSpaceId, FusionRule, Give, Have, HeldBatch, HeldVote, Holder, Holding, Instruction, Know, Known,
+    Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
+    MAX_SAMPLES, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId, SampleId, SampleSeries, Samples,
+    SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -102,7 +102,7 @@ fn message() -> impl Strategy<Value = Message> {
         .prop_map(|(round, decision, votes, knowledge, answer)| Have {
             round,
             decision: decision.map(|decision| decision.rank()),
-            changed: !answer,
+            holders: if answer { 7 } else { 0x1234 },
             votes: votes.into_iter().map(|(robot, stamp)| (RobotId(robot), stamp)).collect(),
             knowledge: knowledge.map(|(key, samples, lessons)| Digest { key, samples, lessons }),
             answer,
@@ -113,9 +113,24 @@ fn message() -> impl Strategy<Value = Message> {
         vote,
         signature: None,
     });
-    let give = (prop::option::of(decision()), prop::collection::vec(held, 0..5))
-        .prop_map(|(decision, votes)| Give { decision, votes });
+    let holder =
+        (any::<u32>(), stamp(), decision(), any::<bool>()).prop_map(|(robot, stamp, held, changed)| Holder {
+            robot: RobotId(robot),
+            stamp,
+            holding: held.holding(changed),
+            signature: None,
+        });
+    let (held, holders) = (prop::collection::vec(held, 0..5), prop::collection::vec(holder, 0..5));
+    let give = (prop::option::of(decision()), held, holders).prop_map(|(decision, votes, holders)| Give {
+        decision,
+        votes,
+        holders,
+    });
+    let announced =
+        (decision(), any::<Option<String>>()).prop_map(|(decision, label)| Announced { decision, label });
     prop_oneof![
+        decision().prop_map(|held| Message::Holding(held.holding(held.is_final))),
+        announced.prop_map(Message::Announced),
         vote().prop_map(Message::Vote),
         have.prop_map(Message::Have),
         give.prop_map(Message::Give),
@@ -301,7 +316,26 @@ fn a_vote_says_only_what_a_robot_can_mean() {
         let Err(DecodeError::Impossible(why)) = read(Message::Vote(vote.clone())) else { panic!("{vote:?}") };
         assert!(why.contains(what), "{why}");
         let held = HeldVote { robot: RobotId(1), stamp: Stamp::default(), vote, signature: None };
-        assert!(read(Message::Give(Give { decision: None, votes: vec![held] })).is_err());
+        assert!(read(Message::Give(Give { decision: None, votes: vec![held], holders: vec![] })).is_err());
+    }
+}
+
+#[test]
+fn a_rank_that_no_decision_has_is_refused() {
+    let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
+    let rank = Rank { decided: true, robots: 2, looks: 2.0, confidence: 0.9, author: RobotId(1) };
+    let holding = |rank| Holding { round, class: Some(ClassId(1)), rank, changed: false };
+    assert!(read(Message::Holding(holding(rank))).is_ok());
+    for rank in [
+        Rank { looks: f32::NAN, ..rank },
+        Rank { looks: -1.0, ..rank },
+        Rank { confidence: f32::INFINITY, ..rank },
+        Rank { confidence: 1.5, ..rank },
+    ] {
+        let holding = holding(rank);
+        assert!(matches!(read(Message::Holding(holding.clone())), Err(DecodeError::Impossible(_))));
+        let holder = Holder { robot: RobotId(1), stamp: Stamp::default(), holding, signature: None };
+        assert!(read(Message::Give(Give { decision: None, votes: vec![], holders: vec![holder] })).is_err());
     }
 }
 
@@ -317,7 +351,7 @@ fn more_classes_or_robots_than_the_limit_are_refused_by_their_reader() {
         read(Message::Have(Have {
             round: None,
             decision: None,
-            changed: false,
+            holders: 0,
             votes,
             knowledge: None,
             answer: false,
@@ -490,21 +524,21 @@ fn no_message_takes_more_memory_than_promised() {
         looks: 0.0,
     };
     let have = |votes| {
-        Message::Have(Have {
-            round: None,
-            decision: None,
-            changed: false,
-            votes,
-            knowledge: None,
-            answer: false,
-        })
+        Message::Have(Have { round: None, decision: None, holders: 0, votes, knowledge: None, answer: false })
     };
     let known = on_the_wire([have(vec![]), have(vec![(RobotId(0), Stamp::default())])]);
     assert!(2 * size_of::<(RobotId, Stamp)>() <= factor * known);
-    let give = |votes| Message::Give(Give { decision: None, votes });
+    let give = |votes| Message::Give(Give { decision: None, votes, holders: vec![] });
     let held = HeldVote { robot: RobotId(0), stamp: Stamp::default(), vote: null, signature: None };
     let given = on_the_wire([give(vec![]), give(vec![held])]);
     assert!(2 * size_of::<HeldVote>() <= factor * given);
+    let gives = |holders| Message::Give(Give { decision: None, votes: vec![], holders });
+    let round = RoundId { counter: 0, opener: RobotId(0), life: 0 };
+    let rank = Rank { decided: false, robots: 0, looks: 0.0, confidence: 0.0, author: RobotId(0) };
+    let holding = Holding { round, class: None, rank, changed: false };
+    let holder = Holder { robot: RobotId(0), stamp: Stamp::default(), holding, signature: None };
+    let given_too = on_the_wire([gives(vec![]), gives(vec![holder])]);
+    assert!(2 * size_of::<Holder>() <= factor * given_too);
     // Beside the vote: the class and the weight.
     let counted = given + 1 + 4;
     assert!(2 * size_of::<CountedVote>() <= factor * counted);

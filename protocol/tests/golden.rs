@@ -2,10 +2,10 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId,
-    FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Instruction, Know, Known, Lesson, Lessons, Message,
-    Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector,
-    VocabularyId, Vote, Word, decode_json,
+    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
+    FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known,
+    Lesson, Lessons, Message, Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
+    Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -39,6 +39,11 @@ fn decision() -> Decision {
             elapsed_ms: 1250,
         },
     }
+}
+
+fn announcement() -> Announcement {
+    let (announcer, stamp) = (RobotId(7), Stamp { boot: 1, sequence: 130 });
+    Announcement { decision: decision(), label: Some("palm".to_owned()), announcer, stamp, signature: None }
 }
 
 fn envelope(message: Message) -> Envelope {
@@ -96,19 +101,19 @@ fn what_a_robot_has() {
     let have = Have {
         round: Some(ROUND),
         decision: Some(decision().rank()),
-        changed: true,
+        holders: 0x1234,
         votes: vec![(RobotId(7), Stamp { boot: 1, sequence: 9 })],
         knowledge: Some(digest(300, 1)),
         answer: true,
     };
-    // Some round; Some rank: decided, robots, looks and confidence as f32, author; changed; one vote: robot, boot, sequence; Some digest:
+    // Some round; Some rank: decided, robots, looks and confidence as f32, author; the digest of who holds what (varint); one vote: robot, boot, sequence; Some digest:
     // key, samples, lessons; answer
     travels_as(
         Message::Have(have),
-        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 01 01 07 01 09 01 {DIGEST} 01"),
+        &format!("{HEAD} 01 01ac0202a101 01 01 01 00000040 0000403f 04 b424 01 07 01 09 01 {DIGEST} 01"),
     );
     let nothing =
-        Have { round: None, decision: None, changed: false, votes: vec![], knowledge: None, answer: false };
+        Have { round: None, decision: None, holders: 0, votes: vec![], knowledge: None, answer: false };
     travels_as(Message::Have(nothing), &format!("{HEAD} 01 00 00 00 00 00 00"));
 }
 
@@ -120,10 +125,35 @@ fn what_a_robot_gives() {
     let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
                    01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
     let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00";
+    // One word on what a robot holds: robot, boot, sequence, the word as it was said, unsigned.
+    let (stamp, holding) = (Stamp { boot: 2, sequence: 6 }, decision().holding(true));
+    let holder = Holder { robot: RobotId(3), stamp, holding, signature: None };
+    let holders = format!("01 03 02 06 {HOLDING} 00");
     travels_as(
-        Message::Give(Give { decision: Some(decision()), votes: vec![held] }),
-        &format!("{HEAD} 02 {decided} {votes}").replace("\n", ""),
+        Message::Give(Give { decision: Some(decision()), votes: vec![held], holders: vec![holder] }),
+        &format!("{HEAD} 02 {decided} {votes} {holders}").replace("\n", ""),
     );
+}
+
+// round; some class; its rank: decided, robots, looks and confidence as f32, author; changed
+const HOLDING: &str = "ac0202a101 0101 01 01 00000040 0000403f 04 01";
+
+#[test]
+fn what_a_robot_holds() {
+    travels_as(Message::Holding(decision().holding(true)), &format!("{HEAD} 07 {HOLDING}"));
+}
+
+#[test]
+fn what_an_announcer_signs() {
+    let announcement = announcement();
+    // The decision as it is given, but here it is final; some label.
+    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
+    let envelope = Envelope::from(announcement.clone());
+    let expected = format!("{HEAD} 08 {decided} 01 04 70616c6d");
+    assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));
+    assert_eq!(Announcement::of(envelope), Some(announcement));
+    assert_eq!(Announcement::of(self::envelope(Message::Vote(vote()))), None);
 }
 
 fn sample(vector: Vector) -> SharedSample {
@@ -219,8 +249,10 @@ fn a_decision_for_clients() {
     let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"rank":{"decided":true,"robots":1,"looks":2.0,"confidence":0.75,"author":4},"changed":true,"guests":[9]}"#;
-    assert_eq!(serde_json::to_string(&decision().holding(vec![RobotId(9)], true)).unwrap(), json);
+    let more = r#","label":"palm","announcer":7,"stamp":{"boot":1,"sequence":130},"signature":null}"#;
+    let json = format!("{}{more}", json.strip_suffix('}').unwrap());
+    assert_eq!(serde_json::to_string(&announcement()).unwrap(), json);
+    assert_eq!(decode_json::<Announcement>(json.as_bytes()), Ok(announcement()));
     let none = Decision { class: None, ..decision() };
     assert!(serde_json::to_string(&none).unwrap().contains(r#""class":null"#));
 }

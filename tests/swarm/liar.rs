@@ -63,6 +63,7 @@ pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
     let give = Message::Give(Give {
         decision: None,
         votes: vec![HeldVote { robot, stamp, vote: other, signature }],
+        holders: vec![],
     });
     let stamp = Stamp { boot: 1, sequence: 3 };
     put(

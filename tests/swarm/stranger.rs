@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use gestalt_link::{Client, LinkConfig, RobotConfig, Seal};
 use gestalt_protocol::{
-    Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Instruction, Keys, Lesson, Lessons,
-    Message, Outcome, RobotId, RoundId, Stamp, Topic, Vote, Word,
+    Announcement, Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction,
+    Keys, Lesson, Lessons, Message, Outcome, RobotId, RoundId, Stamp, Topic, Vote, Word,
 };
 use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, Watched, agreed, config, learning, short_rounds, start, start_learning, unique};
@@ -17,7 +17,7 @@ use gestalt_trust::{Identity, Membership, statement};
 use serde_json::Value;
 use zenoh::qos::CongestionControl;
 
-use crate::trouble::{attach, counted, invented};
+use crate::trouble::{announcing, attach, counted, invented};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -80,7 +80,12 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     // A decision by two hundred invented votes: announced, and given as a neighbour gives.
     let round = RoundId { counter: 2, opener: RobotId(0), life: 9 };
     let decision = invented(round, RobotId(1), 1, 200);
-    put(Topic::Decision, serde_json::to_vec(&decision).unwrap()).await;
+    let announced = announcing(RobotId(1), decision.clone());
+    let statement = Envelope::from(announced.clone()).statement();
+    let signature = Some(statement::sign(&stranger, &swarm_id, &statement));
+    for announced in [announced.clone(), Announcement { signature, ..announced }] {
+        put(Topic::Decision, serde_json::to_vec(&announced).unwrap()).await;
+    }
     let held = |robot| {
         let Envelope { author, stamp, message: Message::Vote(vote), signature } = vote(2, robot) else {
             unreachable!()
@@ -91,28 +96,33 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
         Envelope { author: RobotId(1), stamp: Stamp { boot: u32::MAX, sequence }, message, signature: None }
             .encode()
     };
-    let give = Give { decision: Some(decision.clone()), votes: (0..3).map(held).collect() };
+    let holding = decision.holding(false);
+    let holder = Holder {
+        robot: RobotId(2),
+        stamp: Stamp { boot: u32::MAX, sequence: 1 },
+        holding: holding.clone(),
+        signature: None,
+    };
+    let votes = (0..3).map(held).collect();
+    let give = Give { decision: Some(decision.clone()), votes, holders: vec![holder] };
     put(Topic::Repair(RobotId(0)), said(1, Message::Give(give))).await;
     // Counters that would be used up: as votes, and as what a neighbour says it has.
     for step in 0..4400 {
         let counter = 1_000_000_u32.saturating_mul(step + 1);
         put(Topic::Vote(RobotId(1)), vote(counter, 1).encode()).await;
         let round = Some(RoundId { counter, opener: RobotId(0), life: 9 });
-        let have =
-            Have { round, decision: None, changed: false, votes: vec![], knowledge: None, answer: true };
+        let have = Have { round, decision: None, holders: 0, votes: vec![], knowledge: None, answer: true };
         put(Topic::Repair(RobotId(0)), said(2 + step, Message::Have(have))).await;
     }
-    // What a robot says it holds is asked for, and nobody has it.
-    put(
-        Topic::RobotDecision(RobotId(1)),
-        serde_json::to_vec(&decision.holding(vec![RobotId(2)], false)).unwrap(),
-    )
-    .await;
+    // That a robot holds it is not its own word.
+    put(Topic::RobotDecision(RobotId(1)), said(9000, Message::Holding(holding))).await;
     for (counter, least) in [
         ("refused_vote_unsigned", 4403),
         ("refused_vote_forged", 2),
         ("refused_vote_stranger", 1),
         ("refused_decision_unsigned", 1),
+        ("refused_decision_forged", 1),
+        ("refused_robot_decision_unsigned", 1),
         ("refused_repair_unsigned", 1),
     ] {
         counted(&robots[0], counter, least).await;
@@ -263,7 +273,7 @@ pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
     for (proven, why) in verdicts(&decision) {
         assert!(proven, "{why}: {decision}");
     }
-    let forgeries: [&dyn Fn(&mut Value); 8] = [
+    let forgeries: [&dyn Fn(&mut Value); 16] = [
         &|d| d["class"] = ((d["class"].as_u64().unwrap() + 1) % 6).into(),
         &|d| d["confidence"] = 0.96.into(),
         &|d| d["certificate"]["votes"][0]["vote"]["evidence"][0] = 1.25.into(),
@@ -272,6 +282,15 @@ pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
         &|d| d["certificate"]["votes"][1]["vote"]["round"]["life"] = 5.into(),
         &|d| d["certificate"]["votes"][0]["signature"] = d["certificate"]["votes"][1]["signature"].clone(),
         &|d| d["certificate"]["robots"] = 20.into(),
+        // What no vote covers is its announcer's word.
+        &|d| d["final"] = (!d["final"].as_bool().unwrap()).into(),
+        &|d| d["author"] = 9.into(),
+        &|d| d["round"]["opener"] = 9.into(),
+        &|d| d["certificate"]["elapsed_ms"] = 1.into(),
+        &|d| d["class"] = Value::Null,
+        &|d| d["label"] = "stop".into(),
+        &|d| d["announcer"] = 9.into(),
+        &|d| d["signature"] = Value::Null,
     ];
     for (n, forge) in forgeries.iter().enumerate() {
         let mut forged = decision.clone();

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use gestalt_link::{LinkConfig, LinkError, Robot, RobotConfig};
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Keys, Message, RobotId, RoundId,
-    Stamp, Topic, Vote,
+    Announcement, Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Keys, Message,
+    RobotId, RoundId, Stamp, Topic, Vote,
 };
 use gestalt_strategies::{Classify, MindConfig, Quorum};
 use gestalt_tests::{Fixed, Watched, agreed, config, start, unique};
@@ -115,6 +115,12 @@ pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Deci
     }
 }
 
+/// What an unsigned announcement of it is.
+pub fn announcing(announcer: RobotId, decision: Decision) -> Announcement {
+    let stamp = Stamp { boot: u32::MAX, sequence: 1 };
+    Announcement { decision, label: None, announcer, stamp, signature: None }
+}
+
 pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     let swarm = unique("lies");
     let mut robots = vec![start(config(0, &swarm, &[]), Some(ClassId(4))).await];
@@ -140,7 +146,19 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
         ("refused_vote_", Topic::Vote(nine), nine, vote(vec![f32::NAN; 6])),
         ("refused_vote_", Topic::Vote(nine), nine, vote(vec![f32::INFINITY, 0.0, 0.0, 0.0, 0.0, 0.0])),
         ("refused_vote_", Topic::Vote(RobotId(8)), nine, vote(vec![0.0; 6])),
-        ("refused_vote_", Topic::Vote(nine), nine, Message::Give(Give { decision: None, votes: vec![] })),
+        (
+            "refused_vote_",
+            Topic::Vote(nine),
+            nine,
+            Message::Give(Give { decision: None, votes: vec![], holders: vec![] }),
+        ),
+        ("refused_robot_decision_", Topic::RobotDecision(nine), nine, vote(vec![0.0; 6])),
+        (
+            "refused_robot_decision_",
+            Topic::RobotDecision(RobotId(8)),
+            nine,
+            Message::Holding(invented(round, nine, 2, 3).holding(false)),
+        ),
         ("refused_sample_", Topic::Sample(nine), nine, vote(vec![0.0; 6])),
         ("refused_repair_", Topic::Repair(RobotId(0)), nine, vote(vec![0.0; 6])),
     ];
@@ -167,7 +185,7 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     beyond.class = Some(ClassId(200));
     for lie in [certain, twice, beyond] {
         let before = refusals(&robots[0]);
-        let json = serde_json::to_string(&lie).unwrap();
+        let json = serde_json::to_string(&announcing(nine, lie)).unwrap();
         liar.put(keys.key(&Topic::Decision), json).await.unwrap();
         counted(&robots[0], "refused_", before + 1).await;
     }

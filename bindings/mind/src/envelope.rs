@@ -6,13 +6,13 @@
 //!                                       "evidence": [1.5, -1.5], "looks": 2.0}}}
 //! ```
 //!
-//! Kinds are `vote`, `have`, `give`, `samples`, `know`, `lessons` and `batches`, with the fields of the types of that name in
+//! Kinds are `vote`, `have`, `give`, `samples`, `know`, `lessons`, `batches`, `holding` and `announced`, with the fields of the types of that name in
 //! `gestalt-protocol`. Vectors of samples are spelt `{"f32": […]}`, `{"f16": […]}` (as numbers) or `{"i8": […]}`. What is read
 //! and written again has the same bytes.
 
 use gestalt_protocol::{
-    ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Know, Lessons, MAX_JSON, Message,
-    RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector, Vote,
+    Announced, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons,
+    MAX_JSON, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector, Vote,
 };
 use half::f16;
 use serde::{Deserialize, Serialize};
@@ -67,6 +67,8 @@ enum SpeltMessage {
     Know(Know),
     Lessons(Lessons),
     Batches(SpeltBatches),
+    Holding(Holding),
+    Announced(Announced),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -142,6 +144,8 @@ impl From<Message> for SpeltMessage {
                     });
                 Self::Batches(SpeltBatches { batches: spelt.collect() })
             }
+            Message::Holding(holding) => Self::Holding(holding),
+            Message::Announced(announced) => Self::Announced(announced),
         }
     }
 }
@@ -161,6 +165,8 @@ impl From<SpeltMessage> for Message {
                 });
                 Self::Batches(gestalt_protocol::Batches { batches: held.collect() })
             }
+            SpeltMessage::Holding(holding) => Self::Holding(holding),
+            SpeltMessage::Announced(announced) => Self::Announced(announced),
         }
     }
 }

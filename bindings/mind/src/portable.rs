@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Answer, Decision, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_ROBOTS, Message, RobotId,
+    Announcement, Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_ROBOTS, Message, RobotId,
     Topic, decode_json,
 };
 use gestalt_strategies::{
@@ -176,18 +176,17 @@ impl PortableMind {
         let refused = |cause| MindError::Message { key: shortened(key), cause };
         let topic = self.keys.parse(key).ok_or_else(|| MindError::Key(shortened(key)))?;
         let input = match topic {
-            Topic::Vote(_) | Topic::Sample(_) | Topic::Repair(_) => {
+            Topic::Vote(_) | Topic::Sample(_) | Topic::Repair(_) | Topic::RobotDecision(_) => {
                 let envelope = Envelope::decode(payload).map_err(refused)?;
                 if !self.belongs(&topic, &envelope) {
                     return Err(MindError::Mismatch(shortened(key)));
                 }
                 Input::Received(envelope)
             }
-            Topic::RobotDecision(robot) => Input::Heard(robot, decode_json(payload).map_err(refused)?),
             Topic::Decision => {
-                let decision: Decision = decode_json(payload).map_err(refused)?;
-                decision.check().map_err(refused)?;
-                Input::Announced(decision)
+                let announcement: Announcement = decode_json(payload).map_err(refused)?;
+                announcement.decision.check().map_err(refused)?;
+                Input::Announced(announcement)
             }
             Topic::Answer(instructor) => {
                 let answer: Answer = decode_json(payload).map_err(refused)?;
@@ -208,11 +207,16 @@ impl PortableMind {
     fn belongs(&self, topic: &Topic, envelope: &Envelope) -> bool {
         let author = envelope.author;
         match (topic, &envelope.message) {
-            (Topic::Vote(robot), Message::Vote(_)) => author == *robot,
+            (Topic::Vote(robot), Message::Vote(_)) | (Topic::RobotDecision(robot), Message::Holding(_)) => {
+                author == *robot
+            }
             (Topic::Sample(robot), Message::Samples(samples)) => {
                 author == *robot && samples.first().is_some_and(|first| first.author == author)
             }
-            (Topic::Repair(_), Message::Vote(_) | Message::Samples(_)) => false,
+            (
+                Topic::Repair(_),
+                Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_),
+            ) => false,
             (Topic::Repair(to), _) => *to == self.settings.robot && author != self.settings.robot,
             _ => false,
         }
@@ -306,19 +310,16 @@ impl PortableMind {
             Output::Broadcast(envelope) => {
                 let topic = match &envelope.message {
                     Message::Samples(_) => Topic::Sample(me),
+                    Message::Holding(_) => Topic::RobotDecision(me),
                     _ => Topic::Vote(me),
                 };
                 self.say(&topic, None, false, envelope.encode());
             }
             Output::Tell(to, envelope) => self.say(&Topic::Repair(to), Some(to), false, envelope.encode()),
-            Output::Hold(decision) => {
-                let holding = decision.holding(Vec::new(), self.mind.has_changed());
-                self.say_json(&Topic::RobotDecision(me), &holding);
-            }
-            Output::Announce(decision) => self.say_json(&Topic::Decision, &self.labelled(&decision)),
+            Output::Announce(announcement) => self.say_json(&Topic::Decision, &announcement),
             Output::Answer(instructor, answer) => self.say_json(&Topic::Answer(instructor), &answer),
-            // The host asks whether a round is open.
-            Output::Opened(_) | Output::Closed(_) => {}
+            // The host asks what it holds, and whether a round is open.
+            Output::Hold(_) | Output::Opened(_) | Output::Closed(_) => {}
             Output::Train(changes) => self.untrained.extend(changes),
             // A mind without a memory is owed nothing for it.
             Output::Remember { .. } => {}
@@ -386,15 +387,10 @@ impl PortableMind {
     /// announced.
     #[must_use]
     pub fn decision(&self) -> Option<String> {
-        self.mind.held().map(|decision| self.labelled(decision).to_string())
-    }
-
-    fn labelled(&self, decision: &Decision) -> serde_json::Value {
-        let vocabulary = self.mind.vocabulary().filter(|own| own.id() == decision.certificate.vocabulary);
-        let label = vocabulary.zip(decision.class).and_then(|(own, class)| own.label(class));
+        let decision = self.mind.held()?;
         let mut value = json!(decision);
-        value["label"] = json!(label);
-        value
+        value["label"] = json!(self.mind.label_of(decision));
+        Some(value.to_string())
     }
 
     /// What is worth knowing of this mind, as JSON: its round, what it holds, what it has learned, and what it refused and lost

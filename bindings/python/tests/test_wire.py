@@ -9,6 +9,7 @@ import gestalt_swarm as g
 VOTE = bytes.fromhex("03070182010 0ac0202a1018486880802 0000c03f0000c0bf00000040".replace(" ", ""))
 NULL_VOTE = bytes.fromhex("03070182 0100ac0202a1018486880800 00000000".replace(" ", ""))
 NOTHING = bytes.fromhex("0307018201 01000000000000".replace(" ", ""))
+HOLDING = bytes.fromhex("0307018201 07ac0202a10101010101000000400000403f0401".replace(" ", ""))
 
 
 class Envelopes(unittest.TestCase):
@@ -20,7 +21,7 @@ class Envelopes(unittest.TestCase):
         body = vote["message"]["body"]
         self.assertEqual(body["round"], {"counter": 300, "opener": 2, "life": 161})
         self.assertEqual((body["vocabulary"], body["evidence"], body["looks"]), (0x01020304, [1.5, -1.5], 2.0))
-        for golden in (VOTE, NULL_VOTE, NOTHING):
+        for golden in (VOTE, NULL_VOTE, NOTHING, HOLDING):
             self.assertEqual(g.encode(g.decode(golden)), golden)
 
     def test_samples_are_spelt_out_one_by_one(self):

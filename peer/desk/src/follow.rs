@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_link::{Announcement, Answers, Client, LinkError, News};
-use gestalt_protocol::{Answer, Instruction, InstructorId, Status};
+use gestalt_link::{Answers, Client, LinkError, News};
+use gestalt_protocol::{Announcement, Answer, Instruction, InstructorId, Status};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 

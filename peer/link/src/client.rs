@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Answer, DecodeError, Instruction, InstructorId, Keys, RobotId, Status, Topic, decode_json,
+    Announcement, Answer, DecodeError, Instruction, InstructorId, Keys, RobotId, Status, Topic, decode_json,
 };
 use serde::de::DeserializeOwned;
 use zenoh::Session;
@@ -15,7 +15,7 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 
 use super::identity::{robot_of, swarm_checksum};
-use super::{Announcement, LinkConfig, LinkError, News};
+use super::{LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
 const MAX_WAITING: usize = 1024;

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use gestalt_protocol::{Answer, Decision, InstructorId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{Announcement, Answer, Decision, InstructorId, RobotId, RoundId, SampleId};
 
-use crate::announcement::Announcement;
 use crate::failure::Part;
 
 /// How many observations and instructions of the program may wait for the robot's task.

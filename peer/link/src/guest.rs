@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use gestalt_protocol::{RobotId, Status};
+use gestalt_protocol::{Decision, RobotId, Status};
 use gestalt_strategies::{Classify, Input, Voter};
 use tokio::sync::{broadcast, mpsc};
 
@@ -166,6 +166,7 @@ impl Guest {
                     None => break,
                 },
                 event = host_events.recv() => match event {
+                    Ok(Event::Held(decision)) => self.hold(&decision).await,
                     Ok(event) => self.on_event(event),
                     Err(broadcast::error::RecvError::Lagged(_)) => self.catch_up(),
                     Err(broadcast::error::RecvError::Closed) => break,
@@ -224,6 +225,14 @@ impl Guest {
         }
         // An error says that nobody listens, which is fine.
         let _ = self.events.send(event);
+    }
+
+    /// Says that it holds what its host does.
+    async fn hold(&mut self, decision: &Decision) {
+        if let Some(said) = self.voter.holds(decision) {
+            self.presence.hold(&said);
+            self.tell_host(Input::Received(said)).await;
+        }
     }
 
     fn note_alive(&self, robots: impl IntoIterator<Item = RobotId>) {

@@ -4,13 +4,12 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Decision, RobotId};
+use gestalt_protocol::{Message, RobotId};
 use gestalt_strategies::mind::Mind;
-use gestalt_strategies::{Classify, Fuse, Input, Output, Vocabulary};
+use gestalt_strategies::{Classify, Fuse, Input, Output};
 use tokio::sync::{broadcast, mpsc};
 
 use crate::account::Account;
-use crate::announcement::Announcement;
 use crate::apprentice::Apprentice;
 use crate::event::Event;
 use crate::guard::Sight;
@@ -38,7 +37,6 @@ pub(crate) struct Host {
     /// Your own fusion rule.
     pub fusion: Option<Arc<dyn Fuse>>,
     pub seal: Option<Arc<Seal>>,
-    pub vocabulary: Option<Vocabulary>,
     pub apprentice: Option<Apprentice>,
     /// For the program around the robot to look at.
     pub classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
@@ -83,7 +81,7 @@ impl Host {
         if let Some(blind) = self.sight.news() {
             self.handle(Input::Blind(blind));
         }
-        self.voice.publish_hold();
+        self.voice.publish_hold(&mut self.mind);
         self.report_learning();
         for (refusal, count) in self.mind.refusals().iter() {
             if count > 0 {
@@ -112,10 +110,9 @@ impl Host {
                 self.account.lock().neighbours = neighbours.iter().copied().collect();
                 self.tell(Event::Neighbours(neighbours.clone()));
             }
-            Input::Announced(decision) => self.tell(Event::Announced(self.announcement(decision))),
+            Input::Announced(announcement) => self.tell(Event::Announced(announcement.clone())),
             Input::Learned(classifier) => {
                 let guarded = self.sight.guard(classifier.clone())?;
-                self.vocabulary = Some(guarded.vocabulary().clone());
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier.clone());
                 return Some(Input::Learned(guarded));
             }
@@ -138,13 +135,18 @@ impl Host {
         let learning = apprentice.learning().clone();
         // Its rounds are counted anew from what is remembered: another life, by name too.
         let life = identity::life(boot, fresh_nonce());
-        let mind =
-            new_mind(self.me, life, self.mind.config().clone(), self.fusion.clone(), self.seal.as_deref())
-                .map_err(|error| error.to_string())
-                .and_then(|mind| {
-                    mind.learning(learning.setup(self.me, boot, Some(memory)))
-                        .map_err(|error| error.to_string())
-                });
+        let mind = new_mind(
+            self.me,
+            life,
+            self.mind.config().clone(),
+            self.fusion.clone(),
+            self.seal.as_deref(),
+            None,
+        )
+        .map_err(|error| error.to_string())
+        .and_then(|mind| {
+            mind.learning(learning.setup(self.me, boot, Some(memory))).map_err(|error| error.to_string())
+        });
         let mind = match mind {
             Ok(mind) => mind,
             Err(error) => {
@@ -197,7 +199,7 @@ impl Host {
         match output {
             Output::Broadcast(envelope) => {
                 self.voice.broadcast(&envelope);
-                if let gestalt_protocol::Message::Samples(samples) = envelope.message {
+                if let Message::Samples(samples) = envelope.message {
                     self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
                 }
             }
@@ -206,13 +208,10 @@ impl Host {
                 let mut status = self.account.lock();
                 status.round = status.round.max(Some(decision.round));
                 drop(status);
-                let guests = self.guests.present().into_iter().collect();
-                let holding = decision.holding(guests, self.mind.has_changed());
-                self.voice.hold(self.announcement(&decision), holding);
+                self.voice.hold(decision.round);
                 self.tell(Event::Held(decision));
             }
-            Output::Announce(decision) => {
-                let announcement = self.announcement(&decision);
+            Output::Announce(announcement) => {
                 self.voice.announce(&announcement);
                 self.tell(Event::Announced(announcement));
             }
@@ -244,12 +243,6 @@ impl Host {
                 }
             }
         }
-    }
-
-    fn announcement(&self, decision: &Decision) -> Announcement {
-        let vocabulary = self.vocabulary.as_ref().filter(|v| v.id() == decision.certificate.vocabulary);
-        let label = decision.class.and_then(|class| vocabulary?.label(class)).map(str::to_owned);
-        Announcement { decision: decision.clone(), label }
     }
 
     fn tell(&self, event: Event) {

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
-    Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId,
-    Topic, decode_json,
+    Announcement, Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
+    Message, RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Distrust, Evidence, Judge};
@@ -17,7 +17,6 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::session::ZenohId;
 
 use super::account::{Account, Refusal};
-use super::announcement::Announcement;
 use super::identity::robot_of;
 use super::seal::Seal;
 
@@ -228,7 +227,12 @@ impl Inbox {
         if envelope.author == self.me {
             return Err(Refusal::Twin);
         }
-        if matches!(envelope.message, Message::Vote(_) | Message::Samples(_)) {
+        // What is said to all comes under a key of its own.
+        let to_all = matches!(
+            envelope.message,
+            Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_)
+        );
+        if to_all {
             return Err(Refusal::Kind);
         }
         if let Some((_, last)) = self.lock().heard.get_mut(&envelope.author) {
@@ -252,8 +256,8 @@ impl Inbox {
     fn on_decision(&self, sample: &Sample) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
         announcement.decision.check()?;
-        self.judged(|judge, now| judge.decision(now, &announcement.decision)).unwrap_or(Ok(()))?;
-        self.queue(Input::Announced(announcement.decision))
+        self.judged(|judge, now| judge.announcement(now, &announcement)).unwrap_or(Ok(()))?;
+        self.queue(Input::Announced(announcement))
     }
 
     fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
@@ -270,7 +274,18 @@ impl Inbox {
     }
 
     fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
-        self.queue(Input::Heard(id, decode_json(&payload(sample, MAX_JSON)?)?))
+        let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        match &envelope.message {
+            Message::Holding(_) => {
+                self.believe(&envelope)?;
+                // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
+                if id == self.me { Ok(()) } else { self.queue(Input::Received(envelope)) }
+            }
+            _ => Err(Refusal::Kind),
+        }
     }
 
     fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {

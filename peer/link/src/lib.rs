@@ -10,7 +10,6 @@
 //! ```
 
 mod account;
-mod announcement;
 mod apprentice;
 mod boot;
 mod census;
@@ -51,7 +50,6 @@ mod voice;
 mod wake;
 mod worker;
 
-pub use announcement::Announcement;
 pub use apprentice::RobotLearning;
 pub use boot::boot_number;
 pub use client::{Answers, Client, Decisions};

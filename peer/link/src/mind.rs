@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{FusionRule, RobotId};
-use gestalt_strategies::{Fuse, Life, Mind, MindConfig, MindConfigError};
+use gestalt_strategies::{Fuse, Life, Mind, MindConfig, MindConfigError, Vocabulary};
 
 use crate::seal::Seal;
 
@@ -14,6 +14,7 @@ pub(crate) fn new_mind(
     config: MindConfig,
     fusion: Option<Arc<dyn Fuse>>,
     seal: Option<&Seal>,
+    vocabulary: Option<Vocabulary>,
 ) -> Result<Mind, MindConfigError> {
     let mind = match fusion {
         None => Mind::new(id, life, config)?,
@@ -21,6 +22,10 @@ pub(crate) fn new_mind(
         Some(fusion) => {
             Mind::new(id, life, MindConfig { rule: FusionRule::default(), ..config })?.fused_by(fusion)
         }
+    };
+    let mind = match vocabulary {
+        None => mind,
+        Some(vocabulary) => mind.naming(vocabulary),
     };
     Ok(match seal {
         None => mind,

@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use gestalt_protocol::{Holding, Keys, RobotId, RoundId, Topic, decode_json};
+use gestalt_protocol::{
+    Announcement, DecodeError, Envelope, Holding, Keys, Message, RobotId, RoundId, Topic, decode_json,
+};
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 use zenoh::Session;
 use zenoh::sample::{Sample, SampleKind};
-
-use super::Announcement;
 
 /// How many news may wait for a slow reader before it misses some.
 const MAX_WAITING: usize = 1024;
@@ -119,11 +119,11 @@ impl Listener {
     }
 
     fn on_decision(&self, sample: &Sample) {
-        let json = sample.payload().to_bytes();
+        let bytes = sample.payload().to_bytes();
         let heard = match self.keys.parse(sample.key_expr()) {
-            Some(Topic::Decision) => decode_json(&json).map(Heard::Decided),
+            Some(Topic::Decision) => decode_json(&bytes).map(Heard::Decided),
             Some(Topic::RobotDecision(robot)) => {
-                decode_json(&json).map(|holding| Heard::Held(robot, holding))
+                held(robot, &bytes).map(|holding| Heard::Held(robot, holding))
             }
             _ => return,
         };
@@ -157,5 +157,13 @@ impl Listener {
         if let Some(heard) = heard {
             let _ = self.news.send(heard);
         }
+    }
+}
+
+/// What a robot says under its own key that it holds.
+fn held(robot: RobotId, bytes: &[u8]) -> Result<Holding, DecodeError> {
+    match Envelope::decode(bytes)? {
+        Envelope { author, message: Message::Holding(holding), .. } if author == robot => Ok(holding),
+        _ => Err(DecodeError::Impossible("another message than its robot's own word on what it holds")),
     }
 }

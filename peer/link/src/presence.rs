@@ -24,6 +24,7 @@ const TWIN_CHECK: Duration = Duration::from_secs(3);
 /// are ended.
 pub(crate) struct Presence {
     vote: Publisher<'static>,
+    held: Publisher<'static>,
     account: Arc<Account>,
     _status: Queryable<()>,
 }
@@ -50,6 +51,12 @@ impl Presence {
             .congestion_control(CongestionControl::Drop)
             .express(true)
             .await?;
+        let held = session
+            .declare_publisher(keys.key(&Topic::RobotDecision(me)))
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .await?;
         let alive = keys.key(&Topic::Alive(me));
         let token = session.liveliness().declare_token(&alive).await?;
         let (session, asking, mut first) = (session.clone(), account.clone(), Some(token));
@@ -58,7 +65,7 @@ impl Presence {
             let twin = ask_for_twin(session.clone(), status_key.clone(), asking.clone());
             async { tokio::try_join!(token, twin).map(|_| ()) }
         });
-        Ok(Self { vote, account, _status: status })
+        Ok(Self { vote, held, account, _status: status })
     }
 
     /// Says a vote to all.
@@ -67,6 +74,13 @@ impl Presence {
         self.account.sent("vote", bytes.len());
         self.account.check(self.vote.put(bytes.as_slice()).wait());
         bytes
+    }
+
+    /// Says to all what the robot holds.
+    pub fn hold(&self, envelope: &Envelope) {
+        let bytes = envelope.encode();
+        self.account.sent("robot_decision", bytes.len());
+        self.account.check(self.held.put(bytes).wait());
     }
 }
 

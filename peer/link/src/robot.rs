@@ -101,8 +101,14 @@ impl Robot {
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
         let rounds = mind;
-        let mut mind =
-            new_mind(id, identity::life(boot, nonce), rounds.clone(), fusion.clone(), seal.as_deref())?;
+        let mut mind = new_mind(
+            id,
+            identity::life(boot, nonce),
+            rounds.clone(),
+            fusion.clone(),
+            seal.as_deref(),
+            vocabulary.clone(),
+        )?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
         }
@@ -183,7 +189,6 @@ impl Robot {
             commands: command_queue,
             guests: guests.clone(),
             events: events.clone(),
-            vocabulary,
             apprentice,
             classifier: classifier.clone(),
             voice,

@@ -6,7 +6,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, ClassId, Envelope, Holding, InstructorId, Keys, Message, RobotId, Topic};
+use gestalt_protocol::{
+    Announcement, Answer, Envelope, InstructorId, Keys, Message, RobotId, RoundId, Topic,
+};
+use gestalt_strategies::Mind;
 use serde::Serialize;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
@@ -16,7 +19,6 @@ use zenoh::time::Timestamp;
 use zenoh::{Session, Wait};
 
 use crate::account::Account;
-use crate::announcement::Announcement;
 use crate::inbox::Inbox;
 use crate::outbox::{Outbox, Parcel};
 use crate::presence::Presence;
@@ -33,13 +35,14 @@ pub(crate) struct Voice {
     inbox: Arc<Inbox>,
     outbox: Outbox,
     presence: Presence,
-    held: Publisher<'static>,
     swarm: Publisher<'static>,
     last: Arc<Last>,
-    /// What is still to be published on `robot/<me>/decision`, and when.
-    unsaid: Option<(Announcement, Holding, Instant)>,
-    /// The round and the gesture of what was said last, and when.
-    said: Option<(u32, Option<ClassId>, Instant)>,
+    /// What is still to be published on `robot/<me>/decision`.
+    unsaid: Option<Envelope>,
+    /// When that is due, and what clients are answered who ask for the last decision.
+    due: Option<Instant>,
+    /// The round of what is held, and when that was said last.
+    said: Option<(u32, Instant)>,
 }
 
 impl Voice {
@@ -52,16 +55,13 @@ impl Voice {
         presence: Presence,
         account: Arc<Account>,
     ) -> zenoh::Result<Self> {
-        let decision = |topic| {
-            session
-                .declare_publisher(keys.key(&topic))
-                .encoding(Encoding::APPLICATION_JSON)
-                .priority(Priority::InteractiveHigh)
-                .congestion_control(CongestionControl::Drop)
-                .express(true)
-        };
-        let held = decision(Topic::RobotDecision(me)).await?;
-        let swarm = decision(Topic::Decision).await?;
+        let swarm = session
+            .declare_publisher(keys.key(&Topic::Decision))
+            .encoding(Encoding::APPLICATION_JSON)
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Drop)
+            .express(true)
+            .await?;
         let last = Arc::new(Last::default());
         let of_query = last.clone();
         session
@@ -78,27 +78,24 @@ impl Voice {
             inbox,
             outbox,
             presence,
-            held,
             swarm,
             last,
             unsaid: None,
+            due: None,
             said: None,
         })
     }
 
-    /// Says something to all.
-    pub fn broadcast(&self, envelope: &Envelope) {
-        if matches!(envelope.message, Message::Samples(_)) {
-            let key = self.keys.key(&Topic::Sample(self.me));
-            return self.outbox.send(Parcel {
-                kind: "sample",
-                key,
-                bytes: envelope.encode(),
-                express: false,
-            });
+    /// Says something to all; what it holds when that is due.
+    pub fn broadcast(&mut self, envelope: &Envelope) {
+        match envelope.message {
+            Message::Samples(_) => {
+                let (key, bytes) = (self.keys.key(&Topic::Sample(self.me)), envelope.encode());
+                self.outbox.send(Parcel { kind: "sample", key, bytes, express: false });
+            }
+            Message::Holding(_) => self.unsaid = Some(envelope.clone()),
+            _ => self.inbox.said(&self.presence.vote(envelope)),
         }
-        let bytes = self.presence.vote(envelope);
-        self.inbox.said(&bytes);
     }
 
     /// Says something to one neighbour.
@@ -109,7 +106,9 @@ impl Voice {
             | Message::Give(_)
             | Message::Samples(_)
             | Message::Batches(_)
-            | Message::Lessons(_) => "give",
+            | Message::Lessons(_)
+            | Message::Holding(_)
+            | Message::Announced(_) => "give",
         };
         let key = self.keys.key(&Topic::Repair(neighbour));
         self.outbox.send(Parcel { kind, key, bytes: envelope.encode(), express: true });
@@ -139,40 +138,38 @@ impl Voice {
 
     /// Announces a decision for the swarm.
     pub fn announce(&self, announcement: &Announcement) {
-        self.publish("decision", &self.swarm, announcement);
+        let json = as_json(announcement);
+        self.account.sent("decision", json.len());
+        self.account.check(self.swarm.put(json).wait());
     }
 
-    /// Notes the decision that the robot and its guests hold now; that is said when it is due. Robots that are just settling
+    /// Notes that the robot holds another decision of that round now; that is said when it is due. Robots that are just settling
     /// among each other would otherwise each say every step of it to all.
-    pub fn hold(&mut self, announcement: Announcement, holding: Holding) {
-        let round = announcement.decision.round.counter;
-        let before = self.said.filter(|(said, ..)| *said == round);
-        let due = before.map_or_else(Instant::now, |(.., at)| at + HOLD_INTERVAL);
-        self.unsaid = Some((announcement, holding, due));
+    pub fn hold(&mut self, round: RoundId) {
+        let before = self.said.filter(|(said, _)| *said == round.counter);
+        self.due = Some(before.map_or_else(Instant::now, |(_, at)| at + HOLD_INTERVAL));
+        self.said = Some((round.counter, before.map_or_else(Instant::now, |(_, at)| at)));
     }
 
     /// When [`publish_hold`](Self::publish_hold) is to be called.
     pub fn due(&self) -> Option<Instant> {
-        self.unsaid.as_ref().map(|(_, _, due)| *due)
+        self.due
     }
 
     /// Says which decision the robot holds, when it is due.
-    pub fn publish_hold(&mut self) {
-        if let Some((announcement, holding, _)) = self.unsaid.take_if(|(_, _, due)| Instant::now() >= *due) {
-            let (round, class) = (announcement.decision.round.counter, announcement.decision.class);
-            // A greater decision for the same gesture is news to nobody.
-            if self.said.is_none_or(|(said, of, _)| (said, of) != (round, class)) {
-                self.publish("robot_decision", &self.held, &holding);
-            }
-            self.last.set(announcement, self.session.new_timestamp());
-            self.said = Some((round, class, Instant::now()));
+    pub fn publish_hold(&mut self, mind: &mut Mind) {
+        if self.due.take_if(|due| Instant::now() >= *due).is_none() {
+            return;
         }
-    }
-
-    fn publish(&self, kind: &str, publisher: &Publisher<'_>, said: &impl Serialize) {
-        let json = as_json(said);
-        self.account.sent(kind, json.len());
-        self.account.check(publisher.put(json).wait());
+        if let Some(word) = self.unsaid.take() {
+            self.presence.hold(&word);
+        }
+        if let Some((_, at)) = &mut self.said {
+            *at = Instant::now();
+        }
+        if let Some(announcement) = mind.held_aloud() {
+            self.last.set(announcement, self.session.new_timestamp());
+        }
     }
 }
 

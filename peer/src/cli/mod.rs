@@ -49,10 +49,10 @@ use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
-use gestalt_protocol::{Instruction, InstructorId};
+use gestalt_protocol::{Announcement, Instruction, InstructorId};
 use tracing_subscriber::EnvFilter;
 
-use gestalt_link::{Announcement, Client, News};
+use gestalt_link::{Client, News};
 
 pub use show::clean;
 
@@ -109,7 +109,7 @@ enum Verb {
     Explain(explain::Args),
     /// Make keys for the robots of a sealed swarm, and the roster that names them
     Keys(keys::Args),
-    /// Check a decision without the swarm: that every vote it rests on was signed by a member, and that it follows from them
+    /// Check a decision without the swarm: that a member announced it so, and every vote it rests on was signed by one
     Verify(verify::Args),
     /// Say what is wrong with a robot and its swarm, and how to mend it
     Doctor(Box<doctor::Args>),

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_link::{Announcement, Client, Heard};
-use gestalt_protocol::{CameraState, Instruction, InstructorId, MAX_ROBOTS, RobotId, Status};
+use gestalt_link::{Client, Heard};
+use gestalt_protocol::{Announcement, CameraState, Instruction, InstructorId, MAX_ROBOTS, RobotId, Status};
 use gestalt_ros::message::{Diagnostic, Diagnostics, Header, Level, Text};
 use gestalt_ros::{Node, NodeConfig, NodeName, Publisher, Qos, Received, RosError, Subscription};
 use tokio::sync::mpsc;

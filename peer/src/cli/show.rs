@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use gestalt_link::Announcement;
 use gestalt_protocol::{
-    Answer, Certificate, ClassId, Decision, FusionRule, Instruction, RobotId, RoundId, Status,
+    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, RobotId, RoundId, Status,
 };
 use gestalt_strategies::Vocabulary;
 use serde_json::Value;

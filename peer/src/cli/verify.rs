@@ -3,8 +3,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use gestalt_link::Announcement;
-use gestalt_protocol::{MAX_JSON, decode_json};
+use gestalt_protocol::{Announcement, MAX_JSON, decode_json};
 use gestalt_trust::Roster;
 use serde_json::json;
 
@@ -13,7 +12,7 @@ use super::show::{counted, line};
 use crate::config::Config;
 use crate::proof;
 
-/// Check a decision without the swarm: that every vote it rests on was signed by a member, and that it follows from them
+/// Check a decision without the swarm: that a member announced it so, that members signed its votes, and that it follows from them
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt verify decision.json --roster keys/roster.json
@@ -38,10 +37,10 @@ pub struct Args {
 /// What keeps the decision from being one.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let announcement: Announcement = decode_json(&read(&args.decision)?)?;
-    let decision = announcement.decision;
     let roster: Roster = Roster::read(&args.roster)?;
     let config = args.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
-    proof::check(&decision, &roster, &config.rounds)?;
+    proof::check(&announcement, &roster, &config.rounds)?;
+    let decision = announcement.decision;
     let certificate = &decision.certificate;
     let reached = certificate.reached();
     let words = format!(

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId};
+use gestalt_protocol::{
+    Announcement, DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId,
+};
 use opencv::core::Mat;
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
@@ -10,7 +12,7 @@ use tokio::time::MissedTickBehavior;
 use super::credit::Credit;
 use super::failures::Failures;
 use super::feed::{Content, Feed, Shot};
-use gestalt_link::{Announcement, Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
+use gestalt_link::{Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
 use gestalt_vision::human::Human;
 use gestalt_vision::source::{Reader, Scene, SourceError, encode_jpeg};
 

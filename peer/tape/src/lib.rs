@@ -38,6 +38,6 @@ pub use recorder::{Intake, Recorder, Room};
 pub use run::{ROUNDS, Run, SWARM, Showing, Truth, rounds_of};
 pub use schema::schema;
 pub use score::{PairedDifference, Score};
-pub use view::{Alive, Announced, unreadable, view, wire};
+pub use view::{Alive, unreadable, view, wire};
 pub use what_if::{Outcome, WhatIf, outcomes};
 pub use writer::{TapeWriter, WriteError};

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Decision, Envelope, Gesture, HeldVote, Instruction, InstructorId, Keys, Message, RobotId,
-    RoundId, Status, Topic, VocabularyId, decode_json,
+    Announcement, ClassId, Decision, Envelope, Gesture, HeldVote, Instruction, InstructorId, Keys, Message,
+    RobotId, RoundId, Status, Topic, VocabularyId, decode_json,
 };
 use gestalt_rounds::{Quorum, RoundsConfig, Vocabulary};
 use serde_json::Value;
@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::kind::Kind;
 use crate::ledger::Tally;
 use crate::reader::Recorded;
-use crate::view::{Announced, wire};
+use crate::view::wire;
 
 /// The key of the metadata that names the swarm.
 pub const SWARM: &str = "swarm";
@@ -108,7 +108,7 @@ impl Run {
                 self.showing(held.vote.round, recorded.at).votes.push((recorded.at, held));
             }
             Topic::Decision => {
-                let decision = decode_json::<Announced>(&payload).ok()?.decision;
+                let decision = decode_json::<Announcement>(&payload).ok()?.decision;
                 decision.check().ok()?;
                 self.showing(decision.round, recorded.at).announced.push(decision);
             }

@@ -196,6 +196,9 @@ fn decision() -> Vec<Field> {
         must("final", flag("Whether enough robots are known to hold it.")),
         must("certificate", object("What it was drawn from.", certificate)),
         may("label", text("The label of its class.")),
+        must("announcer", robot()),
+        must("stamp", stamp()),
+        may("signature", text("The announcer's signature, in hexadecimal; only in a sealed swarm.")),
     ]
 }
 
@@ -207,12 +210,17 @@ fn holding() -> Vec<Field> {
         must("confidence", probability("The fused probability of its top class.")),
         must("author", robot()),
     ];
-    vec![
+    let holding = vec![
         must("round", round()),
         may("class", class("The gesture; absent: none.")),
         must("rank", object("Its place among the decisions of its round.", rank)),
         must("changed", flag("Whether the robot held another gesture before.")),
-        must("guests", list("Robots that hold it through this one.", robot())),
+    ];
+    vec![
+        must("robot", robot()),
+        must("stamp", stamp()),
+        must("holding", object("What it holds.", holding)),
+        may("signature", signature()),
     ]
 }
 

@@ -3,22 +3,11 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use gestalt_protocol::{
-    Answer, Decision, DecodeError, Envelope, Gesture, HeldVote, Holding, Instruction, MAX_MESSAGE, Message,
-    RobotId, Samples, Stamp, Status, Topic, Vector, decode_json,
+    Announcement, Answer, DecodeError, Envelope, Gesture, HeldVote, Holder, Instruction, MAX_MESSAGE,
+    Message, RobotId, Samples, Stamp, Status, Topic, Vector, decode_json,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-
-/// A decision with the label of its class, as it is announced.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Announced {
-    /// The decision.
-    #[serde(flatten)]
-    pub decision: Decision,
-    /// The label of its class, if the announcer knew one.
-    #[serde(default)]
-    pub label: Option<String>,
-}
 
 /// Whether a robot is there, as it is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,9 +30,9 @@ pub fn view(topic: &Topic, payload: &[u8]) -> Result<Value, DecodeError> {
     let mut view = match topic {
         Topic::Vote(robot) => vote(*robot, payload)?,
         Topic::Sample(robot) => batch(*robot, payload)?,
-        Topic::RobotDecision(_) => plain(&decode_json::<Holding>(payload)?)?,
+        Topic::RobotDecision(robot) => holding(*robot, payload)?,
         Topic::Decision => {
-            let announced: Announced = decode_json(payload)?;
+            let announced: Announcement = decode_json(payload)?;
             announced.decision.check()?;
             let mut view = plain(&announced)?;
             // A rule of somebody's own is an object in JSON; a viewer wants one type.
@@ -90,8 +79,8 @@ pub fn wire(topic: &Topic, view: &Value) -> Option<Vec<u8>> {
     }
     match topic {
         Topic::Vote(_) => Some(Envelope::from(HeldVote::deserialize(view).ok()?).encode()),
-        Topic::RobotDecision(_) => spoken::<Holding>(view),
-        Topic::Decision => spoken::<Announced>(view),
+        Topic::RobotDecision(_) => Some(Envelope::from(Holder::deserialize(view).ok()?).encode()),
+        Topic::Decision => spoken::<Announcement>(view),
         Topic::Status(_) => spoken::<Status>(view),
         Topic::Alive(_) => spoken::<Alive>(view),
         Topic::Feedback(_) => spoken::<Instruction>(view),
@@ -112,6 +101,17 @@ fn vote(robot: RobotId, payload: &[u8]) -> Result<Value, DecodeError> {
     };
     by(author, robot)?;
     plain(&HeldVote { robot, stamp, vote, signature })
+}
+
+/// A robot's word under its own key on what it holds; anything else there is none.
+fn holding(robot: RobotId, payload: &[u8]) -> Result<Value, DecodeError> {
+    let Envelope { author, stamp, message: Message::Holding(holding), signature } =
+        Envelope::decode(payload)?
+    else {
+        return Err(DecodeError::Impossible("another message than what a robot holds"));
+    };
+    by(author, robot)?;
+    plain(&Holder { robot, stamp, holding, signature })
 }
 
 fn batch(robot: RobotId, payload: &[u8]) -> Result<Value, DecodeError> {

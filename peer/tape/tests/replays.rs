@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, FusionRule, Gesture, Instruction, RobotId, RoundId, Topic};
+use gestalt_protocol::{Announcement, ClassId, FusionRule, Gesture, Instruction, RobotId, RoundId, Topic};
 use gestalt_rounds::{Quorum, RoundsConfig};
-use gestalt_tape::{Announced, Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
+use gestalt_tape::{Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
 use made::{BEGIN, SECOND, decisions, json, keys, round, run, said};
 use proptest::prelude::*;
 
@@ -40,7 +40,7 @@ fn every_decision_is_drawn_again_bit_for_bit() {
 /// What is changed in the first decision is found, and named.
 #[test]
 fn the_first_difference_is_named() {
-    type Change = fn(&mut Announced);
+    type Change = fn(&mut Announcement);
     let changes: [(&str, Change); 8] = [
         ("the probability of class 1", |it| it.decision.certificate.probabilities[1] += 1e-16),
         ("the confidence", |it| it.decision.confidence -= 1e-12),
@@ -54,7 +54,7 @@ fn the_first_difference_is_named() {
     let passed = run();
     let at = passed.iter().position(|passing| passing.topic == Topic::Decision).unwrap();
     for (named, change) in changes {
-        let mut announced: Announced = serde_json::from_slice(&passed[at].payload).unwrap();
+        let mut announced: Announcement = serde_json::from_slice(&passed[at].payload).unwrap();
         change(&mut announced);
         let mut passed = passed.clone();
         passed[at].payload = json(&announced);

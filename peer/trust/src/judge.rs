@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use gestalt_protocol::{Batches, CountedVote, Decision, Envelope, Give, Message, RobotId};
+use gestalt_protocol::{Announcement, Batches, CountedVote, Decision, Envelope, Give, Message, RobotId};
 
 use crate::budget::Budget;
 use crate::distrust::Distrust;
@@ -25,7 +25,7 @@ const OF_SAMPLES: Budget = {
 /// Lets in what members of the swarm signed, and finds out who of them says two things. Pure: time is an argument.
 #[derive(Clone, Debug)]
 pub struct Judge<S: Scheme = Ed25519> {
-    /// For votes and lessons, and for samples: neither keeps the other waiting.
+    /// For samples, and for all else that is signed: neither keeps the other waiting.
     verifier: Verifier<S>,
     of_samples: Verifier<S>,
     witness: Witness,
@@ -53,7 +53,7 @@ impl<S: Scheme> Judge<S> {
         self.verifier.roster().members().robots.contains_key(&robot)
     }
 
-    /// Whether the author said that: a vote, samples or what it passes on of instructors.
+    /// Whether the author said that: a vote, what it holds, samples or what it passes on of instructors.
     ///
     /// # Errors
     /// The [`Distrust`] that it meets. Who has just been found to say two things is [`Distrust::Convicted`], and the evidence is
@@ -81,10 +81,24 @@ impl<S: Scheme> Judge<S> {
         votes.chain(certificate.others.iter().cloned()).try_for_each(|held| self.envelope(now, &held.into()))
     }
 
+    /// Whether its announcer said it, to the last word, and all the votes that it rests on were cast.
+    ///
+    /// # Errors
+    /// The [`Distrust`] that its announcer meets, or the first of the votes which was not.
+    pub fn announcement(&mut self, now: Duration, announcement: &Announcement) -> Result<(), Distrust> {
+        // One who is no member costs no more than that.
+        if announcement.signature.is_none() {
+            return Err(Distrust::Unsigned);
+        }
+        self.envelope(now, &announcement.clone().into())?;
+        self.decision(now, &announcement.decision)
+    }
+
     /// Leaves of a gift what was really said; says why the rest is not believed. What is left may be true: who passes on what it was
     /// told is no liar.
     pub fn give(&mut self, now: Duration, give: &mut Give) -> Option<Distrust> {
-        let mut refused = self.retain(now, &mut give.votes);
+        let of_holders = self.retain(now, &mut give.holders);
+        let mut refused = self.retain(now, &mut give.votes).or(of_holders);
         if let Some(Err(distrust)) = give.decision.as_ref().map(|decision| self.decision(now, decision)) {
             give.decision = None;
             refused = Some(distrust);
@@ -165,6 +179,108 @@ mod tests {
         assert_eq!(there.untold(), told);
     }
 
+    /// That robot's word that it holds something, signed by that one.
+    fn word(author: u32, by: u32) -> Envelope {
+        let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
+        let rank = gestalt_protocol::Rank {
+            decided: true,
+            robots: 1,
+            looks: 1.0,
+            confidence: 1.0,
+            author: RobotId(0),
+        };
+        let message =
+            Message::Holding(gestalt_protocol::Holding { round, class: None, rank, changed: false });
+        signed(author, 9, message, by)
+    }
+
+    fn signed(author: u32, sequence: u32, message: Message, by: u32) -> Envelope {
+        let stamp = gestalt_protocol::Stamp { boot: 1, sequence };
+        let said = Envelope { author: RobotId(author), stamp, message, signature: None };
+        let signature = statement::sign(&robot(by), &roster(5).swarm_id(), &said.statement());
+        Envelope { signature: Some(signature), ..said }
+    }
+
+    #[test]
+    fn what_a_robot_holds_is_its_own_word() {
+        let mut judge = Judge::new(roster(5));
+        assert_eq!(judge.envelope(NOW, &word(1, 1)), Ok(()));
+        assert_eq!(judge.envelope(NOW, &word(2, 1)), Err(Distrust::Forged));
+        let holder = |said: Envelope| {
+            let Envelope { author: robot, stamp, message: Message::Holding(holding), signature } = said
+            else {
+                unreachable!()
+            };
+            gestalt_protocol::Holder { robot, stamp, holding, signature }
+        };
+        let (mine, forged) = (holder(word(1, 1)), holder(word(2, 1)));
+        let mut give = Give { decision: None, votes: vec![], holders: vec![forged, mine.clone()] };
+        assert_eq!(judge.give(NOW, &mut give), Some(Distrust::Forged));
+        assert_eq!(give.holders, [mine]);
+    }
+
+    #[test]
+    fn an_announcement_is_its_announcers_to_the_last_word() {
+        let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
+        let decision = Decision {
+            round,
+            class: None,
+            confidence: 0.5,
+            author: RobotId(0),
+            is_final: true,
+            certificate: gestalt_protocol::Certificate {
+                vocabulary: gestalt_protocol::VocabularyId(9),
+                rule: gestalt_protocol::FusionRule::LogPool,
+                probabilities: vec![],
+                votes: vec![],
+                others: vec![],
+                robots: 1,
+                quorum: 1,
+                elapsed_ms: 1,
+            },
+        };
+        let message = |decision| {
+            Message::Announced(gestalt_protocol::Announced { decision, label: Some("palm".to_owned()) })
+        };
+        let said = |by| Announcement::of(signed(1, 5, message(decision.clone()), by)).unwrap();
+        let heard = |announcement: &Announcement| Judge::new(roster(5)).announcement(NOW, announcement);
+        assert_eq!(heard(&said(1)), Ok(()));
+        assert_eq!(heard(&said(2)), Err(Distrust::Forged));
+        assert_eq!(heard(&Announcement { signature: None, ..said(1) }), Err(Distrust::Unsigned));
+        assert_eq!(heard(&Announcement { announcer: RobotId(9), ..said(1) }), Err(Distrust::Stranger));
+        type Change = fn(&mut Announcement);
+        let changes: [Change; 8] = [
+            |it| it.decision.is_final = false,
+            |it| it.label = None,
+            |it| it.decision.round.life = 8,
+            |it| it.decision.author = RobotId(1),
+            |it| it.decision.certificate.robots = 2,
+            |it| it.decision.certificate.elapsed_ms = 2,
+            |it| it.stamp.sequence = 6,
+            |it| it.announcer = RobotId(2),
+        ];
+        for change in changes {
+            let mut changed = said(1);
+            change(&mut changed);
+            assert_eq!(heard(&changed), Err(Distrust::Forged), "{changed:?}");
+        }
+        let unsigned = gestalt_protocol::HeldVote {
+            robot: RobotId(2),
+            stamp: gestalt_protocol::Stamp { boot: 1, sequence: 1 },
+            vote: gestalt_protocol::Vote {
+                round,
+                vocabulary: gestalt_protocol::VocabularyId(9),
+                evidence: vec![],
+                looks: 0.0,
+            },
+            signature: None,
+        };
+        let mut of_no_vote = decision.clone();
+        of_no_vote.certificate.others = vec![unsigned];
+        let announcement = Announcement::of(signed(1, 5, message(of_no_vote), 1)).unwrap();
+        assert_eq!(heard(&announcement), Err(Distrust::Unsigned), "its votes have to be true, too");
+    }
+
     #[test]
     fn of_a_gift_stays_what_was_said() {
         let mut judge = Judge::new(roster(5));
@@ -175,7 +291,8 @@ mod tests {
             gestalt_protocol::HeldVote { robot, stamp, vote, signature }
         };
         let forged = Envelope { signature: said(2, 1, 1.0).signature, ..said(1, 1, 1.0) };
-        let mut give = Give { decision: None, votes: vec![held(forged), held(said(2, 1, 1.0))] };
+        let votes = vec![held(forged), held(said(2, 1, 1.0))];
+        let mut give = Give { decision: None, votes, holders: Vec::new() };
         assert_eq!(judge.give(NOW, &mut give), Some(Distrust::Forged));
         assert_eq!(give.votes, [held(said(2, 1, 1.0))]);
         assert_eq!(judge.give(NOW, &mut give), None);

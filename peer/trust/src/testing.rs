@@ -38,14 +38,8 @@ pub(crate) fn vote(author: u32, sequence: u32, evidence: f32) -> Vec<u8> {
 
 /// Another kind of message of that robot.
 pub(crate) fn have(author: u32, sequence: u32) -> Vec<u8> {
-    let have = Have {
-        round: None,
-        decision: None,
-        changed: false,
-        votes: Vec::new(),
-        knowledge: None,
-        answer: false,
-    };
+    let have =
+        Have { round: None, decision: None, holders: 0, votes: Vec::new(), knowledge: None, answer: false };
     said(author, sequence, Message::Have(have))
 }
 

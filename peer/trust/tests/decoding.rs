@@ -80,6 +80,7 @@ fn what_robots_say_reads_as_it_was_written() {
         message: gestalt_protocol::Message::Give(gestalt_protocol::Give {
             decision: None,
             votes: Vec::new(),
+            holders: Vec::new(),
         }),
         signature: None,
     };

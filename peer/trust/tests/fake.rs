@@ -7,15 +7,9 @@ use gestalt_trust::{Budget, Distrust, Fake, Identity, Membership, Roster, Verifi
 
 fn said(sequence: u32, other: bool) -> Vec<u8> {
     let stamp = Stamp { boot: 1, sequence };
-    let give = Message::Give(Give { decision: None, votes: Vec::new() });
-    let have = Have {
-        round: None,
-        decision: None,
-        changed: false,
-        votes: Vec::new(),
-        knowledge: None,
-        answer: false,
-    };
+    let give = Message::Give(Give { decision: None, votes: Vec::new(), holders: Vec::new() });
+    let have =
+        Have { round: None, decision: None, holders: 0, votes: Vec::new(), knowledge: None, answer: false };
     let message = if other { give } else { Message::Have(have) };
     Envelope { author: RobotId(1), stamp, message, signature: None }.encode()
 }

@@ -70,7 +70,7 @@ fn nothing_can_be_added_or_taken_away() {
 #[test]
 fn one_kind_of_message_is_not_taken_for_another() {
     let roster = roster("demo");
-    let said = said(1, Message::Give(Give { decision: None, votes: Vec::new() }));
+    let said = said(1, Message::Give(Give { decision: None, votes: Vec::new(), holders: Vec::new() }));
     let signature = statement::sign(&robot(1), &roster.swarm_id(), &said);
     assert!(roster.check(&said, &signature).is_ok());
     // The kind is the byte behind author, boot and a sequence of two bytes.

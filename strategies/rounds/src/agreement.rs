@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, MAX_ROBOTS, Rank, RobotId};
+use gestalt_protocol::{ClassId, Decision, Fnv1a, Holder, MAX_ROBOTS, Rank, RobotId, Stamp};
 
 /// What a robot knows of the decisions of one round.
 ///
@@ -11,20 +11,12 @@ use gestalt_protocol::{ClassId, Decision, MAX_ROBOTS, Rank, RobotId};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
     best: Option<Decision>,
-    /// What each other robot said that it holds, its greatest, or another in its name. At most [`MAX_ROBOTS`].
+    /// What each robot said last that it holds, this one among them. At most [`MAX_ROBOTS`].
     holders: BTreeMap<RobotId, Holder>,
     held: Option<Held>,
     /// The first gesture held. Whoever counts for one gesture of a round counts for no other, or two could be final.
     first: Option<ClassId>,
     announced: Option<Announced>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Holder {
-    rank: Rank,
-    class: Option<ClassId>,
-    /// Who says so: itself, or whoever it sees for.
-    by: RobotId,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -43,36 +35,53 @@ struct Announced {
 }
 
 impl Agreement {
-    /// Hears from `by` which decision a robot holds, without a class from one that held another before. What a robot says of itself
-    /// counts before what is said in its name.
-    pub fn note_holder(&mut self, holder: RobotId, by: RobotId, rank: Rank, class: Option<ClassId>) {
-        if self.holders.len() >= MAX_ROBOTS && !self.holders.contains_key(&holder) {
-            return;
+    /// Hears a robot's word of what it holds, its own or passed on: the latest replaces all earlier ones. Says whether it was news.
+    pub fn note_holder(&mut self, holder: Holder) -> bool {
+        let known = self.holders.get(&holder.robot);
+        let is_news = match known {
+            Some(known) => known.stamp < holder.stamp,
+            None => self.holders.len() < MAX_ROBOTS,
+        };
+        if is_news {
+            self.holders.insert(holder.robot, holder);
         }
-        let said = Holder { rank, class, by };
-        let known = self.holders.entry(holder).or_insert(said);
-        let itself = |said: &Holder| said.by == holder;
-        if (itself(&said), said.rank) > (itself(known), known.rank) {
-            *known = said;
-        }
+        is_news
     }
 
-    /// Whether so many robots, this one and its guests among them, are known to hold the class held here. Of the others, the so many
-    /// `liars` that speak for most count for one each.
+    /// What robots said that they hold, by robot.
+    pub fn holders(&self) -> impl Iterator<Item = &Holder> {
+        self.holders.values()
+    }
+
+    /// What that robot said last that it holds.
     #[must_use]
-    pub fn is_final(&self, quorum: u32, guests: &BTreeSet<RobotId>, liars: u32) -> bool {
-        let Some(class) = self.held().and_then(|held| held.class) else { return false };
-        let mut speakers = BTreeMap::<RobotId, usize>::new();
-        for (robot, said) in &self.holders {
-            if said.class == Some(class) && !guests.contains(robot) {
-                *speakers.entry(said.by).or_default() += 1;
-            }
+    pub fn holder(&self, robot: RobotId) -> Option<&Holder> {
+        self.holders.get(&robot)
+    }
+
+    /// These words in short, for a neighbour that may lack some: a hint, which somebody may make look like another.
+    #[must_use]
+    pub fn digest(&self) -> u16 {
+        let mut digest = Fnv1a::default();
+        for Holder { robot, stamp: Stamp { boot, sequence }, .. } in self.holders.values() {
+            digest.add([robot.0, *boot, *sequence].into_iter().flat_map(u32::to_le_bytes));
         }
-        let mut spoken_for: Vec<usize> = speakers.into_values().collect();
-        spoken_for.sort_unstable_by(|a, b| b.cmp(a));
-        spoken_for.iter_mut().take(liars as usize).for_each(|robots| *robots = 1);
+        // Its lower half alone would be that of the last bytes.
+        let hash = if self.holders.is_empty() { 0 } else { digest.hash() };
+        (hash ^ hash >> 16 ^ hash >> 32 ^ hash >> 48) as u16
+    }
+
+    /// Whether so many robots are known to hold the class held here: by their own words, and this one, `me`, and its guests, who hold
+    /// what it holds.
+    #[must_use]
+    pub fn is_final(&self, quorum: u32, me: RobotId, guests: &BTreeSet<RobotId>) -> bool {
+        let Some(class) = self.held().and_then(|held| held.class) else { return false };
+        let holds = |holder: &&Holder| {
+            let Holder { robot, holding, .. } = holder;
+            holding.class == Some(class) && !holding.changed && *robot != me && !guests.contains(robot)
+        };
         let own = if self.has_changed() { 0 } else { 1 + guests.len() };
-        own + spoken_for.iter().sum::<usize>() >= quorum as usize
+        own + self.holders().filter(holds).count() >= quorum as usize
     }
 
     /// Whether another gesture was held before this one.
@@ -135,6 +144,8 @@ impl Agreement {
     /// Notes that this class was announced for the swarm, by whomever.
     pub fn note_announced(&mut self, now: Duration, class: Option<ClassId>, is_final: bool) {
         let answered = self.announced.map(|announced| announced.class);
+        // An earlier announcement may come again.
+        let is_final = is_final || self.announced == Some(Announced { class, is_final: true });
         self.announced = Some(Announced { class, is_final });
         if let Some(held) = self.held.as_mut().filter(|held| held.decision.class != class)
             // Who goes on contradicting keeps nobody from answering.
@@ -225,52 +236,53 @@ mod tests {
         assert_eq!(agreement.settle(at(2), false).unwrap().class, Some(ClassId(3)));
     }
 
+    /// The word of that robot, its n-th, that it holds this.
+    fn holds(robot: u32, sequence: u32, decision: &Decision, changed: bool) -> Holder {
+        let stamp = Stamp { boot: 1, sequence };
+        Holder { robot: RobotId(robot), stamp, holding: decision.holding(changed), signature: None }
+    }
+
+    /// The most robots that it is known to be held by, of which robot 1 is this one.
+    fn held_by(agreement: &Agreement, guests: &[u32]) -> Option<u32> {
+        let guests = guests.iter().copied().map(RobotId).collect();
+        (1..99).rfind(|quorum| agreement.is_final(*quorum, RobotId(1), &guests))
+    }
+
     #[test]
     fn a_decision_is_final_once_so_many_robots_are_known_to_hold_its_class() {
         let mut agreement = Agreement::default();
         agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(0), true);
-        let holds = |agreement: &mut Agreement, robot, class, robots| {
-            let decision = decision(Some(class), robots, 0.96, robot);
-            agreement.note_holder(RobotId(robot), RobotId(robot), decision.rank(), decision.class);
-        };
-        holds(&mut agreement, 2, 1, 2);
-        holds(&mut agreement, 2, 1, 3);
-        holds(&mut agreement, 3, 0, 2);
-        let of = |agreement: &Agreement, guests: &[u32]| {
-            let guests = guests.iter().copied().map(RobotId).collect();
-            (2..9).rfind(|quorum| agreement.is_final(*quorum, &guests, 0))
-        };
-        assert_eq!(of(&agreement, &[]), Some(2), "one robot counts once");
-        holds(&mut agreement, 3, 1, 3);
-        assert_eq!(of(&agreement, &[]), Some(3), "it has changed its mind");
-        holds(&mut agreement, 3, 0, 2);
-        assert_eq!(of(&agreement, &[]), Some(3), "an old word comes late");
-        assert_eq!(of(&agreement, &[3, 4]), Some(4), "what holds through this one counts, once");
+        let of = |class, robots| decision(Some(class), robots, 0.96, 5);
+        assert!(agreement.note_holder(holds(2, 7, &of(1, 2), false)));
+        assert!(agreement.note_holder(holds(2, 8, &of(1, 3), false)));
+        assert!(agreement.note_holder(holds(3, 1, &of(0, 2), false)));
+        assert_eq!(held_by(&agreement, &[]), Some(2), "one robot counts once");
+        assert!(agreement.note_holder(holds(3, 3, &of(1, 3), false)));
+        assert_eq!(held_by(&agreement, &[]), Some(3), "it has changed its mind");
+        assert!(!agreement.note_holder(holds(3, 2, &of(0, 2), false)));
+        assert_eq!(held_by(&agreement, &[]), Some(3), "an old word comes late");
+        assert_eq!(held_by(&agreement, &[3, 4]), Some(4), "what holds through this one counts, once");
+        assert!(agreement.note_holder(holds(1, 9, &of(1, 3), false)));
+        assert_eq!(held_by(&agreement, &[]), Some(3), "this one counts once, also by its own word");
+        assert!(agreement.note_holder(holds(6, 1, &of(1, 3), true)));
+        assert_eq!(held_by(&agreement, &[]), Some(3), "who held another gesture before counts for none");
     }
 
     #[test]
-    fn who_speaks_for_many_makes_nothing_final_where_liars_are_expected() {
-        let mut agreement = Agreement::default();
-        agreement.believe(decision(Some(1), 3, 0.96, 5));
-        agreement.settle(at(0), true);
-        let rank = agreement.rank().unwrap();
-        let says = |agreement: &mut Agreement, robot, by| {
-            agreement.note_holder(RobotId(robot), RobotId(by), rank, Some(ClassId(1)));
+    fn who_knows_the_same_words_has_the_same_digest() {
+        let words = |order: [u32; 3]| {
+            let mut agreement = Agreement::default();
+            for robot in order {
+                agreement.note_holder(holds(robot, 4, &decision(Some(1), 3, 0.96, 5), false));
+            }
+            agreement
         };
-        // Robot 9 says that all others hold it too.
-        (2..=9).for_each(|robot| says(&mut agreement, robot, 9));
-        let of = |agreement: &Agreement, liars| {
-            (1..12).rfind(|quorum| agreement.is_final(*quorum, &BTreeSet::new(), liars))
-        };
-        assert_eq!((of(&agreement, 0), of(&agreement, 1)), (Some(9), Some(2)));
-        says(&mut agreement, 2, 2);
-        says(&mut agreement, 3, 3);
-        assert_eq!(of(&agreement, 1), Some(4));
-        // What is said in its name does not make a robot hold anything else than it says.
-        let greater = Rank { robots: 99, ..rank };
-        agreement.note_holder(RobotId(3), RobotId(9), greater, Some(ClassId(0)));
-        assert_eq!(of(&agreement, 1), Some(4));
+        let (here, mut there) = (words([1, 2, 3]), words([3, 1, 2]));
+        assert_eq!(here.digest(), there.digest());
+        there.note_holder(holds(2, 5, &decision(Some(1), 3, 0.96, 5), false));
+        assert_ne!(here.digest(), there.digest());
+        assert_eq!(Agreement::default().digest(), 0);
     }
 
     #[test]
@@ -279,14 +291,14 @@ mod tests {
         agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(100), true);
         let due = |agreement: &Agreement| {
-            let is_final = agreement.is_final(2, &BTreeSet::new(), 0);
+            let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new());
             agreement.announcement(at(200), is_final, at(5000))
         };
         assert_eq!(due(&agreement), Some(at(5300)));
         agreement.note_announced(at(5300), Some(ClassId(1)), false);
         assert_eq!(due(&agreement), None);
         let held = agreement.held().cloned().unwrap();
-        agreement.note_holder(RobotId(2), RobotId(2), held.rank(), held.class);
+        agreement.note_holder(holds(2, 1, &held, false));
         assert_eq!(due(&agreement), Some(at(300)), "overdue");
         agreement.note_announced(at(6000), Some(ClassId(1)), true);
         assert_eq!(due(&agreement), None);
@@ -307,6 +319,17 @@ mod tests {
         agreement.believe(decision(Some(2), 4, 0.96, 5));
         agreement.settle(at(500), true);
         assert_eq!(announcement(&agreement), Some(at(700)));
+    }
+
+    #[test]
+    fn an_earlier_announcement_that_comes_again_is_not_answered() {
+        let mut agreement = Agreement::default();
+        agreement.believe(decision(Some(1), 2, 0.96, 5));
+        agreement.settle(at(0), true);
+        for is_final in [false, true, false] {
+            agreement.note_announced(at(300), Some(ClassId(1)), is_final);
+        }
+        assert_eq!(announcement(&agreement), None);
     }
 
     #[test]

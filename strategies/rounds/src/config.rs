@@ -100,7 +100,7 @@ pub struct RoundsConfig {
     #[serde(with = "humantime_serde")]
     pub deadline: Duration,
     /// After hearing of a round, requests to open another have no effect for this long: a copy of the request
-    /// for this one may still be on its way.
+    /// for this one may still be on its way. Nor does a newer round end it; zero lets any newer one, at any time.
     #[serde(with = "humantime_serde")]
     pub refractory: Duration,
     /// The least time between two votes of one robot.

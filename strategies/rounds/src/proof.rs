@@ -5,6 +5,7 @@ use gestalt_protocol::{Certificate, Decision};
 use crate::ballot::Scale;
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
+use crate::fusion::Fusion;
 
 /// What the exponentials of two platforms may differ by, in a probability: a decision that is one at its author is one everywhere.
 const TOLERANCE: f64 = 1e-9;
@@ -12,33 +13,33 @@ const TOLERANCE: f64 = 1e-9;
 /// Whether robots of that configuration, so many of them, decide so on the votes that the decision brings with it, fused by that
 /// rule. What it says of itself counts for nothing. Whether the votes were cast is another question, for `gestalt-trust`.
 ///
-/// A decision without a class claims nothing, and follows from any votes. Its probabilities may be others than those found here by 1e-9, as
-/// exponentials of different platforms are; nothing else may.
+/// A decision without a class follows from votes that do not suffice for any. Its probabilities may be others than those found here by
+/// 1e-9, as exponentials of different platforms are; nothing else may.
 #[must_use]
 pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robots: u32) -> bool {
-    let Some(class) = decision.class else { return decision.check().is_ok() };
+    if decision.check().is_err() {
+        return false;
+    }
     let certificate = &decision.certificate;
     let Certificate { vocabulary, probabilities, votes, others, .. } = certificate;
     let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
     let of_the_round = |counter| counter == decision.round.counter;
-    let sound = decision.check().is_ok()
-        && certificate.rule == rule.rule()
+    let sound = certificate.rule == rule.rule()
         && votes.iter().all(|counted| scale.is_of(&counted.vote) && of_the_round(counted.vote.round.counter))
-        && others.iter().all(|held| of_the_round(held.vote.round.counter))
-        && config.suffice(certificate.reached(), votes.len(), robots);
-    if !sound {
-        return false;
-    }
+        && others.iter().all(|held| of_the_round(held.vote.round.counter));
+    let suffice = config.suffice(certificate.reached(), votes.len(), robots);
     let rows: Vec<&[f32]> = votes.iter().map(|counted| counted.vote.evidence.as_slice()).collect();
-    let Some(fusion) =
-        rule.fuse(config.clip, scale.classes, &rows).filter(|fusion| fusion.is_sound(scale.classes))
-    else {
-        return false;
+    let fusion = rule.fuse(config.clip, scale.classes, &rows).filter(|fusion| fusion.is_sound(scale.classes));
+    let withstands = |fusion: &Fusion| rule.withstands(config.clip, &rows, fusion, config.liars);
+    let Some(class) = decision.class else {
+        let decides = |fusion: &Fusion| config.convinces(withstands(fusion) - TOLERANCE);
+        return sound && !(suffice && fusion.as_ref().is_some_and(decides));
     };
+    let Some(fusion) = fusion.filter(|_| sound && suffice) else { return false };
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
     let likeliest = fusion.probabilities[class.index()];
     fusion.probabilities.iter().zip(probabilities).all(|(a, b)| close(*a, *b))
         && close(likeliest, decision.confidence)
         && close(likeliest, fusion.probabilities[fusion.top.index()])
-        && config.convinces(rule.withstands(config.clip, &rows, &fusion, config.liars) + TOLERANCE)
+        && config.convinces(withstands(&fusion) + TOLERANCE)
 }

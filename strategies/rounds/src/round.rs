@@ -33,6 +33,8 @@ pub(crate) struct Round {
     concluded: bool,
     /// When it ends undecided, if before its deadline.
     ends: Option<Duration>,
+    /// Whether others go on to the next one: then nothing more is waited for.
+    pub hurried: bool,
 }
 
 /// This robot's vote as it was last said.
@@ -56,6 +58,7 @@ impl Round {
             said: None,
             concluded: false,
             ends: None,
+            hurried: false,
         }
     }
 
@@ -179,7 +182,9 @@ impl Round {
     /// second.
     fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
         let mut robots = view.expected.iter().chain([&view.me]);
-        now >= self.since + config.patience || robots.all(|robot| self.ballot.has_spoken(*robot))
+        self.hurried
+            || now >= self.since + config.patience
+            || robots.all(|robot| self.ballot.has_spoken(*robot))
     }
 
     /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too. Where liars are expected they may have
@@ -207,7 +212,7 @@ impl Round {
         let (patience, deadline) = self.patience_and_deadline(config);
         let late = now >= deadline;
         // Asked at every input: with a thousand robots, counting their votes each time would be most of the work.
-        if now < patience && self.ballot.len() < view.expected.len() {
+        if now < patience && self.ballot.len() < view.expected.len() && !self.hurried {
             return;
         }
         let scale = view.scale.or_else(|| self.ballot.prevailing_scale());

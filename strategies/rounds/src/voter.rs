@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, RobotId, RoundId, Stamp};
+use gestalt_protocol::{ClassId, Decision, Envelope, Message, RobotId, RoundId, Stamp};
 
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
@@ -25,6 +25,8 @@ pub struct Voter {
     round: Option<Round>,
     blind: bool,
     signer: Option<Arc<dyn Sign>>,
+    /// What it said last that it holds, and the first gesture of that round.
+    held: Option<(RoundId, Option<ClassId>, Option<ClassId>)>,
 }
 
 impl Voter {
@@ -42,6 +44,7 @@ impl Voter {
             round: None,
             blind: false,
             signer: None,
+            held: None,
         })
     }
 
@@ -107,6 +110,24 @@ impl Voter {
         let mut speaker =
             Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
         self.round.as_mut()?.speak(now, &mut speaker, &self.config)
+    }
+
+    /// It holds that decision, which the other mind drew or believes, and leaves to that one what it does not see. What it says of it, if that
+    /// is news: that word has to be its own, as its votes have.
+    pub fn holds(&mut self, decision: &Decision) -> Option<Envelope> {
+        let (round, class) = (decision.round, decision.class);
+        let before = self.held.filter(|(known, ..)| known.counter == round.counter);
+        if before.is_some_and(|(_, last, _)| last == class) {
+            return None;
+        }
+        let first = before.and_then(|(.., first)| first).or(class);
+        self.held = Some((round, class, first));
+        let holding = decision.holding(class.is_some() && class != first);
+        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+        let message = Message::Holding(holding);
+        let said = Envelope { author: self.me, stamp: self.stamp, message, signature: None };
+        let signature = self.signer.as_deref().map(|signer| signer.sign(&said.statement()));
+        Some(Envelope { signature, ..said })
     }
 
     /// When to ask it to [`speak`](Voter::speak) again, if nothing else comes before.
@@ -217,6 +238,50 @@ mod tests {
         assert!(second.stamp > null.stamp && second.stamp.boot == 3);
         voter.closed();
         assert_eq!((voter.speak(ms(9_000)), voter.next_wake()), (None, None));
+    }
+
+    #[test]
+    fn it_says_itself_what_it_holds_once_for_each_gesture_and_whether_it_held_another() {
+        let mut voter = voter();
+        let decided = |counter, class: Option<u8>| Decision {
+            round: round(counter),
+            class: class.map(ClassId),
+            confidence: 0.9,
+            author: RobotId(1),
+            is_final: false,
+            certificate: gestalt_protocol::Certificate {
+                vocabulary: VocabularyId(1),
+                rule: gestalt_protocol::FusionRule::LogPool,
+                probabilities: vec![0.1, 0.9],
+                votes: vec![],
+                others: vec![],
+                robots: 1,
+                quorum: 1,
+                elapsed_ms: 1,
+            },
+        };
+        let mut said = Vec::new();
+        for (counter, class) in
+            [(1, None), (1, Some(1)), (1, Some(1)), (1, Some(0)), (1, Some(1)), (2, Some(0)), (2, Some(0))]
+        {
+            let Some(envelope) = voter.holds(&decided(counter, class)) else { continue };
+            let Message::Holding(holding) = envelope.message else { panic!("{envelope:?}") };
+            assert_eq!((envelope.author, envelope.stamp.boot), (RobotId(7), 3));
+            said.push((
+                envelope.stamp.sequence,
+                counter,
+                holding.class.map(|class| class.0),
+                holding.changed,
+            ));
+        }
+        let expected = [
+            (1, 1, None, false),
+            (2, 1, Some(1), false),
+            (3, 1, Some(0), true),
+            (4, 1, Some(1), false),
+            (5, 2, Some(0), false),
+        ];
+        assert_eq!(said, expected);
     }
 
     #[test]

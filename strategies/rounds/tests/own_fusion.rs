@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Decision, Envelope, FusionRule, Message, RobotId, RoundId, Stamp, Vote, decode_json,
+    Announcement, ClassId, Decision, Envelope, FusionRule, Message, RobotId, RoundId, Stamp, Vote,
+    decode_json,
 };
 use gestalt_rounds::fusion::Fusion;
 use gestalt_rounds::{
@@ -118,9 +119,11 @@ fn a_rule_of_ones_own_decides_and_signs() {
 fn a_decision_is_adopted_by_who_has_the_rule_and_by_nobody_else() {
     let decision = decided(&mut rounds(7, Some(Arc::new(First)))).remove(0);
     // As robots and clients hear it.
-    let json = serde_json::to_vec(&decision).unwrap();
-    let heard: Decision = decode_json(&json).unwrap();
-    assert_eq!(heard, decision);
+    let (announcer, stamp) = (RobotId(1), Stamp { boot: 1, sequence: 9 });
+    let said = Announcement { decision: decision.clone(), label: None, announcer, stamp, signature: None };
+    let json = serde_json::to_vec(&said).unwrap();
+    let heard: Announcement = decode_json(&json).unwrap();
+    assert_eq!(heard, said);
     let mut same = rounds(8, Some(Arc::new(First)));
     same.handle(Duration::ZERO, Input::Announced(heard.clone()));
     assert_eq!(same.held(), Some(&decision));

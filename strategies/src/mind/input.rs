@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Holding, Instruction, InstructorId, RobotId};
+use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, RobotId};
 use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
 
 /// What the world tells the mind.
@@ -31,10 +31,8 @@ pub enum Input {
     Observed(Observation),
     /// A robot's message arrived, by whichever way.
     Received(Envelope),
-    /// That robot says which decision it holds (`robot/<id>/decision`).
-    Heard(RobotId, Holding),
     /// This decision was announced for the swarm (`decision`).
-    Announced(Decision),
+    Announced(Announcement),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
     Alive(BTreeSet<RobotId>),
     /// The robots that see and vote through this robot's host, and leave deciding and announcing to this mind.
@@ -81,8 +79,7 @@ impl Input {
             Self::Blind(blind) => AboutRounds::Blind(blind),
             Self::Observed(observation) => AboutRounds::Observed(observation),
             Self::Received(envelope) => AboutRounds::Received(envelope),
-            Self::Heard(robot, holding) => AboutRounds::Heard(robot, holding),
-            Self::Announced(decision) => AboutRounds::Announced(decision),
+            Self::Announced(announcement) => AboutRounds::Announced(announcement),
             Self::Alive(robots) => AboutRounds::Alive(robots),
             Self::Guests(robots) => AboutRounds::Guests(robots),
             Self::Neighbours(robots) => AboutRounds::Neighbours(robots),

@@ -40,11 +40,10 @@ impl Mind {
         self.rounds.held()
     }
 
-    /// Whether it held another gesture of that round before: what it then says it holds is
-    /// [`changed`](gestalt_protocol::Holding::changed).
+    /// What the gesture of a decision is called, see [`Rounds::label_of`](gestalt_rounds::Rounds::label_of).
     #[must_use]
-    pub fn has_changed(&self) -> bool {
-        self.rounds.has_changed()
+    pub fn label_of(&self, decision: &Decision) -> Option<&str> {
+        self.rounds.label_of(decision)
     }
 
     /// The votes known in that round.

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, HeldBatch, Message, RobotId};
+use gestalt_protocol::{Announcement, Envelope, HeldBatch, Message, RobotId};
 use gestalt_rounds::{
     Classify, Follow, Fuse, Input as AboutRounds, Life, Rounds, RoundsConfig, RoundsConfigError, Sign,
+    Vocabulary,
 };
 
 use super::answers::Answers;
@@ -86,6 +87,19 @@ impl Mind {
         self
     }
 
+    /// The same mind, that announces gestures by these names, see [`Rounds::naming`].
+    #[must_use]
+    pub fn naming(mut self, vocabulary: Vocabulary) -> Self {
+        self.rounds = self.rounds.naming(vocabulary);
+        self
+    }
+
+    /// The decision held as this robot says it to whoever asks, see [`Rounds::held_aloud`].
+    #[must_use]
+    pub fn held_aloud(&mut self) -> Option<Announcement> {
+        self.rounds.held_aloud()
+    }
+
     /// The same mind, that signs what it stands by, see [`Rounds::signed_by`].
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
@@ -99,8 +113,9 @@ impl Mind {
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
         let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
+        let vocabulary = setup.vocabulary.clone();
         self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
-        self.rounds = self.rounds.counting_from(counter);
+        self.rounds = self.rounds.counting_from(counter).naming(vocabulary);
         Ok(self)
     }
 
@@ -177,7 +192,11 @@ impl Mind {
             }
             Message::Know(know) => self.on_know(author, know, out),
             Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
-            Message::Vote(_) | Message::Have(_) | Message::Give(_) => {}
+            Message::Vote(_)
+            | Message::Have(_)
+            | Message::Give(_)
+            | Message::Holding(_)
+            | Message::Announced(_) => {}
         }
     }
 

@@ -1,6 +1,6 @@
 //! What the mind wants done.
 
-use gestalt_protocol::{Answer, Decision, Envelope, InstructorId, RobotId, RoundId};
+use gestalt_protocol::{Announcement, Answer, Decision, Envelope, InstructorId, RobotId, RoundId};
 use gestalt_rounds::Output as OfRounds;
 
 use crate::learning::{RecordChange, TrainingChange};
@@ -8,14 +8,15 @@ use crate::learning::{RecordChange, TrainingChange};
 /// What the mind wants done. The host carries out all of them, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Output {
-    /// Say this to all robots (a vote on `robot/<me>/vote`, samples on `robot/<me>/sample`): the fast way.
+    /// Say this to all robots (a vote on `robot/<me>/vote`, what it holds on `robot/<me>/decision`, samples on `robot/<me>/sample`): the fast
+    /// way.
     Broadcast(Envelope),
     /// Say this to one neighbour (`robot/<id>/repair`): the sure way.
     Tell(RobotId, Envelope),
-    /// This robot now holds that decision: say so (`robot/<me>/decision`, [`Decision::holding`]).
+    /// This robot now holds that decision. Where it is another gesture, it tells all: that is a [`Broadcast`](Self::Broadcast).
     Hold(Decision),
     /// As the spokesrobot: announce the swarm's decision (`decision`).
-    Announce(Decision),
+    Announce(Announcement),
     /// This robot takes part in that round from now on: look.
     Opened(RoundId),
     /// That round is over for this robot: no further looking.
@@ -41,7 +42,7 @@ impl From<OfRounds> for Output {
             OfRounds::Broadcast(envelope) => Self::Broadcast(envelope),
             OfRounds::Tell(robot, envelope) => Self::Tell(robot, envelope),
             OfRounds::Hold(decision) => Self::Hold(decision),
-            OfRounds::Announce(decision) => Self::Announce(decision),
+            OfRounds::Announce(announcement) => Self::Announce(announcement),
             OfRounds::Opened(round) => Self::Opened(round),
             OfRounds::Closed(round) => Self::Closed(round),
         }

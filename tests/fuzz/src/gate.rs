@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{CountedVote, Decision, Envelope, Give, HeldVote, Message, Signature};
+use gestalt_protocol::{Announcement, CountedVote, Decision, Envelope, Give, HeldVote, Message, Signature};
 use gestalt_strategies::Sign;
 use gestalt_trust::{Budget, Distrust, Fake, Verifier};
 
@@ -19,17 +19,26 @@ impl Default for Gate {
 }
 
 impl Gate {
-    /// What of a message between robots is let in: votes that their authors signed, and all else.
+    /// What of a message between robots is let in: votes and words on what they hold that their authors signed, and all else.
     ///
     /// # Errors
-    /// Why a vote is not believed.
+    /// Why one is not believed.
     pub fn message(&mut self, now: Duration, mut envelope: Envelope) -> Result<Envelope, Distrust> {
         match &mut envelope.message {
-            Message::Vote(_) => self.envelope(now, &envelope)?,
+            Message::Vote(_) | Message::Holding(_) => self.envelope(now, &envelope)?,
             Message::Give(give) => self.give(now, give),
             _ => {}
         }
         Ok(envelope)
+    }
+
+    /// Whether a member announced it so, and all the votes that it rests on were cast.
+    ///
+    /// # Errors
+    /// Why it or one of them is not believed.
+    pub fn announcement(&mut self, now: Duration, announcement: &Announcement) -> Result<(), Distrust> {
+        self.envelope(now, &announcement.clone().into())?;
+        self.decision(now, &announcement.decision)
     }
 
     /// Whether all the votes that a decision rests on were cast.
@@ -51,6 +60,7 @@ impl Gate {
 
     fn give(&mut self, now: Duration, give: &mut Give) {
         give.votes.retain(|held| self.envelope(now, &held.clone().into()).is_ok());
+        give.holders.retain(|holder| self.envelope(now, &holder.clone().into()).is_ok());
         give.decision.take_if(|decision| self.decision(now, decision).is_err());
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use gestalt_protocol::{Decision, Envelope, HeldVote, RobotId, Signature};
+use gestalt_protocol::{Announcement, Decision, Envelope, HeldVote, Holder, RobotId, Signature};
 use gestalt_trust::{Fake, Identity, Membership, Roster, SwarmId, statement};
 
 /// Robots 1 to so many are on the roster.
@@ -56,6 +56,17 @@ pub fn seal(envelope: &mut Envelope) {
 /// The same of a vote that somebody passes on.
 pub fn seal_vote(held: &mut HeldVote) {
     held.signature = Some(sign(held.robot, &Envelope::from(held.clone()).statement()));
+}
+
+/// The same of what a robot holds.
+pub fn seal_holder(holder: &mut Holder) {
+    holder.signature = Some(sign(holder.robot, &Envelope::from(holder.clone()).statement()));
+}
+
+/// The same of an announcement, when its votes are as they are to be.
+pub fn seal_announcement(announcement: &mut Announcement) {
+    let said = Envelope::from(announcement.clone());
+    announcement.signature = Some(sign(announcement.announcer, &said.statement()));
 }
 
 /// Puts their own signatures under those votes that a decision rests on whose bit is set.

@@ -1,11 +1,11 @@
 //! Values as robots and people say them, for inputs to begin with. All of the wire that is spelt out here is in this file.
 
 use gestalt_protocol::{
-    Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, FeatureSpaceId,
-    FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holding, ImageEncoding,
-    Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message, Outcome, RobotId, RoundId,
-    SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Status, Vector, VocabularyId, Vote,
-    Word,
+    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
+    FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
+    Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
+    Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Status,
+    Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -112,8 +112,20 @@ pub fn decision(rng: &mut impl Rng) -> Decision {
 
 /// What a robot says it holds.
 pub fn holding(rng: &mut impl Rng) -> Holding {
-    let guests = some(rng, 3, |rng| robot(rng));
-    decision(rng).holding(guests, rng.random())
+    decision(rng).holding(rng.random())
+}
+
+/// The same, passed on.
+pub fn holder(rng: &mut impl Rng) -> Holder {
+    let (robot, stamp, holding) = (robot(rng), stamp(rng), holding(rng));
+    Holder { robot, stamp, holding, signature: maybe(rng, signature) }
+}
+
+/// What somebody announces.
+pub fn announcement(rng: &mut impl Rng) -> Announcement {
+    let (decision, announcer, stamp) = (decision(rng), robot(rng), stamp(rng));
+    let label = maybe(rng, |_| "thrée\n".to_owned());
+    Announcement { decision, label, announcer, stamp, signature: maybe(rng, signature) }
 }
 
 /// A digest.
@@ -195,23 +207,26 @@ pub fn have(rng: &mut impl Rng) -> Message {
     let votes = some(rng, 4, |rng| (robot(rng), stamp(rng)));
     let decision = maybe(rng, |rng| decision(rng).rank());
     let (round, knowledge) = (maybe(rng, round), maybe(rng, digest));
-    Message::Have(Have { round, decision, changed: rng.random(), votes, knowledge, answer: rng.random() })
+    Message::Have(Have { round, decision, holders: rng.random(), votes, knowledge, answer: rng.random() })
 }
 
 /// What a neighbour was found to lack.
-pub fn give(decision: Option<Decision>, votes: Vec<HeldVote>) -> Message {
-    Message::Give(Give { decision, votes })
+pub fn give(decision: Option<Decision>, votes: Vec<HeldVote>, holders: Vec<Holder>) -> Message {
+    Message::Give(Give { decision, votes, holders })
 }
 
 /// Any message between robots.
 pub fn message(rng: &mut impl Rng) -> Message {
     let about = round(rng);
-    match rng.random_range(0..7) {
+    match rng.random_range(0..9) {
+        7 => Message::Holding(holding(rng)),
+        8 => Envelope::from(announcement(rng)).message,
         0 => Message::Vote(vote(rng, about, 3)),
         1 => have(rng),
         2 => {
             let votes = some(rng, 3, |rng| held_vote(rng, about, 3));
-            give(maybe(rng, decision), votes)
+            let decision = maybe(rng, decision);
+            give(decision, votes, some(rng, 3, |rng| holder(rng)))
         }
         3 => {
             let all = some(rng, 3, |rng| {

@@ -93,7 +93,7 @@ fn the_longest_json_takes_no_more_memory_than_promised() {
             r#"0]},"outcome":"known","class":null,"samples":1}"#,
         ),
         (r#"{"robot":1,"name":"","vocabulary":["#, "\"\",", "0]}"),
-        (r#"{"round":{"counter":1,"opener":1,"life":1},"guests":["#, "0,", "0]}"),
+        (r#"{"round":{"counter":1,"opener":1,"life":1},"class":["#, "0,", "0]}"),
         (r#"{"certificate":{"votes":["#, "0,", "0]}}"),
     ] {
         let times = (MAX_JSON - before.len() - after.len()) / again.len();

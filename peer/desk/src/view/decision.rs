@@ -1,7 +1,6 @@
 //! One decision with its reasons.
 
-use gestalt_link::Announcement;
-use gestalt_protocol::{ClassId, CountedVote, RobotId, RoundId};
+use gestalt_protocol::{Announcement, ClassId, CountedVote, RobotId, RoundId};
 use gestalt_strategies::Vocabulary;
 use serde::Serialize;
 
@@ -71,7 +70,7 @@ pub struct VoteView {
 
 impl DecisionView {
     pub(super) fn new(announced: &Announcement, vocabulary: Option<&Vocabulary>, held: usize) -> Self {
-        let Announcement { decision, label } = announced;
+        let Announcement { decision, label, .. } = announced;
         let certificate = &decision.certificate;
         let name = |class| match label {
             Some(label) if Some(class) == decision.class => clipped(label),

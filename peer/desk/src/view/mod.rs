@@ -15,8 +15,10 @@ mod text;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use gestalt_link::{Announcement, Heard};
-use gestalt_protocol::{Answer, Holding, InstructorId, MAX_ROBOTS, RobotId, RoundId, Status, VocabularyId};
+use gestalt_link::Heard;
+use gestalt_protocol::{
+    Announcement, Answer, Holding, InstructorId, MAX_ROBOTS, RobotId, RoundId, Status, VocabularyId,
+};
 use gestalt_strategies::Vocabulary;
 use serde::Serialize;
 
@@ -129,7 +131,7 @@ impl View {
         let latest = self.latest.as_ref()?;
         let vocabulary = self.known_vocabulary(latest.decision.certificate.vocabulary);
         let held = self.present().filter_map(|(_, robot)| robot.holds(latest.decision.round));
-        let held = held.filter(|held| held.class == latest.decision.class).map(|held| held.robots).sum();
+        let held = held.filter(|held| held.class == latest.decision.class).count();
         Some(DecisionView::new(latest, vocabulary, held))
     }
 

@@ -85,8 +85,6 @@ pub(super) struct Held {
     rank: Rank,
     /// The gesture.
     pub class: Option<ClassId>,
-    /// How many robots hold it with this one's word: itself and its guests.
-    pub robots: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -117,8 +115,8 @@ impl Robot {
     }
 
     pub fn hold(&mut self, holding: &Holding) {
-        let Holding { round, class, rank, guests, .. } = holding;
-        let held = Held { rank: *rank, class: *class, robots: 1 + guests.len() };
+        let Holding { round, class, rank, .. } = holding;
+        let held = Held { rank: *rank, class: *class };
         let known = self.held.entry(*round).or_insert(held);
         if known.rank < held.rank {
             *known = held;

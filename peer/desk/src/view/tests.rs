@@ -56,7 +56,8 @@ fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
     let decision =
         Decision { round, class, confidence: 0.7, author: RobotId(1), is_final: true, certificate };
     let label = class.map(|class| labels()[class.index()].clone());
-    Announcement { decision, label }
+    let (announcer, stamp) = (RobotId(1), Stamp { boot: 1, sequence: 9 });
+    Announcement { decision, label, announcer, stamp, signature: None }
 }
 
 fn was(counter: u32, label: &str, at: u64, outcome: Outcome) -> (InstructorId, Answer) {
@@ -104,18 +105,19 @@ fn a_decision_says_who_voted_for_what_and_who_disagrees() {
 
 #[test]
 fn who_holds_a_decision_is_counted_until_the_next_is_heard() {
-    let holding =
-        |counter| Box::new(decided(counter, Some(2), &[2]).decision.holding(vec![RobotId(8)], false));
+    let holding = |counter| Box::new(decided(counter, Some(2), &[2]).decision.holding(false));
     let mut view = after([
         Input::Came(RobotId(1)),
+        Input::Came(RobotId(8)),
         Input::Held(RobotId(1), holding(3)),
+        Input::Held(RobotId(8), holding(3)),
         decision(decided(3, Some(2), &[2])),
     ]);
-    assert_eq!(view.decision().unwrap().held, 2, "a robot and its guest");
+    assert_eq!(view.decision().unwrap().held, 2, "each by its own word");
     view.hear(NOW, Input::Held(RobotId(1), holding(4)));
     assert_eq!(view.decision().unwrap().held, 2);
     view.hear(NOW, decision(decided(4, Some(2), &[2])));
-    assert_eq!(view.decision().unwrap().held, 2);
+    assert_eq!(view.decision().unwrap().held, 1);
 }
 
 #[test]
@@ -250,7 +252,7 @@ fn heard() -> impl Strategy<Value = Input> {
         (0_u32..6, proptest::option::of(0_u8..3), proptest::collection::vec(0_u8..3, 0..4))
             .prop_map(|(counter, class, votes)| decision(ranked(counter, class, &votes))),
         (robot(), 0_u32..6, 0_u8..3).prop_map(|(robot, counter, class)| {
-            let holding = ranked(counter, Some(class), &[class]).decision.holding(Vec::new(), false);
+            let holding = ranked(counter, Some(class), &[class]).decision.holding(false);
             Input::Held(robot, Box::new(holding))
         }),
         (0_u32..6, 0_usize..3, outcome).prop_map(|(counter, class, outcome)| {

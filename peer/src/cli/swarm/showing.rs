@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, InstructorId, RoundId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Gesture, Instruction, InstructorId, RoundId};
 use serde_json::json;
 
 use super::super::Failure;
@@ -10,7 +10,6 @@ use super::super::show::{self, Names, line};
 use super::{Args, By, SCHEDULE, Swarm, picture};
 use crate::config::Config;
 use crate::swarm::Tally;
-use gestalt_link::Announcement;
 use gestalt_vision::human::Human;
 
 /// The name that the gestures' shower speaks under.

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Answer, ClassId, Decision, Envelope, FeatureSpaceId, FrameHeader, FusionRule, Gesture, ImageEncoding,
-    Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Reported, RobotId, RoundId,
-    SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
+    Announcement, Answer, ClassId, Decision, Envelope, FeatureSpaceId, FrameHeader, FusionRule, Gesture,
+    ImageEncoding, Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Reported, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
 };
 use gestalt_rounds::{
     Classify, ClassifyError, Input, Life, Observation, Output, Rounds, RoundsConfig, Vocabulary,
 };
-use gestalt_tape::{Announced, Passing};
+use gestalt_tape::Passing;
 
 pub const SECOND: u64 = 1_000_000_000;
 
@@ -82,18 +82,15 @@ pub fn round(config: &RoundsConfig, sees: &[Option<[f32; 3]>], at: u64) -> Vec<P
                 };
                 match output {
                     Output::Broadcast(envelope) => {
-                        passed.push(said(Topic::Vote(me), envelope.encode(), at));
+                        let topic = match envelope.message {
+                            Message::Holding(_) => Topic::RobotDecision(me),
+                            _ => Topic::Vote(me),
+                        };
+                        passed.push(said(topic, envelope.encode(), at));
                         to_all(&|| Input::Received(envelope.clone()));
                     }
-                    Output::Hold(decision) => {
-                        let holding = decision.holding(Vec::new(), false);
-                        passed.push(said(Topic::RobotDecision(me), json(&holding), at));
-                        to_all(&|| Input::Heard(me, holding.clone()));
-                    }
-                    Output::Announce(decision) => {
-                        let label =
-                            decision.class.and_then(|class| vocabulary().label(class).map(str::to_owned));
-                        passed.push(said(Topic::Decision, json(&Announced { decision, label }), at));
+                    Output::Announce(announcement) => {
+                        passed.push(said(Topic::Decision, json(&announcement), at));
                         return passed;
                     }
                     _ => {}
@@ -107,7 +104,9 @@ pub fn round(config: &RoundsConfig, sees: &[Option<[f32; 3]>], at: u64) -> Vec<P
 /// The decisions among what passed.
 pub fn decisions(passed: &[Passing]) -> Vec<Decision> {
     let decisions = passed.iter().filter(|passing| passing.topic == Topic::Decision);
-    decisions.map(|passing| serde_json::from_slice::<Announced>(&passing.payload).unwrap().decision).collect()
+    decisions
+        .map(|passing| serde_json::from_slice::<Announcement>(&passing.payload).unwrap().decision)
+        .collect()
 }
 
 /// Three rounds of a palm: clear, mistaken for a fist, and without enough who see. With what the person said of each.
@@ -162,7 +161,9 @@ pub fn one_of_each() -> Vec<Passing> {
     all.push(said(Topic::Status(robot), json(&full), at));
     let mut own = decisions(&run()).remove(0);
     own.certificate.rule = FusionRule::Other("approval".parse().unwrap());
-    all.push(said(Topic::Decision, json(&Announced { decision: own, label: None }), at));
+    let signature = Some(Signature::from_bytes([9; 64]));
+    let own = Announcement { decision: own, label: None, announcer: robot, stamp, signature };
+    all.push(said(Topic::Decision, json(&own), at));
     let ada = || "ada".parse().unwrap();
     let (label, class) = (Gesture::Label("fist".to_owned()), Gesture::Class(ClassId(2)));
     let words = [

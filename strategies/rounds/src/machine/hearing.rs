@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, Decision, Envelope, HeldVote, Holding, Message, RobotId, RoundId, Stamp,
+    Announcement, Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, RoundId,
+    Stamp,
 };
 
 use super::rounds::{Effects, Rounds};
@@ -43,30 +44,33 @@ impl Rounds {
             }
             Message::Have(have) => self.on_have(author, &have, effects),
             Message::Give(give) => self.on_give(author, give, effects),
+            Message::Holding(holding) => {
+                let word = Holder { robot: author, stamp, holding, signature };
+                self.note_holder(word.clone());
+                self.want(author, word.holding);
+            }
+            // That comes as what it is, an announcement.
+            Message::Announced(_) => {}
             // Whoever follows the rounds to learn from them takes these in.
             Message::Samples(_) | Message::Batches(_) | Message::Know(_) | Message::Lessons(_) => {}
         }
     }
 
-    /// Hears which decision a robot holds. That is a hint: the decision itself is asked for.
-    pub(super) fn on_heard(&mut self, robot: RobotId, holding: Holding) {
-        if robot == self.me {
-            return;
-        }
-        if self.is_this_round(holding.round)
-            && let Some(round) = &mut self.round
-        {
-            for holder in holding.guests.iter().chain([&robot]) {
-                let class = holding.class.filter(|_| !holding.changed);
-                round.agreement.note_holder(*holder, robot, holding.rank, class);
-            }
-        }
+    /// Hears what a robot says that it holds, itself or by way of another. Says whether it was news.
+    pub(super) fn note_holder(&mut self, holder: Holder) -> bool {
+        let of_this = holder.robot != self.me && self.is_this_round(holder.holding.round);
+        let round = self.round.as_mut().filter(|_| of_this);
+        round.is_some_and(|round| round.agreement.note_holder(holder))
+    }
+
+    /// Asks a robot for what it says that it holds, if that is lacking here. That is a hint: what it then gives is looked into.
+    fn want(&mut self, holder: RobotId, holding: Holding) {
         let greater = self.wanted.as_ref().is_none_or(|wanted| {
             (holding.round.counter, holding.rank) > (wanted.holding.round.counter, wanted.holding.rank)
         });
         if greater && self.lacks(&holding) {
             let due = self.wanted.as_ref().map_or(self.now + ASK_AFTER, |wanted| wanted.due);
-            self.wanted = Some(Wanted { holder: robot, holding, due, asked: 0 });
+            self.wanted = Some(Wanted { holder, holding, due, asked: 0 });
         }
     }
 
@@ -96,8 +100,9 @@ impl Rounds {
         }
     }
 
-    pub(super) fn on_announced(&mut self, decision: Decision, effects: &mut Effects<'_>) {
-        if !self.may_hear(&decision, None) {
+    pub(super) fn on_announced(&mut self, announcement: Announcement, effects: &mut Effects<'_>) {
+        let Announcement { decision, announcer, .. } = announcement;
+        if !self.may_hear(&decision, announcer, false) {
             return;
         }
         let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
@@ -128,18 +133,24 @@ impl Rounds {
         }
     }
 
-    /// The same, of a round that robots are in; refuses one too far ahead. Rounds opened at the same time
+    /// The same, of a round that robots are in, `by` whose vote; refuses one too far ahead, or too soon. Rounds opened at the same time
     /// merge here, on the smaller name; of others with equal counters, the greater name is the newer, for all alike.
-    fn place(&mut self, id: RoundId, this: bool, effects: &mut Effects<'_>) -> Option<Ordering> {
+    fn place(
+        &mut self,
+        id: RoundId,
+        this: bool,
+        by: Option<RobotId>,
+        effects: &mut Effects<'_>,
+    ) -> Result<Ordering, Refusal> {
         let (first, began) = self.began;
         let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
         if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
             self.refusals.add(Refusal::FarAhead);
-            return None;
+            return Err(Refusal::FarAhead);
         }
-        if self.is_too_soon(id) {
+        if self.is_too_soon(id, by, effects) {
             self.refusals.add(Refusal::TooSoon);
-            return None;
+            return Err(Refusal::TooSoon);
         }
         self.highest = self.highest.max(Some(id.counter));
         let order = match &self.round {
@@ -150,7 +161,7 @@ impl Rounds {
             effects.follower.merged(round.id, id);
             round.id = round.id.min(id);
         }
-        Some(order)
+        Ok(order)
     }
 
     /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
@@ -180,17 +191,6 @@ impl Rounds {
         }
     }
 
-    /// Whether that is a newer round that would end the open one, in which others take part, before that had its time.
-    fn is_too_soon(&self, id: RoundId) -> bool {
-        self.round.as_ref().is_some_and(|round| {
-            let begun = round.open && round.ballot.len() > 1;
-            begun
-                && round.id < id
-                && !self.is_this_round(id)
-                && self.now < round.since + self.config.refractory
-        })
-    }
-
     /// Counts a robot's vote, by whichever way it came. Says whether it was news.
     pub(super) fn hear_vote(&mut self, held: HeldVote, effects: &mut Effects<'_>) -> bool {
         let HeldVote { robot, stamp, ref vote, .. } = held;
@@ -211,14 +211,19 @@ impl Rounds {
             return false;
         }
         let this = self.is_this_round(vote.round);
-        match self.place(vote.round, this, effects) {
-            None => return false,
-            Some(Ordering::Less) => {
+        match self.place(vote.round, this, Some(robot), effects) {
+            Err(refusal) => {
+                if refusal == Refusal::TooSoon {
+                    self.waiting = Some(held);
+                }
+                return false;
+            }
+            Ok(Ordering::Less) => {
                 self.answer_displaced(&held, effects);
                 return false;
             }
-            Some(Ordering::Greater) => self.join(vote.round, effects),
-            Some(Ordering::Equal) => {}
+            Ok(Ordering::Greater) => self.join(vote.round, effects),
+            Ok(Ordering::Equal) => {}
         }
         let Some(round) = self.round.as_mut() else { return false };
         match round.ballot.cast(held) {
@@ -234,17 +239,15 @@ impl Rounds {
         }
     }
 
-    /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. `given`: by whom, if it was not announced. The
-    /// one that is held may be repeated.
-    pub(super) fn may_hear(&mut self, decision: &Decision, given: Option<Option<RobotId>>) -> bool {
+    /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. It comes from that robot, `given` or announced.
+    /// The one that is held may be repeated.
+    pub(super) fn may_hear(&mut self, decision: &Decision, from: RobotId, given: bool) -> bool {
         let held = self.round.as_ref().and_then(|round| round.agreement.held());
         let repeated =
             held.is_some_and(|held| held.round == decision.round && held.rank() == decision.rank());
-        let allowed = match given {
-            _ if repeated => true,
-            Some(by) => self.given.take(self.now, by),
-            None => self.announced.take(self.now, None),
-        };
+        let known = self.known(from);
+        let allowance = if given { &mut self.given } else { &mut self.announced };
+        let allowed = repeated || allowance.take(self.now, known);
         if !allowed {
             self.refusals.add(Refusal::DecisionTooOften);
         }
@@ -268,16 +271,16 @@ impl Rounds {
             return Heard::Refused;
         }
         let displaced = !this && self.is_displaced_by(decision.round);
-        match self.place(decision.round, this, effects) {
-            None | Some(Ordering::Less) => return Heard::Refused,
+        match self.place(decision.round, this, None, effects) {
+            Err(_) | Ok(Ordering::Less) => return Heard::Refused,
             // The gesture of a round of this robot's own is still shown.
-            Some(Ordering::Greater) if displaced => {
+            Ok(Ordering::Greater) if displaced => {
                 self.open_next(effects);
                 return Heard::Known;
             }
             // What is decided elsewhere needs no looking.
-            Some(Ordering::Greater) => self.enter(decision.round, false, effects),
-            Some(Ordering::Equal) => {}
+            Ok(Ordering::Greater) => self.enter(decision.round, false, effects),
+            Ok(Ordering::Equal) => {}
         }
         let expected = self.electorate.expected(&self.alive);
         let (scale, robots) = (self.own_scale(), self.electorate.count());
@@ -294,11 +297,6 @@ impl Rounds {
         {
             // Its votes were heard; what they are worth, this robot finds itself.
             return Heard::Known;
-        }
-        // Who is named as its author may not have drawn it.
-        if decision.author != self.me && self.config.liars == 0 {
-            let (author, rank, class) = (decision.author, decision.rank(), decision.class);
-            round.agreement.note_holder(author, author, rank, class);
         }
         if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Holding, RobotId};
+use gestalt_protocol::{Announcement, Envelope, RobotId};
 
 use crate::classify::Classify;
 use crate::observation::Observation;
@@ -29,10 +29,8 @@ pub enum Input {
     Observed(Observation),
     /// A robot's message arrived, by whichever way. One that is not about rounds changes nothing.
     Received(Envelope),
-    /// That robot says which decision it holds (`robot/<id>/decision`).
-    Heard(RobotId, Holding),
-    /// This decision was announced for the swarm (`decision`).
-    Announced(Decision),
+    /// This was announced for the swarm (`decision`).
+    Announced(Announcement),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
     Alive(BTreeSet<RobotId>),
     /// The robots that see and vote through this robot's host, and leave deciding and announcing to this one.

@@ -62,12 +62,6 @@ impl Rounds {
         self.round.as_ref()?.agreement.held()
     }
 
-    /// Whether it held another gesture of that round before.
-    #[must_use]
-    pub fn has_changed(&self) -> bool {
-        self.round.as_ref().is_some_and(|round| round.agreement.has_changed())
-    }
-
     /// The votes known in that round.
     #[must_use]
     pub fn ballot(&self) -> Option<&Ballot> {

@@ -15,6 +15,7 @@ mod input;
 mod inspect;
 mod output;
 mod partners;
+mod preempting;
 mod repair;
 mod rounds;
 #[cfg(test)]

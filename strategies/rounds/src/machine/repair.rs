@@ -14,6 +14,9 @@ use crate::refusal::Refusal;
 /// The most votes in one [`Give`], so that it fits in a message whatever the vocabulary; the next one brings more.
 const MAX_GIVEN: usize = 1024;
 
+/// The most words on who holds what that fit beside a decision of the largest swarm.
+const BESIDE_A_DECISION: usize = 256;
+
 impl Rounds {
     /// Greets new neighbours with what this robot has.
     pub(super) fn on_neighbours(&mut self, mut robots: BTreeSet<RobotId>, effects: &mut Effects<'_>) {
@@ -49,13 +52,6 @@ impl Rounds {
         }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
-        if let Some(round) =
-            self.round.as_mut().filter(|round| order.is_eq() && round.agreement.rank() == have.decision)
-            && !have.changed
-            && let Some((rank, class)) = round.agreement.held().map(|held| (held.rank(), held.class))
-        {
-            round.agreement.note_holder(from, from, rank, class);
-        }
         if let Some(give) = self.lacking_there(order, have) {
             self.tell(from, Message::Give(give), effects);
         }
@@ -67,10 +63,9 @@ impl Rounds {
 
     /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
     pub(super) fn on_give(&mut self, from: RobotId, give: Give, effects: &mut Effects<'_>) {
-        let mut news = Give { decision: None, votes: Vec::new() };
+        let mut news = Give { decision: None, votes: Vec::new(), holders: Vec::new() };
         let mut greater = false;
-        let known = self.known(from);
-        if let Some(decision) = give.decision.filter(|decision| self.may_hear(decision, Some(known))) {
+        if let Some(decision) = give.decision.filter(|decision| self.may_hear(decision, from, true)) {
             let missed = !self.is_this_round(decision.round);
             let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
             // Of a greater one for the gesture that is held anyway the others are told, and ask for it if they lack it.
@@ -88,7 +83,8 @@ impl Rounds {
                 news.votes.push(held);
             }
         }
-        let is_news = news.decision.is_some() || !news.votes.is_empty();
+        news.holders = give.holders.into_iter().filter(|holder| self.note_holder(holder.clone())).collect();
+        let is_news = news.decision.is_some() || !news.votes.is_empty() || !news.holders.is_empty();
         if !is_news && !greater {
             return;
         }
@@ -130,7 +126,16 @@ impl Rounds {
         } else {
             Vec::new()
         };
-        (decision.is_some() || !votes.is_empty()).then_some(Give { decision, votes })
+        let agreement = &round.agreement;
+        // Those that are on their way by themselves need not be given.
+        let settled = agreement.held_since().is_some_and(|since| self.now >= since + self.config.settle);
+        let lacks = order.is_lt() || have.holders != agreement.digest();
+        let counts = settled && self.now <= round.since.saturating_add(self.config.lately);
+        let fits = decision.is_none() || agreement.holders().count() <= BESIDE_A_DECISION;
+        let holders =
+            if counts && lacks && fits { agreement.holders().cloned().collect() } else { Vec::new() };
+        let gives = decision.is_some() || !votes.is_empty() || !holders.is_empty();
+        gives.then_some(Give { decision, votes, holders })
     }
 
     /// Whether the neighbour has something that this robot lacks.
@@ -140,7 +145,10 @@ impl Rounds {
         let newer = |(robot, stamp): &(RobotId, Stamp)| {
             *robot != self.me && round.ballot.stamp(*robot).is_none_or(|mine| mine < *stamp)
         };
-        have.decision > rank || (rank.is_none() && have.votes.iter().any(newer))
+        let unsure = rank.is_some_and(|rank| rank.decided) && !self.is_final(&round.agreement);
+        have.decision > rank
+            || (rank.is_none() && have.votes.iter().any(newer))
+            || (unsure && have.holders != round.agreement.digest())
     }
 
     pub(super) fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
@@ -148,7 +156,7 @@ impl Rounds {
         let have = Have {
             round: self.round(),
             decision: self.round.as_ref().and_then(|round| round.agreement.rank()),
-            changed: self.has_changed(),
+            holders: self.round.as_ref().map_or(0, |round| round.agreement.digest()),
             votes: match &self.round {
                 Some(round) if round.open => round.ballot.stamps().collect(),
                 _ => Vec::new(),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Stamp};
+use gestalt_protocol::{Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
 use super::follow::Follow;
@@ -20,6 +20,7 @@ use crate::life::Life;
 use crate::refusal::Refusals;
 use crate::round::Round;
 use crate::sign::Sign;
+use crate::vocabulary::Vocabulary;
 
 /// Decisions are heard this often, in the long run: rounds are no faster.
 const DECISIONS_EVERY: Duration = Duration::from_millis(250);
@@ -38,7 +39,7 @@ const BURST: u32 = 16;
 /// use std::sync::Arc;
 /// use std::time::Duration;
 ///
-/// use gestalt_protocol::{ClassId, RobotId};
+/// use gestalt_protocol::RobotId;
 /// use gestalt_rounds::{Classify, ClassifyError, Input, Life, Observation, Output, Rounds, RoundsConfig, Vocabulary};
 ///
 /// /// Takes the features for the probabilities.
@@ -77,13 +78,10 @@ const BURST: u32 = 16;
 ///     for (robot, input) in std::mem::take(&mut inbox) {
 ///         for output in swarm[robot].handle(now, input) {
 ///             match output {
-///                 Output::Broadcast(vote) => inbox.push((1 - robot, Input::Received(vote))),
-///                 Output::Hold(decision) => {
-///                     inbox.push((1 - robot, Input::Heard(robots[robot], decision.holding(Vec::new(), false))));
-///                 }
-///                 Output::Announce(decision) => {
-///                     decided.push(decision.clone());
-///                     inbox.push((1 - robot, Input::Announced(decision)));
+///                 Output::Broadcast(said) => inbox.push((1 - robot, Input::Received(said))),
+///                 Output::Announce(announcement) => {
+///                     decided.push(announcement.clone());
+///                     inbox.push((1 - robot, Input::Announced(announcement)));
 ///                 }
 ///                 _ => {}
 ///             }
@@ -91,8 +89,8 @@ const BURST: u32 = 16;
 ///     }
 /// }
 /// assert_eq!(decided.len(), 1, "one robot speaks for all");
-/// assert_eq!(decided[0].class, Some(ClassId(1)));
-/// assert_eq!(decided[0].certificate.votes.len(), 2);
+/// assert_eq!(decided[0].label.as_deref(), Some("right"));
+/// assert_eq!(decided[0].decision.certificate.votes.len(), 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
@@ -103,6 +101,8 @@ pub struct Rounds {
     pub(super) config: RoundsConfig,
     pub(super) fusion: Arc<dyn Fuse>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
+    /// What gestures are called while there is no classifier.
+    pub(super) vocabulary: Option<Vocabulary>,
     pub(super) signer: Option<Arc<dyn Sign>>,
     /// The stamp of the last message said.
     pub(super) stamp: Stamp,
@@ -126,8 +126,12 @@ pub struct Rounds {
     pub(super) haves: Allowance,
     /// How often each may give it a decision,
     pub(super) given: Allowance,
-    /// and how often decisions may be announced, by whomever: nobody stands for their authors.
+    /// and how often each may announce one.
     pub(super) announced: Allowance,
+    /// How often a robot may end a round that is neither decided nor over, by beginning a newer one.
+    pub(super) preempted: Allowance,
+    /// The latest vote in a newer round that was refused so as not to end the open one: its time comes when that is over.
+    pub(super) waiting: Option<HeldVote>,
     pub(super) refusals: Refusals,
     pub(super) duplicate: Option<Stamp>,
     /// The round for which this robot still looks, though it may be decided: its learning wants more of it.
@@ -155,6 +159,7 @@ impl Rounds {
             me,
             nonce: life.nonce,
             classifier: None,
+            vocabulary: None,
             signer: None,
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
@@ -171,6 +176,8 @@ impl Rounds {
             haves: Allowance::new(config.repair_busy / 4, BURST),
             given: Allowance::new(DECISIONS_EVERY, BURST),
             announced: Allowance::new(DECISIONS_EVERY, BURST),
+            preempted: Allowance::new(config.deadline, 1),
+            waiting: None,
             fusion: Arc::new(config.rule),
             config,
             refusals: Refusals::default(),
@@ -198,7 +205,15 @@ impl Rounds {
         self
     }
 
-    /// The same rounds, in which this robot signs what it stands by: votes, samples and what it passes on of instructors.
+    /// The same rounds, in which gestures have these names where this robot announces them, until a classifier brings its own.
+    #[must_use]
+    pub fn naming(mut self, vocabulary: Vocabulary) -> Self {
+        self.vocabulary = Some(vocabulary);
+        self
+    }
+
+    /// The same rounds, in which this robot signs what it stands by: votes, what it holds and announces, samples and what it passes on
+    /// of instructors.
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
         self.signer = Some(signer);
@@ -225,8 +240,7 @@ impl Rounds {
                 self.on_observed(&observation, effects.follower.knowledge().is_some());
             }
             Input::Received(envelope) => self.on_received(envelope, &mut effects),
-            Input::Heard(robot, holding) => self.on_heard(robot, holding),
-            Input::Announced(decision) => self.on_announced(decision, &mut effects),
+            Input::Announced(announcement) => self.on_announced(announcement, &mut effects),
             Input::Alive(robots) => self.on_alive(robots),
             Input::Guests(robots) => self.on_guests(robots),
             Input::Neighbours(robots) => self.on_neighbours(robots, &mut effects),
@@ -280,6 +294,9 @@ impl Rounds {
         if self.announcement().is_some_and(|due| self.now >= due) {
             self.announce(effects);
         }
+        if let Some(newer) = self.waiting.take_if(|_| !self.round.as_ref().is_some_and(|round| round.open)) {
+            self.hear_vote(newer, effects);
+        }
         if self.looking_until(effects.follower).is_some_and(|until| self.now >= until) {
             self.stop_looking(effects);
         }
@@ -296,8 +313,9 @@ impl Rounds {
     pub(super) fn forget_accounts(&mut self) {
         let (now, alive, neighbours) = (self.now, &self.alive, self.partners.neighbours());
         let known = |robot: RobotId| alive.contains(&robot) || neighbours.contains(&robot);
-        self.haves.forget(now, known);
-        self.given.forget(now, known);
+        for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
+            allowance.forget(now, known);
+        }
     }
 
     /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence. Those that

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, RobotId};
+use gestalt_protocol::{Announced, Announcement, Decision, Envelope, Holder, Message, RobotId};
 
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
@@ -50,7 +50,26 @@ impl Rounds {
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
             effects.out.push(Output::Hold(decision.clone()));
+            self.say_holding(effects);
         }
+    }
+
+    /// Says which gesture this robot holds, unless that is what it said last: a greater decision for the same is news to nobody.
+    fn say_holding(&mut self, effects: &mut Effects<'_>) {
+        let Some(agreement) = self.round.as_ref().map(|round| &round.agreement) else { return };
+        let Some(holding) = agreement.held().map(|held| held.holding(agreement.has_changed())) else {
+            return;
+        };
+        let said = agreement.holder(self.me).map(|own| (own.holding.class, own.holding.changed));
+        if said == Some((holding.class, holding.changed)) {
+            return;
+        }
+        let envelope = self.stamped(Message::Holding(holding.clone()));
+        let Envelope { author: robot, stamp, signature, .. } = envelope;
+        if let Some(round) = &mut self.round {
+            round.agreement.note_holder(Holder { robot, stamp, holding, signature });
+        }
+        effects.out.push(Output::Broadcast(envelope));
     }
 
     /// How long this robot leaves to those before it whatever one robot is to say for all: the live robot of the smallest
@@ -72,13 +91,37 @@ impl Rounds {
         let Some(agreement) = self.round.as_mut().map(|round| &mut round.agreement) else { return };
         if let Some(decision) = agreement.held().cloned() {
             agreement.note_announced(self.now, decision.class, is_final);
-            effects.out.push(Output::Announce(Decision { is_final, ..decision }));
+            let announcement = self.aloud(Decision { is_final, ..decision });
+            effects.out.extend(announcement.map(Output::Announce));
         }
     }
 
-    fn is_final(&self, agreement: &Agreement) -> bool {
+    /// The decision held as this robot says it to whoever asks; `None` while it holds none.
+    #[must_use]
+    pub fn held_aloud(&mut self) -> Option<Announcement> {
+        let agreement = &self.round.as_ref()?.agreement;
+        let (is_final, decision) = (self.is_final(agreement), agreement.held()?.clone());
+        self.aloud(Decision { is_final, ..decision })
+    }
+
+    /// What its gesture is called, if this robot has the vocabulary that it was decided by.
+    #[must_use]
+    pub fn label_of(&self, decision: &Decision) -> Option<&str> {
+        let known = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
+        let vocabulary = known.or(self.vocabulary.as_ref())?;
+        let class = decision.class.filter(|_| vocabulary.id() == decision.certificate.vocabulary)?;
+        vocabulary.label(class)
+    }
+
+    /// A decision in this robot's own words, which it stands by.
+    fn aloud(&mut self, decision: Decision) -> Option<Announcement> {
+        let label = self.label_of(&decision).map(str::to_owned);
+        Announcement::of(self.stamped(Message::Announced(Announced { decision, label })))
+    }
+
+    pub(super) fn is_final(&self, agreement: &Agreement) -> bool {
         let holders = self.config.holders(self.electorate.count());
-        agreement.is_final(holders, &self.guests, self.config.liars)
+        agreement.is_final(holders, self.me, &self.guests)
     }
 
     pub(super) fn own_scale(&self) -> Option<Scale> {

@@ -191,12 +191,6 @@ impl Swarm {
                             due.push_back((robot.0 as usize - 1, Input::Received(envelope)));
                         }
                     }
-                    Output::Hold(decision) => {
-                        let holding = decision.holding(Vec::new(), self.minds[i].has_changed());
-                        for j in (0..self.minds.len()).filter(|j| *j != i) {
-                            due.push_back((j, Input::Heard(me, holding.clone())));
-                        }
-                    }
                     Output::Answer(by, answer) => {
                         for j in 0..self.minds.len() {
                             due.push_back((j, Input::Answered(by.clone(), answer.at, me)));
@@ -228,7 +222,7 @@ impl Swarm {
                             }
                         }
                     }
-                    Output::Announce(_) | Output::Opened(_) | Output::Closed(_) => {}
+                    Output::Hold(_) | Output::Announce(_) | Output::Opened(_) | Output::Closed(_) => {}
                 }
             }
         }

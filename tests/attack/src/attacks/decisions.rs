@@ -3,14 +3,16 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, HeldVote, Holding, RobotId, Stamp, Topic};
+use gestalt_protocol::{
+    Announcement, ClassId, Decision, Give, Have, HeldVote, Holder, Message, RobotId, Stamp, Topic,
+};
 
 use super::WHOEVER_SAYS_SO;
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, decided_alike, decided_in_time, unmoved};
 use crate::forged;
 use crate::swarm::world::{CLASSES, STRANGER, key};
-use crate::swarm::{Plan, Swarm};
+use crate::swarm::{Parcel, Plan, Swarm};
 
 const MS: Duration = Duration::from_millis(1);
 
@@ -75,22 +77,40 @@ pub const ALL: &[Attack] = &[
         what: "says for f + 1 robots that they hold a greater decision, which nobody has",
         tier: Tier::T0,
         setting: Setting::Sealed,
-        expected: "nobody holds another; announced within 0.5 s of the usual",
-        counted: Counted::None("what a robot says it holds is a hint: it is asked for, four times at most"),
+        expected: "nothing",
+        counted: Counted::All(&["refused_robot_decision_unsigned"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed().withstanding(1), seed, hearsay, half_a_second_later),
+        play: |seed| beside(&Plan::sealed().withstanding(1), seed, |swarm| hearsay(swarm, &[2, 3]), unmoved),
     },
     Attack {
         number: "A3",
-        what: "says to a robot that was cut off that the others hold what it holds",
+        what: "an enrolled robot says for itself and others that they hold a greater decision, which nobody has",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nobody holds another; announced within 0.5 s of the usual",
+        counted: Counted::Some(&["refused_robot_decision_unsigned"]),
+        gap: None,
+        play: |seed| beside(&eight(), seed, |swarm| hearsay(swarm, &[2, 3, 9]), half_a_second_later),
+    },
+    Attack {
+        number: "A3",
+        what: "says to a robot that was cut off that the others hold what it holds, in their names, as their neighbour, and by its authors",
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "it is not announced as final",
-        counted: Counted::None("hints are believed where finality is counted"),
-        gap: Some(
-            "what a robot says it holds is not signed: only the votes in a decision prove it, not the word `final`",
-        ),
+        counted: Counted::Some(&["refused_robot_decision_unsigned", "refused_repair_unsigned"]),
+        gap: None,
         play: |seed| beside(&Plan::sealed(), seed, false_finality, final_as_in_peace),
+    },
+    Attack {
+        number: "A3 · 7",
+        what: "says to a robot that was cut off again what the others said they hold in the round before",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "it is not announced as final",
+        counted: Counted::None("they are true words on another round"),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, finality_of_before, final_as_in_peace),
     },
     Attack {
         number: "A4 · 11",
@@ -151,12 +171,10 @@ pub const ALL: &[Attack] = &[
         what: "announces the true decision to the robots alone, as final, before one of them does",
         tier: Tier::T0,
         setting: Setting::Sealed,
-        expected: "clients hear of it from a robot, at most 1 s later than usual",
-        counted: Counted::None("the decision is true, and who announces it is nobody's matter"),
-        gap: Some(
-            "announcements are not signed: robots take one for their spokesrobot's, whoever made it and whoever else heard it",
-        ),
-        play: |seed| beside(&Plan::sealed(), seed, announced_to_robots, same_gesture),
+        expected: "nothing",
+        counted: Counted::All(&["refused_decision_unsigned"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, announced_to_robots, unmoved),
     },
 ];
 
@@ -217,8 +235,15 @@ fn made_up(swarm: &mut Swarm, way: &dyn Fn(&mut Swarm, Vec<HeldVote>)) {
 }
 
 fn announced_aloud(swarm: &mut Swarm, votes: Vec<HeldVote>) {
+    let signs = votes.iter().any(|held| held.signature.is_some());
     let decision = forged::decision(swarm.round(), votes, 0);
-    swarm.put_decision(&decision);
+    if !signs {
+        return swarm.put_decision(&decision);
+    }
+    let (announcer, stamp) = (RobotId(10_000), Stamp { boot: 1, sequence: 2 });
+    let said = Announcement { decision, label: None, announcer, stamp, signature: None };
+    let said = forged::signed(said.into(), &key(STRANGER), &swarm.id());
+    swarm.put_announcement(said);
 }
 
 fn given(swarm: &mut Swarm, votes: Vec<HeldVote>) {
@@ -240,20 +265,25 @@ fn half_a_second_later(peace: &Swarm, war: &Swarm) -> Result<(), String> {
     decided_alike(peace, war, Duration::from_millis(500))
 }
 
-fn hearsay(swarm: &mut Swarm) {
+fn hearsay(swarm: &mut Swarm, in_whose_names: &[u32]) {
     amid_a_round(swarm, &|swarm| {
         let decision = forged::decision(swarm.round(), of_nobody(swarm, 100, false), 0);
-        for robot in [2, 3] {
-            let holding: Holding = decision.holding(Vec::new(), false);
-            let bytes = serde_json::to_vec(&holding).expect("a holding is JSON");
-            swarm.put(&Topic::RobotDecision(RobotId(robot)), &bytes);
+        for robot in in_whose_names {
+            for to in 1..=swarm.honest() {
+                swarm.put_holding(to, *robot, &decision);
+            }
         }
     });
 }
 
 /// How many robots have said a vote with evidence.
 fn voted(swarm: &Swarm) -> usize {
-    let votes = swarm.votes().into_iter().filter(|held| !held.vote.evidence.is_empty());
+    voted_in(swarm, Duration::ZERO)
+}
+
+/// The same since then.
+fn voted_in(swarm: &Swarm, since: Duration) -> usize {
+    let votes = swarm.votes_since(since).into_iter().filter(|held| !held.vote.evidence.is_empty());
     votes.map(|held| held.robot).collect::<BTreeSet<_>>().len()
 }
 
@@ -280,10 +310,39 @@ fn false_finality(swarm: &mut Swarm) {
     swarm.cut([1]);
     swarm.pass(50 * MS);
     if let Some(held) = swarm.mind(1).held().cloned() {
-        let bytes = serde_json::to_vec(&held.holding(Vec::new(), false)).expect("a holding is JSON");
         for robot in [3, 4, 5] {
-            swarm.put_to(1, &Topic::RobotDecision(RobotId(robot)), &bytes);
+            swarm.put_holding(1, robot, &held);
+            let decision = Some(held.rank());
+            let (votes, knowledge) = (Vec::new(), None);
+            let have = Have { round: Some(held.round), decision, holders: 0, votes, knowledge, answer: true };
+            swarm.whisper_to(1, robot, &Message::Have(have));
+            let by_another = Decision { author: RobotId(robot), ..held.clone() };
+            let stamp = Stamp { boot: 10, sequence: 1 };
+            let holder =
+                Holder { robot: RobotId(robot), stamp, holding: held.holding(false), signature: None };
+            let give = Give { decision: Some(by_another), votes: Vec::new(), holders: vec![holder] };
+            swarm.whisper_to(1, robot, &Message::Give(give));
         }
+    }
+    swarm.end(began);
+    swarm.pass(5000 * MS);
+}
+
+/// The same with words that were true once.
+fn finality_of_before(swarm: &mut Swarm) {
+    swarm.show(TRUE);
+    let of_holding = |parcel: &&Parcel| matches!(swarm.topic(&parcel.key), Some(Topic::RobotDecision(_)));
+    let recorded: Vec<Parcel> = swarm.air().iter().filter(of_holding).cloned().collect();
+    swarm.pass(6000 * MS);
+    let began = swarm.now();
+    swarm.begin(TRUE);
+    while voted_in(swarm, began) < 5 && swarm.now() < began + 1000 * MS {
+        swarm.pass(MS / 10);
+    }
+    swarm.cut([1]);
+    swarm.pass(50 * MS);
+    for parcel in &recorded {
+        swarm.replay_to(1, parcel);
     }
     swarm.end(began);
     swarm.pass(5000 * MS);

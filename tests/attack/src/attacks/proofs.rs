@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use gestalt_protocol::{
-    CountedVote, Decision, Envelope, Give, Message, RobotId, RoundId, Stamp, decode_json,
+    Announcement, CountedVote, Decision, Envelope, Give, Message, RobotId, RoundId, Stamp, Topic, decode_json,
 };
 use gestalt_strategies::{MindConfig, follows};
 use gestalt_trust::Roster;
@@ -18,26 +18,23 @@ use crate::swarm::{Plan, Swarm};
 pub const ALL: &[Attack] = &[
     Attack {
         number: "29",
-        what: "flips one bit of every byte of a decision, in JSON and in postcard",
+        what: "flips one bit of every byte of what is announced, in JSON and as its announcer signed it",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "none is proven that differs in anything",
+        counted: Counted::Some(&["no decision", "a signature"]),
+        gap: None,
+        play: announcements,
+    },
+    Attack {
+        number: "29",
+        what: "flips one bit of every byte of a decision that a robot gives to another",
         tier: Tier::T2,
         setting: Setting::Sealed,
         expected: "none is proven that says another gesture, other votes or another probability",
         counted: Counted::Some(&["no decision", "a signature", "it does not follow"]),
         gap: None,
-        play: |seed| flips(seed, what_is_proven),
-    },
-    Attack {
-        number: "29",
-        what: "flips one bit of what an author says beside the votes",
-        tier: Tier::T2,
-        setting: Setting::Sealed,
-        expected: "none is proven that differs in anything",
-        counted: Counted::Some(&["no decision", "a signature", "it does not follow"]),
-        gap: Some(
-            "no vote covers what its author says beside the votes: opener and life in the name of the round, n, q, author, \
-                   milliseconds, `final`, and weight and class beside each vote",
-        ),
-        play: |seed| flips(seed, |decision| decision),
+        play: given,
     },
     Attack {
         number: "29",
@@ -45,18 +42,26 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T2,
         setting: Setting::Sealed,
         expected: "it is not proven that nothing was decided",
-        counted: Counted::None("none of it is refused"),
-        gap: Some(
-            "any votes prove `no decision`, also those that decide: `follows` asks nothing of a decision without a gesture",
-        ),
-        play: without_gesture,
+        counted: Counted::Some(&["a signature"]),
+        gap: None,
+        play: |seed| without_gesture(seed, None),
     },
     Attack {
         number: "29",
-        what: "shows examples/verify.py every byte of a decision flipped",
+        what: "an enrolled robot announces a decision out of which it has taken the gesture",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "it is not proven that nothing was decided",
+        counted: Counted::Some(&["it does not follow"]),
+        gap: None,
+        play: |seed| without_gesture(seed, Some(2)),
+    },
+    Attack {
+        number: "29",
+        what: "shows examples/verify.py every byte of what is announced flipped",
         tier: Tier::T2,
         setting: Setting::Sealed,
-        expected: "none is proven that says another gesture, other votes or another probability",
+        expected: "none is proven that differs in anything",
         counted: Counted::None("it ends with the first cause that it meets, and names it"),
         gap: None,
         play: by_python,
@@ -73,21 +78,33 @@ pub const ALL: &[Attack] = &[
     },
 ];
 
-/// A decision of five sealed robots.
-fn decided(seed: u64) -> Decision {
+/// What one of five sealed robots announces.
+fn announced(seed: u64) -> Announcement {
     let mut swarm = Swarm::new(&Plan::sealed(), seed, true);
     swarm.show((seed % 6) as u8);
-    swarm.mind(1).held().cloned().expect("five robots that see the same decide")
+    let said = swarm.air().iter().filter(|parcel| swarm.topic(&parcel.key) == Some(Topic::Decision));
+    let said = said.last().and_then(|parcel| decode_json(&parcel.bytes).ok());
+    said.expect("five robots that see the same decide")
 }
 
-/// What `gestalt verify` does: whether every vote was signed by a member, and the decision follows from them.
-fn prove(decision: &Decision, roster: &Roster) -> Result<(), &'static str> {
+/// What `gestalt verify` does: whether a member announced it so, and [`prove_votes`].
+fn prove(announcement: &Announcement, roster: &Roster) -> Result<(), &'static str> {
+    announcement.decision.check().map_err(|_| "no decision")?;
+    prove_signed(announcement.clone().into(), roster)?;
+    prove_votes(&announcement.decision, roster)
+}
+
+fn prove_signed(envelope: Envelope, roster: &Roster) -> Result<(), &'static str> {
+    let signature = envelope.signature.ok_or("a signature")?;
+    roster.check(&envelope.statement(), &signature).map(drop).map_err(|_| "a signature")
+}
+
+/// Whether every vote was signed by a member, and the decision follows from them.
+fn prove_votes(decision: &Decision, roster: &Roster) -> Result<(), &'static str> {
     let certificate = &decision.certificate;
     let votes = certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned());
     for held in votes {
-        let envelope = Envelope::from(held);
-        let signature = envelope.signature.ok_or("a signature")?;
-        roster.check(&envelope.statement(), &signature).map_err(|_| "a signature")?;
+        prove_signed(held.into(), roster)?;
     }
     let rounds = MindConfig::default();
     if certificate.rule == rounds.rule && follows(decision, &rounds.rule, &rounds, certificate.robots) {
@@ -113,58 +130,93 @@ fn what_is_proven(mut decision: Decision) -> Decision {
     decision
 }
 
-fn flips(seed: u64, proven: fn(Decision) -> Decision) -> Played {
-    let (decision, roster) = (decided(seed), roster(5));
-    let original = proven(decision.clone());
-    let (mut refused, mut reached) =
-        (BTreeMap::<String, u64>::new(), prove(&decision, &roster).map_err(str::to_owned));
-    let mut judge = |read: Option<Decision>, place: String| {
-        if reached.is_err() {
-            return;
-        }
-        let cause = match read.map(|read| (prove(&read, &roster), read)) {
-            None => "no decision",
-            Some((Err(cause), _)) => cause,
-            Some((Ok(()), read)) => {
-                // What becomes of those without a gesture is another line of the table.
-                if proven(read.clone()) != original && read.class.is_some() {
-                    reached = Err(format!("{place} makes another decision, which is proven"));
-                }
-                return;
-            }
-        };
-        *refused.entry(cause.to_owned()).or_default() += 1;
-    };
-    let json = serde_json::to_vec(&decision).expect("a decision is JSON");
-    let bit = 1 << (seed % 8);
-    for place in 0..json.len() {
-        let mut json = json.clone();
-        json[place] ^= bit;
-        let read = decode_json::<Decision>(&json).ok().filter(|decision| decision.check().is_ok());
-        judge(read, format!("byte {place} of the JSON"));
+/// What became of everything that was flipped: why it was refused, unless it is what it was.
+struct Flips<T> {
+    original: T,
+    played: Played,
+}
+
+impl<T: PartialEq> Flips<T> {
+    fn new(original: T, proven: Result<(), &'static str>) -> Self {
+        let reached = proven.map_err(str::to_owned);
+        Self { original, played: Played { reached, refused: BTreeMap::new(), silent: 0 } }
     }
-    let give = Message::Give(Give { decision: Some(decision), votes: Vec::new() });
+
+    fn judge(&mut self, proven: Result<T, &'static str>, place: &str) {
+        match proven {
+            Err(cause) => *self.played.refused.entry(cause.to_owned()).or_default() += 1,
+            Ok(proven) if proven == self.original => {}
+            Ok(_) => {
+                let reached = Err(format!("{place} makes another one, which is proven"));
+                self.played.reached = self.played.reached.clone().and(reached);
+            }
+        }
+    }
+}
+
+/// The same bytes with one bit flipped, of each byte in turn.
+fn flipped(bytes: &[u8], seed: u64) -> impl Iterator<Item = (usize, Vec<u8>)> {
+    (0..bytes.len()).map(move |place| {
+        let mut bytes = bytes.to_vec();
+        bytes[place] ^= 1 << (seed % 8);
+        (place, bytes)
+    })
+}
+
+fn announcements(seed: u64) -> Played {
+    let (said, roster) = (announced(seed), roster(5));
+    let mut flips = Flips::new(said.clone(), prove(&said, &roster));
+    let judged = |read: Option<Announcement>| {
+        let read = read.ok_or("no decision")?;
+        prove(&read, &roster).map(|()| read)
+    };
+    let json = serde_json::to_vec(&said).expect("an announcement is JSON");
+    for (place, json) in flipped(&json, seed) {
+        flips.judge(judged(decode_json(&json).ok()), &format!("byte {place} of the JSON"));
+    }
+    for (place, bytes) in flipped(&Envelope::from(said).encode(), seed) {
+        let read = Envelope::decode(&bytes).ok().and_then(Announcement::of);
+        flips.judge(judged(read), &format!("byte {place} as it was signed"));
+    }
+    flips.played
+}
+
+fn given(seed: u64) -> Played {
+    let (decision, roster) = (announced(seed).decision, roster(5));
+    let mut flips = Flips::new(what_is_proven(decision.clone()), prove_votes(&decision, &roster));
+    let give = Give { decision: Some(decision), votes: Vec::new(), holders: Vec::new() };
     let stamp = Stamp { boot: 1, sequence: 1 };
-    let bytes = Envelope { author: RobotId(1), stamp, message: give, signature: None }.encode();
-    for place in 0..bytes.len() {
-        let mut bytes = bytes.clone();
-        bytes[place] ^= bit;
+    let bytes =
+        Envelope { author: RobotId(1), stamp, message: Message::Give(give), signature: None }.encode();
+    for (place, bytes) in flipped(&bytes, seed) {
         let read = Envelope::decode(&bytes).ok().and_then(|envelope| match envelope.message {
             Message::Give(give) => give.decision,
             _ => None,
         });
-        judge(read, format!("byte {place} in postcard"));
+        let judged = read.ok_or("no decision");
+        let judged = judged.and_then(|read| prove_votes(&read, &roster).map(|()| what_is_proven(read)));
+        flips.judge(judged, &format!("byte {place}"));
     }
-    Played { reached, refused, silent: 0 }
+    flips.played
 }
 
-fn without_gesture(seed: u64) -> Played {
-    let undecided = Decision { class: None, ..decided(seed) };
-    let reached = match prove(&undecided, &roster(5)) {
-        Err(_) => Ok(()),
-        Ok(()) => Err("votes of five robots for one gesture prove that nothing was decided".to_owned()),
-    };
-    Played { reached, refused: BTreeMap::new(), silent: 0 }
+/// `by`: the member that signs it, if one does.
+fn without_gesture(seed: u64, by: Option<u32>) -> Played {
+    let (mut said, roster) = (announced(seed), roster(5));
+    (said.decision.class, said.label) = (None, None);
+    if let Some(by) = by {
+        said.announcer = RobotId(by);
+        let signed = forged::signed(said.into(), &key(by), &roster.swarm_id());
+        said = Announcement::of(signed).expect("an announcement");
+    }
+    let (mut refused, mut reached) = (BTreeMap::new(), Ok(()));
+    match prove(&said, &roster) {
+        Err(cause) => drop(refused.insert(cause.to_owned(), 1)),
+        Ok(()) => {
+            reached = Err("votes of five robots for one gesture prove that nothing was decided".to_owned());
+        }
+    }
+    Played { reached, refused, silent: 0 }
 }
 
 /// In one process, with the first seed alone: it takes some seconds.
@@ -182,7 +234,7 @@ fn by_python(seed: u64) -> Played {
         eprintln!("skipped: flips.py: python3 has no package cryptography");
         return skipped();
     }
-    let shown = serde_json::json!({ "decision": decided(seed), "roster": roster(5).to_json() });
+    let shown = serde_json::json!({ "decision": announced(seed), "roster": roster(5).to_json() });
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("flips.py");
     let mut child = match Command::new("python3")
         .arg(script)
@@ -207,8 +259,8 @@ fn by_python(seed: u64) -> Played {
 }
 
 fn put_together(seed: u64) -> Played {
-    let (decision, roster) = (decided(seed), roster(5));
-    let earlier = decided(seed + 100);
+    let (decision, roster) = (announced(seed).decision, roster(5));
+    let earlier = announced(seed + 100).decision;
     let changed = |change: &dyn Fn(&mut Decision)| {
         let mut decision = decision.clone();
         change(&mut decision);
@@ -244,7 +296,7 @@ fn put_together(seed: u64) -> Played {
     let mut reached = Ok(());
     let mut judge = |n: usize, decision: &Decision, roster: &Roster| {
         let sound = decision.check().map_err(|_| "no decision");
-        match sound.and_then(|()| prove(decision, roster)) {
+        match sound.and_then(|()| prove_votes(decision, roster)) {
             Err(cause) => *refused.entry(cause.to_owned()).or_default() += 1,
             Ok(()) => reached = Err(format!("forgery {n} is proven")),
         }
@@ -260,7 +312,7 @@ fn put_together(seed: u64) -> Played {
         d.confidence = (d.confidence - 1e-12).max(0.0);
         d.certificate.probabilities.iter_mut().for_each(|p| *p = (*p - 1e-12).max(0.0));
     });
-    if prove(&rounded, &roster).is_err() {
+    if prove_votes(&rounded, &roster).is_err() {
         reached = Err("a rounding apart, and not proven".to_owned());
     }
     Played { reached, refused, silent: 0 }

@@ -130,7 +130,7 @@ fn full_ballot(swarm: &mut Swarm) {
         |n: u32| forged::said(10_000 + n, Stamp { boot: 1, sequence: 1 }, forged::vote(round, FALSE, 16.0));
     let votes: Vec<_> = (0..4096).map(|n| forged::held(vote(n))).collect();
     for to in 1..=5 {
-        let give = gestalt_protocol::Give { decision: None, votes: votes.clone() };
+        let give = gestalt_protocol::Give { decision: None, votes: votes.clone(), holders: Vec::new() };
         swarm.whisper_to(to, 50, &gestalt_protocol::Message::Give(give));
     }
     swarm.end(began);

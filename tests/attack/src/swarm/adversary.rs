@@ -1,8 +1,11 @@
 //! What can be said without being a robot. In peace all of it is left unsaid.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Give, HeldVote, Message, RobotId, RoundId, Stamp, Topic};
+use gestalt_protocol::{
+    Announcement, Decision, Envelope, Give, HeldVote, Message, RobotId, RoundId, Stamp, Topic,
+};
 use gestalt_strategies::Input;
 use gestalt_trust::SwarmId;
 
@@ -21,6 +24,11 @@ impl Swarm {
     /// The swarm's identity, which everybody may know.
     pub fn id(&self) -> SwarmId {
         self.roster.swarm_id()
+    }
+
+    /// How many honest robots there are.
+    pub fn honest(&self) -> u32 {
+        self.plan.honest
     }
 
     /// The number of the first liar.
@@ -55,7 +63,14 @@ impl Swarm {
 
     /// The votes that were said so far, as their authors said them.
     pub fn votes(&self) -> Vec<HeldVote> {
-        let envelopes = self.air.iter().filter_map(|parcel| Envelope::decode(&parcel.bytes).ok());
+        self.votes_since(Duration::ZERO)
+    }
+
+    /// Those that were said since then.
+    pub fn votes_since(&self, since: Duration) -> Vec<HeldVote> {
+        let since = since.as_nanos() as u64;
+        let said = self.air.iter().filter(|parcel| parcel.at >= since);
+        let envelopes = said.filter_map(|parcel| Envelope::decode(&parcel.bytes).ok());
         let votes = envelopes.filter_map(|Envelope { author, stamp, message, signature }| match message {
             Message::Vote(vote) => Some(HeldVote { robot: author, stamp, vote, signature }),
             _ => None,
@@ -78,7 +93,8 @@ impl Swarm {
         (1..=self.plan.honest).for_each(|robot| self.replay_to(robot, parcel));
     }
 
-    fn replay_to(&mut self, robot: u32, parcel: &Parcel) {
+    /// The same to one robot alone.
+    pub fn replay_to(&mut self, robot: u32, parcel: &Parcel) {
         if self.peace {
             return;
         }
@@ -94,9 +110,29 @@ impl Swarm {
         self.put(&Topic::Vote(envelope.author), &envelope.encode());
     }
 
-    /// Announces a decision.
+    /// Announces a decision, in the name of its author; a liar that is enrolled signs it.
     pub fn put_decision(&mut self, decision: &Decision) {
-        self.put(&Topic::Decision, &json(decision));
+        self.whispered += 1;
+        let (announcer, stamp) = (decision.author, Stamp { boot: 10, sequence: self.whispered });
+        let decision = decision.clone();
+        let unsigned = Announcement { decision, label: None, announcer, stamp, signature: None };
+        let said = self.signed_by_liar(unsigned.into());
+        self.put_announcement(said);
+    }
+
+    /// Announces a decision in the words of whoever signed it.
+    pub fn put_announcement(&mut self, said: Envelope) {
+        let announcement = Announcement::of(said).expect("an announcement");
+        self.put(&Topic::Decision, &json(&announcement));
+    }
+
+    /// Says what a robot holds under its key; a liar that is enrolled signs it.
+    pub fn put_holding(&mut self, to: u32, robot: u32, decision: &Decision) {
+        self.whispered += 1;
+        let (author, stamp) = (RobotId(robot), Stamp { boot: 10, sequence: self.whispered });
+        let message = Message::Holding(decision.holding(false));
+        let said = self.signed_by_liar(Envelope { author, stamp, message, signature: None });
+        self.put_to(to, &Topic::RobotDecision(author), &said.encode());
     }
 
     /// Says something as a neighbour does, in that robot's name, to every other robot.
@@ -131,14 +167,16 @@ impl Swarm {
             }
         }
         match envelope.message {
-            Message::Lessons(_) => forged::signed(envelope, &key(by.0), &self.id()),
+            Message::Lessons(_) | Message::Holding(_) | Message::Announced(_) => {
+                forged::signed(envelope, &key(by.0), &self.id())
+            }
             _ => envelope,
         }
     }
 
     /// Gives a decision and votes as a neighbour does.
     pub fn give(&mut self, from: u32, decision: Option<Decision>, votes: Vec<HeldVote>) {
-        self.whisper(from, &Message::Give(Give { decision, votes }));
+        self.whisper(from, &Message::Give(Give { decision, votes, holders: Vec::new() }));
     }
 
     /// Shows liveliness tokens of these robots beside the true ones, and takes others that it showed away.

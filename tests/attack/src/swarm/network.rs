@@ -175,18 +175,15 @@ impl Swarm {
                 }
                 let topic = match envelope.message {
                     Message::Samples(_) => Topic::Sample(me),
+                    Message::Holding(_) => Topic::RobotDecision(me),
                     _ => Topic::Vote(me),
                 };
                 self.broadcast(i, &topic, bytes);
             }
             Output::Tell(to, envelope) => self.send(i, to, &envelope),
-            Output::Hold(decision) => {
-                let holding = decision.holding(Vec::new(), self.robots[i].mind.has_changed());
-                self.broadcast(i, &Topic::RobotDecision(me), json(&holding));
-            }
-            Output::Announce(decision) => {
-                self.broadcast(i, &Topic::Decision, json(&decision));
-                self.announced.push((self.now, me, decision));
+            Output::Announce(announcement) => {
+                self.broadcast(i, &Topic::Decision, json(&announcement));
+                self.announced.push((self.now, me, announcement.decision));
             }
             Output::Answer(by, answer) => {
                 self.broadcast(i, &Topic::Answer(by), json(&answer));
@@ -200,7 +197,7 @@ impl Swarm {
                 self.at(first, Due::Frame(i, looks));
             }
             Output::Closed(_) => self.robots[i].looking = false,
-            Output::Train(_) | Output::Remember { .. } => {}
+            Output::Hold(_) | Output::Train(_) | Output::Remember { .. } => {}
         }
     }
 

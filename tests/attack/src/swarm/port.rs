@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Answer, Decision, DecodeError, Envelope, Holding, Instruction, Keys, MAX_JSON, MAX_MESSAGE, Message,
-    RobotId, Topic, decode_json,
+    Announcement, Answer, DecodeError, Envelope, Instruction, Keys, MAX_JSON, MAX_MESSAGE, Message, RobotId,
+    Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge};
@@ -107,7 +107,7 @@ impl Port {
             Some(Topic::Vote(id)) => ("vote", self.on_vote(now, id, &parcel.bytes)),
             Some(Topic::Sample(id)) => ("sample", self.on_shared(now, id, &parcel.bytes)),
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(now, &parcel.bytes)),
-            Some(Topic::RobotDecision(id)) => ("robot_decision", on_holding(id, &parcel.bytes)),
+            Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(now, id, &parcel.bytes)),
             Some(Topic::Decision) => ("decision", self.on_decision(now, &parcel.bytes)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(now, &parcel.bytes)),
             Some(Topic::Feedback(by)) => {
@@ -169,7 +169,9 @@ impl Port {
             return Err(Refusal::Twin);
         }
         match envelope.message {
-            Message::Vote(_) | Message::Samples(_) => return Err(Refusal::Kind),
+            Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_) => {
+                return Err(Refusal::Kind);
+            }
             Message::Lessons(_) => self.judge(now, &envelope)?,
             _ => {}
         }
@@ -186,12 +188,26 @@ impl Port {
     }
 
     fn on_decision(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
-        let decision: Decision = json(bytes)?;
-        decision.check()?;
+        let announcement: Announcement = json(bytes)?;
+        announcement.decision.check()?;
         if let Some(judge) = &mut self.judge {
-            judge.decision(now, &decision)?;
+            judge.announcement(now, &announcement)?;
         }
-        Ok(Some(Input::Announced(decision)))
+        Ok(Some(Input::Announced(announcement)))
+    }
+
+    fn on_holding(&mut self, now: Duration, id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let envelope = decode(bytes)?;
+        if envelope.author != id {
+            return Err(Refusal::Author);
+        }
+        match envelope.message {
+            Message::Holding(_) => {
+                self.judge(now, &envelope)?;
+                Ok((id != self.me).then_some(Input::Received(envelope)))
+            }
+            _ => Err(Refusal::Kind),
+        }
     }
 
     fn on_evidence(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
@@ -218,10 +234,6 @@ impl Port {
         strangers.iter().for_each(|_| self.refuse("alive", &Refusal::Distrust(Distrust::Stranger)));
         members
     }
-}
-
-fn on_holding(id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
-    Ok(Some(Input::Heard(id, json::<Holding>(bytes)?)))
 }
 
 fn decode(bytes: &[u8]) -> Result<Envelope, Refusal> {

@@ -121,7 +121,8 @@ impl Robot {
     pub fn note(&mut self, now: Duration, output: &Output) {
         let words = match output {
             Output::Broadcast(envelope) | Output::Tell(_, envelope) => envelope.encode(),
-            Output::Hold(decision) | Output::Announce(decision) => format!("{decision:?}").into_bytes(),
+            Output::Hold(decision) => format!("{decision:?}").into_bytes(),
+            Output::Announce(announcement) => format!("{announcement:?}").into_bytes(),
             // What follows from them is said, held or learned.
             Output::Train(_) | Output::Remember { .. } => Vec::new(),
             other => format!("{other:?}").into_bytes(),

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Answer, Decision, Envelope, Instruction, Keys, MAX_ROBOTS, Message, RobotId, Topic, decode_json,
+    Announcement, Answer, Envelope, Instruction, Keys, MAX_ROBOTS, Message, RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::Witness;
@@ -103,20 +103,32 @@ impl Inbox {
             }
             Topic::Repair(ME) => {
                 let envelope = Self::read(payload, seal)?;
-                if envelope.author == ME || matches!(envelope.message, Message::Vote(_)) {
+                if envelope.author == ME
+                    || matches!(
+                        envelope.message,
+                        Message::Vote(_) | Message::Holding(_) | Message::Announced(_)
+                    )
+                {
                     return None;
                 }
                 Input::Received(self.gate.message(self.now, envelope).ok()?)
             }
-            Topic::RobotDecision(id) => Input::Heard(id, bounded(payload, || decode_json(payload)).ok()?),
-            Topic::Decision => {
-                let mut decision: Decision = bounded(payload, || decode_json(payload)).ok()?;
-                decision.check().ok()?;
-                if seal {
-                    swarm::seal_decision(&mut decision, 0xff);
+            Topic::RobotDecision(id) => {
+                let envelope = Self::read(payload, seal)?;
+                if envelope.author != id || id == ME || !matches!(envelope.message, Message::Holding(_)) {
+                    return None;
                 }
-                self.gate.decision(self.now, &decision).ok()?;
-                Input::Announced(decision)
+                Input::Received(self.gate.message(self.now, envelope).ok()?)
+            }
+            Topic::Decision => {
+                let mut announcement: Announcement = bounded(payload, || decode_json(payload)).ok()?;
+                announcement.decision.check().ok()?;
+                if seal {
+                    swarm::seal_decision(&mut announcement.decision, 0xff);
+                    swarm::seal_announcement(&mut announcement);
+                }
+                self.gate.announcement(self.now, &announcement).ok()?;
+                Input::Announced(announcement)
             }
             Topic::Feedback(by) => {
                 let instruction: Instruction = bounded(payload, || decode_json(payload)).ok()?;
@@ -139,9 +151,10 @@ impl Inbox {
         let mut envelope = bounded(payload, || Envelope::decode(payload)).ok()?;
         if seal {
             match &mut envelope.message {
-                Message::Vote(_) => swarm::seal(&mut envelope),
+                Message::Vote(_) | Message::Holding(_) => swarm::seal(&mut envelope),
                 Message::Give(give) => {
                     give.votes.iter_mut().for_each(swarm::seal_vote);
+                    give.holders.iter_mut().for_each(swarm::seal_holder);
                     give.decision.iter_mut().for_each(|decision| swarm::seal_decision(decision, 0xff));
                 }
                 _ => {}
@@ -167,8 +180,11 @@ pub fn seed(rng: &mut impl rand::Rng) -> Vec<u8> {
             }
             1 => (Topic::Sample(author), envelope.encode()),
             2 | 3 => (Topic::Repair(ME), envelope.encode()),
-            4 => (Topic::RobotDecision(author), json(serde_json::to_vec(&values::holding(rng)))),
-            5 => (Topic::Decision, json(serde_json::to_vec(&values::decision(rng)))),
+            4 => {
+                envelope.message = Message::Holding(values::holding(rng));
+                (Topic::RobotDecision(author), envelope.encode())
+            }
+            5 => (Topic::Decision, json(serde_json::to_vec(&values::announcement(rng)))),
             _ => (
                 Topic::Feedback(values::instructor(rng)),
                 json(serde_json::to_vec(&values::instruction(rng))),

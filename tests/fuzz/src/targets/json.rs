@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use gestalt_protocol::{Answer, Decision, Holding, Instruction, Status, decode_json};
+use gestalt_protocol::{Announcement, Answer, Decision, Envelope, Holding, Instruction, Status, decode_json};
 use gestalt_trust::Evidence;
 use serde_json::to_vec;
 
@@ -18,6 +18,14 @@ pub fn run(bytes: &[u8]) {
     }
     if let Ok(answer) = bounded(bytes, || decode_json::<Answer>(bytes)) {
         survives(&answer);
+    }
+    if let Ok(announcement) = bounded(bytes, || decode_json::<Announcement>(bytes))
+        && announcement.decision.check().is_ok()
+    {
+        survives(&announcement);
+        // Who signed it signed the same bytes.
+        let again = decode_json::<Announcement>(&json(&announcement)).map(Envelope::from);
+        assert_eq!(again.map(|again| again.statement()), Ok(Envelope::from(announcement).statement()));
     }
     if let Ok(decision) = bounded(bytes, || decode_json::<Decision>(bytes)) {
         // JSON has no infinity to write: a decision that is none is not written.

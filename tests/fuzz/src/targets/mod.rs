@@ -122,7 +122,7 @@ fn json_seed(rng: &mut impl Rng) -> Vec<u8> {
     let json = match rng.random_range(0..5) {
         0 => serde_json::to_vec(&values::instruction(rng)),
         1 => serde_json::to_vec(&values::answer(rng)),
-        2 => serde_json::to_vec(&values::holding(rng)),
+        2 => serde_json::to_vec(&values::announcement(rng)),
         3 => serde_json::to_vec(&values::status(rng)),
         _ => serde_json::to_vec(&values::decision(rng)),
     };

@@ -57,7 +57,7 @@ fn read(given: bool, bytes: &[u8]) -> Option<Decision> {
 }
 
 fn given(decision: Decision) -> Vec<u8> {
-    let message = values::give(Some(decision), Vec::new());
+    let message = values::give(Some(decision), Vec::new(), Vec::new());
     Envelope { author: RobotId(1), stamp: Stamp::default(), message, signature: None }.encode()
 }
 

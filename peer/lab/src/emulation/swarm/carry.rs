@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, Message};
-use gestalt_strategies::{Input, Mind, Output};
+use gestalt_strategies::{Input, Output};
 use rand::RngExt;
 
 use super::Swarm;
@@ -41,8 +41,11 @@ impl Swarm<'_> {
         match output {
             Output::Broadcast(envelope) => {
                 let (envelope, bytes) = over_the_wire(&envelope);
-                let samples = matches!(envelope.message, Message::Samples(_));
-                let kind = if samples { Kind::Samples } else { Kind::Vote };
+                let kind = match envelope.message {
+                    Message::Samples(_) => Kind::Samples,
+                    Message::Holding(_) => Kind::Decision,
+                    _ => Kind::Vote,
+                };
                 let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope));
                 self.note(&Happening::Broadcast { robot, bytes, reaches });
             }
@@ -59,15 +62,12 @@ impl Swarm<'_> {
             Output::Hold(decision) => {
                 self.note(&Happening::Hold { robot, decision: (&decision).into() });
                 self.record.hold(self.now, i, &decision);
-                let changed = self.mind(i).is_some_and(Mind::has_changed);
-                let (holding, bytes) = as_json(&decision.holding(Vec::new(), changed));
-                self.broadcast(i, bytes, Kind::Decision, &Parcel::Held(robot, holding));
             }
-            Output::Announce(decision) => {
-                self.note(&Happening::Announce { robot, decision: (&decision).into() });
-                self.record.announce(&decision);
-                let (decision, bytes) = as_json(&decision);
-                self.broadcast(i, bytes, Kind::Decision, &Parcel::Announced(decision));
+            Output::Announce(announcement) => {
+                self.note(&Happening::Announce { robot, decision: (&announcement.decision).into() });
+                self.record.announce(&announcement.decision);
+                let (announcement, bytes) = as_json(&announcement);
+                self.broadcast(i, bytes, Kind::Decision, &Parcel::Announced(announcement));
             }
             Output::Opened(round) => {
                 self.note(&Happening::Opened { robot, round });

@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use gestalt_protocol::{ClassId, Decision, Envelope, Give, HeldVote, Holding, Message, RobotId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, Give, HeldVote, Message, RobotId};
 
 use super::Swarm;
 use super::parcel::{Parcel, as_json, over_the_wire};
@@ -25,10 +25,10 @@ impl Swarm<'_> {
                 }
                 _ => Vec::new(),
             },
-            Parcel::Announced(decision) => {
-                decision.certificate.votes.iter().map(|counted| counted.held()).collect()
+            Parcel::Announced(said) => {
+                said.decision.certificate.votes.iter().map(|counted| counted.held()).collect()
             }
-            Parcel::Held(..) | Parcel::Instructed(_) | Parcel::Answered(..) => Vec::new(),
+            Parcel::Instructed(_) | Parcel::Answered(..) => Vec::new(),
         };
         let honest = |robot: RobotId| self.robots[robot.0 as usize - 1].lies.is_none();
         let of_others: Vec<HeldVote> = heard.into_iter().filter(|held| honest(held.robot)).collect();
@@ -86,19 +86,21 @@ impl Swarm<'_> {
         }
     }
 
-    /// Announces a decision as final, gives it to the neighbours, and says that everybody holds it.
+    /// Announces a decision as final, says that all liars hold it, and gives it to the neighbours.
     fn spread_decision(&mut self, liars: &[usize], decision: &Decision) {
-        let (announced, bytes) = as_json(decision);
-        let guests =
-            (0..self.robots.len()).filter(|i| !liars.contains(i)).map(|i| self.robots[i].id).collect();
-        let holding: Holding = decision.holding(guests, false);
         for i in liars {
-            self.broadcast(*i, bytes, Kind::Decision, &Parcel::Announced(announced.clone()));
-            let (held, bytes) = as_json(&holding);
-            self.broadcast(*i, bytes, Kind::Decision, &Parcel::Held(self.robots[*i].id, held));
-            let message = Message::Give(Give { decision: Some(decision.clone()), votes: Vec::new() });
-            let (author, stamp) = (self.robots[*i].id, self.plot.stamp());
-            let given = Rc::new(Envelope { author, stamp, message, signature: None });
+            let announcer = self.robots[*i].id;
+            let said = |stamp, message| Envelope { author: announcer, stamp, message, signature: None };
+            let stamp = self.plot.stamp();
+            let announcement =
+                Announcement { decision: decision.clone(), label: None, announcer, stamp, signature: None };
+            let (announced, bytes) = as_json(&announcement);
+            let (held, held_bytes) =
+                over_the_wire(&said(self.plot.stamp(), Message::Holding(decision.holding(false))));
+            let given = Give { decision: Some(decision.clone()), votes: Vec::new(), holders: Vec::new() };
+            let given = Rc::new(said(self.plot.stamp(), Message::Give(given)));
+            self.broadcast(*i, bytes, Kind::Decision, &Parcel::Announced(announced));
+            self.broadcast(*i, held_bytes, Kind::Decision, &Parcel::Said(held));
             for to in self.network.neighbours(*i) {
                 if let Some(taken) = self.network.tell(*i, to, bytes, false) {
                     self.at(self.now + taken, Due::Arrive(to, Parcel::Said(given.clone())));

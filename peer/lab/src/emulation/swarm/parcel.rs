@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use gestalt_protocol::{Decision, Envelope, Holding, InstructorId, RobotId};
+use gestalt_protocol::{Announcement, Envelope, InstructorId, RobotId};
 use gestalt_strategies::{Input, Instructed};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -11,8 +11,7 @@ use serde::de::DeserializeOwned;
 #[derive(Clone)]
 pub(super) enum Parcel {
     Said(Rc<Envelope>),
-    Held(RobotId, Rc<Holding>),
-    Announced(Rc<Decision>),
+    Announced(Rc<Announcement>),
     Instructed(Rc<Instructed>),
     Answered(InstructorId, u64, RobotId),
 }
@@ -22,8 +21,7 @@ impl Parcel {
     pub fn opened(self) -> Input {
         match self {
             Self::Said(envelope) => Input::Received((*envelope).clone()),
-            Self::Held(robot, holding) => Input::Heard(robot, (*holding).clone()),
-            Self::Announced(decision) => Input::Announced((*decision).clone()),
+            Self::Announced(announcement) => Input::Announced((*announcement).clone()),
             Self::Instructed(instructed) => Input::Instructed((*instructed).clone()),
             Self::Answered(by, at, robot) => Input::Answered(by, at, robot),
         }

@@ -17,6 +17,7 @@ fn the_smallest_live_robot_announces_once_settled_and_only_once() {
     mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
     mind.handle(ms(100), Input::Open);
     mind.handle(ms(100), gives(5, decision(1, Some(0), 3, 5)));
+    mind.handle(ms(100), says_it_holds(5, &decision(1, Some(0), 3, 5)));
     let mut all = live(&mut mind, ms(150));
     // The same class by more robots is no reason to wait longer.
     mind.handle(ms(150), gives(5, decision(1, Some(0), 4, 5)));
@@ -33,8 +34,9 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
         mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
         mind.handle(ms(0), Input::Open);
         mind.handle(ms(0), gives(5, decision(1, Some(0), 3, 5)));
+        mind.handle(ms(0), says_it_holds(5, &decision(1, Some(0), 3, 5)));
         if heard {
-            mind.handle(ms(500), Input::Announced(Decision { is_final: true, ..decision(1, Some(0), 3, 5) }));
+            mind.handle(ms(500), announced(5, Decision { is_final: true, ..decision(1, Some(0), 3, 5) }));
         }
         let all = live(&mut mind, ms(20_000));
         all.iter().filter(|(_, o)| matches!(o, Output::Announce(_))).map(|(at, _)| *at).collect::<Vec<_>>()
@@ -87,6 +89,7 @@ fn a_changed_class_is_announced_again_and_the_same_class_is_not() {
     mind.handle(ms(300), gives(5, decision(1, Some(0), 4, 5)));
     assert_eq!(announces(&mind.handle(ms(900), Input::Tick)), 0);
     mind.handle(ms(1000), gives(5, decision(1, Some(1), 5, 5)));
+    mind.handle(ms(1000), says_it_holds(5, &decision(1, Some(1), 5, 5)));
     assert_eq!(announces(&mind.handle(ms(1200), Input::Tick)), 1);
 }
 
@@ -143,7 +146,7 @@ fn outputs(all: Vec<(Duration, Output)>) -> Vec<Output> {
 fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
     let mut mind = mind(7);
     let heard = decision(3, Some(1), 4, 5);
-    let out = mind.handle(ms(0), Input::Heard(RobotId(5), heard.holding(Vec::new(), false)));
+    let out = mind.handle(ms(0), says_it_holds(5, &heard));
     assert!(out.is_empty() && mind.held().is_none() && mind.round().is_none());
     assert_eq!(mind.next_wake(), Some(ms(100)), "most conclude it themselves until then");
     let out = mind.handle(ms(100), Input::Tick);
@@ -155,7 +158,7 @@ fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
     let [(7, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
     mind.handle(ms(102), says(5, 2, Message::Give(give.clone())));
     assert_eq!(mind.held(), Some(&heard));
-    let out = mind.handle(ms(103), Input::Heard(RobotId(6), heard.holding(Vec::new(), false)));
+    let out = mind.handle(ms(103), says_it_holds(6, &heard));
     assert!(out.is_empty() && told(&outputs(live(&mut mind, ms(3000)))).is_empty(), "it is held");
 }
 
@@ -167,20 +170,97 @@ fn a_gesture_is_final_once_a_majority_is_known_to_hold_it() {
         mind.handle(ms(0), Input::Open);
         mind.handle(ms(0), gives(9, decision(1, Some(1), 5, 9)));
         for holder in holders {
-            mind.handle(
-                ms(10),
-                Input::Heard(RobotId(*holder), decision(1, Some(1), 5, 9).holding(Vec::new(), false)),
-            );
+            mind.handle(ms(10), says_it_holds(*holder, &decision(1, Some(1), 5, 9)));
         }
         let all = live(&mut mind, ms(20_000));
         let said = all.iter().filter_map(|(at, output)| match output {
-            Output::Announce(decision) => Some((at.as_millis(), decision.is_final)),
+            Output::Announce(said) => Some((at.as_millis(), said.decision.is_final)),
             _ => None,
         });
         said.collect::<Vec<_>>()
     };
-    // Five robots: this one, and the author of the decision, and one more.
-    assert_eq!(announced(&[2]), [(200, true)]);
+    // Five robots: this one, and two more.
+    assert_eq!(announced(&[2, 9]), [(200, true)]);
     assert_eq!(announced(&[]), [(5200, false)], "nobody is known to hold it");
-    assert_eq!(announced(&[9]), [(5200, false)], "that one was counted");
+    assert_eq!(announced(&[2, 2]), [(5200, false)], "that one was counted");
+}
+
+#[test]
+fn who_drew_a_decision_or_has_it_counts_for_none_that_did_not_say_that_it_holds_it() {
+    let mut mind = mind(1);
+    mind.handle(ms(0), Input::Alive(robots(2..=5)));
+    mind.handle(ms(0), Input::Open);
+    for author in 2..=5 {
+        mind.handle(ms(0), gives(author, decision(1, Some(1), 5, author)));
+        let have = Have {
+            round: mind.round(),
+            decision: mind.held().map(Decision::rank),
+            holders: 0,
+            votes: vec![],
+            knowledge: None,
+            answer: false,
+        };
+        mind.handle(ms(1), says(author, 51, Message::Have(have)));
+    }
+    assert!(!mind.held_aloud().unwrap().decision.is_final);
+}
+
+#[test]
+fn a_robot_says_which_gesture_it_holds_once_and_whether_it_was_another_before() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), votes(1, 1, vote(1, 0, LEANING)));
+    let mut words = Vec::new();
+    for (at, class, robots) in [(1, 0, 2), (2, 0, 3), (3, 1, 4), (4, 1, 5), (5, 0, 6)] {
+        for output in mind.handle(ms(at), gives(5, decision(1, Some(class), robots, 5))) {
+            if let Output::Broadcast(Envelope { message: Message::Holding(holding), stamp, .. }) = output {
+                words.push((at, holding.class.unwrap().0, holding.changed, stamp.sequence));
+            }
+        }
+    }
+    let said: Vec<_> = words.iter().map(|(at, class, changed, _)| (*at, *class, *changed)).collect();
+    assert_eq!(said, [(1, 0, false), (3, 1, true), (5, 0, false)]);
+    assert!(words.is_sorted_by_key(|word| word.3), "each under a stamp of its own");
+}
+
+#[test]
+fn what_robots_said_that_they_hold_reaches_who_could_not_hear_it() {
+    let held = decision(1, Some(1), 5, 9);
+    let mut knows = mind(7);
+    knows.handle(ms(0), Input::Alive(robots([2, 3, 4, 8])));
+    knows.handle(ms(0), gives(9, held.clone()));
+    for robot in [2, 3] {
+        knows.handle(ms(1), says_it_holds(robot, &held));
+    }
+    let mut lacks = mind(8);
+    lacks.handle(ms(0), Input::Alive(robots([2, 3, 4, 7])));
+    lacks.handle(ms(0), Input::Neighbours(robots([4, 7])));
+    lacks.handle(ms(0), gives(9, held));
+    let is_final = |mind: &mut Rounds| mind.held_aloud().unwrap().decision.is_final;
+    assert_eq!((is_final(&mut knows), is_final(&mut lacks)), (true, false));
+    let asks = |mind: &mut Rounds, at| {
+        let mut out = outputs(live(mind, ms(at)));
+        out.retain(|output| matches!(output, Output::Tell(RobotId(7), _)));
+        out.pop().map(|output| match output {
+            Output::Tell(_, envelope) => Input::Received(envelope),
+            _ => unreachable!(),
+        })
+    };
+    let asked = asks(&mut lacks, 4000).expect("neighbours are asked in turn");
+    let out = knows.handle(ms(4000), asked.clone());
+    let given = told(&out).into_iter().find_map(|(to, message)| match message {
+        Message::Give(give) if to == 8 => Some(give.clone()),
+        _ => None,
+    });
+    let give = given.unwrap_or_else(|| panic!("{out:?}"));
+    assert_eq!(give.holders.iter().map(|holder| holder.robot.0).collect::<Vec<_>>(), [2, 3, 7]);
+    let passed = lacks.handle(ms(4001), says(7, 60, Message::Give(give.clone())));
+    assert!(is_final(&mut lacks));
+    assert!(matches!(told(&passed)[..], [(4, Message::Give(_))]), "the other neighbour may lack it too");
+    assert!(lacks.handle(ms(4002), says(7, 61, Message::Give(give.clone()))).is_empty());
+    // What this one says of itself is all that the other still lacks.
+    let own = lacks.round.as_ref().unwrap().agreement.holder(RobotId(8)).cloned().unwrap();
+    let given = Give { decision: None, votes: vec![], holders: vec![own] };
+    knows.handle(ms(4004), says(8, 90, Message::Give(given)));
+    let digest = |mind: &Rounds| mind.round.as_ref().unwrap().agreement.digest();
+    assert_eq!(digest(&knows), digest(&lacks), "then both are at rest");
 }

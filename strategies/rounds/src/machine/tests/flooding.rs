@@ -8,14 +8,8 @@ fn flood(mind: &mut Rounds, from: Duration, input: impl Fn(u32) -> Input) -> Vec
 }
 
 fn have(from: u32, sequence: u32) -> Input {
-    let have = Have {
-        round: None,
-        decision: None,
-        changed: false,
-        votes: Vec::new(),
-        knowledge: None,
-        answer: false,
-    };
+    let have =
+        Have { round: None, decision: None, holders: 0, votes: Vec::new(), knowledge: None, answer: false };
     says(from, sequence, Message::Have(have))
 }
 
@@ -57,8 +51,13 @@ fn of_a_neighbour_that_gives_decisions_without_end_few_are_looked_into() {
     let mut mind = busy();
     // Each is another one, and none follows from its votes.
     let forged = |n: u32| Decision { confidence: f64::from(n) / 1e4, ..decision(1, Some(2), 3, 2) };
-    let given =
-        |n: u32| says(2, 50 + n, Message::Give(Give { decision: Some(forged(n)), votes: Vec::new() }));
+    let given = |n: u32| {
+        says(
+            2,
+            50 + n,
+            Message::Give(Give { decision: Some(forged(n)), votes: Vec::new(), holders: Vec::new() }),
+        )
+    };
     flood(&mut mind, ms(1), given);
     assert!(mind.refusals().count(Refusal::Unfounded) <= 21);
     assert!(mind.refusals().count(Refusal::DecisionTooOften) >= 970);
@@ -71,7 +70,7 @@ fn of_a_neighbour_that_gives_decisions_without_end_few_are_looked_into() {
 fn who_floods_with_announcements_keeps_nobody_from_deciding() {
     let mut mind = busy();
     let forged = |n: u32| Decision { author: RobotId(n), ..decision(1, Some(2), 1 + n % 3, n) };
-    flood(&mut mind, ms(1), |n| Input::Announced(Decision { confidence: 0.5, ..forged(n) }));
+    flood(&mut mind, ms(1), |n| announced(50 + n, Decision { confidence: 0.5, ..forged(n) }));
     assert!(mind.refusals().count(Refusal::Unfounded) <= 21);
     for robot in [1, 4, 5] {
         mind.handle(ms(1002), votes(robot, 2, vote(1, 0, SURE)));

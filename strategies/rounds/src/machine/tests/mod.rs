@@ -14,8 +14,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Have, HeldVote, Message, RobotId, RoundId,
-    Stamp, VocabularyId, Vote,
+    Announcement, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Have, HeldVote, Message,
+    RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 use super::{Input, Output, Rounds};
@@ -154,7 +154,18 @@ fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u
 
 /// A robot that holds a decision gives it to this one.
 fn gives(from: u32, decision: Decision) -> Input {
-    says(from, 50, Message::Give(Give { decision: Some(decision), votes: Vec::new() }))
+    says(from, 50, Message::Give(Give { decision: Some(decision), votes: Vec::new(), holders: Vec::new() }))
+}
+
+/// A robot says that it holds a decision.
+fn says_it_holds(robot: u32, decision: &Decision) -> Input {
+    says(robot, 40, Message::Holding(decision.holding(false)))
+}
+
+/// A robot announces a decision.
+fn announced(announcer: u32, decision: Decision) -> Input {
+    let (announcer, stamp) = (RobotId(announcer), Stamp { boot: 1, sequence: 60 });
+    Input::Announced(Announcement { decision, label: None, announcer, stamp, signature: None })
 }
 
 fn broadcast(out: &[Output]) -> Vec<&Vote> {

@@ -87,15 +87,51 @@ fn a_round_in_which_others_take_part_has_its_time_whatever_is_said_of_newer_ones
 }
 
 #[test]
+fn who_begins_one_round_after_the_other_ends_one_within_a_deadline() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, LEANING)));
+    let heard = |mind: &mut Rounds, at, author, sequence, vote| {
+        mind.handle(ms(at), votes(author, sequence, vote));
+        mind.round().unwrap().counter
+    };
+    assert_eq!(heard(&mut mind, 500, 66, 1, null(2)), 2, "whoever is behind is taken along");
+    assert_eq!(heard(&mut mind, 510, 3, 2, vote(2, 0, LEANING)), 2);
+    assert_eq!(heard(&mut mind, 1100, 66, 2, null(3)), 2, "but not on and on");
+    assert_eq!(mind.refusals().count(Refusal::TooSoon), 1);
+    assert_eq!(heard(&mut mind, 1200, 4, 1, null(4)), 4, "another one was not heard yet");
+    assert_eq!(heard(&mut mind, 1300, 3, 3, vote(4, 0, LEANING)), 4);
+    assert_eq!(heard(&mut mind, 5600, 66, 3, null(5)), 5, "after a deadline it may be behind again");
+}
+
+#[test]
+fn a_round_whose_votes_suffice_is_decided_before_a_newer_one_ends_it() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+    mind.handle(ms(0), votes(4, 1, vote(1, 0, SURE)));
+    assert_eq!(mind.held(), None, "one of them may yet say something");
+    assert_eq!(holds(&mind.handle(ms(400), votes(66, 1, null(2)))), [], "it has its time");
+    let out = mind.handle(ms(600), votes(66, 2, null(3)));
+    assert_eq!((holds(&out), mind.round().unwrap().counter), (vec![Some(0)], 1));
+    live(&mut mind, ms(799));
+    assert_eq!(mind.round().unwrap().counter, 1, "decisions are left a while to meet");
+    let out: Vec<Output> = live(&mut mind, ms(810)).into_iter().map(|(_, output)| output).collect();
+    assert_eq!(mind.round().unwrap().counter, 3, "then it takes part in the newer one");
+    assert_eq!(broadcast(&out).len(), 1);
+}
+
+#[test]
 fn a_round_decided_elsewhere_is_adopted_without_opening() {
     let mut mind = mind(7);
     let out = mind.handle(ms(0), gives(3, decision(9, Some(2), 4, 1)));
-    assert_eq!(out, [Output::Hold(decision(9, Some(2), 4, 1))]);
+    assert_eq!(holds(&out), [Some(2)]);
+    assert_eq!(mind.held(), Some(&decision(9, Some(2), 4, 1)));
     assert!(!mind.is_open());
     let have = Have {
         round: Some(round(12, 1)),
         decision: Some(decision(12, Some(1), 2, 1).rank()),
-        changed: false,
+        holders: 0,
         votes: vec![],
         knowledge: None,
         answer: false,

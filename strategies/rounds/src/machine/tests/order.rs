@@ -28,7 +28,7 @@ fn heard() -> impl Strategy<Value = Input> {
         }),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| gives(robot, concluded(counter, n))),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(robot, counter, n)| {
-            Input::Heard(RobotId(robot), concluded(counter, n).holding(Vec::new(), false))
+            says(robot, 70 + n, Message::Holding(concluded(counter, n).holding(false)))
         }),
         (1..6u32, 1..4u32, 1..5u32).prop_map(|(from, counter, n)| {
             let held = HeldVote {
@@ -37,7 +37,7 @@ fn heard() -> impl Strategy<Value = Input> {
                 vote: vote(counter, (10 * counter + 2 + n) as usize % 3, 2.0),
                 signature: None,
             };
-            says(from, 90, Message::Give(Give { decision: None, votes: vec![held] }))
+            says(from, 90, Message::Give(Give { decision: None, votes: vec![held], holders: vec![] }))
         }),
     ]
 }

@@ -7,7 +7,7 @@ fn have(counter: u32, known: &[(u32, u32)]) -> Have {
     Have {
         round: Some(round(counter, 1)),
         decision: None,
-        changed: false,
+        holders: 0,
         votes: known.iter().map(|&(robot, sequence)| (RobotId(robot), stamp(sequence))).collect(),
         knowledge: None,
         answer: false,
@@ -58,7 +58,7 @@ fn what_was_given_and_is_news_goes_on_to_the_other_neighbours_and_nothing_else_d
         vote: vote(1, 0, LEANING),
         signature: None,
     };
-    let give = Message::Give(Give { decision: None, votes: vec![held(1, 5), held(2, 2)] });
+    let give = Message::Give(Give { decision: None, votes: vec![held(1, 5), held(2, 2)], holders: vec![] });
     let out = mind.handle(ms(10), says(3, 1, give.clone()));
     let [(4, Message::Give(passed))] = &told(&out)[..] else { panic!("{out:?}") };
     assert_eq!(passed.votes, [held(2, 2)]);
@@ -104,11 +104,24 @@ fn the_others_are_told_of_a_greater_decision_for_the_same_gesture_and_ask_for_it
     mind.handle(ms(0), Input::Neighbours(robots([3, 4])));
     mind.handle(
         ms(0),
-        says(3, 1, Message::Give(Give { decision: Some(decision(1, Some(1), 3, 5)), votes: vec![] })),
+        says(
+            3,
+            1,
+            Message::Give(Give {
+                decision: Some(decision(1, Some(1), 3, 5)),
+                votes: vec![],
+                holders: vec![],
+            }),
+        ),
     );
     let greater = decision(1, Some(1), 4, 5);
-    let give =
-        |sequence| says(3, sequence, Message::Give(Give { decision: Some(greater.clone()), votes: vec![] }));
+    let give = |sequence| {
+        says(
+            3,
+            sequence,
+            Message::Give(Give { decision: Some(greater.clone()), votes: vec![], holders: vec![] }),
+        )
+    };
     let out = mind.handle(ms(100), give(2));
     assert_eq!(holds(&out), [Some(1)]);
     let [(4, Message::Have(have))] = &told(&out)[..] else { panic!("{out:?}") };

@@ -81,10 +81,16 @@ fn a_second_robot_with_my_id_is_counted_and_reported_but_my_echo_is_not() {
         vote: vote(1, 1, SURE),
         signature: None,
     };
-    mind.handle(ms(3), says(3, 1, Message::Give(Give { decision: None, votes: vec![held.clone()] })));
+    mind.handle(
+        ms(3),
+        says(3, 1, Message::Give(Give { decision: None, votes: vec![held.clone()], holders: vec![] })),
+    );
     assert_eq!(mind.duplicate(), Some(held.stamp));
     let earlier = HeldVote { stamp: Stamp { boot: 0, sequence: 9 }, ..held };
-    mind.handle(ms(4), says(3, 2, Message::Give(Give { decision: None, votes: vec![earlier] })));
+    mind.handle(
+        ms(4),
+        says(3, 2, Message::Give(Give { decision: None, votes: vec![earlier], holders: vec![] })),
+    );
     assert_eq!(mind.refusals().count(Refusal::DuplicateId), 2, "a vote of an earlier life is merely old");
     assert_eq!(mind.held(), None, "none of it counts as this robot's evidence");
 }

@@ -124,13 +124,11 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         // What a stranger says, in any name.
         15 => {
             let (to, mut chance) = (events.robot(), events.chance());
-            world.slander();
             world.hear(to, Said::Message(values::envelope(&mut chance)));
         }
         16 => {
             let (to, length) = (events.robot(), events.place());
             if let Ok(envelope) = Envelope::decode(events.take(length)) {
-                world.slander();
                 world.hear(to, Said::Message(envelope));
             }
         }
@@ -141,8 +139,7 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         21 => altered(world, events),
         22 => {
             let (to, mut chance) = (events.robot(), events.chance());
-            world.slander();
-            world.hear(to, Said::Announced(values::decision(&mut chance)));
+            world.hear(to, Said::Announced(values::announcement(&mut chance)));
         }
         _ => {
             let (to, by, at) = (events.robot(), values::instructor(&mut events.chance()), events.byte());
@@ -188,10 +185,7 @@ fn knowledge(world: &mut World, events: &mut Events<'_>) {
     let (to, kind, mut chance) = (events.robot(), events.byte(), events.chance());
     let chance = &mut chance;
     let message = match kind % 4 {
-        0 => {
-            world.slander();
-            values::have(chance)
-        }
+        0 => values::have(chance),
         1 => values::know(chance),
         2 => {
             let id = values::sample_id(
@@ -247,8 +241,9 @@ fn holding(world: &mut World, events: &mut Events<'_>) {
     let (to, mut chance) = (events.robot(), events.chance());
     let mut holding = values::holding(&mut chance);
     holding.round = round(world, to);
-    world.slander();
-    world.hear(to, Said::Holding(values::robot(&mut chance), holding));
+    let (author, signature) = (values::robot(&mut chance), Some(values::signature(&mut chance)));
+    let (stamp, message) = (values::stamp(&mut chance), Message::Holding(holding));
+    world.hear(to, Said::Message(Envelope { author, stamp, message, signature }));
 }
 
 /// Something that was said, with another of the values that nobody signs.
@@ -256,11 +251,12 @@ fn altered(world: &mut World, events: &mut Events<'_>) {
     let (to, which, what, mut chance) = (events.robot(), events.place(), events.byte(), events.chance());
     let number = values::number(&mut chance);
     let Some(mut said) = world.recall(which) else { return };
-    world.slander();
     match &mut said {
-        Said::Announced(decision) => {
+        Said::Announced(announcement) => {
+            let decision = &mut announcement.decision;
             let certificate = &mut decision.certificate;
-            match what % 8 {
+            match what % 9 {
+                8 => announcement.announcer = RobotId(number),
                 0 => decision.author = RobotId(number),
                 1 => decision.is_final ^= true,
                 2 => decision.class = Some(values::class(&mut chance)),
@@ -276,10 +272,6 @@ fn altered(world: &mut World, events: &mut Events<'_>) {
             1 => envelope.stamp = values::stamp(&mut chance),
             2 => envelope.message = values::message(&mut chance),
             _ => envelope.signature = None,
-        },
-        Said::Holding(by, holding) => match what % 2 {
-            0 => *by = RobotId(number),
-            _ => holding.class = Some(values::class(&mut chance)),
         },
         Said::Answered(_, at, _) => *at = number.into(),
     }

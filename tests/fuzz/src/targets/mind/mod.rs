@@ -16,15 +16,15 @@ const CALM: Duration = Duration::from_secs(60);
 
 /// An input is a list of events, each of a byte and its arguments, see [`adversary::event`].
 ///
-/// What is final was held by a majority, unless a stranger said so; while every message arrives at once, never are two gestures final
-/// for one round. No robot panics, forgets what it refused or
+/// What is final was held by a majority, and never are two gestures final for one round, whatever a stranger says and however late messages
+/// are; unless robots are not told who is there. No robot panics, forgets what it refused or
 /// holds more than it may; and after a calm period all know the same.
 ///
 /// # Panics
 /// If not.
 pub fn run(bytes: &[u8]) {
     let world = live(bytes);
-    if !(world.faults().late || world.faults().misled) {
+    if !world.misled() {
         assert_eq!(world.contradiction(), None, "two gestures are final for one round");
     }
     let minds: Vec<&Mind> = world.robots().iter().map(|robot| robot.mind()).collect();

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, Envelope, Holding, InstructorId, RobotId, RoundId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, InstructorId, RobotId, RoundId};
 use gestalt_strategies::{Input, Output};
 
 use crate::gate::Gate;
@@ -20,10 +20,8 @@ const MOST: usize = 256;
 pub enum Said {
     /// Between robots.
     Message(Envelope),
-    /// Which decision a robot holds.
-    Holding(RobotId, Holding),
     /// For the swarm.
-    Announced(Decision),
+    Announced(Announcement),
     /// That a robot answered an instructor.
     Answered(InstructorId, u64, RobotId),
 }
@@ -43,19 +41,8 @@ pub struct World {
     finals: BTreeMap<RoundId, (ClassId, ClassId)>,
     /// Who ever held a gesture, by the counter of its round: names of rounds merge.
     holders: BTreeMap<(u32, ClassId), BTreeSet<usize>>,
-    /// What the robots have to put up with.
-    faults: Faults,
-}
-
-/// What the robots have to put up with.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Faults {
-    /// Messages that come late, or never.
-    pub late: bool,
-    /// Robots that are not told who is there.
-    pub misled: bool,
-    /// A stranger that says what robots hold, which nobody signs.
-    pub slandered: bool,
+    /// Whether robots are not told who is there.
+    misled: bool,
 }
 
 impl World {
@@ -69,7 +56,7 @@ impl World {
             cut: BTreeSet::new(),
             finals: BTreeMap::new(),
             holders: BTreeMap::new(),
-            faults: Faults::default(),
+            misled: false,
         };
         world.introduce();
         world
@@ -92,7 +79,6 @@ impl World {
     /// Cuts a link, or mends it.
     pub fn cut(&mut self, one: usize, other: usize, cut: bool) {
         let link = (one.min(other), one.max(other));
-        self.faults.late |= cut;
         if cut {
             self.cut.insert(link);
         } else {
@@ -103,7 +89,7 @@ impl World {
     /// A robot takes in something of its own: what it sees, or who is there.
     ///
     /// # Panics
-    /// If it announces as final what no majority ever held, and nobody told it so.
+    /// If it announces as final what no majority ever held, and knows who is there.
     pub fn input(&mut self, robot: usize, input: Input) {
         let me = RobotId(robot as u32 + 1);
         for output in self.robots[robot].handle(self.now, input) {
@@ -117,12 +103,10 @@ impl World {
                     if let Some(class) = decision.class {
                         self.holders.entry((decision.round.counter, class)).or_default().insert(robot);
                     }
-                    let changed = self.robots[robot].mind().has_changed();
-                    self.tell_all(robot, Said::Holding(me, decision.holding(Vec::new(), changed)));
                 }
-                Output::Announce(decision) => {
-                    self.announced(&decision);
-                    self.tell_all(robot, Said::Announced(decision));
+                Output::Announce(announcement) => {
+                    self.announced(&announcement.decision);
+                    self.tell_all(robot, Said::Announced(announcement));
                 }
                 Output::Answer(by, answer) => self.tell_all(robot, Said::Answered(by, answer.at, me)),
                 Output::Opened(_) | Output::Closed(_) | Output::Train(_) | Output::Remember { .. } => {}
@@ -133,19 +117,14 @@ impl World {
     fn announced(&mut self, decision: &Decision) {
         let Some(class) = decision.class.filter(|_| decision.is_final) else { return };
         let held_by = self.holders.get(&(decision.round.counter, class)).map_or(0, BTreeSet::len);
-        let known = self.faults.misled || self.faults.slandered || 2 * held_by > ROBOTS;
+        let known = self.misled || 2 * held_by > ROBOTS;
         assert!(known, "gesture {class} is final for {}, and was held by {held_by} robots", decision.round);
         self.finals.entry(decision.round).or_insert((class, class)).1 = class;
     }
 
-    /// What the robots had to put up with.
-    pub fn faults(&self) -> Faults {
-        self.faults
-    }
-
-    /// From now on robots hear what somebody else said that they hold.
-    pub fn slander(&mut self) {
-        self.faults.slandered = true;
+    /// Whether robots were told of others that are not there, or not of all that are.
+    pub fn misled(&self) -> bool {
+        self.misled
     }
 
     /// A round for which two gestures were final.
@@ -155,7 +134,7 @@ impl World {
 
     /// Who is there is not what a robot is told.
     pub fn mislead(&mut self, robot: usize, input: Input) {
-        self.faults.misled = true;
+        self.misled = true;
         self.input(robot, input);
     }
 
@@ -195,13 +174,13 @@ impl World {
                 Ok(envelope) => Input::Received(envelope),
                 Err(_) => return,
             },
-            Said::Announced(decision) => {
-                if decision.check().is_err() || gate.decision(self.now, &decision).is_err() {
+            Said::Announced(announcement) => {
+                let sound = announcement.decision.check().is_ok();
+                if !sound || gate.announcement(self.now, &announcement).is_err() {
                     return;
                 }
-                Input::Announced(decision)
+                Input::Announced(announcement)
             }
-            Said::Holding(by, holding) => Input::Heard(by, holding),
             Said::Answered(by, at, robot) => Input::Answered(by, at, robot),
         };
         self.input(robot, input);
@@ -217,7 +196,6 @@ impl World {
 
     /// It is lost.
     pub fn lose(&mut self, which: usize) {
-        self.faults.late = true;
         let place = which % self.under_way.len().max(1);
         self.under_way.remove(place);
     }
@@ -248,7 +226,6 @@ impl World {
     /// If a robot wants to be woken without end.
     pub fn pass(&mut self, time: Duration, arriving: bool) {
         let end = self.now + time;
-        self.faults.late |= !arriving;
         let mut left = 100_000;
         loop {
             if arriving {
