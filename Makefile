@@ -10,7 +10,7 @@ endif
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
             libclang1-14 clang pkg-config
-TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium
+TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++
 
 # $(call install,PACKAGES): those of them that are missing.
 define install
@@ -39,8 +39,8 @@ demo: packages
 	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
 	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap
 
-# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data makes failures
-# of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
+# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data,enki,valgrind makes
+# failures of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
 	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk

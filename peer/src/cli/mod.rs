@@ -41,6 +41,8 @@ mod teach;
 #[cfg(feature = "opencv")]
 mod train;
 mod verify;
+#[cfg(feature = "opencv")]
+mod views;
 mod watch;
 mod web;
 mod word;
@@ -103,6 +105,9 @@ enum Verb {
     /// Show what perception makes of one frame, stage by stage
     #[cfg(feature = "opencv")]
     Look(look::Args),
+    /// Write what a camera sees of drawn hands from many places, for simulators
+    #[cfg(feature = "opencv")]
+    Views(views::Args),
     /// Run a scenario or an experiment in an emulated network, over several seeds
     Emulate(emulate::Args),
     /// Draw which samples each selection or forgetting rule picks
@@ -155,6 +160,8 @@ impl Command {
             Verb::Evaluate(args) => evaluate::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Look(args) => look::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Views(args) => views::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
             Verb::Keys(args) => keys::run(&args),
