@@ -19,6 +19,10 @@ pub enum Need {
     Enki,
     /// Valgrind.
     Valgrind,
+    /// `systemd-analyze`, which needs no running systemd.
+    Systemd,
+    /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
+    Debian,
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -29,8 +33,16 @@ pub fn data() -> PathBuf {
 }
 
 impl Need {
-    const ALL: [Self; 6] =
-        [Self::Namespaces, Self::Mount, Self::Browser, Self::Data, Self::Enki, Self::Valgrind];
+    const ALL: [Self; 8] = [
+        Self::Namespaces,
+        Self::Mount,
+        Self::Browser,
+        Self::Data,
+        Self::Enki,
+        Self::Valgrind,
+        Self::Systemd,
+        Self::Debian,
+    ];
 
     /// Its name in `GESTALT_REQUIRE`.
     #[must_use]
@@ -42,6 +54,8 @@ impl Need {
             Self::Data => "data",
             Self::Enki => "enki",
             Self::Valgrind => "valgrind",
+            Self::Systemd => "systemd",
+            Self::Debian => "debian",
         }
     }
 
@@ -65,6 +79,13 @@ impl Need {
             Self::Enki => enki(),
             Self::Valgrind if done("valgrind", &["--version"]) => Ok(()),
             Self::Valgrind => Err("needs valgrind".to_owned()),
+            Self::Systemd if done("systemd-analyze", &["--version"]) => Ok(()),
+            Self::Systemd => Err("needs systemd-analyze (systemd)".to_owned()),
+            Self::Debian => {
+                let tools = ["dpkg-deb", "dpkg-shlibdeps", "lintian", "strip"];
+                let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
+                missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
+            }
         }
     }
 }
