@@ -162,7 +162,7 @@ fn client_of(config: &Config) -> (String, LinkConfig) {
     (config.swarm.0.clone(), link)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "opencv"))]
 mod tests {
     use clap::Parser;
 
