@@ -162,7 +162,8 @@ fn client_of(config: &Config) -> (String, LinkConfig) {
     (config.swarm.0.clone(), link)
 }
 
-#[cfg(all(test, feature = "opencv"))]
+#[cfg(feature = "opencv")]
+#[cfg(test)]
 mod tests {
     use clap::Parser;
 
