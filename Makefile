@@ -93,7 +93,7 @@ fuzz: packages
 lint: packages
 	cargo fmt --check
 	cargo clippy --workspace --all-targets -- -D warnings
-	cargo clippy -p gestalt-peer --no-default-features --all-targets -- -D warnings
+	cargo clippy -p gestalt-peer --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	@if ! cargo deny --version >/dev/null 2>&1; then echo "skipped: cargo deny is not installed"; \
 	else cargo deny check; fi
