@@ -5,12 +5,13 @@ SHELL := /bin/bash
 ifeq ($(shell cargo --version 2>/dev/null),)
 export RUSTUP_TOOLCHAIN := stable
 endif
-.PHONY: demo test attack fuzz bench lint eyes packages test-packages
+.PHONY: demo test attack fuzz bench lint eyes deb deb-test packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
             libclang1-14 clang pkg-config
-TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium
+TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++ systemd \
+                 dpkg-dev lintian
 
 # $(call install,PACKAGES): those of them that are missing.
 define install
@@ -39,8 +40,8 @@ demo: packages
 	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
 	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap
 
-# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data makes failures
-# of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
+# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data,enki,valgrind,systemd,debian makes
+# failures of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
 	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
@@ -57,6 +58,17 @@ eyes: packages
 	mkdir -p out/eyes
 	RUSTFLAGS="-C target-cpu=native" \
 	cargo run --release --manifest-path peer/training/Cargo.toml -- --data $(GESTALT_DATA) --out out/eyes $(EYES)
+
+# A Debian package of a release build, in out/. See docs/install.md.
+deb: packages
+	@$(call install,dpkg-dev)
+	cargo build --release -p gestalt-peer --bin gestalt
+	packaging/deb.sh target/release/gestalt out
+
+# Installs it in a fresh Debian 12, made by debootstrap in a temporary folder, and runs a round of two robots there. Needs root.
+deb-test: deb
+	@$(call install,debootstrap)
+	packaging/installed.sh out/gestalt_*.deb
 
 # Every speed the README states, with its yardstick in the same run.
 bench: packages
@@ -81,6 +93,7 @@ fuzz: packages
 lint: packages
 	cargo fmt --check
 	cargo clippy --workspace --all-targets -- -D warnings
+	cargo clippy -p gestalt-peer --no-default-features -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 	@if ! cargo deny --version >/dev/null 2>&1; then echo "skipped: cargo deny is not installed"; \
 	else cargo deny check; fi

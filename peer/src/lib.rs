@@ -35,6 +35,7 @@ pub mod proof;
 pub mod recording;
 #[cfg(feature = "opencv")]
 mod ros_camera;
+pub mod service_manager;
 #[cfg(feature = "opencv")]
 pub mod stream;
 #[cfg(feature = "opencv")]

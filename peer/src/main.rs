@@ -2,11 +2,10 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use gestalt_peer::cli;
 
 fn main() -> ExitCode {
-    let command = cli::Command::parse();
+    let command = cli::Command::of_this_process();
     cli::start_log();
     match command.run() {
         Ok(()) => ExitCode::SUCCESS,

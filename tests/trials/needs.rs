@@ -15,6 +15,14 @@ pub enum Need {
     Browser,
     /// Recordings and photographs, which are not part of the project: see [`data`].
     Data,
+    /// The simulator Enki (libenki-dev), a C++ compiler and CMake.
+    Enki,
+    /// Valgrind.
+    Valgrind,
+    /// `systemd-analyze`, which needs no running systemd.
+    Systemd,
+    /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
+    Debian,
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -25,7 +33,16 @@ pub fn data() -> PathBuf {
 }
 
 impl Need {
-    const ALL: [Self; 4] = [Self::Namespaces, Self::Mount, Self::Browser, Self::Data];
+    const ALL: [Self; 8] = [
+        Self::Namespaces,
+        Self::Mount,
+        Self::Browser,
+        Self::Data,
+        Self::Enki,
+        Self::Valgrind,
+        Self::Systemd,
+        Self::Debian,
+    ];
 
     /// Its name in `GESTALT_REQUIRE`.
     #[must_use]
@@ -35,12 +52,17 @@ impl Need {
             Self::Mount => "mount",
             Self::Browser => "browser",
             Self::Data => "data",
+            Self::Enki => "enki",
+            Self::Valgrind => "valgrind",
+            Self::Systemd => "systemd",
+            Self::Debian => "debian",
         }
     }
 
     /// Why this machine does not have it; `None` when it does. Tried once.
     pub(crate) fn missing(self) -> Option<String> {
-        static TRIED: [OnceLock<Option<String>>; 4] = [const { OnceLock::new() }; 4];
+        static TRIED: [OnceLock<Option<String>>; Need::ALL.len()] =
+            [const { OnceLock::new() }; Need::ALL.len()];
         TRIED[self as usize].get_or_init(|| self.attempt().err()).clone()
     }
 
@@ -54,6 +76,16 @@ impl Need {
             Self::Data => {
                 Err("needs photographs and recordings (GESTALT_DATA names their folder)".to_owned())
             }
+            Self::Enki => enki(),
+            Self::Valgrind if done("valgrind", &["--version"]) => Ok(()),
+            Self::Valgrind => Err("needs valgrind".to_owned()),
+            Self::Systemd if done("systemd-analyze", &["--version"]) => Ok(()),
+            Self::Systemd => Err("needs systemd-analyze (systemd)".to_owned()),
+            Self::Debian => {
+                let tools = ["dpkg-deb", "dpkg-shlibdeps", "lintian", "strip"];
+                let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
+                missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
+            }
         }
     }
 }
@@ -63,13 +95,27 @@ pub(crate) fn required(text: Option<&str>) -> Result<Vec<Need>, String> {
     let names = text.unwrap_or_default().split(',').map(str::trim).filter(|name| !name.is_empty());
     let known = |name: &str| Need::ALL.into_iter().find(|need| need.name() == name);
     names
-        .map(|name| known(name).ok_or(format!("'{name}' is none of namespaces, mount, browser, data")))
+        .map(|name| {
+            known(name).ok_or_else(|| format!("'{name}' is none of {}", Need::ALL.map(Need::name).join(", ")))
+        })
         .collect()
 }
 
 fn done(program: &str, words: &[&str]) -> bool {
     let done = Command::new(program).args(words).stdout(Stdio::null()).stderr(Stdio::null()).status();
     done.is_ok_and(|status| status.success())
+}
+
+/// The simulator, and what builds a program for it.
+fn enki() -> Result<(), String> {
+    let header =
+        ["/usr/include", "/usr/local/include"].map(|folder| Path::new(folder).join("enki/PhysicalEngine.h"));
+    let programs = ["c++", "cmake"].iter().all(|program| done(program, &["--version"]));
+    if programs && header.iter().any(|header| header.is_file()) {
+        Ok(())
+    } else {
+        Err("needs the simulator Enki (libenki-dev, cmake and a C++ compiler)".to_owned())
+    }
 }
 
 /// A chroot may let a process make namespaces, and not enter them.

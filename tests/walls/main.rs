@@ -12,10 +12,15 @@ use sources::{CRATES, Source, sources};
 
 /// The packages a package is built with, itself included, as its users get them: without its tests, with its default features.
 fn built_with(package: &str) -> BTreeSet<String> {
+    tree_of(package, &["-e", "normal"])
+}
+
+fn tree_of(package: &str, more: &[&str]) -> BTreeSet<String> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
-    let words = ["tree", "--offline", "-e", "normal", "--prefix", "none", "-f", "{p}", "-p"];
+    let words = ["tree", "--offline", "--prefix", "none", "-f", "{p}", "-p"];
     let mut tree = Command::new(cargo);
-    let tree = tree.args(words).arg(package).current_dir(sources::root()).output().expect("cargo runs");
+    let tree =
+        tree.args(words).arg(package).args(more).current_dir(sources::root()).output().expect("cargo runs");
     assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
     let listed = String::from_utf8(tree.stdout).expect("names of packages");
     listed.lines().filter_map(|line| Some(line.split(' ').next()?.to_owned())).collect()
@@ -85,6 +90,30 @@ fn only_eyes_and_who_uses_them_need_opencv() {
 }
 
 #[test]
+fn without_opencv_the_program_needs_rust_alone() {
+    let built = tree_of("gestalt-peer", &["--no-default-features", "-e", "normal,build"]);
+    assert!(built.contains("gestalt-tape") && built.contains("gestalt-desk"), "{built:?}");
+    // What looks for a library of the system, or reads its headers, while building; and crates that link one.
+    let searching = [
+        "opencv",
+        "opencv-binding-generator",
+        "bindgen",
+        "clang",
+        "clang-sys",
+        "cmake",
+        "pkg-config",
+        "vcpkg",
+    ];
+    let found: Vec<_> = searching.into_iter().filter(|name| built.contains(*name)).collect();
+    assert!(found.is_empty(), "the program without OpenCV is built with {found:?}");
+    // These two name the system's interface, and link nothing.
+    let harmless = ["dirs-sys", "linux-raw-sys"];
+    let linking: Vec<_> =
+        built.iter().filter(|name| name.ends_with("-sys") && !harmless.contains(&name.as_str())).collect();
+    assert!(linking.is_empty(), "the program without OpenCV links {linking:?}");
+}
+
+#[test]
 fn no_two_files_import_each_other_in_a_circle() {
     let found: BTreeSet<Vec<String>> =
         CRATES.iter().flat_map(|(_, folder)| circles::circles(folder)).collect();
@@ -146,4 +175,48 @@ fn declared_type(line: &str) -> Option<&str> {
     let rest = line.strip_prefix("pub ")?;
     let rest = ["struct ", "enum ", "trait ", "type "].iter().find_map(|kind| rest.strip_prefix(kind))?;
     rest.split(|c: char| !c.is_alphanumeric() && c != '_').next()
+}
+
+/// The crates that others may depend on, with their manifests.
+fn published() -> Vec<(&'static str, String)> {
+    let manifest = |folder: &str| {
+        let path = sources::root().join(folder);
+        let path = path.ancestors().map(|folder| folder.join("Cargo.toml")).find(|path| path.is_file());
+        std::fs::read_to_string(path.expect("a manifest")).expect("a manifest is text")
+    };
+    let all = CRATES.iter().map(|(package, folder)| (*package, manifest(folder)));
+    all.filter(|(_, manifest)| !manifest.contains("publish = false")).collect()
+}
+
+#[test]
+fn every_published_crate_packs_with_its_licences_and_says_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let mut package = Command::new(cargo);
+    package.args(["package", "--no-verify", "--allow-dirty", "--offline", "--target-dir"]).arg(folder.path());
+    let published = published();
+    assert!(published.len() >= 15, "{} crates", published.len());
+    for (name, manifest) in &published {
+        package.args(["-p", name]);
+        let description = manifest.lines().find_map(|line| line.strip_prefix("description = "));
+        assert!(description.is_some_and(|text| text.len() > 20), "{name} has no description");
+        for field in ["license.workspace = true", "readme.workspace = true", "keywords = [", "categories = ["]
+        {
+            assert!(manifest.contains(field), "{name} lacks {field}");
+        }
+    }
+    let packed = package.current_dir(sources::root()).output().expect("cargo runs");
+    let said = String::from_utf8_lossy(&packed.stderr);
+    assert!(packed.status.success(), "{said}");
+    for (name, _) in &published {
+        let file = folder.path().join(format!("package/{name}-{}.crate", env!("CARGO_PKG_VERSION")));
+        let listed = Command::new("tar").arg("-tzf").arg(&file).output().expect("tar runs");
+        let listed = String::from_utf8(listed.stdout).expect("names of files");
+        for needed in ["LICENSE-MIT", "LICENSE-APACHE", "README.md", "Cargo.toml"] {
+            assert!(
+                listed.lines().any(|line| line.ends_with(&format!("/{needed}"))),
+                "{name} lacks {needed}"
+            );
+        }
+    }
 }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::config::{Config, ConfigError, Document, ModelSection, Override};
+#[cfg(feature = "opencv")]
+use crate::config::ModelSection;
+use crate::config::{Config, ConfigError, Document, Override};
 use gestalt_link::LinkConfig;
 
 /// Which configuration, and what to change in it.
@@ -50,11 +52,13 @@ pub(super) struct Setting {
 
 impl Setting {
     /// A key's value, whatever the file says.
+    #[cfg(feature = "opencv")]
     pub(super) fn new(path: &'static [&'static str], value: Value) -> Self {
         Self { path, value, yields: false }
     }
 
     /// A key's value where neither the file nor a flag says another.
+    #[cfg(feature = "opencv")]
     pub(super) fn unless_said(path: &'static [&'static str], value: Value) -> Self {
         Self { path, value, yields: true }
     }
@@ -91,6 +95,7 @@ impl ConfigArgs {
     ///
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
+    #[cfg(feature = "opencv")]
     pub(super) fn streaming(&self, settings: Vec<Setting>) -> Result<(Config, LinkConfig), ConfigError> {
         let mut config: Config = self.document(settings)?.meaning()?;
         // Mind and model are those of whoever processes its frames.
@@ -157,6 +162,7 @@ fn client_of(config: &Config) -> (String, LinkConfig) {
     (config.swarm.0.clone(), link)
 }
 
+#[cfg(feature = "opencv")]
 #[cfg(test)]
 mod tests {
     use clap::Parser;

@@ -51,6 +51,7 @@ pub enum EmulateError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The experiment cannot be read.
+    #[cfg(feature = "opencv")]
     #[error("cannot read the experiment {}: {source}", path.display())]
     Read {
         /// Which.
@@ -59,9 +60,11 @@ pub enum EmulateError {
         source: io::Error,
     },
     /// A scenario where an experiment is wanted.
+    #[cfg(feature = "opencv")]
     #[error("{} is a scenario, not an experiment (it has neither `axis` nor `swarms`): leave out --out, or see configs/experiments/", .0.display())]
     NoExperiment(PathBuf),
     /// An experiment without a place for its results.
+    #[cfg(feature = "opencv")]
     #[error("{} is an experiment: give --out DIR for its results", .0.display())]
     NoOut(PathBuf),
     /// The trace cannot be written.
@@ -74,6 +77,14 @@ pub enum EmulateError {
     },
 }
 
+/// Whether a file is an experiment: this build cannot read it, but can say so.
+#[cfg(not(feature = "opencv"))]
+fn is_experiment(path: &std::path::Path) -> bool {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let keys = json5::from_str::<serde_json::Map<String, serde_json::Value>>(&text).unwrap_or_default();
+    keys.contains_key("axis") || keys.contains_key("swarms")
+}
+
 /// Carries out `gestalt emulate`.
 ///
 /// # Errors
@@ -84,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return conduct(args, folder);
     }
     #[cfg(not(feature = "opencv"))]
-    if args.out.is_some() {
+    if args.out.is_some() || is_experiment(&args.scenario) {
         return Err(
             "this gestalt was built without OpenCV, which experiments need to look at hands: build it with the feature 'opencv'"
                 .into()

@@ -41,8 +41,12 @@ mod teach;
 #[cfg(feature = "opencv")]
 mod train;
 mod verify;
+#[cfg(feature = "opencv")]
+mod views;
 mod watch;
 mod web;
+#[cfg(not(feature = "opencv"))]
+mod without_eyes;
 mod word;
 
 use std::io::{self, IsTerminal, Write};
@@ -56,12 +60,21 @@ use gestalt_link::{Client, News};
 
 pub use show::clean;
 
+#[cfg(feature = "opencv")]
+const EXAMPLES: &str = "Examples:
+  gestalt swarm --robots footbot:3,parrot:1 --rounds 3
+  gestalt peer -c configs/footbot.json5";
+#[cfg(not(feature = "opencv"))]
+const EXAMPLES: &str = "This build is without OpenCV: the verbs that look at pictures are left out.
+
+Examples:
+  gestalt watch --web
+  gestalt emulate configs/emulation/churn.json5";
+
 /// A swarm of robots that reads hand gestures together.
 #[derive(Debug, Parser)]
 #[command(name = "gestalt", version, propagate_version = true)]
-#[command(after_help = "Examples:
-  gestalt swarm --robots footbot:3,parrot:1 --rounds 3
-  gestalt peer -c configs/footbot.json5")]
+#[command(after_help = EXAMPLES)]
 pub struct Command {
     #[command(subcommand)]
     verb: Verb,
@@ -103,6 +116,9 @@ enum Verb {
     /// Show what perception makes of one frame, stage by stage
     #[cfg(feature = "opencv")]
     Look(look::Args),
+    /// Write what a camera sees of drawn hands from many places, for simulators
+    #[cfg(feature = "opencv")]
+    Views(views::Args),
     /// Run a scenario or an experiment in an emulated network, over several seeds
     Emulate(emulate::Args),
     /// Draw which samples each selection or forgetting rule picks
@@ -128,6 +144,19 @@ const ANSWER: Duration = Duration::from_secs(2);
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 impl Command {
+    /// What the command line says; where it says nothing that can be done, the program ends with the reason.
+    #[must_use]
+    pub fn of_this_process() -> Self {
+        Self::try_parse().unwrap_or_else(|error| {
+            #[cfg(not(feature = "opencv"))]
+            if let Some(reason) = without_eyes::explain(&error) {
+                eprintln!("gestalt: {reason}");
+                std::process::exit(2);
+            }
+            error.exit()
+        })
+    }
+
     /// Carries out the verb.
     ///
     /// # Errors
@@ -155,6 +184,8 @@ impl Command {
             Verb::Evaluate(args) => evaluate::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Look(args) => look::run(&args),
+            #[cfg(feature = "opencv")]
+            Verb::Views(args) => views::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
             Verb::Keys(args) => keys::run(&args),

@@ -14,6 +14,7 @@ use super::web::WebArgs;
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::Config;
+use crate::service_manager::{ServiceEnvironment, ServiceManager};
 use gestalt_link::{Event, LinkConfig, boot_number};
 
 /// Run one robot until Ctrl-C
@@ -70,6 +71,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let config = args.config()?;
     let model = crate::model::load(&config.model)?;
     let names = model.as_ref().map(|model| Names::new(model.classifier.vocabulary())).unwrap_or_default();
+    let manager = ServiceManager::new(&ServiceEnvironment::read(), std::process::id())?;
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         let body = tokio::select! {
@@ -93,14 +95,22 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 return Err(error);
             }
         };
-        let mut schedule = args.open_every.map(tokio::time::interval);
-        if let Some(schedule) = &mut schedule {
-            schedule.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        }
+        manager.ready(&format!("robot {} of swarm {} listens on {}", config.robot.id, config.swarm.0, locators.join(" ")));
+        let mut schedule = args.open_every.map(every);
+        let mut watchdog = manager.watchdog_period().map(every);
+        let mut unheard = 0;
         let ended = loop {
             tokio::select! {
                 () = &mut interrupted => break Ok(()),
                 () = tick(&mut schedule) => body.robot().open_round(),
+                () = tick(&mut watchdog) => {
+                    // A robot whose mind takes nothing in any more is no better than one that hangs.
+                    let status = body.robot().status();
+                    let full = status.counters.get("refused_command_full").copied().unwrap_or(0);
+                    if std::mem::replace(&mut unheard, full) == full {
+                        manager.alive();
+                    }
+                }
                 event = events.recv() => match event {
                     Ok(event) => report(args.json, &event, &names)?,
                     Err(RecvError::Lagged(missed)) => lagged(missed),
@@ -109,12 +119,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 failure = body.robot().ended() => break Err(failure.to_string().into()),
             }
         };
+        manager.stopping();
         if let Some(page) = page {
             page.close().await;
         }
         body.stop().await;
         ended
     })
+}
+
+fn every(period: Duration) -> tokio::time::Interval {
+    let mut schedule = tokio::time::interval(period);
+    schedule.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    schedule
 }
 
 async fn tick(schedule: &mut Option<tokio::time::Interval>) {

@@ -47,6 +47,7 @@ pub(super) struct Names(Vec<Vocabulary>);
 
 impl Names {
     /// Those of one vocabulary.
+    #[cfg(any(test, feature = "opencv"))]
     pub(super) fn new(vocabulary: &Vocabulary) -> Self {
         Self(vec![vocabulary.clone()])
     }

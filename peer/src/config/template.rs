@@ -1,7 +1,7 @@
 //! The one place where every key is explained.
 
 /// A commented configuration file in which every key has its default: what `gestalt config` prints.
-pub const TEMPLATE: &str = include_str!("../../../configs/template.json5");
+pub const TEMPLATE: &str = include_str!("../../template.json5");
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! Where robots stand around the human.
 
+#[cfg(feature = "opencv")]
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -55,6 +56,7 @@ impl Pose {
     }
 
     /// The position, in metres, with the palm at the origin, x to the right of who faces the palm, y up, z towards them.
+    #[cfg(feature = "opencv")]
     pub(crate) fn position(&self) -> Point3<f32> {
         let (bearing, elevation) = (self.bearing_deg.to_radians(), self.elevation_deg.to_radians());
         let at =
