@@ -82,8 +82,8 @@ pub const ALL: &[Attack] = &[
 fn announced(seed: u64) -> Announcement {
     let mut swarm = Swarm::new(&Plan::sealed(), seed, true);
     swarm.show((seed % 6) as u8);
-    let said = swarm.air().iter().filter(|parcel| swarm.topic(&parcel.key) == Some(Topic::Decision));
-    let said = said.last().and_then(|parcel| decode_json(&parcel.bytes).ok());
+    let mut said = swarm.air().iter().filter(|parcel| swarm.topic(&parcel.key) == Some(Topic::Decision));
+    let said = said.next_back().and_then(|parcel| decode_json(&parcel.bytes).ok());
     said.expect("five robots that see the same decide")
 }
 
