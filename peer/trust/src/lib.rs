@@ -38,7 +38,7 @@
 //!
 //! // Robot 0 signs a vote.
 //! let round = RoundId { counter: 1, opener: RobotId(0), life: 0xA1 };
-//! let vote = Vote { round, vocabulary: VocabularyId(9), evidence: vec![2.0, -1.0, -1.0], looks: 3.0 };
+//! let vote = Vote { round, vocabulary: VocabularyId(9), evidence: vec![2.0, -1.0, -1.0], looks: 3.0, unknown: None };
 //! let stamp = Stamp { boot: 1, sequence: 1 };
 //! let said = Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }.encode();
 //! let signature = statement::sign(&robots[0], &roster.swarm_id(), &said);
@@ -67,7 +67,10 @@ mod identity;
 mod judge;
 mod key_file;
 mod membership;
+mod precedence;
 mod public_key;
+mod request;
+mod roles;
 mod roster;
 mod roster_error;
 mod roster_file;
@@ -78,6 +81,7 @@ pub mod statement;
 mod testing;
 mod verify;
 mod witness;
+pub mod word;
 
 pub use budget::Budget;
 pub use distrust::Distrust;
@@ -87,8 +91,11 @@ pub use fake::Fake;
 pub use identity::Identity;
 pub use judge::Judge;
 pub use key_file::KeyFileError;
-pub use membership::{MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
+pub use membership::{Instructor, MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
+pub use precedence::Precedence;
 pub use public_key::PublicKey;
+pub use request::{Applicant, REQUEST_DOMAIN, Request, RequestError};
+pub use roles::{Role, RoleError, Roles};
 pub use roster::{MAX_ROSTER, Roster};
 pub use roster_error::{Member, RosterError};
 pub use scheme::{Ed25519, Scheme};
@@ -96,3 +103,4 @@ pub use signed::MAX_EVIDENT;
 pub use statement::{Heading, STATEMENT_DOMAIN, SwarmId};
 pub use verify::Verifier;
 pub use witness::Witness;
+pub use word::{Attention, Speaker, WORD_DOMAIN, WordHeading};

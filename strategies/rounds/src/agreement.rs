@@ -48,6 +48,20 @@ impl Agreement {
         is_news
     }
 
+    /// Forgets what these robots hold, and every decision that counted one of them, or that one of them drew; whether there was one.
+    pub fn expel(&mut self, robots: &BTreeSet<RobotId>) -> bool {
+        let counts = |decision: &Decision| {
+            let certificate = &decision.certificate;
+            let voters = certificate.votes.iter().map(|counted| counted.robot);
+            let others = certificate.others.iter().map(|held| held.robot);
+            voters.chain(others).chain([decision.author]).any(|robot| robots.contains(&robot))
+        };
+        self.holders.retain(|robot, _| !robots.contains(robot));
+        let forgotten = self.best.take_if(|best| counts(best)).is_some();
+        let forgotten = self.held.take_if(|held| counts(&held.decision)).is_some() || forgotten;
+        forgotten
+    }
+
     /// What robots said that they hold, by robot.
     pub fn holders(&self) -> impl Iterator<Item = &Holder> {
         self.holders.values()
@@ -184,7 +198,13 @@ mod tests {
             stamp: Stamp::default(),
             class: ClassId(0),
             weight: 1.0,
-            vote: Vote { round, vocabulary: VocabularyId(0), evidence: vec![0.0; 4], looks: 1.0 },
+            vote: Vote {
+                round,
+                vocabulary: VocabularyId(0),
+                evidence: vec![0.0; 4],
+                looks: 1.0,
+                unknown: None,
+            },
             signature: None,
         };
         Decision {
@@ -196,7 +216,9 @@ mod tests {
             certificate: Certificate {
                 vocabulary: VocabularyId(0),
                 rule: FusionRule::LogPool,
+                pool: None,
                 probabilities: vec![0.5; 4],
+                unknown: None,
                 votes: (0..robots).map(vote).collect(),
                 others: Vec::new(),
                 robots,

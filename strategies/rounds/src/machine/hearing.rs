@@ -69,21 +69,22 @@ impl Rounds {
             (holding.round.counter, holding.rank) > (wanted.holding.round.counter, wanted.holding.rank)
         });
         if greater && self.lacks(&holding) {
-            let due = self.wanted.as_ref().map_or(self.now + ASK_AFTER, |wanted| wanted.due);
+            // What is for the same gesture may wait a while: a greater one may follow.
+            let same = self.held().is_some_and(|held| held.class == holding.class);
+            let first = self.now + if same { 4 * ASK_AFTER } else { ASK_AFTER };
+            let due = self.wanted.as_ref().map_or(first, |wanted| wanted.due.min(first));
             self.wanted = Some(Wanted { holder, holding, due, asked: 0 });
         }
     }
 
-    /// Whether that is a decision of a newer round than this robot knows, or a greater one of the newest, for another gesture. A greater one
-    /// for the same comes by repair.
+    /// Whether that is a decision of a newer round than this robot knows, or a greater one of the newest.
     fn lacks(&self, holding: &Holding) -> bool {
         if holding.class.is_none() {
             return false;
         }
         match &self.round {
             Some(round) if self.is_this_round(holding.round) => {
-                let held = round.agreement.held();
-                held.is_none_or(|held| held.class != holding.class && held.rank() < holding.rank)
+                round.agreement.held().is_none_or(|held| held.rank() < holding.rank)
             }
             Some(round) => round.id < holding.round,
             None => true,
