@@ -1,9 +1,9 @@
 //! Hangs up links over which nothing is heard, so that they are made anew.
 //!
 //! When many links break and come back at once (a machine that stood still for longer than the lease, a switch that was off), Zenoh's
-//! routers may process each other's news in an order that leaves them with other maps of the network than the real one. They then take a
-//! link for working over which they send nothing, for good: of twenty robots in a line that were stopped for 1.1 to 5 seconds, some pair was left
-//! so in three of four trials. Two that are linked tell each other what they have all the time, so silence shows it.
+//! routers may process each other's news in an order that leaves them with other maps of the network than the real one: it logs "unknown link
+//! mapping". They may then take a link for working over which they send nothing, as was seen among twenty robots in a line that were
+//! stopped for a second or more. Two that are linked tell each other what they have all the time, so silence shows it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
