@@ -1,7 +1,5 @@
 //! What a host may want to know of a mind, and to show.
 
-use std::collections::BTreeSet;
-
 use gestalt_protocol::{Decision, Digest, RobotId, RoundId, Stamp};
 use gestalt_rounds::{Ballot, Refusals, RoundsConfig, Vocabulary};
 
@@ -91,8 +89,7 @@ impl Mind {
     }
 
     /// The robots this one is directly linked to.
-    #[must_use]
-    pub fn neighbours(&self) -> &BTreeSet<RobotId> {
+    pub fn neighbours(&self) -> impl ExactSizeIterator<Item = RobotId> {
         self.rounds.neighbours()
     }
 }

@@ -176,7 +176,8 @@ impl Mind {
 
     /// Whether that robot is one to compare knowledge with: a neighbour, or anyone while none is known.
     fn compares_with(&self, robot: RobotId) -> bool {
-        self.rounds.neighbours().is_empty() || self.rounds.neighbours().contains(&robot)
+        let mut neighbours = self.rounds.neighbours();
+        neighbours.len() == 0 || neighbours.any(|neighbour| neighbour == robot)
     }
 
     /// Takes in what instructors said and this robot had not heard.

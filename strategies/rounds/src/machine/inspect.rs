@@ -81,8 +81,7 @@ impl Rounds {
     }
 
     /// The robots this one is directly linked to.
-    #[must_use]
-    pub fn neighbours(&self) -> &BTreeSet<RobotId> {
+    pub fn neighbours(&self) -> impl ExactSizeIterator<Item = RobotId> {
         self.partners.neighbours()
     }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Rank, RobotId};
 
 /// After a change of the neighbourhood, repair stays busy for this long.
 const UNREST: Duration = Duration::from_secs(5);
@@ -15,54 +15,94 @@ const MEETING: Duration = Duration::from_secs(10);
 /// Later it does when the neighbour was told nothing for so many idle periods, as happens to those of a robot with many.
 const SILENT_PERIODS: u32 = 6;
 
+/// So often a neighbour is given what it lacks by the same comparison before the pauses between grow: what is lost comes again, and who does
+/// not take it, for it knows more robots that a majority would need, or the round by another name, is reminded seldom.
+const AT_ONCE: u32 = 4;
+
+/// The longest such pause, in idle periods.
+const LONGEST: u32 = 32;
+
 /// The partners of repair, and the time of the next one's turn.
 #[derive(Clone, Debug)]
 pub(super) struct Partners {
-    neighbours: BTreeSet<RobotId>,
-    /// Since when each neighbour is one, and when it was last told what this robot has.
-    told: BTreeMap<RobotId, (Duration, Duration)>,
+    neighbours: BTreeMap<RobotId, Partner>,
     next: Duration,
     busy_until: Duration,
     /// Whom this robot turned to last.
     last: Option<RobotId>,
 }
 
+/// What a robot has of the newest round: its decision, and the digest of its words on who holds what.
+pub(super) type Possession = (Option<Rank>, u16);
+
+#[derive(Clone, Debug)]
+struct Given {
+    compared: [Possession; 2],
+    times: u32,
+    /// When it may be again.
+    due: Duration,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Partner {
+    /// Since when it is a neighbour.
+    since: Duration,
+    /// When it was last told what this robot has.
+    told: Duration,
+    /// By what comparison it was last given something.
+    given: Option<Given>,
+}
+
 impl Partners {
     pub fn new(first: Duration) -> Self {
-        Self {
-            neighbours: BTreeSet::new(),
-            told: BTreeMap::new(),
-            next: first,
-            busy_until: Duration::ZERO,
-            last: None,
-        }
+        Self { neighbours: BTreeMap::new(), next: first, busy_until: Duration::ZERO, last: None }
     }
 
-    pub fn neighbours(&self) -> &BTreeSet<RobotId> {
-        &self.neighbours
+    pub fn neighbours(&self) -> impl ExactSizeIterator<Item = RobotId> {
+        self.neighbours.keys().copied()
+    }
+
+    pub fn is_neighbour(&self, robot: RobotId) -> bool {
+        self.neighbours.contains_key(&robot)
     }
 
     /// Takes the place of the old neighbourhood; gives those who are new in it.
-    pub fn change(&mut self, now: Duration, robots: BTreeSet<RobotId>) -> Vec<RobotId> {
-        let new: Vec<RobotId> = robots.difference(&self.neighbours).copied().collect();
-        self.told.retain(|robot, _| robots.contains(robot));
-        self.told.extend(new.iter().map(|robot| (*robot, (now, now))));
-        self.neighbours = robots;
+    pub fn change(&mut self, now: Duration, robots: &BTreeSet<RobotId>) -> Vec<RobotId> {
+        self.neighbours.retain(|robot, _| robots.contains(robot));
+        let new: Vec<RobotId> = robots.iter().copied().filter(|robot| !self.is_neighbour(*robot)).collect();
+        let met = Partner { since: now, told: now, ..Partner::default() };
+        self.neighbours.extend(new.iter().map(|robot| (*robot, met.clone())));
         new
     }
 
     /// A robot is told what this one has.
     pub fn tell(&mut self, now: Duration, robot: RobotId) {
-        if let Some((_, told)) = self.told.get_mut(&robot) {
-            *told = now;
+        if let Some(partner) = self.neighbours.get_mut(&robot) {
+            partner.told = now;
         }
     }
 
     /// Whether a neighbour that says what it has is to hear from this robot, whatever either lacks.
     pub fn owes(&self, now: Duration, robot: RobotId, idle: Duration) -> bool {
-        self.told.get(&robot).is_some_and(|(since, told)| {
+        self.neighbours.get(&robot).is_some_and(|Partner { since, told, .. }| {
             now < *since + MEETING || now >= told.saturating_add(idle.saturating_mul(SILENT_PERIODS))
         })
+    }
+
+    /// Whether it is time to give something to a robot by what it has and what this robot has; counts that it is given.
+    pub fn give(&mut self, now: Duration, robot: RobotId, compared: [Possession; 2], idle: Duration) -> bool {
+        let Some(partner) = self.neighbours.get_mut(&robot) else { return true };
+        let given = &mut partner.given;
+        if given.as_ref().is_none_or(|given| given.compared != compared) {
+            *given = Some(Given { compared, times: 0, due: now });
+        }
+        let Some(given) = given.as_mut().filter(|given| now >= given.due) else { return false };
+        given.times = given.times.saturating_add(1);
+        let doubled = 1_u32.checked_shl(given.times.saturating_sub(AT_ONCE)).unwrap_or(LONGEST);
+        let pause =
+            if given.times < AT_ONCE { Duration::ZERO } else { idle.saturating_mul(doubled.min(LONGEST)) };
+        given.due = now.saturating_add(pause);
+        true
     }
 
     /// When the next repair is due; never for a robot that knows of no other.
@@ -93,8 +133,12 @@ impl Partners {
 
     /// Whom to turn to: the neighbours in turn, or, where none is known, all the living in turn.
     pub fn turn(&mut self, alive: &BTreeSet<RobotId>) -> Option<RobotId> {
-        let partners = if self.neighbours.is_empty() { alive } else { &self.neighbours };
-        let next = partners.iter().find(|robot| Some(**robot) > self.last).or(partners.first()).copied();
+        let after = |robot: &RobotId| Some(*robot) > self.last;
+        let next = if self.neighbours.is_empty() {
+            alive.iter().copied().find(after).or(alive.first().copied())
+        } else {
+            self.neighbours().find(after).or(self.neighbours().next())
+        };
         self.last = next;
         next
     }
@@ -115,15 +159,33 @@ mod tests {
         let robot = RobotId(3);
         let mut partners = Partners::new(at(0));
         assert!(!partners.owes(at(1), robot, IDLE), "it is no neighbour");
-        partners.change(at(1), [robot].into());
+        partners.change(at(1), &[robot].into());
         assert!(partners.owes(at(10), robot, IDLE), "they have just met");
         partners.tell(at(12), robot);
         assert!(!partners.owes(at(35), robot, IDLE));
         assert!(partners.owes(at(36), robot, IDLE), "it was told nothing for six periods");
         partners.tell(at(36), robot);
         assert!(!partners.owes(at(37), robot, IDLE));
-        partners.change(at(40), BTreeSet::new());
-        partners.change(at(41), [robot].into());
+        partners.change(at(40), &BTreeSet::new());
+        partners.change(at(41), &[robot].into());
         assert!(partners.owes(at(42), robot, IDLE), "they have met again");
+    }
+
+    #[test]
+    fn who_does_not_take_what_it_lacks_is_left_alone_until_something_changes() {
+        let robot = RobotId(3);
+        let mut partners = Partners::new(at(0));
+        partners.change(at(1), &[robot].into());
+        let mut given = |seconds: std::ops::Range<u64>, theirs, own| -> Vec<u64> {
+            let due = |second: &u64| partners.give(at(*second), robot, [(None, theirs), (None, own)], IDLE);
+            seconds.filter(due).collect()
+        };
+        assert_eq!(
+            given(2..400, 1, 2),
+            [2, 3, 4, 5, 9, 17, 33, 65, 129, 257, 385],
+            "pauses grow, and do not without end"
+        );
+        assert_eq!(given(400..410, 1, 3), [400, 401, 402, 403, 407], "something has changed here");
+        assert_eq!(given(410..420, 4, 3), [410, 411, 412, 413, 417], "and there");
     }
 }

@@ -21,10 +21,10 @@ impl Rounds {
     /// Greets new neighbours with what this robot has.
     pub(super) fn on_neighbours(&mut self, mut robots: BTreeSet<RobotId>, effects: &mut Effects<'_>) {
         robots.remove(&self.me);
-        if robots == *self.neighbours() {
+        if self.neighbours().eq(robots.iter().copied()) {
             return;
         }
-        let new = self.partners.change(self.now, robots);
+        let new = self.partners.change(self.now, &robots);
         self.forget_accounts();
         self.hurry_repair();
         for robot in new {
@@ -52,7 +52,7 @@ impl Rounds {
         }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
-        if let Some(give) = self.lacking_there(order, have) {
+        if let Some(give) = self.lacking_there(from, order, have) {
             self.tell(from, Message::Give(give), effects);
         }
         let owes = self.partners.owes(self.now, from, self.config.repair_idle);
@@ -92,7 +92,7 @@ impl Rounds {
             // What is told next is what is held then.
             self.decide(effects);
         }
-        let others: Vec<RobotId> = self.neighbours().iter().copied().filter(|r| *r != from).collect();
+        let others: Vec<RobotId> = self.neighbours().filter(|robot| *robot != from).collect();
         for robot in others {
             if is_news {
                 self.tell(robot, Message::Give(news.clone()), effects);
@@ -113,7 +113,7 @@ impl Rounds {
     }
 
     /// What the neighbour lacks; its newest round stands to this robot's as `order` says.
-    fn lacking_there(&self, order: Ordering, have: &Have) -> Option<Give> {
+    fn lacking_there(&mut self, from: RobotId, order: Ordering, have: &Have) -> Option<Give> {
         let round = self.round.as_ref().filter(|_| order.is_le())?;
         let (rank, known) = match order {
             Ordering::Equal => (have.decision, have.votes.iter().copied().collect()),
@@ -134,8 +134,14 @@ impl Rounds {
         let fits = decision.is_none() || agreement.holders().count() <= BESIDE_A_DECISION;
         let holders =
             if counts && lacks && fits { agreement.holders().cloned().collect() } else { Vec::new() };
-        let gives = decision.is_some() || !votes.is_empty() || !holders.is_empty();
-        gives.then_some(Give { decision, votes, holders })
+        let compared = [(have.decision, have.holders), (agreement.rank(), agreement.digest())];
+        let due = if decision.is_some() || !holders.is_empty() {
+            self.partners.give(self.now, from, compared, self.config.repair_idle)
+        } else {
+            // More votes than one message holds come with the next.
+            !votes.is_empty()
+        };
+        due.then_some(Give { decision, votes, holders })
     }
 
     /// Whether the neighbour has something that this robot lacks.

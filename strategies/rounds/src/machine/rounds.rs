@@ -306,13 +306,13 @@ impl Rounds {
 
     /// A robot by its name, if there is reason to believe that there is one.
     pub(super) fn known(&self, robot: RobotId) -> Option<RobotId> {
-        Some(robot).filter(|robot| self.neighbours().contains(robot) || self.alive.contains(robot))
+        Some(robot).filter(|robot| self.partners.is_neighbour(*robot) || self.alive.contains(robot))
     }
 
     /// Keeps an account of those alone who are there.
     pub(super) fn forget_accounts(&mut self) {
-        let (now, alive, neighbours) = (self.now, &self.alive, self.partners.neighbours());
-        let known = |robot: RobotId| alive.contains(&robot) || neighbours.contains(&robot);
+        let (now, alive, partners) = (self.now, &self.alive, &self.partners);
+        let known = |robot: RobotId| alive.contains(&robot) || partners.is_neighbour(robot);
         for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
             allowance.forget(now, known);
         }

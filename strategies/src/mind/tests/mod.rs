@@ -82,6 +82,7 @@ struct Swarm {
     /// What the clock says at the next start, if not the truth.
     boot: Option<u32>,
     /// Of the latest start.
+    started: u32,
     nonce: u32,
     /// How many messages robots told each other, and their bytes, by kind.
     told: BTreeMap<&'static str, (usize, usize)>,
@@ -107,6 +108,7 @@ impl Swarm {
             spaces: vec![space(); n],
             vocabularies: vec![vocabulary(); n],
             boot: None,
+            started: 0,
             nonce: 0,
             told: BTreeMap::new(),
         };
@@ -123,7 +125,9 @@ impl Swarm {
     /// A mind with what its disk holds.
     fn waken(&mut self, i: usize) -> Mind {
         let id = RobotId(i as u32 + 1);
-        let boot = self.boot.unwrap_or(self.now.as_secs() as u32 + 1);
+        // No start has the number of another: who says two things under one stamp is taken for two.
+        self.started = self.started.max(self.now.as_secs() as u32) + 1;
+        let boot = self.boot.unwrap_or(self.started);
         self.nonce = self.nonce.wrapping_mul(0x9E37_79B1).wrapping_add(1);
         let config = RoundsConfig { patience: Duration::from_millis(600), ..RoundsConfig::default() };
         let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));

@@ -11,7 +11,12 @@ impl Swarm {
     }
 
     fn check_rest(&mut self) {
-        let told = self.told_within(Duration::from_secs(60));
+        let mut told = self.told_within(Duration::from_secs(60));
+        // A robot that refuses a decision or a word is reminded of it now and then.
+        let reminders = self.minds.len() * (self.minds.len() - 1);
+        if told.get("other").is_some_and(|(times, _)| *times <= reminders) {
+            told.remove("other");
+        }
         assert_eq!(told.keys().copied().collect::<Vec<_>>(), ["have"], "{told:?}");
     }
 }
@@ -93,7 +98,7 @@ fn instructors_beyond_those_kept_are_not_told_again_and_again() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
     #[test]
     fn whatever_is_lost_and_forgotten_repair_comes_to_rest(
