@@ -275,7 +275,7 @@ fn keys(keys: &KeyFacts, robot: RobotId) -> Finding {
             trouble.clone(),
             "a robot that is no member of its sealed swarm does not start, or none believes it",
             format!(
-                "gestalt keys --swarm NAME --robots {robot} {folder}     where authority.key is; then copy roster.json to all robots"
+                "gestalt trust request {robot} {folder}     here; then gestalt trust enrol --request LINE keys     where authority.key is, and gestalt trust accept {folder}     here"
             ),
         ),
     }
