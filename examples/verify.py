@@ -17,7 +17,7 @@ import sys
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-ROLES = ("open", "teach", "overrule", "expel")
+ROLES = ("open", "teach", "overrule")
 VERSION, VOTE, ANNOUNCED = 3, 0, 8
 POOLS = ("log_pool", "confidence_weighted")
 RULES = ("majority", "mean_probability", *POOLS)

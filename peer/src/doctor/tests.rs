@@ -29,7 +29,7 @@ fn well() -> RobotFacts {
             exposed: false,
             trouble: None,
         }),
-        ports: vec![PortFacts { endpoint: "tcp/0.0.0.0:7447".to_owned(), taken: None }],
+        ports: vec![PortFacts { endpoint: "tls/0.0.0.0:7447".to_owned(), taken: None }],
         multicast: Some(Ok(())),
         camera: Some(camera()),
         ..RobotFacts::new(RobotId(1), NOW)
@@ -160,7 +160,7 @@ fn each_fault_of_a_robot_is_named_alone_with_its_fix() {
         (
             on(|it| it.ports[0].taken = Some("another program listens there".to_owned())),
             "port",
-            "tcp/0.0.0.0:7447",
+            "tls/0.0.0.0:7447",
             "sport = :7447",
         ),
         (

@@ -17,13 +17,11 @@ pub enum Role {
     Teach,
     /// Say it also where somebody else has.
     Overrule,
-    /// Have a robot that is a member believed no more, until the authority says otherwise.
-    Expel,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Open, Self::Teach, Self::Overrule, Self::Expel];
+    pub const ALL: [Self; 3] = [Self::Open, Self::Teach, Self::Overrule];
 
     /// One word.
     #[must_use]
@@ -32,7 +30,6 @@ impl Role {
             Self::Open => "open",
             Self::Teach => "teach",
             Self::Overrule => "overrule",
-            Self::Expel => "expel",
         }
     }
 
@@ -49,7 +46,7 @@ impl fmt::Display for Role {
 
 /// A word that names no role.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("'{0}' is no role: write one or more of open, teach, overrule, expel, with commas between them")]
+#[error("'{0}' is no role: write one or more of open, teach, overrule, with commas between them")]
 pub struct RoleError(String);
 
 impl FromStr for Role {
@@ -75,8 +72,7 @@ impl Roles {
         match role {
             Role::Open => Self::from_iter([Role::Open]),
             Role::Teach => Self::from_iter([Role::Open, Role::Teach]),
-            Role::Overrule => Self::from_iter([Role::Open, Role::Teach, Role::Overrule]),
-            Role::Expel => Self::from_iter(Role::ALL),
+            Role::Overrule => Self::from_iter(Role::ALL),
         }
     }
 
@@ -126,7 +122,7 @@ impl<'de> Deserialize<'de> for Roles {
             type Value = Roles;
 
             fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str("a list of roles: open, teach, overrule, expel, in this order")
+                f.write_str("a list of roles: open, teach, overrule, in this order")
             }
 
             /// In their order, and none twice: one set of roles has one spelling.
@@ -163,7 +159,7 @@ mod tests {
         assert_eq!(serde_json::from_str::<Roles>(r#"["open","teach","overrule"]"#).unwrap(), roles);
         assert_eq!(postcard::to_allocvec(&roles).unwrap(), [7]);
         assert_eq!(postcard::from_bytes::<Roles>(&[7]).unwrap(), roles);
-        assert!(postcard::from_bytes::<Roles>(&[16]).is_err());
+        assert!(postcard::from_bytes::<Roles>(&[8]).is_err());
         for bad in [r#"["teach","open"]"#, r#"["open","open"]"#, r#"["reign"]"#, "7", r#""open""#] {
             assert!(serde_json::from_str::<Roles>(bad).is_err(), "{bad}");
         }

@@ -75,7 +75,7 @@ struct Enrol {
     /// Make a client a member, and all that it needs in a folder of its own (client-NAME): a Zenoh configuration for any language, a key to speak with
     #[arg(long, value_name = "NAME", conflicts_with = "request")]
     client: Option<InstructorId>,
-    /// What the client may do, with what comes before it: open, teach, overrule, expel [default: listen]
+    /// What the client may do, with what comes before it: open, teach, overrule [default: listen]
     #[arg(long, value_name = "ROLE")]
     role: Option<Role>,
     /// The line that `gestalt trust request` printed where the new member is
@@ -187,9 +187,6 @@ fn say(words: &str) -> Result<(), Failure> {
 }
 
 fn new(args: &New) -> Result<(), Failure> {
-    if args.local_role == Role::Expel {
-        return Err("whoever has no key expels nobody: take open, teach or overrule".into());
-    }
     let mut authority = Authority::create(&args.folder, &args.swarm)?;
     authority.let_local(Roles::up_to(args.local_role));
     let roster = authority.save()?;

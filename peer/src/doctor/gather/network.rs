@@ -62,7 +62,7 @@ pub(super) fn ports(config: &Config) -> Vec<PortFacts> {
 
 /// The endpoint at which a robot of this machine is reached that listens there.
 pub(super) fn at_home(endpoint: &str) -> String {
-    endpoint.replacen("tcp/0.0.0.0:", "tcp/127.0.0.1:", 1).replacen("tcp/[::]:", "tcp/[::1]:", 1)
+    endpoint.replacen("/0.0.0.0:", "/127.0.0.1:", 1).replacen("/[::]:", "/[::1]:", 1)
 }
 
 /// Why nobody answers at a TCP endpoint; `None` when somebody listens there.
