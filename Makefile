@@ -32,13 +32,15 @@ test-packages: packages
 	@$(call install,$(TEST_PACKAGES))
 
 # A heterogeneous swarm of real Zenoh peers that knows no gesture looks, decides, is told what it was, and learns.
-# Leaves its pictures and a recording in out/.
+# Leaves its pictures and a recording in out/. It is sealed with keys of its own: SEALED=1 keeps them in out/keys, SEALED=0 seals nothing.
+SEAL := $(if $(filter 1,$(SEALED)),--keys out/keys,$(if $(filter 0,$(SEALED)),--open))
 demo: packages
 	cargo build -p gestalt-peer --bin gestalt
 	mkdir -p out
 	rm -f out/run.mcap
 	target/debug/gestalt swarm --robots footbot:6,parrot:2 --topology random --rounds 30 --pause 300ms \
-	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap
+	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap $(SEAL)
+	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
 # Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data,enki,valgrind,systemd,debian makes
 # failures of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.

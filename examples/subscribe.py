@@ -3,6 +3,7 @@
 
     pip install eclipse-zenoh
     python3 examples/subscribe.py --connect tcp/127.0.0.1:7447 --swarm gestalt
+    python3 examples/subscribe.py --connect tls/192.168.1.5:7447 --config keys/client-desk/zenoh.json5    # a sealed swarm
 
 One message per decision; `round` tells the rare repeat (a spokesrobot that died while it spoke) from news.
 """
@@ -16,12 +17,13 @@ import zenoh
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--connect", "-e", default="tcp/127.0.0.1:7447", help="a robot's endpoint")
+    arguments.add_argument("--config", help="Zenoh configuration, as `gestalt trust enrol --client` writes it")
     arguments.add_argument("--swarm", default="gestalt", help="the swarm's name")
     arguments.add_argument("--count", type=int, default=0, help="stop after so many decisions; 0: never")
     arguments.add_argument("--json", action="store_true", help="print the messages as they came")
     given = arguments.parse_args()
 
-    config = zenoh.Config()
+    config = zenoh.Config.from_file(given.config) if given.config else zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([given.connect]))
 

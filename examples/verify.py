@@ -17,6 +17,7 @@ import sys
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
+ROLES = ("open", "teach", "overrule")
 VERSION, VOTE, ANNOUNCED = 3, 0, 8
 POOLS = ("log_pool", "confidence_weighted")
 RULES = ("majority", "mean_probability", *POOLS)
@@ -53,16 +54,26 @@ def verify(key: str, message: bytes, signature: str) -> None:
 
 def members(roster: dict) -> bytes:
     """Checks who signed the roster; gives the swarm's id."""
-    def keys(of: dict, write, order) -> bytes:
-        entries = [write(name) + bytes.fromhex(key) for name, key in sorted(of.items(), key=order)]
-        return varint(len(entries)) + b"".join(entries)
+    def entries(of: dict, write, order) -> bytes:
+        written = [write(name, entry) for name, entry in sorted(of.items(), key=order)]
+        return varint(len(written)) + b"".join(written)
+
+    def robot(number: str, key: str) -> bytes:
+        return varint(int(number)) + bytes.fromhex(key)
+
+    def roles(words: list) -> bytes:
+        return bytes([sum(1 << ROLES.index(word) for word in words)])
+
+    def instructor(name: str, entry: dict) -> bytes:
+        return text(name) + bytes.fromhex(entry["key"]) + roles(entry["roles"])
 
     by_number, by_name = (lambda item: int(item[0])), (lambda item: item[0])
     body = bytes.fromhex(roster["authority"]) + text(roster["swarm"]) + varint(roster["epoch"])
-    body += keys(roster["robots"], lambda robot: varint(int(robot)), by_number)
-    body += keys(roster.get("instructors", {}), text, by_name)
-    body += keys(roster.get("expelled", {}), lambda robot: varint(int(robot)), by_number)
-    verify(roster["authority"], b"gestalt-roster-1\0" + body, roster["signature"])
+    body += entries(roster["robots"], robot, by_number)
+    body += entries(roster.get("instructors", {}), instructor, by_name)
+    body += roles(roster.get("local", []))
+    body += entries(roster.get("expelled", {}), robot, by_number)
+    verify(roster["authority"], b"gestalt-roster-2\0" + body, roster["signature"])
     return hashlib.sha256(b"gestalt-swarm-1" + bytes.fromhex(roster["authority"]) + roster["swarm"].encode()).digest()
 
 

@@ -197,6 +197,8 @@ pub enum Outcome {
     UnknownGesture,
     /// The robots have no memory for samples: learning is not configured.
     NotLearning,
+    /// In a sealed swarm: who said it may not do that. It changed nothing.
+    NotAllowed,
 }
 
 impl Outcome {
@@ -210,6 +212,10 @@ impl Outcome {
             Self::UnknownRound => "no such round is known, or it is too long ago",
             Self::UnknownGesture => "the vocabulary has no such gesture",
             Self::NotLearning => "the robots are not set up to learn",
+            Self::NotAllowed => {
+                "not allowed: ask whoever has the swarm's authority key for the role (gestalt trust roster shows who may do what, gestalt trust \
+                 enrol --client gives it)"
+            }
         }
     }
 }

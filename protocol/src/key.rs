@@ -38,8 +38,14 @@ pub enum Topic {
     Decision,
     /// `evidence`: in a sealed swarm, proof that a member said two things; see `gestalt-trust`.
     Evidence,
-    /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON.
+    /// `roster`: in a sealed swarm, its newest members, for all who hear it; see `gestalt-trust`.
+    Roster,
+    /// `robot/<id>/roster`: the same, from a neighbour to that robot alone.
+    RosterFor(RobotId),
+    /// `instructor/<id>/feedback`: an [`Instruction`](crate::Instruction), JSON. In a sealed swarm, to the robot on whose computer it is said.
     Feedback(InstructorId),
+    /// `instructor/<id>/word`: in a sealed swarm, an [`Instruction`](crate::Instruction), JSON, signed in its attachment; see `gestalt-trust`.
+    Word(InstructorId),
     /// `instructor/<id>/answer`: the swarm's [`Answer`](crate::Answer) to it, JSON.
     Answer(InstructorId),
 }
@@ -81,6 +87,9 @@ impl Keys {
             Topic::Taken(id) => format!("{prefix}robot/{id}/taken"),
             Topic::Decision => format!("{prefix}decision"),
             Topic::Evidence => format!("{prefix}evidence"),
+            Topic::Roster => format!("{prefix}roster"),
+            Topic::RosterFor(id) => format!("{prefix}robot/{id}/roster"),
+            Topic::Word(id) => format!("{prefix}instructor/{id}/word"),
             Topic::Feedback(id) => format!("{prefix}instructor/{id}/feedback"),
             Topic::Answer(id) => format!("{prefix}instructor/{id}/answer"),
         }
@@ -105,6 +114,7 @@ impl Keys {
         let topic = match (chunks.next()?, chunks.next(), chunks.next()) {
             ("decision", None, None) => Topic::Decision,
             ("evidence", None, None) => Topic::Evidence,
+            ("roster", None, None) => Topic::Roster,
             ("robot", Some(id), Some(what)) => {
                 let id = id.parse().ok()?;
                 match what {
@@ -116,10 +126,12 @@ impl Keys {
                     "alive" => Topic::Alive(id),
                     "frame" => Topic::Frame(id),
                     "taken" => Topic::Taken(id),
+                    "roster" => Topic::RosterFor(id),
                     _ => return None,
                 }
             }
             ("instructor", Some(id), Some("feedback")) => Topic::Feedback(id.parse().ok()?),
+            ("instructor", Some(id), Some("word")) => Topic::Word(id.parse().ok()?),
             ("instructor", Some(id), Some("answer")) => Topic::Answer(id.parse().ok()?),
             _ => return None,
         };
@@ -152,7 +164,10 @@ mod tests {
             Topic::Taken(RobotId(6)),
             Topic::Decision,
             Topic::Evidence,
+            Topic::Roster,
+            Topic::RosterFor(RobotId(7)),
             Topic::Feedback("ada".parse().unwrap()),
+            Topic::Word("ada".parse().unwrap()),
             Topic::Answer("ada".parse().unwrap()),
         ];
         for topic in topics {

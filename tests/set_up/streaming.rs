@@ -91,6 +91,7 @@ pub fn center_config(orders: &Value) -> Config {
         let endpoints = orders["link"].get(key).cloned().unwrap_or_else(|| json!([]));
         config.zenoh.insert(key.to_owned(), json!({ "endpoints": endpoints }));
     }
+    config.trust.insecure = orders["link"]["insecure"].as_bool().unwrap_or_default();
     let serve = &orders["serve"];
     if !serve["fuse"].is_null() {
         config.center.fuse =

@@ -41,6 +41,7 @@ impl Mixed {
         let link = json!({
             "listen": if node < 3 { vec![format!("tcp/0.0.0.0:{PORT}")] } else { vec![] },
             "connect": self.namespaces.to_dial(node, PORT),
+            "insecure": true,
         });
         let mut orders = json!({"id": node, "swarm": self.swarm, "link": link, "quorum": 1});
         match node {

@@ -180,7 +180,7 @@ pub async fn faults_that_are_planted_are_each_named_with_their_fix() {
     std::fs::write(folder.path().join("robot.memory"), "not a database").unwrap();
     let keys = folder.path().join("keys");
     let made = Command::new(env!("CARGO_BIN_EXE_test-gestalt"))
-        .args(["keys", "--swarm", &swarm, "--robots", "7"])
+        .args(["trust", "enrol", "--local", "--swarm", &swarm, "--robots", "7"])
         .arg(&keys)
         .output()
         .unwrap();

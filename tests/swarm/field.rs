@@ -48,6 +48,7 @@ impl Field {
             "quorum": self.quorum,
             "link": {
                 "listen": [format!("tcp/0.0.0.0:{PORT}")],
+                "insecure": true,
                 "connect": self.namespaces.to_dial(node, PORT),
             },
         });

@@ -29,6 +29,7 @@ fn robot(namespaces: &Namespaces, swarm: &str, id: u32) -> Process {
         "learn": {"keep": 3, "share": 0.5},
         "link": {
             "listen": [format!("tcp/0.0.0.0:{PORT}")],
+            "insecure": true,
             "connect": namespaces.to_dial(id, PORT),
             "loss": LOSS,
         },

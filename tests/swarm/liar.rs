@@ -7,18 +7,17 @@ use gestalt_protocol::{
 };
 use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, agreed, start, unique};
-use gestalt_trust::{Membership, statement};
+use gestalt_trust::statement;
 use zenoh::qos::CongestionControl;
 
-use crate::stranger::{key, sealed};
-use crate::trouble::{attach, counted};
+use crate::stranger::{enter, key, sealed, with_eve};
+use crate::trouble::counted;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
 pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
     let swarm = unique("liar");
-    let robots = (0..5).map(|id| (RobotId(id), key(id).public_key())).collect();
-    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let members = with_eve(&swarm, 5);
     let swarm_id = members.clone().sign(&key(1000)).unwrap().swarm_id();
     let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
     let locators = robots[0].robot.locators().to_vec();
@@ -29,7 +28,7 @@ pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
         assert!(robot.sees_alive(2, PATIENCE).await);
     }
     let keys = Keys::new(&swarm).unwrap();
-    let liar = attach(&locators).await;
+    let liar = enter(&members, &locators).await;
     let put = async |topic: Topic, bytes: Vec<u8>| {
         let put = liar.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
         put.await.unwrap();

@@ -27,6 +27,7 @@ mod scouting;
 mod stranger;
 mod stream;
 mod trouble;
+mod wall;
 
 fn main() -> std::process::ExitCode {
     gestalt_trials::run(gestalt_trials::trials![
@@ -81,6 +82,10 @@ fn main() -> std::process::ExitCode {
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,
         [Waits] stranger::one_who_is_no_member_changes_nothing_and_every_lie_is_named.await,
         [Waits] stranger::what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_said_it.await,
+        [Waits] wall::a_stranger_in_any_mode_neither_reads_nor_changes_anything.await,
+        [Waits] wall::clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more.await,
+        [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
+        [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,

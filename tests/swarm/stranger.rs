@@ -6,18 +6,18 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU8;
 use std::time::Duration;
 
-use gestalt_link::{Client, LinkConfig, RobotConfig, Seal};
+use gestalt_link::{Bearer, Certificate, Client, Credentials, LinkConfig, RobotConfig, Seal};
 use gestalt_protocol::{
     Announcement, Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction,
     Keys, Lesson, Lessons, Message, Outcome, RobotId, RoundId, Stamp, Topic, Vote, Word,
 };
 use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, Watched, agreed, config, learning, short_rounds, start, start_learning, unique};
-use gestalt_trust::{Identity, Membership, statement};
+use gestalt_trust::{Identity, Instructor, Membership, Role, Roles, statement};
 use serde_json::Value;
 use zenoh::qos::CongestionControl;
 
-use crate::trouble::{announcing, attach, counted, invented};
+use crate::trouble::{announcing, counted, invented};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -30,14 +30,54 @@ pub fn key(id: u32) -> Identity {
 
 pub fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
     let roster = members.clone().sign(&key(1000)).expect("a roster");
-    let seal = Seal { identity: Arc::new(key(id)), roster, guests: std::collections::BTreeMap::new() };
-    RobotConfig { seal: Some(seal), ..config(id, &members.swarm, connect) }
+    let seal = Seal::issue(&key(1000), roster, RobotId(id), Arc::new(key(id))).expect("a certificate");
+    let plain = config(id, &members.swarm, &by_tls(connect));
+    let listen = ["tls/127.0.0.1:0", "tcp/127.0.0.1:0"].map(str::to_owned).to_vec();
+    RobotConfig { seal: Some(seal), link: LinkConfig { listen, ..plain.link }, ..plain }
+}
+
+/// The endpoints at which a sealed robot is dialled.
+pub fn by_tls(locators: &[String]) -> Vec<String> {
+    locators.iter().filter(|locator| locator.starts_with("tls/")).cloned().collect()
+}
+
+/// The members `robots` of a swarm, and eve, who may listen and nothing else. Whoever is local may teach.
+pub fn with_eve(swarm: &str, robots: u32) -> Membership {
+    let robots = (0..robots).map(|id| (RobotId(id), key(id).public_key())).collect();
+    let eve = Instructor { key: key(666).public_key(), roles: Roles::NONE };
+    Membership {
+        swarm: swarm.to_owned(),
+        epoch: 1,
+        robots,
+        instructors: [("eve".parse().unwrap(), eve)].into(),
+        local: Roles::up_to(Role::Teach),
+        ..Membership::default()
+    }
+}
+
+/// What a client with that key shows.
+pub fn credentials(members: &Membership, name: &str, identity: Identity) -> Credentials {
+    let roster = members.clone().sign(&key(1000)).expect("a roster");
+    let holder = || Bearer::Client(name.parse().unwrap());
+    let certificate =
+        Certificate::issue(&key(1000), &members.swarm, holder(), &identity.public_key()).unwrap();
+    Credentials::new(&roster, holder(), Arc::new(identity), certificate).expect("its own certificate")
+}
+
+/// A Zenoh client that is let in, as eve, and then says what it likes.
+pub async fn enter(members: &Membership, locators: &[String]) -> zenoh::Session {
+    let mut zenoh = zenoh::Config::default();
+    zenoh.insert_json5("mode", "\"client\"").unwrap();
+    zenoh.insert_json5("connect/endpoints", &serde_json::json!(by_tls(locators)).to_string()).unwrap();
+    zenoh.insert_json5("scouting/multicast/enabled", "false").unwrap();
+    let tls = credentials(members, "eve", key(666)).tls();
+    zenoh.insert_json5("transport/link/tls", &tls.to_string()).unwrap();
+    zenoh::open(zenoh).await.unwrap()
 }
 
 pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     let swarm = unique("stranger");
-    let robots = (0..3).map(|id| (RobotId(id), key(id).public_key())).collect();
-    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let members = with_eve(&swarm, 3);
     let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
     let locators = robots[0].robot.locators().to_vec();
     robots.push(start(sealed(1, &members, &locators), Some(ClassId(4))).await);
@@ -50,7 +90,7 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     let signed = first.certificate.votes.iter().all(|counted| counted.signature.is_some());
     assert!(signed && first.certificate.reached() == 3, "{first:?}");
 
-    let liar = attach(&locators).await;
+    let liar = enter(&members, &locators).await;
     let keys = Keys::new(&swarm).unwrap();
     let vocabulary = Fixed::default().vocabulary().id();
     let put = async |topic: Topic, bytes: Vec<u8>| {
@@ -139,8 +179,7 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
 
 pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_said_it() {
     let swarm = unique("sealed-school");
-    let robots = (0..4).map(|id| (RobotId(id), key(id).public_key())).collect();
-    let members = Membership { swarm: swarm.clone(), epoch: 1, robots, ..Membership::default() };
+    let members = with_eve(&swarm, 4);
     let shown = Arc::new(AtomicU8::new(3));
     let pupil = |id, connect: &[String]| {
         let learning = Some(learning(2, 1.0, None));
@@ -157,9 +196,10 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
         assert!(robot.sees_alive(2, PATIENCE).await);
     }
     let keys = Keys::new(&swarm).unwrap();
-    let liar = attach(&locators).await;
+    let liar = enter(&members, &locators).await;
     let heard = liar.declare_subscriber(keys.key(&Topic::Sample(RobotId(1)))).await.unwrap();
-    let link = LinkConfig { connect: locators.clone(), ..LinkConfig::default() };
+    let here = robots[0].robot.for_clients().unwrap().to_owned();
+    let link = LinkConfig { connect: vec![here], ..LinkConfig::default() };
     let client = Client::open(&swarm, &link).await.unwrap();
     let ada = "ada".parse().unwrap();
     client.instruct(&ada, &Instruction::Open).await.unwrap();

@@ -197,6 +197,9 @@ impl PortableMind {
             | Topic::Frame(_)
             | Topic::Taken(_)
             | Topic::Evidence
+            | Topic::Roster
+            | Topic::RosterFor(_)
+            | Topic::Word(_)
             | Topic::Feedback(_) => return Err(MindError::Key(shortened(key))),
         };
         self.tell(now, input);

@@ -3,14 +3,16 @@
 //!
 //! Each sample of the one is followed by a sample of the others, so that all see the same machine.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, Seal, fresh_nonce};
+use gestalt_link::{
+    Bearer, Certificate, Credentials, Event, LinkConfig, Robot, RobotConfig, Seal, fresh_nonce,
+};
 use gestalt_protocol::{Envelope, Keys, Message, RobotId, RoundId, Stamp, Topic, VocabularyId, Vote};
 use gestalt_strategies::MindConfig;
-use gestalt_trust::{Identity, Membership, Roster, statement};
+use gestalt_trust::{Identity, Instructor, Membership, Roles, Roster, statement};
+use serde_json::Value;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
@@ -25,7 +27,8 @@ struct Neighbour {
 }
 
 impl Neighbour {
-    async fn start(swarm: &str, seal: Option<Seal>) -> Self {
+    async fn start(swarm: &str, seal: Option<Seal>, of_voter: Option<Value>) -> Self {
+        let listen = if seal.is_some() { "tls/127.0.0.1:0" } else { "tcp/127.0.0.1:0" };
         let robot = Robot::start(RobotConfig {
             id: RobotId(1),
             name: "bench".to_owned(),
@@ -33,7 +36,7 @@ impl Neighbour {
             swarm: swarm.to_owned(),
             mind: MindConfig::default(),
             fusion: None,
-            link: LinkConfig { listen: vec!["tcp/127.0.0.1:0".to_owned()], ..LinkConfig::default() },
+            link: LinkConfig { listen: vec![listen.to_owned()], ..LinkConfig::default() },
             vocabulary: None,
             learning: None,
             nonce: fresh_nonce(),
@@ -41,7 +44,7 @@ impl Neighbour {
         })
         .await
         .expect("the robot starts");
-        let voter = session(&[], robot.locators()).await;
+        let voter = session(&[], robot.locators(), of_voter).await;
         let (held, holds) = mpsc::channel();
         let mut events = robot.events();
         std::thread::spawn(move || {
@@ -68,14 +71,22 @@ impl Neighbour {
 async fn main() {
     let key = |robot: u8| Identity::from_bytes(&[robot + 1; 32]);
     let robots = (0..2).map(|robot| (RobotId(robot.into()), key(robot).public_key())).collect();
-    let members = Membership { swarm: "sealed".to_owned(), epoch: 1, robots, ..Membership::default() };
+    let voter = || Bearer::Client("voter".parse().expect("a name"));
+    let instructors =
+        [("voter".parse().expect("a name"), Instructor { key: key(50).public_key(), roles: Roles::NONE })]
+            .into();
+    let members =
+        Membership { swarm: "sealed".to_owned(), epoch: 1, robots, instructors, ..Membership::default() };
     let roster: Roster = members.sign(&key(100)).expect("a roster");
-    let seal = Seal { identity: Arc::new(key(1)), roster: roster.clone(), guests: BTreeMap::new() };
-    let open = Neighbour::start("open", None).await;
-    let sealed = Neighbour::start("sealed", Some(seal)).await;
-    let receiver = session(&["tcp/127.0.0.1:0".to_owned()], &[]).await;
+    let seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(1))).expect("a certificate");
+    let certificate =
+        Certificate::issue(&key(100), "sealed", voter(), &key(50).public_key()).expect("a certificate");
+    let of_voter = Credentials::new(&roster, voter(), Arc::new(key(50)), certificate).expect("its own").tls();
+    let open = Neighbour::start("open", None, None).await;
+    let sealed = Neighbour::start("sealed", Some(seal), Some(of_voter)).await;
+    let receiver = session(&["tcp/127.0.0.1:0".to_owned()], &[], None).await;
     let locators: Vec<String> = receiver.info().locators().await.iter().map(ToString::to_string).collect();
-    let sender = session(&[], &locators).await;
+    let sender = session(&[], &locators, None).await;
     let (arrived, arrivals) = mpsc::channel();
     let _subscriber = receiver
         .declare_subscriber("raw/vote")
@@ -106,7 +117,7 @@ async fn main() {
     sealed.robot.stop().await;
 }
 
-async fn session(listen: &[String], connect: &[String]) -> Session {
+async fn session(listen: &[String], connect: &[String], tls: Option<Value>) -> Session {
     let mut config = zenoh::Config::default();
     for (key, value) in [
         ("mode", serde_json::json!("router")),
@@ -116,6 +127,9 @@ async fn session(listen: &[String], connect: &[String]) -> Session {
         ("timestamping/enabled", serde_json::json!(false)),
     ] {
         config.insert_json5(key, &value.to_string()).expect("a key of Zenoh's");
+    }
+    if let Some(tls) = tls {
+        config.insert_json5("transport/link/tls", &tls.to_string()).expect("credentials");
     }
     zenoh::open(config).await.expect("a session")
 }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, Reported, RobotId, Status};
-use gestalt_trust::{Distrust, EvidenceError};
+use gestalt_trust::{Distrust, EvidenceError, RosterError};
 
 const MAX_ERRORS: usize = 16;
 const MAX_ERROR_LENGTH: usize = 400;
@@ -143,6 +143,12 @@ pub(super) enum Refusal {
     Distrust(#[from] Distrust),
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
+    #[error(transparent)]
+    Roster(#[from] RosterError),
+    #[error("more of it than is looked into: it comes again")]
+    TooOften,
+    #[error("nobody but those on this robot's own computer say anything without a signature")]
+    Unsaid,
 }
 
 impl Refusal {
@@ -160,6 +166,13 @@ impl Refusal {
             Self::Full => "full",
             Self::Twin => "twin",
             Self::Evidence(_) => "false",
+            Self::Roster(RosterError::Older { .. }) => "older",
+            Self::Roster(RosterError::OtherSwarm) => "other_swarm",
+            Self::Roster(RosterError::Contradiction { .. }) => "contradiction",
+            Self::Roster(RosterError::Forged) => "forged",
+            Self::Roster(_) => "malformed",
+            Self::TooOften => "too_often",
+            Self::Unsaid => "unsigned",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
         }
     }

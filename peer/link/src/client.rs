@@ -1,10 +1,12 @@
 //! A client of a swarm: no robot, no vote; it hears decisions, asks robots how they are, and instructs them.
 
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Instruction, InstructorId, Keys, RobotId, Status, Topic, decode_json,
 };
+use gestalt_trust::{Roster, Speaker, WordHeading, word};
 use serde::de::DeserializeOwned;
 use zenoh::Session;
 use zenoh::bytes::Encoding;
@@ -15,6 +17,8 @@ use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 
 use super::identity::{robot_of, swarm_checksum};
+use super::tls::{Bearer, Credentials};
+use super::words::next_count;
 use super::{LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
@@ -25,6 +29,8 @@ const MAX_WAITING: usize = 1024;
 pub struct Client {
     pub(super) session: Session,
     pub(super) keys: Keys,
+    /// Whoever speaks through it, in a sealed swarm, and the count of their last word.
+    speaker: Option<(Credentials, Mutex<u64>)>,
 }
 
 /// The swarm's decisions, as they are announced.
@@ -47,7 +53,8 @@ impl Client {
     pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
         let keys = Keys::new(swarm)?;
         let session = zenoh::open(link.client()?).await.map_err(|error| LinkError::open(&*error))?;
-        Ok(Self { session, keys })
+        let speaker = link.credentials.clone().map(|credentials| (credentials, Mutex::new(0)));
+        Ok(Self { session, keys, speaker })
     }
 
     /// Every decision from now on: one message each; where a spokesrobot died while speaking, its successor may
@@ -140,11 +147,40 @@ impl Client {
     /// # Errors
     /// [`LinkError::Open`] when the session is closed.
     pub async fn instruct(&self, as_whom: &InstructorId, say: &Instruction) -> Result<(), LinkError> {
+        let as_whom = self.name(as_whom);
         let json = serde_json::to_string(say).expect("an instruction has a place in JSON");
+        let attachment = self.speaker.as_ref().and_then(|(who, last)| signed(who, last, as_whom, &json));
+        let topic = match &attachment {
+            Some(_) => Topic::Word(as_whom.clone()),
+            None => Topic::Feedback(as_whom.clone()),
+        };
         self.session
-            .put(self.keys.key(&Topic::Feedback(as_whom.clone())), json)
+            .put(self.keys.key(&topic), json)
             .encoding(Encoding::APPLICATION_JSON)
+            .attachment(attachment)
             // On its own: a link that takes nothing must hold up no decision because of a word that is not to be lost.
+            .priority(Priority::InteractiveLow)
+            .congestion_control(CongestionControl::Block)
+            .await
+            .map_err(|error| LinkError::open(&*error))
+    }
+
+    /// Who speaks: whoever has a key speaks in its name alone.
+    fn name<'a>(&'a self, as_whom: &'a InstructorId) -> &'a InstructorId {
+        match self.speaker.as_ref().map(|(who, _)| &who.holder) {
+            Some(Bearer::Client(name)) => name,
+            _ => as_whom,
+        }
+    }
+
+    /// Tells all robots of a roster: each goes by it if it follows the one that it holds.
+    ///
+    /// # Errors
+    /// [`LinkError::Open`] when the session is closed.
+    pub async fn tell_roster(&self, roster: &Roster) -> Result<(), LinkError> {
+        self.session
+            .put(self.keys.key(&Topic::Roster), roster.to_json())
+            .encoding(Encoding::APPLICATION_JSON)
             .priority(Priority::InteractiveLow)
             .congestion_control(CongestionControl::Block)
             .await
@@ -163,7 +199,7 @@ impl Client {
     ) -> Result<Option<Answer>, LinkError> {
         let answers = self
             .session
-            .declare_subscriber(self.keys.key(&Topic::Answer(as_whom.clone())))
+            .declare_subscriber(self.keys.key(&Topic::Answer(self.name(as_whom).clone())))
             .with(RingChannel::new(MAX_WAITING))
             .await
             .map_err(|error| LinkError::open(&*error))?;
@@ -186,6 +222,19 @@ impl Client {
             tracing::debug!("closing the client's session: {error}");
         }
     }
+}
+
+/// The attachment of a word, by whoever has a key to sign it with.
+fn signed(who: &Credentials, last: &Mutex<u64>, by: &InstructorId, word: &str) -> Option<Vec<u8>> {
+    let speaker = match &who.holder {
+        Bearer::Client(_) => Speaker::Own(by.clone()),
+        Bearer::Robot(robot) => Speaker::For(*robot),
+        Bearer::Authority => return None,
+    };
+    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+    *last = next_count(*last);
+    let heading = WordHeading { speaker, count: *last };
+    Some(word::sign(&who.identity, &who.swarm, by, &heading, word.as_bytes()))
 }
 
 impl Decisions {

@@ -2,19 +2,24 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Keys, RobotId};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::LinkError;
 use super::identity::zenoh_id;
+use super::reach;
+use super::tls::{self, Credentials};
+
+/// Where a robot listens that was told nothing else, see [`LinkConfig::listen`].
+const AUTO: &str = "auto";
 
 /// How a robot is linked to others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinkConfig {
-    /// Zenoh endpoints to listen on, such as `tcp/0.0.0.0:7447`; port 0 takes a free one. Default: any free TCP
-    /// port.
+    /// Zenoh endpoints to listen on, such as `tls/0.0.0.0:7447`; port 0 takes a free one. `auto`, the default: for an open robot a free
+    /// TCP port of this computer alone; for a sealed one a free port with TLS, and one for clients on this computer.
     pub listen: Vec<String>,
     /// Zenoh endpoints of other robots to link to, tried for ever. Name a link at one of its two ends only:
     /// linked from both ends, Zenoh may stop receiving.
@@ -29,10 +34,15 @@ pub struct LinkConfig {
     /// a short lease loses links that are merely slow.
     #[serde(with = "humantime_serde")]
     pub lease: Duration,
+    /// Lets an open robot listen beyond its own computer and its own link-local network: whoever reaches it there is believed.
+    pub insecure: bool,
+    /// What this session shows to be let in where links are TLS; a robot has those of its seal.
+    #[serde(skip)]
+    pub credentials: Option<Credentials>,
     /// For trials of what a swarm withstands: the part of all received messages that is dropped unread. Range
     /// `0.0..1.0`; 0 in the field.
     pub loss: f64,
-    /// Anything Zenoh's own configuration offers, verbatim; it has the last word, except for `id`.
+    /// Anything Zenoh's own configuration offers, verbatim; it has the last word, except for `id` and what seals a swarm.
     pub zenoh: serde_json::Map<String, Value>,
 }
 
@@ -55,11 +65,13 @@ impl Default for Scouting {
 impl Default for LinkConfig {
     fn default() -> Self {
         Self {
-            listen: vec!["tcp/0.0.0.0:0".to_owned()],
+            listen: vec![AUTO.to_owned()],
             connect: Vec::new(),
             scouting: None,
             max_links: 4,
             lease: Duration::from_secs(1),
+            insecure: false,
+            credentials: None,
             loss: 0.0,
             zenoh: serde_json::Map::new(),
         }
@@ -67,12 +79,12 @@ impl Default for LinkConfig {
 }
 
 impl LinkConfig {
-    /// Whether a robot could be linked like this.
+    /// Whether a robot could be linked like this, an open one or one of a sealed swarm.
     ///
     /// # Errors
     /// [`LinkError::Config`] names the key and the mend.
-    pub fn check(&self, robot: RobotId) -> Result<(), LinkError> {
-        self.to_zenoh(robot, "gestalt", 0).map(drop)
+    pub fn check(&self, robot: RobotId, sealed: bool) -> Result<(), LinkError> {
+        self.of_robot(robot, "gestalt", 0, sealed).map(drop)
     }
 
     /// Zenoh's configuration for that robot.
@@ -86,6 +98,16 @@ impl LinkConfig {
         swarm: &str,
         nonce: u64,
     ) -> Result<zenoh::Config, LinkError> {
+        self.of_robot(robot, swarm, nonce, self.credentials.is_some())
+    }
+
+    fn of_robot(
+        &self,
+        robot: RobotId,
+        swarm: &str,
+        nonce: u64,
+        sealed: bool,
+    ) -> Result<zenoh::Config, LinkError> {
         if self.max_links < 2 {
             return Err(LinkError::Config {
                 key: "max_links".to_owned(),
@@ -98,41 +120,73 @@ impl LinkConfig {
                 cause: format!("{} is no part below 1: take 0 but for trials", self.loss),
             });
         }
-        self.with_defaults(&serde_json::json!({
-            "id": zenoh_id(robot, swarm, nonce),
-            "mode": "router",
-            "listen/endpoints": self.listen,
-            // Words of instructors have the time that their clients give them; nothing else needs one.
-            "timestamping/enabled": false,
-            "connect/timeout_ms": -1,
-            "connect/exit_on_failure": false,
-            "scouting/delay": 0,
-        }))
+        let keys = Keys::new(swarm)?;
+        let wall = self.credentials.as_ref().map(|credentials| tls::robot(credentials, &keys));
+        let listen = self.listening(sealed);
+        let config = self.with_defaults(
+            wall.unwrap_or_default(),
+            &serde_json::json!({
+                "id": zenoh_id(robot, swarm, nonce),
+                "mode": "router",
+                "listen/endpoints": listen,
+                // Words of instructors have the time that their clients give them; nothing else needs one.
+                "timestamping/enabled": false,
+                "connect/timeout_ms": -1,
+                "connect/exit_on_failure": false,
+                "scouting/delay": 0,
+            }),
+        )?;
+        if sealed {
+            reach::check_sealed(&config)?;
+        } else {
+            reach::check_open(&config, self.insecure)?;
+        }
+        Ok(config)
+    }
+
+    /// The endpoints that an open robot listens on, or one of a sealed swarm.
+    #[must_use]
+    pub fn listening(&self, sealed: bool) -> Vec<String> {
+        let auto: &[&str] = if sealed { &["tls/0.0.0.0:0", "tcp/127.0.0.1:0"] } else { &["tcp/127.0.0.1:0"] };
+        let said = self.listen.iter().flat_map(|endpoint| match endpoint.as_str() {
+            AUTO => auto.to_vec(),
+            endpoint => vec![endpoint],
+        });
+        said.map(tls::bounded).collect()
     }
 
     /// Zenoh's configuration for a client: it attaches to one robot and gives up after a few seconds without.
     pub(super) fn client(&self) -> Result<zenoh::Config, LinkError> {
-        self.with_defaults(&serde_json::json!({
-            "mode": "client",
-            "listen/endpoints": [],
-            "timestamping/enabled": true,
-            "connect/timeout_ms": 5000,
-        }))
+        let wall = self.credentials.as_ref().map(tls::client).unwrap_or_default();
+        self.with_defaults(
+            wall,
+            &serde_json::json!({
+                "mode": "client",
+                "listen/endpoints": [],
+                "timestamping/enabled": true,
+                "connect/timeout_ms": 5000,
+            }),
+        )
     }
 
     /// Zenoh's configuration for a session that stands for a whole swarm: clients attach to it as to a robot.
     pub(super) fn stage(&self) -> Result<zenoh::Config, LinkError> {
-        self.with_defaults(&serde_json::json!({
-            "mode": "router",
-            "listen/endpoints": self.listen,
-            "timestamping/enabled": false,
-            "connect/timeout_ms": -1,
-            "connect/exit_on_failure": false,
-            "scouting/delay": 0,
-        }))
+        let config = self.with_defaults(
+            Value::Null,
+            &serde_json::json!({
+                "mode": "router",
+                "listen/endpoints": self.listening(false),
+                "timestamping/enabled": false,
+                "connect/timeout_ms": -1,
+                "connect/exit_on_failure": false,
+                "scouting/delay": 0,
+            }),
+        )?;
+        reach::check_open(&config, self.insecure)?;
+        Ok(config)
     }
 
-    fn with_defaults(&self, first: &Value) -> Result<zenoh::Config, LinkError> {
+    fn with_defaults(&self, wall: Value, first: &Value) -> Result<zenoh::Config, LinkError> {
         let mut config = zenoh::Config::default();
         let lease = u64::try_from(self.lease.as_millis()).unwrap_or(u64::MAX);
         let scouting = self.scouting.clone().unwrap_or_default();
@@ -165,6 +219,12 @@ impl LinkConfig {
                 });
             }
             merge(&mut config, key, value)?;
+        }
+        // Nobody opens a sealed robot a little: to open it, take its key away.
+        for (path, value) in wall.as_object().into_iter().flatten() {
+            config
+                .insert_json5(path, &value.to_string())
+                .map_err(|error| LinkError::config(path, &*error))?;
         }
         Ok(config)
     }
@@ -213,6 +273,44 @@ mod tests {
         .unwrap();
         assert_eq!(config.get_json("mode").unwrap(), "\"client\"");
         assert!(config.get_json("connect/endpoints").unwrap().contains("tcp/127.0.0.1:1"));
+    }
+
+    #[test]
+    fn what_seals_a_swarm_cannot_be_taken_back() {
+        use gestalt_trust::{Identity, Membership};
+
+        use crate::tls::{Bearer, Certificate};
+
+        let key = |number| std::sync::Arc::new(Identity::from_bytes(&[number; 32]));
+        let robots = [(RobotId(7), key(7).public_key())].into();
+        let members = Membership { swarm: "demo".to_owned(), epoch: 1, robots, ..Membership::default() };
+        let roster = members.sign(&key(1)).unwrap();
+        let holder = Bearer::Robot(RobotId(7));
+        let certificate = Certificate::issue(&key(1), "demo", holder.clone(), &key(7).public_key()).unwrap();
+        let credentials = Credentials::new(&roster, holder, key(7), certificate).unwrap();
+        let zenoh = serde_json::json!({
+            "access_control": {"enabled": false, "default_permission": "allow"},
+            "transport": {"link": {"tls": {"enable_mtls": false}, "protocols": ["tcp"], "tx": {"lease": 2500}}},
+        });
+        let link = LinkConfig {
+            credentials: Some(credentials),
+            zenoh: zenoh.as_object().unwrap().clone(),
+            ..LinkConfig::default()
+        };
+        let config = link.to_zenoh(RobotId(7), "demo", 1).unwrap();
+        let said = |key| config.get_json(key).unwrap();
+        assert_eq!(
+            (said("access_control/enabled"), said("transport/link/tx/lease")),
+            ("true".into(), "2500".into())
+        );
+        assert_eq!(
+            (said("transport/link/tls/enable_mtls"), said("access_control/default_permission")),
+            ("true".into(), "\"deny\"".into())
+        );
+        assert!(said("listen/endpoints").contains("tls/0.0.0.0:0#tls_handshake_timeout_ms=2000"));
+        // Whoever prints the configuration prints no key.
+        let secret = "MC4CAQAwBQYDK2VwBCIEIAcHBwc";
+        assert!(!config.to_string().contains(secret) && !format!("{link:?}").contains(secret));
     }
 
     #[test]

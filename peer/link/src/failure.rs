@@ -24,6 +24,8 @@ pub enum Part {
     Deafness,
     /// Asks who is alive after links have changed. It begins anew.
     Census,
+    /// In a sealed swarm, tells neighbours of its roster and hangs up who is on it no more. It begins anew.
+    Roster,
     /// Lets others see that this robot is alive. It declares itself anew.
     Presence,
     /// The Zenoh session. Without it the robot ends.
@@ -34,7 +36,7 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Mind,
         Self::Classifier,
         Self::Training,
@@ -43,6 +45,7 @@ impl Part {
         Self::Links,
         Self::Deafness,
         Self::Census,
+        Self::Roster,
         Self::Presence,
         Self::Session,
         Self::Host,
@@ -60,6 +63,7 @@ impl Part {
             Self::Links => "links",
             Self::Deafness => "deafness",
             Self::Census => "census",
+            Self::Roster => "roster",
             Self::Presence => "presence",
             Self::Session => "session",
             Self::Host => "host",
@@ -74,7 +78,7 @@ impl Part {
             Self::Training => "it begins anew with all samples; the robot judges as before until then",
             Self::Memory => "it is opened anew, and what waits is written then",
             Self::Speaking => "it goes on with the next; neighbours repeat what is lost",
-            Self::Links | Self::Deafness | Self::Census | Self::Presence => "it begins anew",
+            Self::Links | Self::Deafness | Self::Census | Self::Roster | Self::Presence => "it begins anew",
             Self::Session => "the robot ends: start it again, once its network is up",
             Self::Host => "the guest ends: start it again with its host",
         }

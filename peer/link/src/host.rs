@@ -59,6 +59,7 @@ impl Host {
                         self.step(input);
                     }
                     self.voice.accuse();
+                    self.voice.pass_on();
                 }
                 command = self.commands.recv() => match command {
                     Some(input) => self.step(input),

@@ -18,10 +18,11 @@ use zenoh::session::ZenohId;
 
 use super::account::{Account, Refusal};
 use super::identity::robot_of;
-use super::seal::Seal;
+use super::roll::Roll;
+use super::words::{Vouched, Words};
 
 /// The most messages that wait for the mind, votes apart.
-const MAX_QUEUE: usize = 8192;
+pub(super) const MAX_QUEUE: usize = 8192;
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;
@@ -30,34 +31,41 @@ const OWN_VOTES: usize = 64;
 ///
 /// Votes wait in a ring of one per robot: the latest replaces the earlier. Everything else waits in a queue that
 /// loses nothing short of its bound; what exceeds it is refused and counted, and repair brings it again.
-#[derive(Debug)]
 pub(super) struct Inbox {
     me: RobotId,
     swarm: u32,
     keys: Keys,
-    account: Arc<Account>,
+    pub(super) account: Arc<Account>,
     state: Mutex<State>,
-    /// In a sealed swarm: who lets in what its members said.
-    judge: Option<Mutex<Judge>>,
+    /// In a sealed swarm: who lets in what its members said, what is done about its roster, and by which right instructors speak.
+    pub(super) sealed: Option<Sealed>,
     /// For trials: the part of what arrives that is dropped, and the chance that chooses it.
     loss: f64,
     chance: Mutex<ChaCha8Rng>,
     ready: Notify,
-    unrest: Notify,
+    pub(super) unrest: Notify,
     lost_links: watch::Sender<u64>,
 }
 
+pub(super) struct Sealed {
+    pub judge: Mutex<Judge>,
+    pub roll: Arc<Roll>,
+    pub words: Mutex<Words>,
+}
+
 #[derive(Debug, Default)]
-struct State {
-    votes: BTreeMap<RobotId, Envelope>,
-    queue: VecDeque<Input>,
+pub(super) struct State {
+    pub(super) votes: BTreeMap<RobotId, Envelope>,
+    pub(super) queue: VecDeque<Input>,
     own_votes: VecDeque<u32>,
     links: BTreeMap<ZenohId, RobotId>,
     /// Since when each of those is linked, and when it last told this robot something.
     heard: BTreeMap<RobotId, (Instant, Option<Instant>)>,
-    alive: BTreeSet<RobotId>,
+    pub(super) alive: BTreeSet<RobotId>,
     links_changed: bool,
-    alive_changed: bool,
+    pub(super) alive_changed: bool,
+    /// Words that this robot signed, and are yet to be said.
+    pub(super) vouched: Vec<Vouched>,
 }
 
 impl Inbox {
@@ -67,7 +75,7 @@ impl Inbox {
         keys: Keys,
         account: Arc<Account>,
         loss: f64,
-        seal: Option<&Seal>,
+        sealed: Option<Sealed>,
     ) -> Self {
         let state = Mutex::new(State::default());
         Self {
@@ -76,7 +84,7 @@ impl Inbox {
             keys,
             account,
             state,
-            judge: seal.map(|seal| Mutex::new(Judge::new(seal.roster.clone()))),
+            sealed,
             loss,
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
@@ -85,14 +93,24 @@ impl Inbox {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What the judge of a sealed swarm says.
-    fn judged<T>(&self, ask: impl FnOnce(&mut Judge, Duration) -> T) -> Option<T> {
-        let judge = self.judge.as_ref()?;
+    pub(super) fn judged<T>(&self, ask: impl FnOnce(&mut Judge, Duration) -> T) -> Option<T> {
+        let judge = &self.sealed.as_ref()?.judge;
         Some(ask(&mut judge.lock().unwrap_or_else(PoisonError::into_inner), self.account.started().elapsed()))
+    }
+
+    /// Whether the swarm is a sealed one.
+    pub(super) fn is_sealed(&self) -> bool {
+        self.sealed.is_some()
+    }
+
+    /// Whether that robot is none of a sealed swarm's.
+    pub(super) fn is_stranger(&self, robot: RobotId) -> bool {
+        self.judged(|judge, _| judge.is_member(robot)) == Some(false)
     }
 
     /// Whether a member said that; in an open swarm everybody is believed.
@@ -154,6 +172,9 @@ impl Inbox {
             Some(Topic::Decision) => ("decision", self.on_decision(sample)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(sample)),
             Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
+            Some(Topic::Word(by)) => ("word", self.on_word(by, sample)),
+            Some(Topic::Roster) => ("roster", self.on_roster(sample)),
+            Some(Topic::RosterFor(id)) if id == self.me => ("roster", self.on_roster(sample)),
             Some(Topic::Answer(to)) => ("answer", self.on_answer(to, sample)),
             _ => ("other", Err(Refusal::Key)),
         };
@@ -290,6 +311,9 @@ impl Inbox {
 
     fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
         let instruction: Instruction = decode_json(&payload(sample, MAX_JSON)?)?;
+        if self.sealed.is_some() {
+            return self.on_local_word(by, instruction, sample);
+        }
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
         self.queue(Input::Instructed(Instructed { by, at, instruction }))
@@ -306,7 +330,7 @@ impl Inbox {
         self.ready.notify_one();
     }
 
-    fn queue(&self, input: Input) -> Result<(), Refusal> {
+    pub(super) fn queue(&self, input: Input) -> Result<(), Refusal> {
         let mut state = self.lock();
         if state.queue.len() >= MAX_QUEUE {
             return Err(Refusal::Full);
@@ -320,7 +344,7 @@ impl Inbox {
         let Some(Topic::Alive(id)) = self.keys.parse(sample.key_expr().as_str()) else {
             return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Key);
         };
-        if self.judged(|judge, _| judge.is_member(id)) == Some(false) {
+        if self.is_stranger(id) {
             return self.account.refused("alive", sample.key_expr().as_str(), 0, &Distrust::Stranger.into());
         }
         let mut state = self.lock();
@@ -345,8 +369,7 @@ impl Inbox {
         let before = state.alive.clone();
         state.alive.retain(|id| !gone.contains(id));
         for robot in present {
-            let is_stranger = self.judged(|judge, _| judge.is_member(*robot)) == Some(false);
-            if state.alive.len() < MAX_ROBOTS && !is_stranger {
+            if state.alive.len() < MAX_ROBOTS && !self.is_stranger(*robot) {
                 state.alive.insert(*robot);
             }
         }
@@ -372,6 +395,9 @@ impl Inbox {
         if up {
             state.links.insert(id, robot);
             state.heard.insert(robot, (Instant::now(), None));
+            if let Some(sealed) = &self.sealed {
+                sealed.roll.meet();
+            }
         } else {
             state.links.remove(&id);
             state.heard.remove(&robot);
@@ -410,7 +436,7 @@ fn unsaid_time(now: SystemTime, word: &[u8]) -> u64 {
 }
 
 /// The bytes of a payload, looked into only if they are few enough.
-fn payload(sample: &Sample, limit: usize) -> Result<std::borrow::Cow<'_, [u8]>, Refusal> {
+pub(super) fn payload(sample: &Sample, limit: usize) -> Result<std::borrow::Cow<'_, [u8]>, Refusal> {
     let length = sample.payload().len();
     if length > limit {
         return Err(gestalt_protocol::DecodeError::TooLong { length, limit }.into());

@@ -128,6 +128,10 @@ impl Keeper {
 
     fn on_heard(&mut self, id: ZenohId, locators: Vec<String>) {
         let Some(robot) = robot_of(id, self.swarm) else { return };
+        let locators = self.reachable(locators);
+        if locators.is_empty() || self.inbox.is_stranger(robot) {
+            return;
+        }
         if robot == self.me {
             if id != self.node.id() {
                 self.account.twin();
@@ -137,6 +141,13 @@ impl Keeper {
         if self.heard.len() < MAX_HEARD || self.heard.contains_key(&robot) {
             self.heard.insert(robot, Sighting { id, locators, at: Instant::now(), failures: 0 });
         }
+    }
+
+    /// Where a robot is dialled: in a sealed swarm by TLS alone.
+    fn reachable(&self, mut locators: Vec<String>) -> Vec<String> {
+        let sealed = self.inbox.is_sealed();
+        locators.retain(|locator| locator.starts_with("tls/") == sealed);
+        locators
     }
 
     async fn look_after(&mut self, started: Instant) {

@@ -44,6 +44,7 @@ impl Client {
             self.keys.key(&Topic::Decision),
             self.keys.key(&Topic::Evidence),
             self.keys.every_instructor("feedback"),
+            self.keys.every_instructor("word"),
             self.keys.every_instructor("answer"),
         ];
         for key in of_all.into_iter().chain(frames.then(|| self.keys.every_robot("frame"))) {
@@ -73,6 +74,8 @@ impl Client {
 
 fn said(keys: &Keys, sample: &Sample) -> Option<Overheard> {
     let topic = keys.parse(sample.key_expr()).filter(|_| sample.kind() == SampleKind::Put)?;
+    // In a sealed swarm, what an instructor says travels with its signature beside it.
+    let topic = if let Topic::Word(by) = topic { Topic::Feedback(by) } else { topic };
     let payload = sample.payload().to_bytes().into_owned();
     let attachment = sample.attachment().map(|attachment| attachment.to_bytes().into_owned());
     let published = sample.timestamp().map(|stamp| stamp.get_time().to_system_time());

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use gestalt_protocol::{Camera, Keys, RobotId, RoundId, Status};
 use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary};
+use gestalt_trust::Judge;
 use serde_json::Value;
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{broadcast, mpsc, watch};
@@ -24,16 +25,19 @@ use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::host::Host;
 use crate::identity::{self, swarm_checksum};
-use crate::inbox::Inbox;
+use crate::inbox::{Inbox, Sealed};
 use crate::keeper::Keeper;
 use crate::mind::new_mind;
 use crate::outbox::Outbox;
 use crate::presence::Presence;
-use crate::seal::Seal;
-use crate::session::{Node, watch_session};
+use crate::roll::Roll;
+use crate::roll_call::keep_roll;
+use crate::seal::{Seal, SealError};
+use crate::session::{Guard, Node, watch_session};
 use crate::subscriptions::listen;
 use crate::supervisor::{Supervisor, run_apart};
 use crate::voice::Voice;
+use crate::words::Words;
 
 /// Everything a robot needs to take part in a swarm.
 #[derive(Clone, Debug)]
@@ -93,10 +97,12 @@ impl Robot {
         if Handle::current().runtime_flavor() == RuntimeFlavor::CurrentThread {
             return Err(LinkError::Runtime);
         }
-        let RobotConfig { id, name, boot, swarm, mind, fusion, link, vocabulary, learning, nonce, seal } =
+        let RobotConfig { id, name, boot, swarm, mind, fusion, mut link, vocabulary, learning, nonce, seal } =
             config;
         seal.as_ref().map_or(Ok(()), |seal| seal.check(id, &swarm))?;
         let seal = seal.map(Arc::new);
+        let credentials = seal.as_ref().map(|seal| seal.credentials(id)).transpose();
+        link.credentials = credentials.map_err(SealError::from)?;
         let vocabulary = vocabulary.or_else(|| learning.as_ref().map(|learning| learning.vocabulary.clone()));
         let mut prepared = learning.map(|learning| Prepared::open(id, boot, learning)).transpose()?;
         let boot = prepared.as_ref().map_or(boot, |prepared| prepared.boot);
@@ -125,13 +131,25 @@ impl Robot {
         let account = Arc::new(Account::new(status, started));
         let (events, first_events) = broadcast::channel(MAX_EVENTS);
         let supervisor = Supervisor::new(account.clone(), events.clone());
+        let sealed = seal.as_ref().map(|seal| {
+            let Seal { identity, roster, roster_file, .. } = &**seal;
+            let key = identity.public_key();
+            let roll = Roll::new(id, key, roster.clone(), roster_file.clone(), account.clone());
+            let words = Words::new(id, identity.clone(), roster.swarm_id(), keys.clone());
+            Sealed {
+                judge: Mutex::new(Judge::new(roster.clone())),
+                roll: Arc::new(roll),
+                words: Mutex::new(words),
+            }
+        });
+        let roll = sealed.as_ref().map(|sealed| sealed.roll.clone());
         let inbox = Arc::new(Inbox::new(
             id,
             swarm_checksum(&swarm),
             keys.clone(),
             account.clone(),
             link.loss,
-            seal.as_deref(),
+            sealed,
         ));
         let mut first_classifier = None;
         let apprentice = match prepared {
@@ -145,7 +163,12 @@ impl Robot {
             let inbox = inbox.clone();
             move |id, up| inbox.on_link(id, up)
         };
-        let node = Node::open(zenoh.clone(), on_link).await?;
+        let guard = roll.as_ref().map(|roll| Guard {
+            swarm: swarm_checksum(&swarm),
+            door: roll.door(),
+            account: account.clone(),
+        });
+        let node = Node::open(zenoh.clone(), guard, on_link).await?;
         let locators = node.locators();
         account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));
         let declared = declare(id, &node, &keys, &inbox, &account, &supervisor).await;
@@ -162,6 +185,12 @@ impl Robot {
             supervisor.keep(Part::Links, move || {
                 let (node, inbox, account) = (node.clone(), inbox.clone(), account.clone());
                 Keeper::new(id, &swarm, link.max_links, node, inbox, account, zenoh.clone()).run()
+            });
+        }
+        if let Some(roll) = roll {
+            let (account, node, keys, inbox) = (account.clone(), node.clone(), keys.clone(), inbox.clone());
+            supervisor.keep(Part::Roster, move || {
+                keep_roll(roll.clone(), account.clone(), node.clone(), keys.clone(), inbox.clone())
             });
         }
         let (linked, heard, mended, idle) =
@@ -308,6 +337,20 @@ impl Robot {
     /// Sets a counter of its status that is kept elsewhere, by name.
     pub fn set(&self, name: &str, value: u64) {
         self.account.set(name, value);
+    }
+
+    /// The endpoint that other robots dial: with TLS in a sealed swarm.
+    #[must_use]
+    pub fn for_robots(&self) -> Option<&str> {
+        let tls = self.locators.iter().find(|locator| locator.starts_with("tls/"));
+        tls.or(self.locators.first()).map(String::as_str)
+    }
+
+    /// The endpoint that clients on this computer attach to: without a key also in a sealed swarm.
+    #[must_use]
+    pub fn for_clients(&self) -> Option<&str> {
+        let plain = self.locators.iter().find(|locator| locator.starts_with("tcp/"));
+        plain.or(self.locators.first()).map(String::as_str)
     }
 
     /// The endpoints it listens on, with the ports it was given.

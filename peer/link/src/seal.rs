@@ -1,6 +1,7 @@
-//! A sealed swarm: its robots sign their votes, and believe those of each other alone.
+//! A sealed swarm: its robots show each other certificates, sign what they say, and believe those of each other alone.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use gestalt_protocol::{RobotId, Signature};
@@ -8,20 +9,26 @@ use gestalt_strategies::Sign;
 use gestalt_trust::{Identity, Roster, SwarmId, statement};
 use thiserror::Error;
 
-/// What makes a robot one of a sealed swarm. Its robots sign their votes, and so the decisions that are made of them; their samples, under
-/// which their signature stays whoever passes them on; and what they pass on of instructors, who have no keys.
+use crate::tls::{Bearer, Certificate, CertificateError, Credentials};
+
+/// What makes a robot one of a sealed swarm. Its links are TLS, to members alone. Its robots sign their votes, and so the decisions that are
+/// made of them; their samples, under which their signature stays whoever passes them on; and what they pass on of instructors.
 #[derive(Clone, Debug)]
 pub struct Seal {
     /// The robot's own key.
     pub identity: Arc<Identity>,
-    /// The members of the swarm.
+    /// What the robot shows to be let in.
+    pub certificate: Certificate,
+    /// The members of the swarm, as it knows them at its start.
     pub roster: Roster,
+    /// The file that a newer roster is kept in; `None`: it is asked for anew at every start.
+    pub roster_file: Option<PathBuf>,
     /// The keys of robots that are looked for here, and vote through this one.
     pub guests: BTreeMap<RobotId, Arc<Identity>>,
 }
 
 /// A seal that does not fit the robot.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SealError {
     /// The roster of another swarm.
@@ -39,9 +46,35 @@ pub enum SealError {
         "robot {0} is not on the roster with the key that it has here: enrol it with this key, or bring the newest roster"
     )]
     NotEnrolled(RobotId),
+    /// A certificate that is not the robot's.
+    #[error(transparent)]
+    Certificate(#[from] CertificateError),
 }
 
 impl Seal {
+    /// That of a robot on the roster, certified here and now by the authority: for swarms whose keys are all in one hand.
+    ///
+    /// # Errors
+    /// [`CertificateError::Make`].
+    pub fn issue(
+        authority: &Identity,
+        roster: Roster,
+        robot: RobotId,
+        identity: Arc<Identity>,
+    ) -> Result<Self, CertificateError> {
+        let (swarm, key) = (&roster.members().swarm, identity.public_key());
+        let certificate = Certificate::issue(authority, swarm, Bearer::Robot(robot), &key)?;
+        Ok(Self { identity, certificate, roster, roster_file: None, guests: BTreeMap::new() })
+    }
+
+    /// What the robot shows to be let in.
+    ///
+    /// # Errors
+    /// [`CertificateError`] for a certificate that is not the robot's.
+    pub fn credentials(&self, robot: RobotId) -> Result<Credentials, CertificateError> {
+        Credentials::new(&self.roster, Bearer::Robot(robot), self.identity.clone(), self.certificate.clone())
+    }
+
     pub(crate) fn check(&self, me: RobotId, swarm: &str) -> Result<(), SealError> {
         let members = self.roster.members();
         if members.swarm != swarm {

@@ -23,6 +23,9 @@ pub(crate) async fn listen(
         keys.key(&Topic::Decision),
         keys.key(&Topic::Evidence),
         keys.every_instructor("feedback"),
+        keys.every_instructor("word"),
+        keys.key(&Topic::Roster),
+        keys.key(&Topic::RosterFor(me)),
         keys.every_instructor("answer"),
     ];
     for key in of_interest {

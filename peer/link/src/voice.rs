@@ -22,6 +22,7 @@ use crate::account::Account;
 use crate::inbox::Inbox;
 use crate::outbox::{Outbox, Parcel};
 use crate::presence::Presence;
+use crate::words::Vouched;
 
 /// A robot that comes to hold another decision of the same round within this time says so only once.
 const HOLD_INTERVAL: Duration = Duration::from_millis(50);
@@ -133,6 +134,23 @@ impl Voice {
         for evidence in self.inbox.untold() {
             let (key, bytes) = (self.keys.key(&Topic::Evidence), evidence.encode());
             self.outbox.send(Parcel { kind: "evidence", key, bytes, express: true });
+        }
+    }
+
+    /// Says to all what those on this robot's own computer said, signed by it.
+    pub fn pass_on(&self) {
+        for Vouched { key, word, attachment, .. } in self.inbox.unsaid() {
+            self.account.sent("word", word.len() + attachment.len());
+            let put = self
+                .session
+                .put(key, word)
+                .encoding(Encoding::APPLICATION_JSON)
+                .attachment(attachment)
+                .priority(Priority::InteractiveHigh)
+                .congestion_control(CongestionControl::Drop)
+                .express(true)
+                .wait();
+            self.account.check(put);
         }
     }
 

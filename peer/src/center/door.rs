@@ -21,7 +21,9 @@ use gestalt_vision::model::RobotModel;
 use gestalt_vision::sight::{Sight, SightError};
 
 /// Where the centre listens for the robots in its own process.
-pub(super) const LOOPBACK: &str = "tcp/127.0.0.1:0";
+pub(super) fn loopback(sealed: bool) -> &'static str {
+    if sealed { "tls/127.0.0.1:0" } else { "tcp/127.0.0.1:0" }
+}
 
 /// How often silent robots are looked for, and how it goes is put into the status.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -162,7 +164,7 @@ impl Door {
             Fuse::Central => self.robot.guest(GuestConfig { id, name, boot }).await,
             Fuse::Swarm => {
                 let locators = self.robot.locators();
-                let here = LOOPBACK.trim_end_matches('0');
+                let here = loopback(self.config.trust.keys.is_some()).trim_end_matches('0');
                 let centre = locators.iter().find(|at| at.starts_with(here)).or(locators.first());
                 let link = LinkConfig {
                     listen: Vec::new(),

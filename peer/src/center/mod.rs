@@ -161,12 +161,13 @@ impl Center {
 /// How the centre is linked; robots with sessions of their own reach it within this machine.
 fn link(config: &Config) -> LinkConfig {
     let mut link = config.link();
+    let sealed = config.trust.keys.is_some();
     if config.center.fuse == Fuse::Swarm {
+        let auto = link.listening(sealed);
         let listen = link.zenoh.entry("listen").or_insert_with(|| json!({}));
         let configured = listen.get("endpoints").and_then(Value::as_array).cloned();
-        let mut endpoints =
-            configured.unwrap_or_else(|| link.listen.iter().map(|endpoint| json!(endpoint)).collect());
-        endpoints.push(json!(door::LOOPBACK));
+        let mut endpoints = configured.unwrap_or_else(|| auto.into_iter().map(Value::from).collect());
+        endpoints.push(json!(door::loopback(sealed)));
         listen["endpoints"] = Value::Array(endpoints);
     }
     link

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 #[cfg(feature = "opencv")]
 use crate::config::ModelSection;
 use crate::config::{Config, ConfigError, Document, Override};
-use gestalt_link::LinkConfig;
+use gestalt_link::{LinkConfig, LinkError};
 
 /// Which configuration, and what to change in it.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -24,11 +24,11 @@ pub struct ConfigArgs {
     #[arg(short, long, value_parser = ["router", "peer", "client"])]
     pub mode: Option<String>,
 
-    /// Endpoint to connect to, `tcp/192.168.1.5:7447`; repeatable
+    /// Endpoint to connect to, `tls/192.168.1.5:7447`, or tcp/ in an open swarm; repeatable
     #[arg(short = 'e', long, value_name = "ENDPOINT")]
     pub connect: Vec<String>,
 
-    /// Endpoint to listen on, `tcp/[::]:7447`; repeatable
+    /// Endpoint to listen on, `tls/[::]:7447`, or tcp/127.0.0.1:7447 in an open swarm; repeatable
     #[arg(short, long, value_name = "ENDPOINT")]
     pub listen: Vec<String>,
 
@@ -39,6 +39,10 @@ pub struct ConfigArgs {
     /// Name of the swarm
     #[arg(long, value_name = "NAME")]
     pub swarm: Option<String>,
+
+    /// Folder of keys, as `gestalt trust` writes it: lets in to a sealed swarm (trust.keys)
+    #[arg(long, value_name = "DIR")]
+    pub keys: Option<PathBuf>,
 }
 
 /// What another flag sets.
@@ -87,7 +91,7 @@ impl ConfigArgs {
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
     pub fn client(&self) -> Result<(String, LinkConfig), ConfigError> {
-        Ok(client_of(&self.load()?))
+        client_of(&self.load()?)
     }
 
     /// The configuration of a robot that only streams: it needs no classifier, and how it reaches the others is a client's
@@ -104,7 +108,7 @@ impl ConfigArgs {
         let source = std::mem::take(&mut config.camera.source);
         config.validate()?;
         config.camera.source = source;
-        let (_, link) = client_of(&config);
+        let (_, link) = client_of(&config)?;
         Ok((config, link))
     }
 
@@ -136,6 +140,9 @@ impl ConfigArgs {
         if let Some(swarm) = &self.swarm {
             set(&["swarm"], json!(swarm))?;
         }
+        if let Some(keys) = &self.keys {
+            set(&["trust", "keys"], json!(keys))?;
+        }
         let (weak, strong): (Vec<Setting>, Vec<Setting>) = settings.into_iter().partition(|it| it.yields);
         for Setting { path, value, .. } in strong {
             document.set(path, value)?;
@@ -149,9 +156,14 @@ impl ConfigArgs {
     }
 }
 
-/// The swarm, and how a client reaches it.
-fn client_of(config: &Config) -> (String, LinkConfig) {
+/// The swarm, how a client reaches it, and what it shows to be let in.
+fn client_of(config: &Config) -> Result<(String, LinkConfig), ConfigError> {
     let mut link = config.link();
+    let credentials = config.trust.credentials(config.robot.id);
+    link.credentials = credentials.map_err(|error| match error {
+        LinkError::Config { key, cause } => ConfigError::Value { key, cause },
+        other => ConfigError::value("trust.keys", other),
+    })?;
     link.zenoh.remove("listen");
     let endpoints = link.zenoh.get("connect").and_then(|connect| connect.get("endpoints"));
     if endpoints.is_some_and(|endpoints| !endpoints.as_array().is_some_and(Vec::is_empty)) {
@@ -159,7 +171,7 @@ fn client_of(config: &Config) -> (String, LinkConfig) {
     } else {
         link.zenoh.remove("connect");
     }
-    (config.swarm.0.clone(), link)
+    Ok((config.swarm.0.clone(), link))
 }
 
 #[cfg(feature = "opencv")]

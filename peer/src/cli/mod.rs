@@ -13,7 +13,6 @@ mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod explain;
-mod keys;
 #[cfg(feature = "opencv")]
 mod look;
 mod manual;
@@ -40,6 +39,7 @@ mod swarm;
 mod teach;
 #[cfg(feature = "opencv")]
 mod train;
+mod trust;
 mod verify;
 #[cfg(feature = "opencv")]
 mod views;
@@ -123,8 +123,8 @@ enum Verb {
     Emulate(emulate::Args),
     /// Draw which samples each selection or forgetting rule picks
     Explain(explain::Args),
-    /// Make keys for the robots of a sealed swarm, and the roster that names them
-    Keys(keys::Args),
+    /// Enrol and expel the robots and clients of a sealed swarm
+    Trust(Box<trust::Args>),
     /// Check a decision without the swarm: that a member announced it so, and every vote it rests on was signed by one
     Verify(verify::Args),
     /// Say what is wrong with a robot and its swarm, and how to mend it
@@ -188,7 +188,7 @@ impl Command {
             Verb::Views(args) => views::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
-            Verb::Keys(args) => keys::run(&args),
+            Verb::Trust(args) => trust::run(&args),
             Verb::Verify(args) => verify::run(&args),
             Verb::Doctor(args) => doctor::run(&args),
             Verb::Config(args) => config::run(&args),
@@ -337,13 +337,18 @@ mod tests {
     fn every_verb_ends_its_help_with_two_examples_that_can_be_run() {
         let command = Command::command();
         command.clone().debug_assert();
-        for verb in command.get_subcommands() {
-            let name = verb.get_name();
+        let verbs = command.get_subcommands().flat_map(|verb| {
+            let inner = verb
+                .get_subcommands()
+                .map(|inner| (format!("{} {}", verb.get_name(), inner.get_name()), inner));
+            std::iter::once((verb.get_name().to_owned(), verb)).chain(inner)
+        });
+        for (name, verb) in verbs {
             let help = verb.get_after_help().unwrap_or_else(|| panic!("{name} has no examples")).to_string();
             let examples: Vec<&str> = help.lines().skip(1).map(str::trim).collect();
             assert!(help.starts_with("Examples:\n") && examples.len() == 2, "{name}: {help}");
             for example in examples {
-                let given = example.split(['|', '>']).next().unwrap();
+                let given = example.split(['|', '>', '<']).next().unwrap();
                 assert!(given.starts_with(&format!("gestalt {name}")), "{name}: {example}");
                 if let Err(error) = Command::try_parse_from(words(given)) {
                     panic!("{example}: {error}");

@@ -86,7 +86,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             &format!("robot {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
         )?;
         // The page is a client of this robot, as others are.
-        let link = LinkConfig { connect: locators.iter().take(1).cloned().collect(), ..LinkConfig::default() };
+        let endpoint = body.robot().for_clients();
+        let credentials = match endpoint {
+            Some(endpoint) if endpoint.starts_with("tls/") => config.trust.credentials(config.robot.id)?,
+            _ => None,
+        };
+        let link = LinkConfig {
+            connect: endpoint.into_iter().map(str::to_owned).collect(),
+            credentials,
+            ..LinkConfig::default()
+        };
         let web = args.web.or(config.web.listen.as_ref());
         let page = match web.open(&config.swarm.0, &link, args.json).await {
             Ok(page) => page,

@@ -20,7 +20,7 @@ use crate::proof;
 pub struct Args {
     /// Decision, JSON, as robots publish it on `gestalt/<swarm>/decision`; `-` for standard input
     decision: PathBuf,
-    /// Roster of the swarm, as `gestalt keys` writes it
+    /// Roster of the swarm, as `gestalt trust` writes it
     #[arg(long, value_name = "FILE")]
     roster: PathBuf,
     /// Configuration of a robot of the swarm, for its rounds [default: the defaults]

@@ -34,7 +34,7 @@ pub use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, Moti
 pub use learning::{LearnFrom, LearningSection};
 pub use links::{LinksSection, ScoutingSection};
 pub use template::TEMPLATE;
-pub use trust::{ROSTER_FILE, TrustSection, key_file};
+pub use trust::{ROSTER_FILE, TrustSection, certificate_file, client_key_file, key_file};
 pub use web::WebSection;
 
 /// One robot: who it is, what it sees with, how it decides, whom it talks to.
@@ -170,6 +170,7 @@ impl Config {
         LinkConfig {
             scouting: enabled.then_some(Scouting { address, interface }),
             max_links: self.links.max_links,
+            insecure: self.trust.insecure,
             zenoh: self.zenoh.clone(),
             ..LinkConfig::default()
         }
@@ -206,7 +207,7 @@ impl Config {
         found.extend(self.center.check());
         // Too few links would be said again, in other words.
         if self.links.check().is_ok()
-            && let Err(error) = self.link().check(self.robot.id)
+            && let Err(error) = self.link().check(self.robot.id, self.trust.keys.is_some())
         {
             found.push(match error {
                 LinkError::Config { key, cause } => ConfigError::Value { key, cause },

@@ -5,8 +5,8 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use gestalt_link::{LinkError, Seal};
-use gestalt_protocol::RobotId;
+use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal};
+use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_trust::{Identity, Roster};
 use serde::{Deserialize, Serialize};
 
@@ -19,13 +19,27 @@ pub fn key_file(folder: &Path, robot: RobotId) -> PathBuf {
     folder.join(format!("robot-{robot}.key"))
 }
 
+/// A client's key in a folder of keys.
+#[must_use]
+pub fn client_key_file(folder: &Path, client: &InstructorId) -> PathBuf {
+    folder.join(format!("client-{client}.key"))
+}
+
+/// The certificate beside a key.
+#[must_use]
+pub fn certificate_file(key: &Path) -> PathBuf {
+    key.with_extension("crt")
+}
+
 /// Whom a robot believes.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrustSection {
-    /// The folder with `roster.json` and this robot's `robot-<id>.key`, as `gestalt keys` writes them. Without one the swarm is open: robots
-    /// are who they say they are.
+    /// The folder with `roster.json`, this robot's `robot-<id>.key` and its certificate, as `gestalt trust` writes them. Without one the swarm is
+    /// open: robots are who they say they are.
     pub keys: Option<PathBuf>,
+    /// Lets an open robot listen beyond its own computer, where it believes whoever reaches it.
+    pub insecure: bool,
 }
 
 impl TrustSection {
@@ -35,9 +49,12 @@ impl TrustSection {
     /// [`LinkError::Config`] names the file, what is wrong with it, and the mend.
     pub fn seal(&self, robot: RobotId) -> Result<Option<Seal>, LinkError> {
         let Some(folder) = &self.keys else { return Ok(None) };
-        let roster = Roster::read(&folder.join(ROSTER_FILE)).map_err(wrong)?;
-        let identity = Arc::new(Identity::read(&key_file(folder, robot)).map_err(wrong)?);
-        Ok(Some(Seal { identity, roster, guests: BTreeMap::new() }))
+        let file = folder.join(ROSTER_FILE);
+        let roster = Roster::read(&file).map_err(wrong)?;
+        let key = key_file(folder, robot);
+        let identity = Arc::new(Identity::read(&key).map_err(wrong)?);
+        let certificate = Certificate::read(&certificate_file(&key)).map_err(wrong)?;
+        Ok(Some(Seal { identity, certificate, roster, roster_file: Some(file), guests: BTreeMap::new() }))
     }
 
     /// The same for a robot through which others vote: with the keys of all others that are in the folder.
@@ -55,6 +72,24 @@ impl TrustSection {
             }
         }
         Ok(Some(seal))
+    }
+
+    /// What a program shows to be let in that is no robot: the one client's key in the folder, or else this robot's own.
+    ///
+    /// # Errors
+    /// As [`TrustSection::seal`].
+    pub fn credentials(&self, robot: RobotId) -> Result<Option<Credentials>, LinkError> {
+        let Some(folder) = &self.keys else { return Ok(None) };
+        let roster = Roster::read(&folder.join(ROSTER_FILE)).map_err(wrong)?;
+        let clients = roster.members().instructors.keys();
+        let mut clients = clients.filter(|name| client_key_file(folder, name).exists());
+        let (holder, key) = match (clients.next(), clients.next()) {
+            (Some(one), None) => (Bearer::Client(one.clone()), client_key_file(folder, one)),
+            _ => (Bearer::Robot(robot), key_file(folder, robot)),
+        };
+        let identity = Arc::new(Identity::read(&key).map_err(wrong)?);
+        let certificate = Certificate::read(&certificate_file(&key)).map_err(wrong)?;
+        Credentials::new(&roster, holder, identity, certificate).map(Some).map_err(wrong)
     }
 }
 

@@ -275,7 +275,7 @@ fn keys(keys: &KeyFacts, robot: RobotId) -> Finding {
             trouble.clone(),
             "a robot that is no member of its sealed swarm does not start, or none believes it",
             format!(
-                "gestalt keys --swarm NAME --robots {robot} {folder}     where authority.key is; then copy roster.json to all robots"
+                "gestalt trust request {robot} {folder}     here; then gestalt trust enrol --request LINE keys     where authority.key is, and gestalt trust accept {folder}     here"
             ),
         ),
     }
@@ -287,13 +287,12 @@ fn port(port: &PortFacts) -> Finding {
         None => Finding::fine("port", format!("{endpoint}: can be listened on")),
         Some(cause) => {
             let number = endpoint.rsplit(':').next().unwrap_or_default();
+            let free = endpoint.strip_suffix(number).map_or("auto".to_owned(), |host| format!("{host}0"));
             Finding::failure(
                 "port",
                 format!("{endpoint}: {cause}"),
                 "a robot that cannot listen on its endpoint does not start",
-                format!(
-                    "ss -ltnp 'sport = :{number}'     shows who holds it; or take a free one: -l tcp/0.0.0.0:0"
-                ),
+                format!("ss -ltnp 'sport = :{number}'     shows who holds it; or take a free one: -l {free}"),
             )
         }
     }
@@ -302,7 +301,7 @@ fn port(port: &PortFacts) -> Finding {
 fn multicast(multicast: &Result<(), String>, connects: bool) -> Finding {
     let Err(cause) = multicast else { return Finding::fine("multicast", "comes back on this machine") };
     let what = format!("multicast does not work here: {cause}");
-    let fix = "name the endpoints: -l tcp/0.0.0.0:7447 on one robot, -e tcp/ITS-ADDRESS:7447 on the others, and \
+    let fix = "name the endpoints: -l tls/0.0.0.0:7447 on one robot, -e tls/ITS-ADDRESS:7447 on the others (tcp/ in an open swarm), and \
                --no-multicast-scouting; or links: {scouting: {interface: \"eth0\"}}";
     if connects {
         Finding::warning("multicast", what, "robots are found at the endpoints named alone", fix)

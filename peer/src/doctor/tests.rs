@@ -29,7 +29,7 @@ fn well() -> RobotFacts {
             exposed: false,
             trouble: None,
         }),
-        ports: vec![PortFacts { endpoint: "tcp/0.0.0.0:7447".to_owned(), taken: None }],
+        ports: vec![PortFacts { endpoint: "tls/0.0.0.0:7447".to_owned(), taken: None }],
         multicast: Some(Ok(())),
         camera: Some(camera()),
         ..RobotFacts::new(RobotId(1), NOW)
@@ -155,12 +155,12 @@ fn each_fault_of_a_robot_is_named_alone_with_its_fix() {
             on(|it| it.keys.as_mut().unwrap().trouble = Some("robot 1 is not on the roster".to_owned())),
             "keys",
             "roster",
-            "gestalt keys",
+            "gestalt trust request",
         ),
         (
             on(|it| it.ports[0].taken = Some("another program listens there".to_owned())),
             "port",
-            "tcp/0.0.0.0:7447",
+            "tls/0.0.0.0:7447",
             "sport = :7447",
         ),
         (
@@ -254,7 +254,7 @@ fn each_fault_of_a_swarm_is_named_alone_with_its_fix() {
             with(|it| it.counters.insert("convicted_7".to_owned(), 1).map_or((), drop)),
             "liar",
             "robot 7",
-            "rm keys/robot-7.key",
+            "gestalt trust rekey 7",
         ),
         (
             mine(Status {

@@ -53,7 +53,8 @@ pub enum Members {
 }
 
 impl Members {
-    /// Starts robots in this process, each linked to those of `links` (pairs of positions) that come before it.
+    /// Starts robots in this process, each linked to those of `links` (pairs of positions) that come before it; also gives the endpoints
+    /// that clients attach to.
     ///
     /// # Errors
     /// [`MembersError::Body`]; those started so far leave again.
@@ -64,17 +65,18 @@ impl Members {
         mut started: impl FnMut(usize),
     ) -> Result<(Self, Vec<String>), MembersError> {
         let mut bodies: Vec<Body> = Vec::new();
-        let mut endpoints: Vec<String> = Vec::new();
+        let (mut endpoints, mut clients) = (Vec::<String>::new(), Vec::new());
         for (i, config) in configs.iter().enumerate() {
             let config = linked(config, i, links, &endpoints);
             let body = Body::start(&config, Some(model.clone()), boot_number(SystemTime::now()))
                 .await
                 .map_err(|cause| MembersError::Body { name: config.name(), cause })?;
-            endpoints.push(body.robot().locators().first().cloned().unwrap_or_default());
+            endpoints.push(body.robot().for_robots().unwrap_or_default().to_owned());
+            clients.push(body.robot().for_clients().unwrap_or_default().to_owned());
             bodies.push(body);
             started(i + 1);
         }
-        Ok((Self::Here(bodies), endpoints))
+        Ok((Self::Here(bodies), clients))
     }
 
     /// Starts robots as processes of this very program, linked in the same way. `folder` receives their
@@ -89,19 +91,22 @@ impl Members {
         mut started: impl FnMut(usize),
     ) -> Result<(Self, Vec<String>), MembersError> {
         let mut children = Vec::new();
-        let mut endpoints: Vec<String> = Vec::new();
+        let (mut endpoints, mut clients) = (Vec::<String>::new(), Vec::new());
         for (i, config) in configs.iter().enumerate() {
             let config = linked(config, i, links, &endpoints);
             let name = config.name();
-            let (child, endpoint) = spawn(&config, folder)
+            let (child, locators) = spawn(&config, folder)
                 .await
                 .map_err(|cause| MembersError::Process { name: name.clone(), cause })?
                 .ok_or(MembersError::Silent(name))?;
             children.push(child);
-            endpoints.push(endpoint);
+            let at =
+                |protocol: &str| locators.iter().find(|it| it.starts_with(protocol)).or(locators.first());
+            endpoints.push(at("tls/").cloned().unwrap_or_default());
+            clients.push(at("tcp/").cloned().unwrap_or_default());
             started(i + 1);
         }
-        Ok((Self::Processes(children, folder.to_owned()), endpoints))
+        Ok((Self::Processes(children, folder.to_owned()), clients))
     }
 
     /// The robots of this process; none when each has its own.
@@ -151,7 +156,7 @@ struct Started {
 }
 
 /// Starts a process and waits until it says where it listens; `None` when it does not.
-async fn spawn(config: &Config, folder: &Path) -> std::io::Result<Option<(Child, String)>> {
+async fn spawn(config: &Config, folder: &Path) -> std::io::Result<Option<(Child, Vec<String>)>> {
     let RobotId(id) = config.robot.id;
     let file = folder.join(format!("robot-{id}.json5"));
     std::fs::write(&file, serde_json::to_vec_pretty(config)?)?;
@@ -171,7 +176,7 @@ async fn spawn(config: &Config, folder: &Path) -> std::io::Result<Option<(Child,
         return Ok(None);
     };
     tokio::spawn(drain(lines));
-    Ok(started.locators.into_iter().next().map(|endpoint| (child, endpoint)))
+    Ok(Some((child, started.locators)))
 }
 
 /// Reads on, so that the process never waits for room in its pipe.

@@ -70,7 +70,9 @@ impl Kind {
             Topic::Answer(_) => Self::Answer,
             Topic::Evidence => Self::Evidence,
             Topic::Frame(_) => Self::Frame,
-            Topic::Repair(_) | Topic::Taken(_) => return None,
+            Topic::Repair(_) | Topic::Taken(_) | Topic::Roster | Topic::RosterFor(_) | Topic::Word(_) => {
+                return None;
+            }
         })
     }
 

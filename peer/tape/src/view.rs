@@ -50,7 +50,12 @@ pub fn view(topic: &Topic, payload: &[u8]) -> Result<Value, DecodeError> {
         }
         Topic::Evidence if payload.len() <= MAX_MESSAGE => json!({"bytes": payload.len()}),
         Topic::Evidence => return Err(DecodeError::TooLong { length: payload.len(), limit: MAX_MESSAGE }),
-        Topic::Repair(_) | Topic::Frame(_) | Topic::Taken(_) => {
+        Topic::Repair(_)
+        | Topic::Frame(_)
+        | Topic::Taken(_)
+        | Topic::Roster
+        | Topic::RosterFor(_)
+        | Topic::Word(_) => {
             return Err(DecodeError::Impossible("a kind of message that is not recorded as JSON"));
         }
     };

@@ -23,6 +23,9 @@ pub enum Distrust {
     /// By a key that was proven to say different things to different robots.
     #[error("its author was caught in a lie: enrol it anew with a new key, if it is to come back")]
     Convicted,
+    /// A word of an instructor that was heeded before, or is older than one that was.
+    #[error("said before, or overtaken by a later word: it is heeded once")]
+    Repeated,
     /// More statements in that author's name than are checked.
     #[error("more in its author's name than is checked: it or somebody in its name floods the swarm")]
     TooFast,
@@ -35,12 +38,13 @@ pub enum Distrust {
 
 impl Distrust {
     /// All causes.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Unsigned,
         Self::Malformed,
         Self::Stranger,
         Self::Expelled,
         Self::Convicted,
+        Self::Repeated,
         Self::TooFast,
         Self::Forged,
     ];
@@ -54,6 +58,7 @@ impl Distrust {
             Self::Stranger => "refused_stranger",
             Self::Expelled => "refused_expelled",
             Self::Convicted => "refused_convicted",
+            Self::Repeated => "refused_repeated",
             Self::TooFast => "refused_too_fast",
             Self::Forged => "refused_forged",
         }

@@ -8,8 +8,9 @@ use gestalt_protocol::{InstructorId, MAX_ROBOTS, RobotId, Signature};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
-use crate::membership::{MAX_INSTRUCTORS, Membership};
+use crate::membership::{Instructor, MAX_INSTRUCTORS, Membership};
 use crate::public_key::PublicKey;
+use crate::roles::Roles;
 
 /// The JSON of a roster.
 #[derive(Serialize, Deserialize)]
@@ -18,40 +19,44 @@ pub(crate) struct Document {
     swarm: String,
     authority: PublicKey,
     epoch: u64,
-    #[serde(deserialize_with = "members::<_, _, MAX_ROBOTS>")]
+    #[serde(deserialize_with = "members::<_, _, _, MAX_ROBOTS>")]
     robots: BTreeMap<RobotId, PublicKey>,
-    #[serde(default, deserialize_with = "members::<_, _, MAX_INSTRUCTORS>")]
-    instructors: BTreeMap<InstructorId, PublicKey>,
-    #[serde(default, deserialize_with = "members::<_, _, MAX_ROBOTS>")]
+    #[serde(default, deserialize_with = "members::<_, _, _, MAX_INSTRUCTORS>")]
+    instructors: BTreeMap<InstructorId, Instructor>,
+    #[serde(default)]
+    local: Roles,
+    #[serde(default, deserialize_with = "members::<_, _, _, MAX_ROBOTS>")]
     expelled: BTreeMap<RobotId, PublicKey>,
     signature: Signature,
 }
 
 impl Document {
     pub(crate) fn new(members: &Membership, authority: PublicKey, signature: Signature) -> Self {
-        let Membership { swarm, epoch, robots, instructors, expelled } = members.clone();
-        Self { swarm, authority, epoch, robots, instructors, expelled, signature }
+        let Membership { swarm, epoch, robots, instructors, local, expelled } = members.clone();
+        Self { swarm, authority, epoch, robots, instructors, local, expelled, signature }
     }
 
     pub(crate) fn into_parts(self) -> (Membership, PublicKey, Signature) {
-        let Self { swarm, authority, epoch, robots, instructors, expelled, signature } = self;
-        (Membership { swarm, epoch, robots, instructors, expelled }, authority, signature)
+        let Self { swarm, authority, epoch, robots, instructors, local, expelled, signature } = self;
+        (Membership { swarm, epoch, robots, instructors, local, expelled }, authority, signature)
     }
 }
 
 /// At most `MAX` members, none twice: of two keys for one robot, which one counts must not depend on who reads.
-fn members<'de, D, K, const MAX: usize>(deserializer: D) -> Result<BTreeMap<K, PublicKey>, D::Error>
+fn members<'de, D, K, V, const MAX: usize>(deserializer: D) -> Result<BTreeMap<K, V>, D::Error>
 where
     D: Deserializer<'de>,
     K: Deserialize<'de> + Ord + fmt::Display,
+    V: Deserialize<'de>,
 {
-    struct Members<K, const MAX: usize>(PhantomData<K>);
+    struct Members<K, V, const MAX: usize>(PhantomData<(K, V)>);
 
-    impl<'de, K, const MAX: usize> Visitor<'de> for Members<K, MAX>
+    impl<'de, K, V, const MAX: usize> Visitor<'de> for Members<K, V, MAX>
     where
         K: Deserialize<'de> + Ord + fmt::Display,
+        V: Deserialize<'de>,
     {
-        type Value = BTreeMap<K, PublicKey>;
+        type Value = BTreeMap<K, V>;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             write!(f, "at most {MAX} members and their keys")
@@ -72,5 +77,5 @@ where
         }
     }
 
-    deserializer.deserialize_map(Members::<K, MAX>(PhantomData))
+    deserializer.deserialize_map(Members::<K, V, MAX>(PhantomData))
 }

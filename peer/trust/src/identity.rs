@@ -52,6 +52,14 @@ impl<S: Scheme> Identity<S> {
         self.public
     }
 
+    /// The signature under the body of an X.509 certificate (RFC 5280, `TBSCertificate`); `None` for any other bytes. Such a body begins as
+    /// nothing else does that is signed here, so it is never taken for anything else.
+    #[must_use]
+    pub fn sign_certificate(&self, body: &[u8]) -> Option<Signature> {
+        // A sequence, whose length takes more than one byte to say.
+        (body.len() > 0x80 && body[0] == 0x30 && body[1] > 0x80).then(|| self.sign(body))
+    }
+
     /// The signature under bytes that already say what they are for.
     pub(crate) fn sign(&self, message: &[u8]) -> Signature {
         S::sign(&self.secret, message)
@@ -79,6 +87,19 @@ mod tests {
         assert_ne!(new(1).public_key(), new(2).public_key());
         let again = Identity::from_bytes(&new(1).to_bytes());
         assert_eq!(again.public_key(), new(1).public_key());
+    }
+
+    #[test]
+    fn a_certificate_is_no_statement() {
+        let identity = Identity::from_bytes(&[1; 32]);
+        let mut body = vec![0; 300];
+        body[..2].copy_from_slice(&[0x30, 0x82]);
+        assert!(identity.sign_certificate(&body).is_some());
+        for domain in [crate::STATEMENT_DOMAIN.as_slice(), crate::ROSTER_DOMAIN.as_slice()] {
+            body[..domain.len()].copy_from_slice(domain);
+            assert_eq!(identity.sign_certificate(&body), None);
+        }
+        assert_eq!(identity.sign_certificate(&[0x30, 0x82]), None);
     }
 
     #[test]

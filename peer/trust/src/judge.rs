@@ -4,15 +4,21 @@ use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, Batches, CountedVote, Decision, Envelope, Give, Message, RobotId};
+use gestalt_protocol::{
+    Announcement, Batches, CountedVote, Decision, Envelope, Give, Instruction, InstructorId, Message, RobotId,
+};
 
 use crate::budget::Budget;
 use crate::distrust::Distrust;
 use crate::evidence::{Evidence, EvidenceError};
+use crate::precedence::Precedence;
+use crate::roles::Roles;
 use crate::roster::Roster;
+use crate::roster_error::RosterError;
 use crate::scheme::{Ed25519, Scheme};
 use crate::verify::Verifier;
 use crate::witness::Witness;
+use crate::word::{Attention, WordHeading};
 
 /// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows.
 const OF_SAMPLES: Budget = {
@@ -28,6 +34,8 @@ pub struct Judge<S: Scheme = Ed25519> {
     /// For samples, and for all else that is signed: neither keeps the other waiting.
     verifier: Verifier<S>,
     of_samples: Verifier<S>,
+    of_words: Attention<S>,
+    precedence: Precedence,
     witness: Witness,
     /// Against whom, as it is told to others; those found here are yet to be.
     evidence: BTreeMap<RobotId, Evidence>,
@@ -42,9 +50,54 @@ impl<S: Scheme> Judge<S> {
             witness: Witness::new(&roster),
             verifier: Verifier::new(roster.clone(), Budget::default()),
             of_samples: Verifier::new(roster, OF_SAMPLES),
+            of_words: Attention::default(),
+            precedence: Precedence::default(),
             evidence: BTreeMap::new(),
             untold: Vec::new(),
         }
+    }
+
+    /// The roster that it goes by.
+    #[must_use]
+    pub fn roster(&self) -> &Roster<S> {
+        self.verifier.roster()
+    }
+
+    /// Goes by that roster from now on, if it is newer than the one held; whether it is. Who has no key on it, or another one than
+    /// before, is forgotten: nothing that the old key signed counts any more, and the new one begins anew.
+    ///
+    /// # Errors
+    /// As [`Verifier::adopt`].
+    pub fn adopt(&mut self, roster: Roster<S>) -> Result<bool, RosterError> {
+        let before = self.roster().clone();
+        if !self.verifier.adopt(roster.clone())? {
+            return Ok(false);
+        }
+        self.of_samples.adopt(roster.clone())?;
+        self.of_words.follow(&before, &roster);
+        self.witness.follow(&before, &roster);
+        self.evidence.retain(|robot, _| roster.keeps_key(&before, *robot));
+        self.untold.retain(|robot| roster.keeps_key(&before, *robot));
+        Ok(true)
+    }
+
+    /// Whether to heed an instructor's word; who signed it, and what they may do.
+    ///
+    /// # Errors
+    /// As [`Attention::heed`].
+    pub fn word(
+        &mut self,
+        now: Duration,
+        by: &InstructorId,
+        word: &[u8],
+        attachment: Option<&[u8]>,
+    ) -> Result<(WordHeading, Roles), Distrust> {
+        self.of_words.heed(now, self.verifier.roster(), by, word, attachment)
+    }
+
+    /// Whether somebody with these roles may say that.
+    pub fn permits(&mut self, by: &InstructorId, roles: Roles, said: &Instruction) -> bool {
+        self.precedence.permits(by, roles, said)
     }
 
     /// Whether that robot is a member that is believed.

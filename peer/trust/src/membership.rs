@@ -3,16 +3,27 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{InstructorId, Keys, MAX_ROBOTS, RobotId};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::public_key::PublicKey;
+use crate::roles::Roles;
 use crate::roster_error::{Member, RosterError};
 
 /// Stands first under every signature of a roster.
-pub const ROSTER_DOMAIN: &[u8; 17] = b"gestalt-roster-1\0";
+pub const ROSTER_DOMAIN: &[u8; 17] = b"gestalt-roster-2\0";
 
 /// The most instructors one roster can name.
 pub const MAX_INSTRUCTORS: usize = 256;
+
+/// Somebody with a key who is no robot: an instructor, or a program that listens.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Instructor {
+    /// The key that the instructor's words are signed with.
+    pub key: PublicKey,
+    /// What they may do.
+    pub roles: Roles,
+}
 
 /// The members of a swarm as its authority puts them together, before it signs.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -23,8 +34,10 @@ pub struct Membership {
     pub epoch: u64,
     /// The robots, at most [`MAX_ROBOTS`], each with a key of its own.
     pub robots: BTreeMap<RobotId, PublicKey>,
-    /// Those who may teach, at most [`MAX_INSTRUCTORS`], each with a key of its own.
-    pub instructors: BTreeMap<InstructorId, PublicKey>,
+    /// The clients, at most [`MAX_INSTRUCTORS`], each with a key of its own, and what they may do.
+    pub instructors: BTreeMap<InstructorId, Instructor>,
+    /// What whoever works on a robot's own computer may do, without a key: the robot signs for them.
+    pub local: Roles,
     /// The keys that robots lost their trust with, at most [`MAX_ROBOTS`]. A robot comes back with a new key alone.
     pub expelled: BTreeMap<RobotId, PublicKey>,
 }
@@ -49,7 +62,8 @@ impl Membership {
             }
         }
         let robots = self.robots.iter().map(|(robot, key)| (Member::Robot(*robot), key));
-        let instructors = self.instructors.iter().map(|(name, key)| (Member::Instructor(name.clone()), key));
+        let instructors =
+            self.instructors.iter().map(|(name, it)| (Member::Instructor(name.clone()), &it.key));
         let mut members: BTreeMap<PublicKey, Member> = BTreeMap::new();
         for (member, key) in robots.chain(instructors) {
             if let Some(first) = members.insert(*key, member.clone()) {

@@ -65,7 +65,7 @@ impl<S: Scheme> Roster<S> {
             S::key(key).map(|key| (*robot, key)).ok_or_else(|| bad(Member::Robot(*robot)))
         });
         let keys = keys.collect::<Result<_, _>>()?;
-        if let Some((name, _)) = members.instructors.iter().find(|(_, key)| S::key(key).is_none()) {
+        if let Some((name, _)) = members.instructors.iter().find(|(_, it)| S::key(&it.key).is_none()) {
             return Err(bad(Member::Instructor(name.clone())));
         }
         let swarm = SwarmId::new(&authority, &members.swarm);
@@ -201,8 +201,13 @@ mod tests {
     use gestalt_protocol::MAX_ROBOTS;
 
     use super::*;
-    use crate::membership::MAX_INSTRUCTORS;
+    use crate::membership::{Instructor, MAX_INSTRUCTORS};
+    use crate::roles::{Role, Roles};
     use crate::testing::{authority, members, robot, roster, vote};
+
+    fn instructor(number: u32) -> Instructor {
+        Instructor { key: robot(number).public_key(), roles: Roles::up_to(Role::Teach) }
+    }
 
     #[track_caller]
     fn refused(members: Membership) -> RosterError {
@@ -212,7 +217,8 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let mut members = members(3);
-        members.instructors.insert("ada".parse().unwrap(), robot(90).public_key());
+        members.instructors.insert("ada".parse().unwrap(), instructor(90));
+        members.local = Roles::up_to(Role::Open);
         members.expelled.insert(RobotId(2), robot(91).public_key());
         let roster = members.sign(&authority()).unwrap();
         let json = roster.to_json();
@@ -226,7 +232,7 @@ mod tests {
         // Of the domain, the authority and the members in postcard, by another program.
         assert_eq!(
             roster(1).signature.to_string(),
-            "5c6d5164a3de04aab8bbba16d0b16e20c9837503360bb9f9663ea5ba0348c5632dff749378c0423c7160877618db88ed04201c196ed06b5d860446d2d3bef401"
+            "f1c1c6eee48a65321e61ac1f4c1f11a4404d10def3848bdd352ad07e8a6deab79b22a6475bda54fb9f726bf20c913a1005fa914251267996cc8c4c2ba6d5f107"
         );
     }
 
@@ -249,7 +255,7 @@ mod tests {
         twice.robots.insert(RobotId(9), robot(1).public_key());
         assert!(matches!(refused(twice), RosterError::SharedKey { .. }));
         let mut robot_teaches = members(1);
-        robot_teaches.instructors.insert("ada".parse().unwrap(), robot(1).public_key());
+        robot_teaches.instructors.insert("ada".parse().unwrap(), instructor(1));
         assert!(matches!(refused(robot_teaches), RosterError::SharedKey { .. }));
         let mut back = members(1);
         back.expelled.insert(RobotId(77), robot(1).public_key());
@@ -267,7 +273,7 @@ mod tests {
             let error = refused(weak);
             assert!(error.to_string().contains("robot 2"), "{error}");
             let mut weak = members(1);
-            weak.instructors.insert("ada".parse().unwrap(), bad);
+            weak.instructors.insert("ada".parse().unwrap(), Instructor { key: bad, ..instructor(1) });
             let error = refused(weak);
             assert!(error.to_string().contains("instructor ada"), "{error}");
         }
@@ -316,7 +322,9 @@ mod tests {
         assert!(matches!(Roster::<Ed25519>::parse(json.as_bytes()), Err(RosterError::Malformed(_))));
         let many = Membership { expelled: robots(MAX_ROBOTS + 1), ..members(1) };
         assert!(matches!(refused(many), RosterError::TooMany { what: "expelled robots", .. }));
-        let instructors = (0..=MAX_INSTRUCTORS).map(|n| (format!("i{n}").parse().unwrap(), key(n))).collect();
+        let instructor = |n| Instructor { key: key(n), ..instructor(1) };
+        let instructors =
+            (0..=MAX_INSTRUCTORS).map(|n| (format!("i{n}").parse().unwrap(), instructor(n))).collect();
         let many = Membership { instructors, ..members(1) };
         assert!(matches!(refused(many), RosterError::TooMany { what: "instructors", .. }));
         let long = vec![b' '; MAX_ROSTER + 1];

@@ -48,6 +48,19 @@ impl Agreement {
         is_news
     }
 
+    /// Forgets what these robots hold, and every decision that counted one of them, or that one of them drew; whether there was one.
+    pub fn expel(&mut self, robots: &BTreeSet<RobotId>) -> bool {
+        let counts = |decision: &Decision| {
+            let certificate = &decision.certificate;
+            let voters = certificate.votes.iter().map(|counted| counted.robot);
+            let others = certificate.others.iter().map(|held| held.robot);
+            voters.chain(others).chain([decision.author]).any(|robot| robots.contains(&robot))
+        };
+        self.holders.retain(|robot, _| !robots.contains(robot));
+        let forgotten = self.best.take_if(|best| counts(best)).is_some();
+        self.held.take_if(|held| counts(&held.decision)).is_some() || forgotten
+    }
+
     /// What robots said that they hold, by robot.
     pub fn holders(&self) -> impl Iterator<Item = &Holder> {
         self.holders.values()

@@ -1,7 +1,7 @@
 //! The latest vote of each robot in one round.
 
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
 
@@ -60,6 +60,11 @@ impl Ballot {
                 Cast::Counted
             }
         }
+    }
+
+    /// Takes the votes of these robots out.
+    pub fn strike(&mut self, robots: &BTreeSet<RobotId>) {
+        self.votes.retain(|robot, _| !robots.contains(robot));
     }
 
     /// How many robots take part, seeing or not.

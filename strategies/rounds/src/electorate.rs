@@ -42,6 +42,13 @@ impl Electorate {
         }
     }
 
+    /// These are of the swarm no more.
+    pub fn expel(&mut self, robots: &BTreeSet<RobotId>) {
+        self.heard.retain(|robot, _| !robots.contains(robot));
+        self.unheard.retain(|robot, _| !robots.contains(robot));
+        self.silent.retain(|robot| !robots.contains(robot));
+    }
+
     /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
     /// without a robot.
     pub fn round_over(&mut self, since: Duration) {

@@ -107,6 +107,14 @@ impl Round {
         }
     }
 
+    /// Takes out what these robots said, and what was concluded with them.
+    pub fn expel(&mut self, robots: &BTreeSet<RobotId>) {
+        self.ballot.strike(robots);
+        if self.agreement.expel(robots) {
+            self.concluded = false;
+        }
+    }
+
     /// Forgets what was seen so far: it was judged by another vocabulary.
     pub fn look_afresh(&mut self) {
         self.evidence = None;

@@ -25,6 +25,8 @@ pub enum Input {
     Blind(bool),
     /// A human says something.
     Instructed(Instructed),
+    /// A human says something that they may not: it is answered, and changes nothing.
+    Disallowed(Instructed),
     /// That robot has answered what that instructor said at that time.
     Answered(InstructorId, u64, RobotId),
     /// A frame showed a hand.
@@ -39,6 +41,8 @@ pub enum Input {
     Guests(BTreeSet<RobotId>),
     /// The robots this one is directly linked to now.
     Neighbours(BTreeSet<RobotId>),
+    /// These robots belong to the swarm no more, or were given another key: nothing that they said counts in the round that is open.
+    Expelled(BTreeSet<RobotId>),
     /// A new classifier takes the place of the old one.
     Learned(Arc<dyn Classify>),
     /// All that was to be remembered up to this revision is safe.
@@ -61,6 +65,7 @@ pub struct Instructed {
 pub(super) enum Concern {
     Rounds(AboutRounds),
     Word(Instructed),
+    Disallowed(Instructed),
     Answered(InstructorId, u64, RobotId),
     Remembered(u64),
 }
@@ -72,6 +77,7 @@ impl Input {
                 AboutRounds::Open
             }
             Self::Instructed(word) => return Concern::Word(word),
+            Self::Disallowed(word) => return Concern::Disallowed(word),
             Self::Answered(by, at, robot) => return Concern::Answered(by, at, robot),
             Self::Remembered(revision) => return Concern::Remembered(revision),
             Self::Tick => AboutRounds::Tick,
@@ -84,6 +90,7 @@ impl Input {
             Self::Alive(robots) => AboutRounds::Alive(robots),
             Self::Guests(robots) => AboutRounds::Guests(robots),
             Self::Neighbours(robots) => AboutRounds::Neighbours(robots),
+            Self::Expelled(robots) => AboutRounds::Expelled(robots),
             Self::Learned(classifier) => AboutRounds::Learned(classifier),
         })
     }

@@ -26,6 +26,12 @@ impl Mind {
         AboutRounds::Tick
     }
 
+    /// One robot says so for all, as it does of a word that is heeded.
+    pub(super) fn on_disallowed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
+        self.prepare_answer(now, instructed, Outcome::NotAllowed);
+        AboutRounds::Tick
+    }
+
     fn learn_from(&mut self, instructed: &Instructed) -> Outcome {
         let Some(learning) = &mut self.learning else { return Outcome::NotLearning };
         let Some(round) = instructed.instruction.round() else { return Outcome::UnknownRound };
@@ -73,7 +79,7 @@ impl Mind {
             return;
         }
         let wait = match outcome {
-            Outcome::Learned | Outcome::Known => Duration::ZERO,
+            Outcome::Learned | Outcome::Known | Outcome::NotAllowed => Duration::ZERO,
             Outcome::NothingSeen => SAW_NOTHING,
             Outcome::UnknownRound | Outcome::UnknownGesture | Outcome::NotLearning => KNOWS_NOTHING,
         };

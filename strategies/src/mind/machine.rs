@@ -126,6 +126,7 @@ impl Mind {
         let about_rounds = match input.concern() {
             Concern::Rounds(input) => self.learn_along(now, input, &mut out),
             Concern::Word(word) => self.on_instructed(now, word),
+            Concern::Disallowed(word) => self.on_disallowed(now, word),
             Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use gestalt_protocol::{Announcement, Decision, Envelope, HeldVote, Holder, RobotId, Signature};
-use gestalt_trust::{Fake, Identity, Membership, Roster, SwarmId, statement};
+use gestalt_trust::{Fake, Identity, Instructor, Membership, Role, Roles, Roster, SwarmId, statement};
 
 /// Robots 1 to so many are on the roster.
 pub const MEMBERS: u32 = 5;
@@ -24,11 +24,17 @@ pub fn identity(robot: RobotId) -> Identity<Fake> {
 /// The swarm `demo`.
 pub fn members() -> Membership {
     let key = |number| (RobotId(number), identity(RobotId(number)).public_key());
+    let ada = Identity::<Fake>::fake(1 << 40).public_key();
     Membership {
         swarm: "demo".to_owned(),
         epoch: 3,
         robots: (1..=MEMBERS).map(key).collect(),
-        instructors: [("ada".parse().expect("a name"), Identity::<Fake>::fake(1 << 40).public_key())].into(),
+        instructors: [(
+            "ada".parse().expect("a name"),
+            Instructor { key: ada, roles: Roles::up_to(Role::Teach) },
+        )]
+        .into(),
+        local: Roles::up_to(Role::Open),
         expelled: [key(EXPELLED.0)].into(),
     }
 }

@@ -15,7 +15,7 @@ pub struct Tally {
     /// Robots for which there was no room.
     pub refused: u64,
     /// Answers to instructors, by [`Tally::OUTCOMES`].
-    pub answers: [u64; 6],
+    pub answers: [u64; 7],
     /// Rounds by how long they took: one for each of [`SECONDS`] and one for all above, each counted once.
     pub seconds: [u64; SECONDS.len() + 1],
     /// The sum of these times, in seconds.
@@ -24,8 +24,15 @@ pub struct Tally {
 
 impl Tally {
     /// The outcomes in the order of `answers`, by their names in messages.
-    pub const OUTCOMES: [&'static str; 6] =
-        ["learned", "known", "nothing_seen", "unknown_round", "unknown_gesture", "not_learning"];
+    pub const OUTCOMES: [&'static str; 7] = [
+        "learned",
+        "known",
+        "nothing_seen",
+        "unknown_round",
+        "unknown_gesture",
+        "not_learning",
+        "not_allowed",
+    ];
 
     pub(super) fn count_decision(&mut self, decision: &Decision) {
         if decision.class.is_some() {
@@ -47,6 +54,7 @@ impl Tally {
             Outcome::UnknownRound => 3,
             Outcome::UnknownGesture => 4,
             Outcome::NotLearning => 5,
+            Outcome::NotAllowed => 6,
         };
         self.answers[place] += 1;
     }

@@ -16,10 +16,10 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use self::showing::Showing;
-use super::keys;
 use super::progress::bar;
 use super::record;
 use super::show::{Names, counted, line};
+use super::trust::Authority;
 use super::web::WebArgs;
 use super::{Failure, interrupted};
 use crate::config::{Config, LearnFrom, ModelSection, Schedule};
@@ -141,7 +141,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let keys = (!args.open).then(|| args.keys.clone().unwrap_or_else(|| folder.path().join("keys")));
     let configs = plan::configs(args, keys.as_deref())?;
     if let Some(keys) = &keys {
-        keys::enrol(keys, &args.swarm, configs.iter().map(|config| config.robot.id))?;
+        let mut authority = Authority::open_or_create(keys, &args.swarm)?;
+        configs.iter().try_for_each(|config| authority.enrol_here(config.robot.id))?;
+        authority.save()?;
     }
     let model = crate::model::load(&args.model)?.ok_or("a swarm needs a model: give --model FILE")?;
     super::runtime()?.block_on(async {

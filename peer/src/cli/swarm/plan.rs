@@ -13,6 +13,11 @@ use gestalt_vision::pose::place;
 /// One configuration for each robot: all around one person, listening on a free port of this machine.
 pub(super) fn configs(args: &Args, keys: Option<&Path>) -> Result<Vec<Config>, Failure> {
     let cameras = args.robots.cameras();
+    // Clients of this computer attach without a key.
+    let listen: &[&str] = match keys {
+        Some(_) => &["tls/127.0.0.1:0", "tcp/127.0.0.1:0"],
+        None => &["tcp/127.0.0.1:0"],
+    };
     let schedule = (args.by == By::Motion).then_some(SCHEDULE);
     let mut configs = Vec::with_capacity(cameras.len());
     for (id, (camera, pose)) in (1..).zip(cameras.iter().zip(place(cameras.len(), args.seed))) {
@@ -40,7 +45,7 @@ pub(super) fn configs(args: &Args, keys: Option<&Path>) -> Result<Vec<Config>, F
             };
         }
         config.links.scouting.enabled = false;
-        config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));
+        config.zenoh.insert("listen".to_owned(), json!({"endpoints": listen}));
         if !args.processes {
             // Robots of one process live and die together; a short lease would only mistake a busy processor for a
             // lost robot.

@@ -31,9 +31,10 @@ pub(super) fn endpoints(config: &Config, which: &str) -> Vec<String> {
     found
 }
 
-/// Host and port of a TCP endpoint.
+/// Host and port of a TCP endpoint, with TLS or without.
 fn address(endpoint: &str) -> Option<&str> {
-    endpoint.strip_prefix("tcp/").map(|rest| rest.split(['?', '#']).next().unwrap_or(rest))
+    let rest = endpoint.strip_prefix("tcp/").or_else(|| endpoint.strip_prefix("tls/"));
+    rest.map(|rest| rest.split(['?', '#']).next().unwrap_or(rest))
 }
 
 /// Which of the ports that the robot is to listen on can be had; those it takes as they come (port 0) always can.
@@ -61,13 +62,13 @@ pub(super) fn ports(config: &Config) -> Vec<PortFacts> {
 
 /// The endpoint at which a robot of this machine is reached that listens there.
 pub(super) fn at_home(endpoint: &str) -> String {
-    endpoint.replacen("tcp/0.0.0.0:", "tcp/127.0.0.1:", 1).replacen("tcp/[::]:", "tcp/[::1]:", 1)
+    endpoint.replacen("/0.0.0.0:", "/127.0.0.1:", 1).replacen("/[::]:", "/[::1]:", 1)
 }
 
 /// Why nobody answers at a TCP endpoint; `None` when somebody listens there.
 pub(super) fn unreachable(endpoint: &str) -> Option<String> {
     let Some(address) = address(endpoint) else {
-        return Some("this build speaks TCP alone: tcp/ADDRESS:PORT".to_owned());
+        return Some("this build speaks TCP and TLS alone: tcp/ADDRESS:PORT, tls/ADDRESS:PORT".to_owned());
     };
     let addresses: Vec<SocketAddr> = match address.to_socket_addrs() {
         Ok(addresses) => addresses.collect(),
@@ -169,7 +170,7 @@ mod tests {
         assert_eq!(found.iter().map(|port| port.taken.is_some()).collect::<Vec<_>>(), [true, false]);
         assert_eq!(unreachable(&found[0].endpoint), None);
         assert!(unreachable(&found[1].endpoint).unwrap().contains("nothing listens"));
-        assert!(unreachable("tls/localhost:7447").unwrap().contains("TCP alone"));
+        assert!(unreachable("udp/localhost:7447").unwrap().contains("TCP and TLS alone"));
     }
 
     #[test]

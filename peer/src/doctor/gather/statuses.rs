@@ -133,7 +133,9 @@ async fn attach(config: &Config, endpoints: &[String]) -> Result<Client, String>
     }
     let patience = u64::try_from(LINK.as_millis()).unwrap_or(u64::MAX);
     zenoh.insert("connect".to_owned(), json!({"endpoints": endpoints, "timeout_ms": patience}));
-    let link = LinkConfig { zenoh, ..LinkConfig::default() };
+    // What is wrong with its keys is found where they are looked at.
+    let credentials = config.trust.credentials(config.robot.id).ok().flatten();
+    let link = LinkConfig { zenoh, credentials, ..LinkConfig::default() };
     let opened = tokio::time::timeout(LINK + ANSWER, Client::open(&config.swarm.0, &link)).await;
     opened
         .map_err(|_| "it does not answer as a Zenoh session does".to_owned())?

@@ -85,7 +85,7 @@ fn sealed(facts: &SwarmFacts) -> Finding {
             format!("some robots are sealed and others are not: {}", shown(&groups, word)),
             "sealed robots refuse the votes of those that do not sign them",
             format!(
-                "trust: {{keys: \"keys\"}}     in the configuration of those that are open; gestalt keys --swarm {} --robots ID keys makes the keys",
+                "trust: {{keys: \"keys\"}}     in the configuration of those that are open; gestalt trust enrol --local --swarm {} --robots ID keys makes the keys",
                 facts.name
             ),
         ),

@@ -122,7 +122,7 @@ fn liars(facts: &SwarmFacts) -> Vec<Finding> {
                 "liar",
                 format!("robot {robot} said two things under one stamp"),
                 "it lies, or its key is in two hands; nothing of it counts any more",
-                format!("rm keys/robot-{robot}.key; gestalt keys --swarm {} --robots {robot} keys; then restart all with the new roster", facts.name),
+                format!("gestalt trust rekey {robot} keys -e ENDPOINT     where authority.key is; then start robot {robot} again"),
             )
         })
         .collect()
@@ -175,7 +175,7 @@ fn meaning(counter: &str) -> (&'static str, &'static str) {
         ),
         _ if has(&["_stranger", "_unsigned"]) => (
             "somebody who is no member speaks to it",
-            "if it is one of yours, enrol it: gestalt keys --swarm NAME --robots ID keys",
+            "if it is one of yours, enrol it: gestalt trust enrol --local --robots ID keys",
         ),
         _ if has(&["_forged", "_malformed", "_impossible", "_unfounded"]) => {
             ("somebody says what no robot would say", WHO)

@@ -100,7 +100,7 @@ fn parts(facts: &SwarmFacts) -> Vec<Finding> {
             "parts",
             format!("{} can be heard by multicast, and the others do not reach", robots(&facts.silent)),
             WHY,
-            "let them connect to each other: open the TCP ports that they listen on, or -l tcp/0.0.0.0:7447 and open that one",
+            "let them connect to each other: open the TCP ports that they listen on, or -l tls/0.0.0.0:7447 and open that one; an open robot (without trust.keys) is reached from its own computer alone",
         ));
     }
     if found.is_empty() && facts.answers().count() > 1 {

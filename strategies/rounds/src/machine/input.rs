@@ -37,6 +37,8 @@ pub enum Input {
     Guests(BTreeSet<RobotId>),
     /// The robots this one is directly linked to now.
     Neighbours(BTreeSet<RobotId>),
+    /// These robots belong to the swarm no more, or were given another key: nothing that they said counts in the round that is open.
+    Expelled(BTreeSet<RobotId>),
     /// A new classifier takes the place of the old one.
     Learned(Arc<dyn Classify>),
 }

@@ -9,6 +9,7 @@
 
 mod allowance;
 mod course;
+mod expulsion;
 mod follow;
 mod hearing;
 mod input;

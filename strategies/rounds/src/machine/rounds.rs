@@ -244,6 +244,7 @@ impl Rounds {
             Input::Alive(robots) => self.on_alive(robots),
             Input::Guests(robots) => self.on_guests(robots),
             Input::Neighbours(robots) => self.on_neighbours(robots, &mut effects),
+            Input::Expelled(robots) => self.on_expelled(&robots),
             Input::Learned(classifier) => self.on_learned(classifier),
         }
         self.advance(&mut effects);

@@ -3,14 +3,12 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, Outcome, RobotId, Topic};
+use gestalt_trust::{Speaker, WordHeading, word};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};
-use crate::swarm::world::instructor;
+use crate::swarm::world::{STRANGER, instructor, key};
 use crate::swarm::{Plan, Swarm};
-
-/// Why anybody may teach.
-const NO_KEYS: &str = "instructors have no keys yet: whoever reaches a session speaks as any of them";
 
 pub const ALL: &[Attack] = &[
     Attack {
@@ -19,8 +17,12 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::None("none of it is refused"),
-        gap: Some(NO_KEYS),
+        counted: Counted::Some(&[
+            "refused_feedback_unsigned",
+            "refused_word_unsigned",
+            "refused_word_forged",
+        ]),
+        gap: None,
         play: |seed| beside(&Plan::sealed(), seed, in_her_name, learned_alike),
     },
     Attack {
@@ -39,7 +41,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T5,
         setting: Setting::Sealed,
         expected: "at most two rounds a second, and each ends decided as in peace",
-        counted: Counted::None("a request while a round is open, or has just begun, is a copy of the first"),
+        counted: Counted::Some(&["refused_word_too_fast"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, opens, few_rounds),
     },
@@ -49,8 +51,8 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T2,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::None("none of it is refused"),
-        gap: Some("requests to open carry neither a signature nor a number of their own"),
+        counted: Counted::Some(&["refused_word_repeated"]),
+        gap: None,
         play: |seed| beside(&Plan::sealed(), seed, open_replayed, unmoved),
     },
     Attack {
@@ -65,19 +67,25 @@ pub const ALL: &[Attack] = &[
     },
     Attack {
         number: "27",
-        what: "an instructor overrules another",
+        what: "an instructor who may teach overrules another, who spoke first",
         tier: Tier::T5,
         setting: Setting::Sealed,
-        expected: "by role",
-        counted: Counted::None("none of it is refused"),
-        gap: Some("instructors have no roles: of words that exclude each other the latest counts alone"),
+        expected: "nothing: that takes the role",
+        counted: Counted::Some(&["refused_word_not_allowed"]),
+        gap: None,
         play: |seed| beside(&Plan::sealed(), seed, overruled, learned_alike),
     },
 ];
 
-fn say(swarm: &mut Swarm, by: &str, instruction: &Instruction) {
+/// In somebody's name: without a signature, and with that of a key that is nobody's.
+fn say_as(swarm: &mut Swarm, by: &str, instruction: &Instruction) {
     let bytes = serde_json::to_vec(instruction).expect("a word is JSON");
     swarm.put(&Topic::Feedback(instructor(by)), &bytes);
+    swarm.put(&Topic::Word(instructor(by)), &bytes);
+    let mut forged = swarm.word(by, instruction);
+    let heading = WordHeading { speaker: Speaker::Own(instructor(by)), count: u64::MAX };
+    forged.attachment = Some(word::sign(&key(STRANGER), &swarm.id(), &instructor(by), &heading, &bytes));
+    swarm.replay(&forged);
 }
 
 fn was(round: gestalt_protocol::RoundId, class: u8) -> Instruction {
@@ -87,7 +95,7 @@ fn was(round: gestalt_protocol::RoundId, class: u8) -> Instruction {
 fn in_her_name(swarm: &mut Swarm) {
     let round = swarm.show(1);
     swarm.teach(round, 1);
-    say(swarm, "ada", &was(round, 4));
+    say_as(swarm, "ada", &was(round, 4));
     swarm.pass(Duration::from_secs(3));
 }
 
@@ -112,9 +120,8 @@ fn opens(swarm: &mut Swarm) {
     for n in 0..5000_u32 {
         swarm.pass(Duration::from_millis(1));
         if n % 5 == 0 {
-            // Each arrives at one robot, so that all are asked 200 times a second.
-            let bytes = br#"{"say":"open"}"#;
-            (1..=5).for_each(|robot| swarm.put_to(robot, &Topic::Feedback(instructor("eve")), bytes));
+            // All are asked 200 times a second, by one who may.
+            swarm.put_word("eve", &Instruction::Open);
         }
     }
     swarm.end(began);
@@ -149,7 +156,7 @@ fn seventeen(swarm: &mut Swarm) {
         let round = swarm.show(class);
         let others = |swarm: &mut Swarm| {
             for n in 0..16 {
-                say(swarm, &format!("eve{n}"), &was(round, 4));
+                swarm.put_word(&format!("eve{n}"), &was(round, 4));
             }
         };
         if class == 2 {
@@ -180,6 +187,6 @@ fn ada_has_the_last_word(_: &Swarm, war: &Swarm) -> Result<(), String> {
 fn overruled(swarm: &mut Swarm) {
     let round = swarm.show(1);
     swarm.teach(round, 1);
-    say(swarm, "eve", &was(round, 4));
+    swarm.put_word("eve", &was(round, 4));
     swarm.pass(Duration::from_secs(3));
 }

@@ -97,8 +97,18 @@ pub const ALL: &[Attack] = &[
         play: |seed| beside(&Plan::sealed().liars(1), seed, stolen, enrolled_anew_counts),
     },
     Attack {
+        number: "8 · 12",
+        what: "a thief votes on, with the last stamp too, after the robot is enrolled anew in the midst of a round",
+        tier: Tier::T3,
+        setting: Setting::Sealed,
+        expected: "its vote is taken out of that round, and it counts in none after it; the robot with the new key does",
+        counted: Counted::Some(&["refused_vote_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, expelled_live, enrolled_anew_counts),
+    },
+    Attack {
         number: "8",
-        what: "a thief votes, and the robot is enrolled anew while the swarm goes on",
+        what: "a thief votes, and the robot is enrolled anew while the swarm goes on, and hears nothing of it",
         tier: Tier::T3,
         setting: Setting::Sealed,
         expected: "the thief counts no more: what else it says under the last stamp convicts its key",
@@ -245,6 +255,30 @@ fn enrolled_anew_counts(_: &Swarm, war: &Swarm) -> Result<(), String> {
         0 => Ok(()),
         robots => Err(format!("{robots} robots do not hold the vote of the robot that was enrolled anew")),
     }
+}
+
+fn expelled_live(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    swarm.pass(50 * MS);
+    let (round, id) = (swarm.round(), swarm.id());
+    let by_thief =
+        |stamp, round| forged::signed(forged::said(6, stamp, forged::vote(round, 4, 1.0)), &key(6), &id);
+    swarm.put_vote(&by_thief(forged::LAST, round));
+    swarm.pass(50 * MS);
+    let roster = second_epoch().sign(&authority()).expect("members that go together").to_json();
+    swarm.put(&gestalt_protocol::Topic::Roster, roster.as_bytes());
+    swarm.pass(50 * MS);
+    swarm.put_vote(&by_thief(Stamp { boot: 2, sequence: 9 }, round));
+    swarm.end(began);
+    let began = swarm.now();
+    swarm.begin(2);
+    swarm.pass(50 * MS);
+    let round = swarm.round();
+    swarm.put_vote(&by_thief(Stamp { boot: 2, sequence: 10 }, round));
+    let own = forged::said(6, Stamp { boot: 2, sequence: 1 }, forged::vote_of(round, 2, 1.0, 1.0));
+    swarm.put_vote(&forged::signed(own, &key(66), &id));
+    swarm.end(began);
 }
 
 fn stolen_live(swarm: &mut Swarm) {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Decision, Envelope, Give, HeldVote, Message, RobotId, RoundId, Stamp, Topic,
+    Announcement, Decision, Envelope, Give, HeldVote, Instruction, Message, RobotId, RoundId, Stamp, Topic,
 };
 use gestalt_strategies::Input;
 use gestalt_trust::SwarmId;
@@ -85,7 +85,16 @@ impl Swarm {
 
     /// The same to one robot alone.
     pub fn put_to(&mut self, robot: u32, topic: &Topic, bytes: &[u8]) {
-        self.replay_to(robot, &Parcel { key: self.keys.key(topic), bytes: bytes.to_vec(), at: self.time() });
+        self.replay_to(
+            robot,
+            &Parcel { key: self.keys.key(topic), bytes: bytes.to_vec(), attachment: None, at: self.time() },
+        );
+    }
+
+    /// Says a word as the instructor of that name, who has a key.
+    pub fn put_word(&mut self, by: &str, instruction: &Instruction) {
+        let parcel = self.word(by, instruction);
+        self.replay(&parcel);
     }
 
     /// Says what was recorded once more.

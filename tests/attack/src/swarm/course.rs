@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
 use gestalt_strategies::{Input, Observation};
-use gestalt_trust::Roster;
+use gestalt_trust::{Roster, Speaker, WordHeading, word};
 use rand::RngExt;
 
 use super::network::{Due, Swarm, json};
 use super::port::Parcel;
 use super::shown::Shown;
-use super::world::{CLASSES, features, instructor};
+use super::world::{CLASSES, features, instructor, key_of};
 use crate::attack::Setting;
 
 /// How long a gesture is shown.
@@ -68,9 +68,8 @@ impl Swarm {
 
     /// An instructor says something, which all robots hear. Says when.
     pub fn say(&mut self, by: &str, instruction: &Instruction) -> u64 {
-        let at = self.time();
-        let parcel =
-            Parcel { key: self.keys.key(&Topic::Feedback(instructor(by))), bytes: json(instruction), at };
+        let parcel = self.word(by, instruction);
+        let at = parcel.at;
         for i in 0..self.robots.len() {
             let arrives = self.now + Duration::from_millis(1 + i as u64);
             self.at(arrives, Due::Arrive(i, parcel.clone()));
@@ -78,6 +77,20 @@ impl Swarm {
         self.air.push(parcel);
         self.pass(Duration::from_secs(2));
         at
+    }
+
+    /// The word of an instructor as it travels: with their signature in a sealed swarm.
+    pub fn word(&mut self, by: &str, instruction: &Instruction) -> Parcel {
+        let (by, bytes) = (instructor(by), json(instruction));
+        // Each word has a count of its own.
+        self.said = self.time().max(self.said + 1);
+        let at = self.said;
+        if self.plan.setting == Setting::Open {
+            return Parcel { key: self.keys.key(&Topic::Feedback(by)), bytes, attachment: None, at };
+        }
+        let heading = WordHeading { speaker: Speaker::Own(by.clone()), count: at };
+        let attachment = Some(word::sign(&key_of(&by), &self.roster.swarm_id(), &by, &heading, &bytes));
+        Parcel { key: self.keys.key(&Topic::Word(by)), bytes, attachment, at }
     }
 
     /// Ada says which gesture it was. Says when.

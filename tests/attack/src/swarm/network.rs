@@ -45,6 +45,8 @@ pub struct Swarm {
     /// All that was said so far.
     pub(super) air: Vec<Parcel>,
     pub(super) silent: u64,
+    /// The count of the last word of an instructor.
+    pub(super) said: u64,
     /// How often the adversary spoke as a neighbour does.
     pub(super) whispered: u32,
     /// How long a message takes, by sender and receiver.
@@ -77,6 +79,7 @@ impl Swarm {
             answers: Vec::new(),
             air: Vec::new(),
             silent: 0,
+            said: 0,
             whispered: 0,
             delays,
             queue: BTreeMap::new(),
@@ -202,14 +205,18 @@ impl Swarm {
     }
 
     fn broadcast(&mut self, i: usize, topic: &Topic, bytes: Vec<u8>) {
-        let parcel = Parcel { key: self.keys.key(topic), bytes, at: self.time() };
+        let parcel = Parcel { key: self.keys.key(topic), bytes, attachment: None, at: self.time() };
         (0..self.robots.len()).filter(|j| *j != i).for_each(|j| self.carry(i, j, parcel.clone()));
         self.air.push(parcel);
     }
 
     fn send(&mut self, i: usize, to: RobotId, envelope: &Envelope) {
-        let parcel =
-            Parcel { key: self.keys.key(&Topic::Repair(to)), bytes: envelope.encode(), at: self.time() };
+        let parcel = Parcel {
+            key: self.keys.key(&Topic::Repair(to)),
+            bytes: envelope.encode(),
+            attachment: None,
+            at: self.time(),
+        };
         if let Some(j) = self.robots.iter().position(|robot| robot.id == to) {
             self.carry(i, j, parcel.clone());
         }

@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, DecodeError, Envelope, Instruction, Keys, MAX_JSON, MAX_MESSAGE, Message, RobotId,
-    Topic, decode_json,
+    Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
+    Message, RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
-use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge};
+use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge, RosterError};
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;
@@ -20,6 +20,8 @@ pub struct Parcel {
     pub key: String,
     /// The payload.
     pub bytes: Vec<u8>,
+    /// What travels beside it.
+    pub attachment: Option<Vec<u8>>,
     /// In the swarm's own time.
     pub at: u64,
 }
@@ -43,6 +45,13 @@ enum Refusal {
     Twin,
     Distrust(Distrust),
     Evidence,
+    Roster,
+}
+
+impl From<RosterError> for Refusal {
+    fn from(_: RosterError) -> Self {
+        Self::Roster
+    }
 }
 
 impl From<EvidenceError> for Refusal {
@@ -77,6 +86,7 @@ impl Refusal {
             Self::Kind => "kind",
             Self::Twin => "twin",
             Self::Evidence => "false",
+            Self::Roster => "untrue",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
         }
     }
@@ -110,11 +120,17 @@ impl Port {
             Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(now, id, &parcel.bytes)),
             Some(Topic::Decision) => ("decision", self.on_decision(now, &parcel.bytes)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(now, &parcel.bytes)),
+            Some(Topic::Roster) => ("roster", self.on_roster(&parcel.bytes)),
+            // Links between members carry none without a signature.
+            Some(Topic::Feedback(_)) if self.judge.is_some() => {
+                ("feedback", Err(Refusal::Distrust(Distrust::Unsigned)))
+            }
             Some(Topic::Feedback(by)) => {
                 let heard = json::<Instruction>(&parcel.bytes);
                 let word = |instruction| Input::Instructed(Instructed { by, at: parcel.at, instruction });
                 ("feedback", heard.map(|instruction| Some(word(instruction))))
             }
+            Some(Topic::Word(by)) => ("word", self.on_word(now, by, parcel)),
             Some(Topic::Answer(to)) => {
                 let heard = json::<Answer>(&parcel.bytes);
                 ("answer", heard.map(|answer| Some(Input::Answered(to, answer.at, answer.robot))))
@@ -214,6 +230,35 @@ impl Port {
         let judge = self.judge.as_mut().ok_or(Refusal::Kind)?;
         judge.evidence(now, Evidence::decode(bytes)?)?;
         Ok(None)
+    }
+
+    fn on_word(
+        &mut self,
+        now: Duration,
+        by: InstructorId,
+        parcel: &Parcel,
+    ) -> Result<Option<Input>, Refusal> {
+        let judge = self.judge.as_mut().ok_or(Refusal::Kind)?;
+        let instruction: Instruction = json(&parcel.bytes)?;
+        let (heading, roles) = judge.word(now, &by, &parcel.bytes, parcel.attachment.as_deref())?;
+        let allowed = judge.permits(&by, roles, &instruction);
+        let said = Instructed { by, at: heading.count, instruction };
+        if allowed {
+            return Ok(Some(Input::Instructed(said)));
+        }
+        // It is answered, which names it to whoever said it.
+        *self.refused.entry("refused_word_not_allowed".to_owned()).or_default() += 1;
+        Ok(Some(Input::Disallowed(said)))
+    }
+
+    fn on_roster(&mut self, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let judge = self.judge.as_mut().ok_or(Refusal::Kind)?;
+        let Some(next) = judge.roster().successor(bytes)? else { return Ok(None) };
+        let before = judge.roster().members().robots.clone();
+        let after = next.members().robots.clone();
+        judge.adopt(next)?;
+        let gone = before.into_iter().filter(|(robot, key)| after.get(robot) != Some(key));
+        Ok(Some(Input::Expelled(gone.map(|(robot, _)| robot).collect())))
     }
 
     fn judge(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Refusal> {

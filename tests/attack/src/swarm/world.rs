@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_strategies::{Classify, ClassifyError, Components, FeatureSpace, ScalingMethod, Vocabulary};
-use gestalt_trust::{Identity, Membership, Roster};
+use gestalt_trust::{Identity, Instructor, Membership, Role, Roles, Roster};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -74,13 +74,29 @@ pub fn authority() -> Identity {
     key(1000)
 }
 
+/// The key that an instructor of that name is enrolled with.
+pub fn key_of(name: &InstructorId) -> Identity {
+    let mut secret = [9; 32];
+    let name = name.to_string();
+    secret[..name.len()].copy_from_slice(name.as_bytes());
+    Identity::from_bytes(&secret)
+}
+
 /// The number of a key that nobody enrolled.
 pub const STRANGER: u32 = 77;
 
 /// So many robots, from 1 on, as members of the swarm in that epoch.
 pub fn members(robots: u32, epoch: u64) -> Membership {
     let robots = (1..=robots).map(|id| (RobotId(id), key(id).public_key())).collect();
-    Membership { swarm: SWARM.to_owned(), epoch, robots, ..Membership::default() }
+    // Ada was there first, and may overrule; the others may teach.
+    let others = (0..16).map(|n| format!("eve{n}")).chain(["eve".to_owned()]);
+    let names = others.map(|name| (name, Role::Teach)).chain([("ada".to_owned(), Role::Overrule)]);
+    let enrolled = |(name, role): (String, Role)| {
+        let key = key_of(&instructor(&name)).public_key();
+        (instructor(&name), Instructor { key, roles: Roles::up_to(role) })
+    };
+    let instructors = names.map(enrolled).collect();
+    Membership { swarm: SWARM.to_owned(), epoch, robots, instructors, ..Membership::default() }
 }
 
 /// Those, enrolled.

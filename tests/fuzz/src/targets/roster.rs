@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{RobotId, hex};
 use gestalt_trust::{
-    Budget, Ed25519, Fake, MAX_ROSTER, Membership, PublicKey, ROSTER_DOMAIN, Roster, RosterError, Scheme,
-    Verifier,
+    Budget, Ed25519, Fake, MAX_ROSTER, Membership, PublicKey, ROSTER_DOMAIN, Roles, Roster, RosterError,
+    Scheme, Verifier,
 };
 use serde_json::{Map, Value};
 
@@ -40,7 +40,7 @@ fn accepted<S: Scheme>(roster: &Roster<S>, json: &[u8]) {
     assert_eq!(&Roster::<S>::parse(roster.to_json().as_bytes()).expect("it is one"), roster);
     let Membership { robots, instructors, expelled, .. } = roster.members();
     let keys: BTreeMap<&PublicKey, ()> =
-        robots.values().chain(instructors.values()).map(|key| (key, ())).collect();
+        robots.values().chain(instructors.values().map(|it| &it.key)).map(|key| (key, ())).collect();
     assert_eq!(keys.len(), robots.len() + instructors.len(), "a key is one member's");
     assert!(expelled.values().all(|key| !keys.contains_key(key)));
 }
@@ -62,9 +62,12 @@ fn sign(json: &[u8]) -> Option<Vec<u8>> {
     let members = Membership {
         swarm: document.get("swarm")?.as_str()?.to_owned(),
         epoch: document.get("epoch")?.as_u64()?,
-        robots: keys(document.get("robots"))?,
-        instructors: keys(document.get("instructors"))?,
-        expelled: keys(document.get("expelled"))?,
+        robots: entries(document.get("robots"))?,
+        instructors: entries(document.get("instructors"))?,
+        local: document
+            .get("local")
+            .map_or(Some(Roles::NONE), |roles| serde_json::from_value(roles.clone()).ok())?,
+        expelled: entries(document.get("expelled"))?,
     };
     let signed = postcard::to_extend(&(authority.public_key(), &members), ROSTER_DOMAIN.to_vec()).ok()?;
     let signature = Fake::sign(&Fake::secret(&authority.to_bytes()), &signed);
@@ -73,11 +76,17 @@ fn sign(json: &[u8]) -> Option<Vec<u8>> {
     serde_json::to_vec(&value).ok()
 }
 
-fn keys<K: Ord + std::str::FromStr>(map: Option<&Value>) -> Option<BTreeMap<K, PublicKey>> {
+fn entries<K, V>(map: Option<&Value>) -> Option<BTreeMap<K, V>>
+where
+    K: Ord + std::str::FromStr,
+    V: serde::de::DeserializeOwned,
+{
     let empty = Map::new();
     let map = map.map_or(Some(&empty), Value::as_object)?;
-    let key = |(name, key): (&String, &Value)| Some((name.parse().ok()?, key.as_str()?.parse().ok()?));
-    map.iter().map(key).collect()
+    let entry = |(name, entry): (&String, &Value)| {
+        Some((name.parse().ok()?, serde_json::from_value(entry.clone()).ok()?))
+    };
+    map.iter().map(entry).collect()
 }
 
 /// A roster to begin with: the swarm's own, of another epoch, without some of its members or with one more.

@@ -2,6 +2,7 @@
 
 mod agreeing;
 mod deciding;
+mod expelling;
 mod flooding;
 mod opening;
 mod order;

@@ -1,0 +1,87 @@
+//! What arrives in a sealed swarm alone: words with a signature, words of those on this computer, and rosters.
+
+use std::sync::PoisonError;
+
+use gestalt_protocol::{Instruction, InstructorId, MAX_JSON, RobotId, decode_json};
+use gestalt_strategies::{Input, Instructed};
+use gestalt_trust::MAX_ROSTER;
+use gestalt_trust::word::MAX_WORD_ATTACHMENT;
+use zenoh::sample::Sample;
+
+use crate::account::Refusal;
+use crate::inbox::{Inbox, MAX_QUEUE, payload};
+use crate::words::Vouched;
+
+/// The most words of those on this computer that wait to be passed on.
+const MAX_VOUCHED: usize = 64;
+
+impl Inbox {
+    /// A word that came without a signature in a sealed swarm: links to members carry none, so it was said on this computer.
+    pub(super) fn on_local_word(
+        &self,
+        by: InstructorId,
+        instruction: Instruction,
+        sample: &Sample,
+    ) -> Result<(), Refusal> {
+        let sealed = self.sealed.as_ref().ok_or(Refusal::Kind)?;
+        let (roles, has_key) = sealed.roll.local_roles(&by);
+        if has_key {
+            return Err(Refusal::Unsaid);
+        }
+        let mut words = sealed.words.lock().unwrap_or_else(PoisonError::into_inner);
+        let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
+        let vouched = words.vouch(&by, sample.payload().to_bytes().into_owned());
+        let said = Instructed { by, at: vouched.count, instruction };
+        if !allowed {
+            return self.queue(Input::Disallowed(said));
+        }
+        let mut state = self.lock();
+        if state.queue.len() >= MAX_QUEUE || state.vouched.len() >= MAX_VOUCHED {
+            return Err(Refusal::Full);
+        }
+        state.vouched.push(vouched);
+        state.queue.push_back(Input::Instructed(said));
+        Ok(())
+    }
+
+    /// Words that this robot signed for those on its own computer, and that are to be said to all.
+    pub(super) fn unsaid(&self) -> Vec<Vouched> {
+        std::mem::take(&mut self.lock().vouched)
+    }
+
+    pub(super) fn on_word(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
+        let word = payload(sample, MAX_JSON)?;
+        let instruction: Instruction = decode_json(&word)?;
+        let attachment = sample.attachment().filter(|it| it.len() <= MAX_WORD_ATTACHMENT);
+        let attachment = attachment.map(|it| it.to_bytes());
+        let heeded = self.judged(|judge, now| judge.word(now, &by, &word, attachment.as_deref()));
+        let (heading, roles) = heeded.ok_or(Refusal::Kind)??;
+        let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
+        let said = Instructed { by, at: heading.count, instruction };
+        self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) })
+    }
+
+    pub(super) fn on_roster(&self, sample: &Sample) -> Result<(), Refusal> {
+        let sealed = self.sealed.as_ref().ok_or(Refusal::Kind)?;
+        let json = payload(sample, MAX_ROSTER)?;
+        if sealed.roll.is_held(&json) {
+            return Ok(());
+        }
+        if !sealed.roll.may_look() {
+            return Err(Refusal::TooOften);
+        }
+        let taken_up = self.judged(|judge, _| sealed.roll.take_up(judge, &json));
+        let Some(gone) = taken_up.ok_or(Refusal::Kind)?? else { return Ok(()) };
+        let mut state = self.lock();
+        state.votes.retain(|robot, _| !gone.contains(robot));
+        let left = |robot: &RobotId| !gone.contains(robot) || !self.is_stranger(*robot);
+        state.alive.retain(left);
+        state.alive_changed = true;
+        // Before anything that it may be asked to believe from now on.
+        state.queue.push_back(Input::Expelled(gone));
+        drop(state);
+        // Who is new was refused until now, its token too.
+        self.unrest.notify_one();
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! The newest roster of a sealed swarm that a robot knows.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::{InstructorId, RobotId};
+use gestalt_trust::{Judge, PublicKey, Roles, Roster, RosterError};
+use tokio::sync::Notify;
+
+use crate::account::Account;
+use crate::tls::Door;
+
+/// How many rosters are looked into in one such span; looking into one may cost milliseconds.
+const MAX_LOOKED_INTO: u32 = 16;
+const SPAN: Duration = Duration::from_secs(2);
+
+/// The newest roster that a robot knows.
+pub(crate) struct Roll {
+    me: RobotId,
+    key: PublicKey,
+    door: Arc<Door>,
+    account: Arc<Account>,
+    file: Option<PathBuf>,
+    held: Mutex<Held>,
+    looked_into: Mutex<(Instant, u32)>,
+    news: Notify,
+}
+
+struct Held {
+    roster: Roster,
+    json: Arc<str>,
+}
+
+impl Held {
+    fn new(roster: Roster) -> Self {
+        Self { json: roster.to_json().into(), roster }
+    }
+}
+
+impl Roll {
+    pub fn new(
+        me: RobotId,
+        key: PublicKey,
+        roster: Roster,
+        file: Option<PathBuf>,
+        account: Arc<Account>,
+    ) -> Self {
+        account.set("roster_epoch", roster.members().epoch);
+        let door = Arc::new(Door::new(roster.clone()));
+        let looked_into = Mutex::new((Instant::now(), 0));
+        Self {
+            me,
+            key,
+            door,
+            account,
+            file,
+            held: Mutex::new(Held::new(roster)),
+            looked_into,
+            news: Notify::new(),
+        }
+    }
+
+    /// Who is let in by it.
+    pub fn door(&self) -> Arc<Door> {
+        self.door.clone()
+    }
+
+    fn held(&self) -> MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether those bytes are the roster held: then they need no look.
+    pub fn is_held(&self, json: &[u8]) -> bool {
+        self.held().json.as_bytes() == json
+    }
+
+    /// Whether one more may be looked into now.
+    pub fn may_look(&self) -> bool {
+        let mut looked = self.looked_into.lock().unwrap_or_else(PoisonError::into_inner);
+        if looked.0.elapsed() >= SPAN {
+            *looked = (Instant::now(), 0);
+        }
+        looked.1 += 1;
+        looked.1 <= MAX_LOOKED_INTO
+    }
+
+    /// Goes by a roster that came from anywhere, if it follows the one held; the robots that have no key on it any more, or another one.
+    ///
+    /// # Errors
+    /// [`RosterError`]; the one held stays.
+    pub fn take_up(&self, judge: &mut Judge, json: &[u8]) -> Result<Option<BTreeSet<RobotId>>, RosterError> {
+        let Some(next) = judge.roster().successor(json)? else { return Ok(None) };
+        let before = judge.roster().members().robots.clone();
+        judge.adopt(next.clone())?;
+        let members = next.members();
+        let gone = before.iter().filter(|(robot, key)| members.robots.get(robot) != Some(key));
+        let gone = gone.map(|(robot, _)| *robot).collect();
+        self.account.set("roster_epoch", members.epoch);
+        if members.robots.get(&self.me) != Some(&self.key) {
+            self.account.count("expelled");
+            self.account.error(&format!(
+                "the roster of epoch {} does not have this robot with its key: nothing it says counts any more; enrol it anew, or start it with the \
+                 key that it was given",
+                members.epoch
+            ));
+        }
+        self.door.follow(next.clone());
+        *self.held() = Held::new(next);
+        self.news.notify_one();
+        Ok(Some(gone))
+    }
+
+    /// What somebody of that name may do here without a key; and whether one of that name has a key, and speaks for themselves.
+    pub fn local_roles(&self, by: &InstructorId) -> (Roles, bool) {
+        let held = self.held();
+        let members = held.roster.members();
+        (members.local, members.instructors.contains_key(by))
+    }
+
+    /// A link to a robot has come.
+    pub fn meet(&self) {
+        self.news.notify_one();
+    }
+
+    /// Waits until there is a newer roster, or somebody to tell of it.
+    pub async fn news(&self) {
+        self.news.notified().await;
+    }
+
+    /// The epoch of the roster held, and its JSON.
+    pub fn newest(&self) -> (u64, Arc<str>) {
+        let held = self.held();
+        (held.roster.members().epoch, held.json.clone())
+    }
+
+    /// Writes the roster held to its file: a robot that starts again must not go back to an older one.
+    pub async fn keep(&self) {
+        let Some(file) = self.file.clone() else { return };
+        let roster = self.held().roster.clone();
+        let written = tokio::task::spawn_blocking(move || roster.write(&file)).await;
+        let failed = match written {
+            Ok(Ok(())) => return,
+            Ok(Err(error)) => error.to_string(),
+            Err(error) => error.to_string(),
+        };
+        self.account.error(&format!("the new roster is gone by, but not kept: {failed}"));
+    }
+}

@@ -1,0 +1,89 @@
+//! What a robot of a sealed swarm signs for those who speak on its own computer.
+
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use gestalt_protocol::{InstructorId, Keys, RobotId, Topic};
+use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, word};
+
+/// Signs words in the name of a robot.
+pub(crate) struct Words {
+    me: RobotId,
+    identity: Arc<Identity>,
+    swarm: SwarmId,
+    keys: Keys,
+    /// The count of the last word that was signed here.
+    last: u64,
+}
+
+/// A word that a robot signed for whoever said it on its own computer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Vouched {
+    pub key: String,
+    pub word: Vec<u8>,
+    pub attachment: Vec<u8>,
+    pub count: u64,
+}
+
+impl Words {
+    pub fn new(me: RobotId, identity: Arc<Identity>, swarm: SwarmId, keys: Keys) -> Self {
+        Self { me, identity, swarm, keys, last: 0 }
+    }
+
+    /// Signs a word in the name of whoever said it here.
+    pub fn vouch(&mut self, by: &InstructorId, word: Vec<u8>) -> Vouched {
+        let count = next_count(self.last);
+        self.last = count;
+        let heading = WordHeading { speaker: Speaker::For(self.me), count };
+        let attachment = word::sign(&self.identity, &self.swarm, by, &heading, &word);
+        Vouched { key: self.keys.key(&Topic::Word(by.clone())), word, attachment, count }
+    }
+}
+
+/// The count of the next word under one key: higher than the last, and, as long as the clock is right, than all before the last start. In the units
+/// of Zenoh's timestamps, so that words of before and after a swarm was sealed keep their order.
+pub(crate) fn next_count(last: u64) -> u64 {
+    let span = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let now = (span.as_secs() << 32) | ((u64::from(span.subsec_nanos()) << 32) / 1_000_000_000);
+    now.max(last.saturating_add(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_trust::{Instructor, Membership, Role, Roles};
+
+    use super::*;
+
+    fn words() -> (Words, gestalt_trust::Roster) {
+        let key = |number| Identity::from_bytes(&[number; 32]);
+        let robots = [(RobotId(7), key(7).public_key())].into();
+        let ada = Instructor { key: key(90).public_key(), roles: Roles::up_to(Role::Teach) };
+        let instructors = [("ada".parse().unwrap(), ada)].into();
+        let local = Roles::up_to(Role::Open);
+        let members = Membership {
+            swarm: "demo".to_owned(),
+            epoch: 1,
+            robots,
+            instructors,
+            local,
+            ..Membership::default()
+        };
+        let roster = members.sign(&key(100)).unwrap();
+        let keys = Keys::new("demo").unwrap();
+        (Words::new(RobotId(7), Arc::new(key(7)), roster.swarm_id(), keys), roster)
+    }
+
+    #[test]
+    fn a_word_that_is_vouched_for_is_believed_and_the_next_one_after_it() {
+        let (mut words, roster) = words();
+        let bob: InstructorId = "bob".parse().unwrap();
+        let [first, second] = [0, 1].map(|_| words.vouch(&bob, b"word".to_vec()));
+        assert!(second.count > first.count && first.key == "gestalt/demo/instructor/bob/word");
+        let (heading, roles) = roster.check_word(&bob, b"word", Some(&first.attachment)).unwrap();
+        assert_eq!((heading.count, roles), (first.count, Roles::up_to(Role::Open)));
+        // Nobody with a key is spoken for.
+        let ada = "ada".parse().unwrap();
+        let vouched = words.vouch(&ada, b"word".to_vec());
+        assert!(roster.check_word(&ada, b"word", Some(&vouched.attachment)).is_err());
+    }
+}

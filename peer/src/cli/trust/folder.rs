@@ -1,0 +1,300 @@
+//! The folder of whoever has the authority's key: who is a member, and with which key.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use gestalt_link::{Bearer, Certificate};
+use gestalt_protocol::{InstructorId, Keys, RobotId};
+use gestalt_trust::{Applicant, Identity, Instructor, Membership, PublicKey, Role, Roles, Roster};
+
+use super::super::Failure;
+use crate::config::{ROSTER_FILE, certificate_file, client_key_file, key_file};
+
+/// The secret of whoever may change the roster.
+const AUTHORITY_FILE: &str = "authority.key";
+
+/// A swarm in the hands of its authority.
+pub(crate) struct Authority {
+    folder: PathBuf,
+    identity: Arc<Identity>,
+    members: Membership,
+}
+
+impl Authority {
+    /// Makes a swarm: its authority's key, and a roster without members.
+    ///
+    /// # Errors
+    /// A name that no swarm can have, a folder that has a swarm already, and files that cannot be written.
+    pub fn create(folder: &Path, swarm: &str) -> Result<Self, Failure> {
+        Keys::new(swarm)?;
+        make(folder)?;
+        let file = folder.join(AUTHORITY_FILE);
+        if file.exists() {
+            return Err(format!(
+                "{} is there already: this folder has its swarm; choose another",
+                file.display()
+            )
+            .into());
+        }
+        let identity = Arc::new(new_identity(&file)?);
+        // Whoever works on a robot's own computer could as well show it gestures.
+        let members =
+            Membership { swarm: swarm.to_owned(), local: Roles::up_to(Role::Teach), ..Membership::default() };
+        let mut authority = Self { folder: folder.to_owned(), identity, members };
+        authority.save()?;
+        Ok(authority)
+    }
+
+    /// Opens the folder of a swarm.
+    ///
+    /// # Errors
+    /// A folder without the authority's key or its roster, or with that of another authority.
+    pub fn open(folder: &Path) -> Result<Self, Failure> {
+        let file = folder.join(AUTHORITY_FILE);
+        if !file.exists() {
+            return Err(format!(
+                "{} is not there: name the folder that `gestalt trust new` made, which alone can change who is a member",
+                file.display()
+            )
+            .into());
+        }
+        let identity = Arc::new(Identity::read(&file)?);
+        let roster: Roster = Roster::read(&folder.join(ROSTER_FILE))?;
+        if roster.authority() != identity.public_key() {
+            return Err(format!("{} is of another authority: choose another folder", folder.display()).into());
+        }
+        Ok(Self { folder: folder.to_owned(), identity, members: roster.members().clone() })
+    }
+
+    /// Opens the folder, or makes a swarm there.
+    ///
+    /// # Errors
+    /// As [`Authority::create`] and [`Authority::open`]; a folder of another swarm.
+    pub fn open_or_create(folder: &Path, swarm: &str) -> Result<Self, Failure> {
+        if !folder.join(AUTHORITY_FILE).exists() {
+            return Self::create(folder, swarm);
+        }
+        let authority = Self::open(folder)?;
+        if authority.members.swarm != swarm {
+            let of = &authority.members.swarm;
+            return Err(
+                format!("{} is of the swarm \"{of}\": choose another folder", folder.display()).into()
+            );
+        }
+        Ok(authority)
+    }
+
+    /// The authority's own key.
+    pub fn identity(&self) -> Arc<Identity> {
+        self.identity.clone()
+    }
+
+    /// Says what whoever works on a robot's own computer may do.
+    pub fn let_local(&mut self, roles: Roles) {
+        self.members.local = roles;
+    }
+
+    /// Makes a robot a member, whose key is in this folder, or is made here now.
+    ///
+    /// # Errors
+    /// Files that cannot be read or written.
+    pub fn enrol_here(&mut self, robot: RobotId) -> Result<(), Failure> {
+        let file = key_file(&self.folder, robot);
+        let identity = if file.exists() { Identity::read(&file)? } else { new_identity(&file)? };
+        self.enrol(&Applicant::Robot(robot), identity.public_key(), Roles::NONE)?;
+        self.certify(&Applicant::Robot(robot), &identity.public_key())?.write(&certificate_file(&file))?;
+        Ok(())
+    }
+
+    /// Makes a robot or a client a member with that key.
+    ///
+    /// # Errors
+    /// One that is a member already with another key.
+    pub fn enrol(&mut self, applicant: &Applicant, key: PublicKey, roles: Roles) -> Result<(), Failure> {
+        match applicant {
+            Applicant::Robot(robot) => {
+                if self.members.robots.get(robot).is_some_and(|held| *held != key) {
+                    return Err(format!(
+                        "robot {robot} is a member with another key: if it was given a new one, `gestalt trust rekey {robot}` takes the old one's \
+                         trust away"
+                    )
+                    .into());
+                }
+                self.members.robots.insert(*robot, key);
+            }
+            Applicant::Client(name) => {
+                self.members.instructors.insert(name.clone(), Instructor { key, roles });
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives a robot another key; the old one is never believed again.
+    ///
+    /// # Errors
+    /// A robot that is no member, files that cannot be written.
+    pub fn rekey(&mut self, robot: RobotId, key: Option<PublicKey>) -> Result<(), Failure> {
+        let old = self.members.robots.get(&robot).or_else(|| self.members.expelled.get(&robot)).copied();
+        let old =
+            old.ok_or_else(|| format!("robot {robot} was never a member: gestalt trust enrol makes it one"))?;
+        self.members.robots.remove(&robot);
+        self.members.expelled.insert(robot, old);
+        let Some(key) = key else {
+            let file = key_file(&self.folder, robot);
+            if file.exists() {
+                fs::remove_file(&file)
+                    .map_err(|error| format!("cannot remove {}: {error}", file.display()))?;
+            }
+            return self.enrol_here(robot);
+        };
+        self.enrol(&Applicant::Robot(robot), key, Roles::NONE)
+    }
+
+    /// Takes a robot or a client off the roster.
+    ///
+    /// # Errors
+    /// One that is no member.
+    pub fn expel(&mut self, who: &Applicant) -> Result<(), Failure> {
+        let known = match who {
+            Applicant::Robot(robot) => {
+                let key = self.members.robots.remove(robot);
+                self.members.expelled.extend(key.map(|key| (*robot, key)));
+                key.is_some()
+            }
+            Applicant::Client(name) => self.members.instructors.remove(name).is_some(),
+        };
+        if known {
+            return Ok(());
+        }
+        Err(format!("{} is no member: gestalt trust roster shows who is", said(who)).into())
+    }
+
+    /// The certificate of a member.
+    ///
+    /// # Errors
+    /// What keeps a certificate from being made.
+    pub fn certify(&self, who: &Applicant, key: &PublicKey) -> Result<Certificate, Failure> {
+        let holder = match who {
+            Applicant::Robot(robot) => Bearer::Robot(*robot),
+            Applicant::Client(name) => Bearer::Client(name.clone()),
+        };
+        Ok(Certificate::issue(&self.identity, &self.members.swarm, holder, key)?)
+    }
+
+    /// Signs the next roster and writes it.
+    ///
+    /// # Errors
+    /// Members that exclude each other, and a file that cannot be written.
+    pub fn save(&mut self) -> Result<Roster, Failure> {
+        self.members.epoch += 1;
+        let roster = self.members.clone().sign(&self.identity)?;
+        roster.write(&self.folder.join(ROSTER_FILE))?;
+        Ok(roster)
+    }
+}
+
+/// The key of a robot or client in that folder, made now if there is none.
+///
+/// # Errors
+/// Files that cannot be read or written.
+pub(super) fn key_of(folder: &Path, who: &Applicant, anew: bool) -> Result<Identity, Failure> {
+    make(folder)?;
+    let file = key_path(folder, who);
+    if anew && file.exists() {
+        fs::remove_file(&file).map_err(|error| format!("cannot remove {}: {error}", file.display()))?;
+    }
+    if file.exists() { Ok(Identity::read(&file)?) } else { new_identity(&file) }
+}
+
+/// Where a member's key lies.
+pub(super) fn key_path(folder: &Path, who: &Applicant) -> PathBuf {
+    match who {
+        Applicant::Robot(robot) => key_file(folder, *robot),
+        Applicant::Client(name) => client_key_file(folder, name),
+    }
+}
+
+/// The member in words.
+pub(super) fn said(who: &Applicant) -> String {
+    match who {
+        Applicant::Robot(robot) => format!("robot {robot}"),
+        Applicant::Client(name) => format!("client {name}"),
+    }
+}
+
+/// A robot by its number, a client by its name.
+pub(super) fn applicant(text: &str) -> Result<Applicant, String> {
+    if let Ok(robot) = text.parse() {
+        return Ok(Applicant::Robot(robot));
+    }
+    let name: Result<InstructorId, _> = text.parse();
+    name.map(Applicant::Client).map_err(|error| error.to_string())
+}
+
+fn make(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()).into())
+}
+
+fn new_identity(file: &Path) -> Result<Identity, Failure> {
+    let mut secret = zeroize::Zeroizing::new([0; 32]);
+    getrandom::fill(&mut *secret).map_err(|error| format!("the system gives no random numbers: {error}"))?;
+    let identity = Identity::from_bytes(&secret);
+    identity.write(file)?;
+    Ok(identity)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::TrustSection;
+
+    #[test]
+    fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path().join("keys");
+        let enrol = |robots: &[u32]| {
+            let mut authority = Authority::open_or_create(&folder, "demo").unwrap();
+            robots.iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+            authority.save().unwrap()
+        };
+        let (first, second) = (enrol(&[1, 2]), enrol(&[2, 3]));
+        assert!(second.newer_than(&first));
+        let (first, second) = (first.members(), second.members());
+        assert_eq!((first.robots.len(), second.robots.len()), (2, 3));
+        assert_eq!(first.robots[&RobotId(2)], second.robots[&RobotId(2)]);
+        let other = Authority::open_or_create(&folder, "other").map(drop).unwrap_err().to_string();
+        assert!(other.contains("choose another folder"), "{other}");
+        let trust = TrustSection { keys: Some(folder), ..TrustSection::default() };
+        let seal = trust.seal(RobotId(3)).unwrap().unwrap();
+        assert_eq!(seal.identity.public_key(), second.robots[&RobotId(3)]);
+        assert!(seal.credentials(RobotId(3)).is_ok() && seal.credentials(RobotId(2)).is_err());
+        let missing = trust.seal(RobotId(4)).unwrap_err().to_string();
+        assert!(missing.contains("trust.keys") && missing.contains("robot-4.key"), "{missing}");
+        assert_eq!(trust.seal_with_guests(RobotId(3)).unwrap().unwrap().guests.len(), 2);
+    }
+
+    #[test]
+    fn who_was_expelled_comes_back_with_a_new_key_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut authority = Authority::create(folder.path(), "demo").unwrap();
+        [1, 7].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+        let before = authority.save().unwrap().members().robots[&RobotId(7)];
+        authority.expel(&Applicant::Robot(RobotId(7))).unwrap();
+        let roster = authority.save().unwrap();
+        assert!(
+            !roster.members().robots.contains_key(&RobotId(7))
+                && roster.members().expelled[&RobotId(7)] == before
+        );
+        assert!(
+            authority.expel(&Applicant::Robot(RobotId(7))).unwrap_err().to_string().contains("no member")
+        );
+        // With its old key, which still lies there.
+        authority.enrol_here(RobotId(7)).unwrap();
+        assert!(authority.save().unwrap_err().to_string().contains("expelled"));
+        let mut authority = Authority::open(folder.path()).unwrap();
+        authority.rekey(RobotId(7), None).unwrap();
+        let after = authority.save().unwrap().members().clone();
+        assert!(after.robots[&RobotId(7)] != before && after.expelled[&RobotId(7)] == before);
+    }
+}

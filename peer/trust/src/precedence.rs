@@ -1,0 +1,76 @@
+//! Who may say what of a round, and who said so first.
+
+use std::collections::VecDeque;
+
+use gestalt_protocol::{Instruction, InstructorId, RoundId};
+
+use crate::roles::{Role, Roles};
+
+/// Of how many rounds it is remembered who said first what was shown.
+const ROUNDS: usize = 1024;
+
+/// Remembers who taught which round first: they are overruled by those alone who may.
+#[derive(Clone, Debug, Default)]
+pub struct Precedence {
+    taught: VecDeque<(RoundId, InstructorId)>,
+}
+
+impl Precedence {
+    /// Whether somebody with these roles may say that.
+    pub fn permits(&mut self, by: &InstructorId, roles: Roles, said: &Instruction) -> bool {
+        let Some(round) = said.round() else { return roles.has(Role::Open) };
+        if !roles.has(Role::Teach) {
+            return false;
+        }
+        let first = self.taught.iter().find(|(taught, _)| *taught == round);
+        if let Some((_, first)) = first {
+            // What one takes back is what one said oneself.
+            return first == by || roles.has(Role::Overrule) || matches!(said, Instruction::Retract { .. });
+        }
+        if self.taught.len() == ROUNDS {
+            self.taught.pop_front();
+        }
+        self.taught.push_back((round, by.clone()));
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{ClassId, Gesture, RobotId};
+
+    use super::*;
+
+    fn round(counter: u32) -> RoundId {
+        RoundId { counter, opener: RobotId(1), life: 7 }
+    }
+
+    fn was(counter: u32) -> Instruction {
+        Instruction::Was { round: round(counter), class: Gesture::Class(ClassId(3)) }
+    }
+
+    #[test]
+    fn each_word_needs_its_role() {
+        let mut words = Precedence::default();
+        let [ada, bob] = ["ada", "bob"].map(|name| name.parse().unwrap());
+        let [open, teach, overrule] = [Role::Open, Role::Teach, Role::Overrule].map(Roles::up_to);
+        let begin = Instruction::Open;
+        assert!(words.permits(&ada, open, &begin) && !words.permits(&ada, Roles::NONE, &begin));
+        assert!(!words.permits(&ada, open, &was(1)));
+        assert!(words.permits(&ada, teach, &was(1)) && words.permits(&ada, teach, &was(1)));
+        assert!(!words.permits(&bob, teach, &was(1)), "ada said it first");
+        assert!(words.permits(&bob, overrule, &was(1)) && words.permits(&bob, teach, &was(2)));
+        let back = Instruction::Retract { round: round(1) };
+        assert!(words.permits(&bob, teach, &back), "it takes back what bob said");
+    }
+
+    #[test]
+    fn what_is_remembered_of_rounds_is_bounded() {
+        let mut words = Precedence::default();
+        let ada = "ada".parse().unwrap();
+        for counter in 0..3000 {
+            assert!(words.permits(&ada, Roles::up_to(Role::Teach), &was(counter)));
+        }
+        assert_eq!(words.taught.len(), ROUNDS);
+    }
+}

@@ -1,0 +1,56 @@
+//! Robots that belong to the swarm no more.
+
+use super::*;
+
+fn counted(decision: &Decision) -> Vec<u32> {
+    decision.certificate.votes.iter().map(|counted| counted.robot.0).collect()
+}
+
+#[test]
+fn who_is_expelled_is_taken_out_of_what_is_still_to_be_decided() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([1, 2, 3])));
+    mind.handle(ms(1), votes(3, 1, vote(1, 1, SURE)));
+    mind.handle(ms(2), votes(1, 1, vote(1, 0, LEANING)));
+    assert_eq!(mind.held(), None, "robot 2 may be about to see");
+    mind.handle(ms(3), Input::Expelled(robots([3])));
+    mind.handle(ms(4), votes(2, 1, vote(1, 0, SURE)));
+    let held = mind.held().expect("nobody else is waited for");
+    assert_eq!((held.class, counted(held)), (Some(ClassId(0)), vec![1, 2]));
+}
+
+#[test]
+fn a_decision_that_counted_one_who_is_expelled_is_drawn_anew() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([1, 3])));
+    mind.handle(ms(1), votes(1, 1, vote(1, 0, LEANING)));
+    mind.handle(ms(2), votes(3, 1, vote(1, 1, SURE)));
+    assert_eq!(mind.held().map(counted), Some(vec![1, 3]));
+    mind.handle(ms(3), Input::Expelled(robots([3])));
+    assert!(mind.held().is_none_or(|held| !counted(held).contains(&3)), "{:?}", mind.held());
+    live(&mut mind, ms(6000));
+    let held = mind.held().expect("the round ends");
+    assert!(!counted(held).contains(&3) && held.class != Some(ClassId(1)), "{held:?}");
+}
+
+#[test]
+fn a_decision_of_a_round_that_is_over_stands() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3])));
+    mind.handle(ms(1), votes(3, 1, vote(1, 1, SURE)));
+    live(&mut mind, ms(3000));
+    let before = mind.held().cloned();
+    assert!(before.is_some());
+    mind.handle(ms(3001), Input::Expelled(robots([3])));
+    assert_eq!(mind.held().cloned(), before);
+}
+
+#[test]
+fn nobody_waits_for_who_is_expelled() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([1, 3])));
+    mind.handle(ms(1), votes(1, 1, vote(1, 0, SURE)));
+    assert_eq!(mind.held(), None, "robot 3 may be about to see");
+    mind.handle(ms(2), Input::Expelled(robots([3])));
+    assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(0)));
+}
