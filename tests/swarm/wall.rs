@@ -1,5 +1,6 @@
 //! The wall around a sealed swarm: who gets in, who does not, and who is put out.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -9,6 +10,8 @@ use gestalt_strategies::{MindConfig, Quorum};
 use gestalt_tests::{Watched, agreed, config, start, unique};
 use gestalt_trust::{Instructor, Membership, Role, Roles};
 use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
@@ -19,6 +22,9 @@ const PATIENCE: Duration = Duration::from_secs(30);
 
 /// How long after the word all robots must have acted on it.
 const EXPULSION: Duration = Duration::from_secs(2);
+
+/// How long a member may take to be linked, whoever else is at the door.
+const LINKING: Duration = Duration::from_secs(5);
 
 /// A robot that is reached by TLS alone.
 fn walled(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
@@ -310,4 +316,61 @@ pub async fn an_open_robot_and_a_sealed_one_do_not_link() {
     assert!(refused.unwrap_err().to_string().contains("trust.insecure"));
     open.stop().await;
     guarded.stop().await;
+}
+
+/// Knocks twenty times a second with bytes that are no handshake, or begin one and leave it at that, until it is stopped.
+async fn knock(address: String) {
+    // The head of a TLS record that announces a ClientHello, which never comes.
+    let begins = [0x16, 3, 1, 2, 0, 1];
+    let mut held = VecDeque::new();
+    for number in 0_u32.. {
+        if let Ok(mut stream) = TcpStream::connect(&address).await {
+            let junk = [number as u8 | 0x80; 64];
+            let _ = stream.write_all(if number.is_multiple_of(2) { &begins } else { &junk }).await;
+            held.push_back(stream);
+        }
+        if held.len() > 100 {
+            held.pop_front();
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+pub async fn junk_at_the_door_keeps_no_member_out() {
+    let swarm = unique("junk");
+    let members = with_eve(&swarm, 3);
+    let mut robots = vec![start(walled(0, &members, &[]), Some(ClassId(4))).await];
+    let locators = robots[0].robot.locators().to_vec();
+    robots.push(start(walled(1, &members, &locators), Some(ClassId(4))).await);
+    let address = locators[0].trim_start_matches("tls/").to_owned();
+    let knocking = tokio::spawn(knock(address.clone()));
+    // And those who say nothing at all.
+    let mut silent = Vec::new();
+    for _ in 0..200 {
+        silent.push(TcpStream::connect(&address).await.unwrap());
+    }
+    let began = Instant::now();
+    robots.push(start(walled(2, &members, &locators), Some(ClassId(4))).await);
+    for robot in &robots {
+        assert!(
+            robot.sees_alive(2, LINKING).await,
+            "after {:?}: {:?}",
+            began.elapsed(),
+            robot.robot.status()
+        );
+    }
+    eprintln!("linked after {:?}", began.elapsed());
+    robots[0].robot.open_round();
+    let decision = agreed(&mut robots, 1, PATIENCE).await;
+    assert_eq!((decision.class, decision.certificate.robots), (Some(ClassId(4)), 3));
+    // The robot holds none of its files for those who say nothing.
+    for stream in &mut silent {
+        let closed = tokio::time::timeout(PATIENCE, stream.read(&mut [0; 16])).await;
+        assert!(!matches!(closed.expect("it is hung up on"), Ok(1..)));
+    }
+    knocking.abort();
+    let _ = knocking.await;
+    for robot in robots {
+        robot.stop().await;
+    }
 }
