@@ -6,10 +6,9 @@ use std::time::Duration;
 
 use gestalt_link::{Client, LinkConfig, RobotConfig};
 use gestalt_protocol::{
-    ClassId, Envelope, FeatureSpaceId, FusionRule, Gesture, Instruction, InstructorId, Keys, MAX_SAMPLES,
-    Message, Outcome, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Status, Topic, Vector,
+    ClassId, Envelope, FeatureSpaceId, Gesture, Instruction, InstructorId, Keys, MAX_SAMPLES, Message,
+    Outcome, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Status, Topic, Vector,
 };
-use gestalt_strategies::MindConfig;
 use gestalt_tests::{Watched, agreed, config, learning, short_rounds, space, start, start_learning, unique};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -242,13 +241,11 @@ pub async fn forged_samples_are_refused_counted_and_named_and_nothing_is_trained
 pub async fn a_robot_votes_and_decides_while_it_trains() {
     const SAMPLES: u32 = 8000;
     let swarm = unique("busy");
-    // One robot is sure, the other learns nonsense: what matters is that they decide.
-    let mind = MindConfig { rule: FusionRule::LogPool, ..short_rounds() };
     let mut apprenticeship = learning(3, 1.0, None);
     apprenticeship.config.capacity = 2 * SAMPLES as usize;
-    let busy = RobotConfig { mind: mind.clone(), learning: Some(apprenticeship), ..config(0, &swarm, &[]) };
+    let busy = RobotConfig { mind: short_rounds(), learning: Some(apprenticeship), ..config(0, &swarm, &[]) };
     let mut busy = start_learning(busy, Arc::new(AtomicU8::new(4))).await;
-    let sees = RobotConfig { mind, ..config(1, &swarm, busy.robot.locators()) };
+    let sees = RobotConfig { mind: short_rounds(), ..config(1, &swarm, busy.robot.locators()) };
     let sees = start(sees, Some(ClassId(4))).await;
     assert!(busy.sees_alive(1, PATIENCE).await && sees.sees_alive(1, PATIENCE).await);
     // Samples with labels by chance: the hardest there are to tell apart.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use gestalt_link::{LinkConfig, LinkError, Robot, RobotConfig};
 use gestalt_protocol::{
     Announcement, Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Keys, Message,
-    Pool, RobotId, RoundId, Stamp, Topic, Vote,
+    RobotId, RoundId, Stamp, Topic, Vote,
 };
 use gestalt_strategies::{Classify, MindConfig, Quorum};
 use gestalt_tests::{Fixed, Watched, agreed, config, start, unique};
@@ -104,8 +104,8 @@ pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Deci
         is_final: false,
         certificate: Certificate {
             vocabulary,
-            rule: FusionRule::CorrelatedPool,
-            pool: Some(Pool::PRIOR),
+            rule: FusionRule::LogPool,
+            pool: None,
             probabilities,
             unknown: None,
             votes: (0..robots).map(vote).collect(),

@@ -126,7 +126,7 @@ pub struct RoundsConfig {
 impl Default for RoundsConfig {
     fn default() -> Self {
         Self {
-            rule: FusionRule::CorrelatedPool,
+            rule: FusionRule::LogPool,
             alpha: None,
             quorum: Quorum::Majority,
             lately: Duration::from_secs(120),

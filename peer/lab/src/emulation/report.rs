@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::FusionRule;
 use serde::Serialize;
 
-use super::calibration::{Calibration, Said};
+use super::calibration::{Calibration, Heard, Said};
 use super::network::{Network, Traffic};
 use super::record::{Record, Showing};
 use super::statistics::{Mean, Proportion};
@@ -175,6 +175,11 @@ impl Report {
             said,
         }
     }
+
+    fn heard(&self) -> Heard<'_> {
+        let taught = self.right.trials - self.untaught;
+        Heard { said: &self.said, taught, untaught: self.untaught }
+    }
 }
 
 /// The likeliest class; of equals the first, as a fusion takes it.
@@ -254,9 +259,7 @@ impl Summary {
             settled_ms: means(&|report| report.settled_ms),
             announcements: means(&|report| report.announcements),
             vote_bytes_per_open_second: mean(&|report| report.vote_bytes_per_open_second),
-            calibration: Calibration::of(
-                &reports.iter().map(|report| (report.said.as_slice(), report.untaught)).collect::<Vec<_>>(),
-            ),
+            calibration: Calibration::of(&reports.iter().map(Report::heard).collect::<Vec<_>>()),
         }
     }
 }
@@ -303,23 +306,31 @@ impl fmt::Display for Table<'_> {
         }
         writeln!(
             f,
-            "\n{:<20} {:>5}  {:<20} {:<22} {:<24}",
-            "rule", "alpha", "calibration error", "≥ .99 and wrong %", "untaught, and ≥ .9 %"
+            "\n{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
+            "rule",
+            "alpha",
+            "calibration error",
+            "≥ .99 and wrong %",
+            "untaught, and ≥ .9 %",
+            "taught, and decided %",
+            "of these right %"
         )?;
         for summary in self.0 {
-            let Calibration { error, sure_and_wrong, untaught_and_sure } = summary.calibration;
+            let Calibration { error, .. } = summary.calibration;
             let of = |p: Proportion| match p.trials {
                 0 => "–".to_owned(),
                 trials => format!("{} of {trials}", percent(p)),
             };
             writeln!(
                 f,
-                "{:<20} {:>5}  {:<20} {:<22} {:<24}",
+                "{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
                 summary.rule,
                 summary.alpha,
                 format!("{:.3} ± {:.3}", error.mean, error.half_width),
-                of(sure_and_wrong),
-                of(untaught_and_sure),
+                of(summary.calibration.sure_and_wrong),
+                of(summary.calibration.untaught_and_sure),
+                of(summary.calibration.taught_and_decided),
+                of(summary.calibration.taught_and_right),
             )?;
         }
         if let Some(any) = self.0.first() {

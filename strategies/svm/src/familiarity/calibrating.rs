@@ -4,7 +4,7 @@ use super::Score;
 
 /// What is believed of offset, distance and lead before anything is known, and how firmly: a normal prior.
 const PRIOR: [f64; 3] = [-0.2, 2.0, -2.0];
-const SPREAD: [f64; 3] = [3.0, 1.0, 1.0];
+const SPREAD: [f64; 3] = [1.0, 1.0, 1.0];
 
 /// The lead where only one class is there to be near to: that at which it says nothing.
 const NO_LEAD: f64 = 0.3;
