@@ -211,10 +211,10 @@ impl Rounds {
             return false;
         }
         let this = self.is_this_round(vote.round);
-        match self.place(vote.round, this, Some(robot), effects) {
+        let order = match self.place(vote.round, this, Some(robot), effects) {
             Err(refusal) => {
                 if refusal == Refusal::TooSoon {
-                    self.waiting = Some(held);
+                    self.keep_waiting(held);
                 }
                 return false;
             }
@@ -222,11 +222,13 @@ impl Rounds {
                 self.answer_displaced(&held, effects);
                 return false;
             }
-            Ok(Ordering::Greater) => self.join(vote.round, effects),
-            Ok(Ordering::Equal) => {}
+            Ok(order) => order,
+        };
+        if order.is_gt() {
+            self.join(vote.round, effects);
         }
         let Some(round) = self.round.as_mut() else { return false };
-        match round.ballot.cast(held) {
+        let is_news = match round.ballot.cast(held) {
             Cast::Counted => {
                 self.electorate.hear(robot, self.now);
                 true
@@ -236,7 +238,11 @@ impl Rounds {
                 self.refusals.add(Refusal::BallotFull);
                 false
             }
+        };
+        if order.is_gt() {
+            self.hear_waiting(effects);
         }
+        is_news
     }
 
     /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. It comes from that robot, `given` or announced.

@@ -1,6 +1,6 @@
 //! Which newer rounds may end the one that is open.
 
-use gestalt_protocol::{RobotId, RoundId};
+use gestalt_protocol::{HeldVote, RobotId, RoundId};
 
 use super::rounds::{Effects, Rounds};
 
@@ -9,8 +9,8 @@ impl Rounds {
     /// if it is one.
     ///
     /// Robots are behind, and a newer round takes them along; but whoever may vote could begin one round after the other. So the votes of the open
-    /// one decide first if they suffice, without waiting for more; and if they do not, nobody ends two rounds within a deadline. A refractory
-    /// time of zero switches all of that off.
+    /// one decide first if they suffice, without waiting for more; and if they do not, nobody ends two rounds within a deadline. But where as many
+    /// are as make a decision final, the swarm has gone on. A refractory time of zero switches all of that off.
     pub(super) fn is_too_soon(
         &mut self,
         id: RoundId,
@@ -31,8 +31,32 @@ impl Rounds {
         if self.concludes_now(effects) {
             return true;
         }
+        let elsewhere = self.waiting.keys().filter(|robot| **robot != by).count() + 1;
+        if elsewhere >= self.config.holders(self.electorate.count()).max(2) as usize {
+            return false;
+        }
         let known = self.known(by);
         !self.preempted.take(self.now, known)
+    }
+
+    /// Keeps a vote in a newer round for when the open one is over: the latest of each robot that is known.
+    pub(super) fn keep_waiting(&mut self, held: HeldVote) {
+        if self.known(held.robot).is_none() {
+            return;
+        }
+        let newer = self.waiting.get(&held.robot).is_none_or(|waiting| waiting.stamp < held.stamp);
+        if newer {
+            self.waiting.insert(held.robot, held);
+        }
+    }
+
+    /// Counts the votes that wait for it, once the open round is over, or where the swarm has gone on: in the order of their rounds.
+    pub(super) fn hear_waiting(&mut self, effects: &mut Effects<'_>) {
+        let mut waiting: Vec<HeldVote> = std::mem::take(&mut self.waiting).into_values().collect();
+        waiting.sort_by_key(|held| (held.vote.round, held.robot));
+        for held in waiting {
+            self.hear_vote(held, effects);
+        }
     }
 
     /// Whether something is held for the open round, if need be by the votes that there are.

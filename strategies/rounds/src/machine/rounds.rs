@@ -1,6 +1,6 @@
 //! The machine itself: what it holds, and the one verb that moves it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -130,8 +130,8 @@ pub struct Rounds {
     pub(super) announced: Allowance,
     /// How often a robot may end a round that is neither decided nor over, by beginning a newer one.
     pub(super) preempted: Allowance,
-    /// The latest vote in a newer round that was refused so as not to end the open one: its time comes when that is over.
-    pub(super) waiting: Option<HeldVote>,
+    /// The latest votes in newer rounds that were refused so as not to end the open one: their time comes when that is over.
+    pub(super) waiting: BTreeMap<RobotId, HeldVote>,
     pub(super) refusals: Refusals,
     pub(super) duplicate: Option<Stamp>,
     /// The round for which this robot still looks, though it may be decided: its learning wants more of it.
@@ -177,7 +177,7 @@ impl Rounds {
             given: Allowance::new(DECISIONS_EVERY, BURST),
             announced: Allowance::new(DECISIONS_EVERY, BURST),
             preempted: Allowance::new(config.deadline, 1),
-            waiting: None,
+            waiting: BTreeMap::new(),
             fusion: Arc::new(config.rule),
             config,
             refusals: Refusals::default(),
@@ -294,8 +294,8 @@ impl Rounds {
         if self.announcement().is_some_and(|due| self.now >= due) {
             self.announce(effects);
         }
-        if let Some(newer) = self.waiting.take_if(|_| !self.round.as_ref().is_some_and(|round| round.open)) {
-            self.hear_vote(newer, effects);
+        if !self.is_open() {
+            self.hear_waiting(effects);
         }
         if self.looking_until(effects.follower).is_some_and(|until| self.now >= until) {
             self.stop_looking(effects);
@@ -316,6 +316,7 @@ impl Rounds {
         for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
             allowance.forget(now, known);
         }
+        self.waiting.retain(|robot, _| known(*robot));
     }
 
     /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence. Those that

@@ -105,6 +105,27 @@ fn who_begins_one_round_after_the_other_ends_one_within_a_deadline() {
 }
 
 #[test]
+fn who_is_left_behind_in_a_round_goes_where_most_have_gone() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3, 4, 5, 66])));
+    mind.handle(ms(0), votes(3, 1, null(1)));
+    let heard = |mind: &mut Rounds, at, author, counter| {
+        mind.handle(ms(at), votes(author, counter, null(counter)));
+        mind.round().unwrap().counter
+    };
+    for (at, author, counter) in [(500, 3, 2), (1000, 4, 3), (1500, 66, 4), (2000, 5, 5)] {
+        assert_eq!(heard(&mut mind, at, author, counter), counter, "each takes it along once in a while");
+    }
+    for (at, counter) in [(2500, 6), (2600, 7), (2700, 8)] {
+        assert_eq!(heard(&mut mind, at, 66, counter), 5, "one is not the swarm, whatever it says");
+    }
+    assert_eq!(heard(&mut mind, 2800, 3, 8), 5, "nor are two");
+    assert_eq!(heard(&mut mind, 2900, 4, 8), 8, "three of five are");
+    let voters: Vec<u32> = mind.round.as_ref().unwrap().ballot.stamps().map(|(robot, _)| robot.0).collect();
+    assert_eq!(voters, [3, 4, 7, 66], "all are heard");
+}
+
+#[test]
 fn a_round_whose_votes_suffice_is_decided_before_a_newer_one_ends_it() {
     let mut mind = mind(7);
     mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
