@@ -161,8 +161,8 @@ fn what_a_robot_holds() {
 fn what_an_announcer_signs() {
     let announcement = announcement();
     // The decision as it is given, but here it is final; some label.
-    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
+    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 03 02 e209";
     let envelope = Envelope::from(announcement.clone());
     let expected = format!("{HEAD} 08 {decided} 01 04 70616c6d");
     assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));

@@ -17,6 +17,9 @@ use crate::fusion::Fusion;
 use crate::observation::Observation;
 use crate::sign::Sign;
 
+/// The most other names of a round that are remembered.
+const MAX_NAMES: usize = 64;
+
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
 #[derive(Clone, Debug)]
 pub(crate) struct Round {
@@ -35,6 +38,8 @@ pub(crate) struct Round {
     ends: Option<Duration>,
     /// Whether others go on to the next one: then nothing more is waited for.
     pub hurried: bool,
+    /// Its other names, under which robots opened it at the same time.
+    names: BTreeSet<RoundId>,
 }
 
 /// This robot's vote as it was last said.
@@ -59,7 +64,22 @@ impl Round {
             concluded: false,
             ends: None,
             hurried: false,
+            names: BTreeSet::new(),
         }
+    }
+
+    /// Whether that is its name, or was found to be one while it began. A vote is passed on under the name that it was cast under, however late:
+    /// who took that for another round would go on in one that nobody shows anything in.
+    pub fn is_named(&self, id: RoundId) -> bool {
+        self.id == id || self.names.contains(&id)
+    }
+
+    /// Takes in another name: the smaller is its own.
+    pub fn merge(&mut self, other: RoundId) {
+        if self.names.len() < MAX_NAMES {
+            self.names.insert(self.id.max(other));
+        }
+        self.id = self.id.min(other);
     }
 
     /// Judges a frame and counts it; `false` when the classifier could not judge it, or gave no distribution.

@@ -96,8 +96,12 @@ mod tests {
         let said = |confidence, right| Said { confidence, right, taught: true };
         let honest: Vec<Said> = (0..100).map(|n| said(0.75, n % 4 != 0)).collect();
         let boasting: Vec<Said> = (0..100).map(|n| said(0.995, n % 4 != 0)).collect();
-        let heard = |said, taught, untaught| Heard { said, taught, untaught };
-        let of = |said: &[Said]| Calibration::of(&[heard(said, 100, 0), heard(said, 150, 0)]);
+        let of = |said: &[Said]| {
+            Calibration::of(&[
+                Heard { said, taught: 100, untaught: 0 },
+                Heard { said, taught: 150, untaught: 0 },
+            ])
+        };
         assert!(of(&honest).error.mean < 1e-9);
         assert!((of(&boasting).error.mean - 0.245).abs() < 1e-9);
         assert_eq!(of(&boasting).sure_and_wrong, Proportion::new(50, 200));

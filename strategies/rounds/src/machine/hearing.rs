@@ -121,7 +121,7 @@ impl Rounds {
         let opened_at_once = |round: &Round| {
             round.id.counter == id.counter && self.now <= round.since.saturating_add(self.config.deadline)
         };
-        self.round.as_ref().is_some_and(|round| round.id == id || opened_at_once(round))
+        self.round.as_ref().is_some_and(|round| round.is_named(id) || opened_at_once(round))
     }
 
     /// Where a round that was heard of stands to the newest one known.
@@ -159,7 +159,7 @@ impl Rounds {
         };
         if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
             effects.follower.merged(round.id, id);
-            round.id = round.id.min(id);
+            round.merge(id);
         }
         Ok(order)
     }

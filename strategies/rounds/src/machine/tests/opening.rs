@@ -50,6 +50,24 @@ fn equal_counters_merge_on_the_smaller_opener_and_keep_what_was_seen() {
 }
 
 #[test]
+fn a_vote_under_another_name_of_a_round_begins_no_other_however_late() {
+    let mut mind = mind(7);
+    let deadline = RoundsConfig::default().deadline;
+    let of_nine = |sequence| votes(9, sequence, Vote { round: round(1, 9), ..null(1) });
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(10), of_nine(1));
+    live(&mut mind, deadline + ms(500));
+    assert!(!mind.is_open(), "undecided, and over");
+    for (late, sequence) in [(501, 1), (900, 2), (8000, 3)] {
+        mind.handle(deadline + ms(late), of_nine(sequence));
+        assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 7)), false), "{late} ms after");
+    }
+    // One that nobody knows from then is another showing.
+    mind.handle(deadline + ms(9000), votes(8, 1, Vote { round: round(1, 8), ..null(1) }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 8)), true));
+}
+
+#[test]
 fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
     let mut mind = mind(7).counting_from(Some(1000));
     let ahead = 1000 + (1 << 24);
