@@ -1,13 +1,13 @@
 //! The Python package, driven by the interpreter of this machine: the tests in `tests/*.py`, each file a trial.
 //!
-//! `GESTALT_PYTHON` names another interpreter than `python3`, such as that of a virtual environment with numpy, scikit-learn and
-//! mypy. What the interpreter lacks is skipped, by name and with the reason.
+//! `GESTALT_PYTHON` names another interpreter than `python3` and the system's, such as that of a virtual environment with scikit-learn.
+//! What the interpreter lacks is skipped, by name and with the reason.
 
 mod expected;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
@@ -67,9 +67,20 @@ fn here() -> PathBuf {
 }
 
 fn python() -> Command {
-    let mut python = Command::new(std::env::var("GESTALT_PYTHON").unwrap_or_else(|_| "python3".to_owned()));
+    static INTERPRETER: OnceLock<String> = OnceLock::new();
+    let mut python = Command::new(INTERPRETER.get_or_init(interpreter));
     python.env("PYTHONDONTWRITEBYTECODE", "1");
     python
+}
+
+/// The interpreter that is asked for; else `python3`, unless that of the system alone has numpy, as where another one is in its way.
+fn interpreter() -> String {
+    let has_numpy = |python: &&str| {
+        Command::new(python).args(["-c", "import numpy"]).output().is_ok_and(|output| output.status.success())
+    };
+    std::env::var("GESTALT_PYTHON").unwrap_or_else(|_| {
+        ["python3", "/usr/bin/python3"].into_iter().find(has_numpy).unwrap_or("python3").to_owned()
+    })
 }
 
 /// What the interpreter lacks of these packages.

@@ -88,8 +88,9 @@ def native_rule(rule: Union[str, Rule]) -> Union[str, Callable[[list[Sample], in
     """A rule as the native part asks it."""
     if isinstance(rule, str) or not callable(rule):
         return rule
+    chosen: Rule = rule
 
     def seeded(samples: list[Sample], seed: int) -> Optional[int]:
-        return rule(samples, random.Random(seed))
+        return chosen(samples, random.Random(seed))
 
     return seeded

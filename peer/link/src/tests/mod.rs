@@ -149,7 +149,8 @@ impl Watched {
     async fn event<T>(&mut self, what: &str, suits: impl Fn(&Event) -> Option<T>) -> T {
         let end = Instant::now() + PATIENCE;
         loop {
-            let event = timeout_at(end, self.events.recv()).await.unwrap_or_else(|_| panic!("never: {what}"));
+            let event = timeout_at(end, self.events.recv()).await;
+            let event = event.unwrap_or_else(|_| panic!("never: {what}: {:#?}", self.robot.status()));
             if let Some(found) = event.ok().as_ref().and_then(&suits) {
                 return found;
             }
