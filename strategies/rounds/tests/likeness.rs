@@ -144,7 +144,7 @@ fn confidence_means_what_it_says_whatever_robots_have_in_common() {
             b.1
         );
         assert!(fitted.error() <= 0.05, "{robots} robots, alike {alike}: {}", fitted.error());
-        // One in fifty would be as good as said; five robots come to four in a hundred, for few of their decisions are that sure.
+        // One in fifty would be as good as hoped for; half alike robots come to two to four in a hundred.
         assert!(b.0 as f64 <= 0.05 * b.1 as f64 + 1.0, "{robots} robots, alike {alike}: {b:?}");
         if alike >= 0.5 && robots >= 5 {
             assert!(fitted.error() < independent.error() / 2.0, "{robots} robots, alike {alike}");
