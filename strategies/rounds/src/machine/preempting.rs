@@ -31,23 +31,30 @@ impl Rounds {
         if self.concludes_now(effects) {
             return true;
         }
-        let elsewhere = self.waiting.keys().filter(|robot| **robot != by).count() + 1;
+        let known = self.known(by);
+        let others = self.waiting.keys().filter(|robot| **robot != by && self.known(**robot).is_some());
+        let elsewhere = others.count() + usize::from(known.is_some());
         if elsewhere >= self.config.holders(self.electorate.count()).max(2) as usize {
             return false;
         }
-        let known = self.known(by);
         !self.preempted.take(self.now, known)
     }
 
-    /// Keeps a vote in a newer round for when the open one is over: the latest of each robot that is known.
+    /// Keeps a vote in a newer round for when the open one is over: the latest of each robot that is known, and of all others one.
     pub(super) fn keep_waiting(&mut self, held: HeldVote) {
         if self.known(held.robot).is_none() {
-            return;
+            self.forget_waiting();
         }
         let newer = self.waiting.get(&held.robot).is_none_or(|waiting| waiting.stamp < held.stamp);
         if newer {
             self.waiting.insert(held.robot, held);
         }
+    }
+
+    /// Keeps waiting those alone who are there.
+    pub(super) fn forget_waiting(&mut self) {
+        let (alive, partners) = (&self.alive, &self.partners);
+        self.waiting.retain(|robot, _| alive.contains(robot) || partners.is_neighbour(*robot));
     }
 
     /// Counts the votes that wait for it, once the open round is over, or where the swarm has gone on: in the order of their rounds.

@@ -317,7 +317,7 @@ impl Rounds {
         for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
             allowance.forget(now, known);
         }
-        self.waiting.retain(|robot, _| known(*robot));
+        self.forget_waiting();
     }
 
     /// A message as this robot's next: whatever it says, of rounds or of what it learned, counts in one sequence. Those that

@@ -144,6 +144,22 @@ fn who_is_left_behind_in_a_round_goes_where_most_have_gone() {
 }
 
 #[test]
+fn made_up_robots_make_no_majority_and_the_last_of_them_is_heard_when_the_round_is_over() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(robots([3, 4])));
+    mind.handle(ms(0), votes(3, 1, null(1)));
+    assert_eq!((mind.round().unwrap().counter, mind.is_open()), (1, true));
+    // They share what they may do, and have done it.
+    mind.handle(ms(600), votes(900, 1, null(2)));
+    for robot in 901..2000 {
+        mind.handle(ms(1200), votes(robot, 1, null(3)));
+    }
+    assert_eq!((mind.round().unwrap().counter, mind.waiting.len()), (2, 1));
+    live(&mut mind, ms(6000));
+    assert_eq!(mind.round().unwrap().counter, 3);
+}
+
+#[test]
 fn a_round_whose_votes_suffice_is_decided_before_a_newer_one_ends_it() {
     let mut mind = mind(7);
     mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
