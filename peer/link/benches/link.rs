@@ -34,7 +34,8 @@ impl Neighbour {
             name: "bench".to_owned(),
             boot: 1,
             swarm: swarm.to_owned(),
-            mind: MindConfig::default(),
+            // One round after the other, as fast as they come.
+            mind: MindConfig { refractory: Duration::ZERO, ..MindConfig::default() },
             fusion: None,
             link: LinkConfig { listen: vec![listen.to_owned()], ..LinkConfig::default() },
             vocabulary: None,
@@ -61,7 +62,8 @@ impl Neighbour {
 
     fn decides(&self, vote: Vec<u8>) -> Duration {
         let began = put(&self.voter, &self.vote_key, vote);
-        let held = self.holds.recv_timeout(Duration::from_secs(5)).expect("the robot decides");
+        let held = self.holds.recv_timeout(Duration::from_secs(5));
+        let held = held.unwrap_or_else(|_| panic!("the robot does not decide: {:#?}", self.robot.status()));
         std::thread::sleep(Duration::from_millis(10));
         held - began
     }

@@ -56,7 +56,7 @@ fn unique() -> String {
     format!("link-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
-/// A robot that dials `connect`, and in a round waits a minute for whoever is alive and has seen nothing yet.
+/// A robot that dials `connect`, and in a round waits two minutes for whoever is alive and has seen nothing yet.
 fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
     RobotConfig {
         id: RobotId(id),
@@ -64,8 +64,8 @@ fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         boot: 1,
         swarm: swarm.to_owned(),
         mind: MindConfig {
-            patience: Duration::from_secs(60),
-            deadline: Duration::from_secs(90),
+            patience: Duration::from_secs(120),
+            deadline: Duration::from_secs(150),
             ..MindConfig::default()
         },
         fusion: None,
@@ -147,7 +147,16 @@ impl Watched {
 
     /// Waits for an event that suits.
     async fn event<T>(&mut self, what: &str, suits: impl Fn(&Event) -> Option<T>) -> T {
-        let end = Instant::now() + PATIENCE;
+        self.event_within(PATIENCE, what, suits).await
+    }
+
+    async fn event_within<T>(
+        &mut self,
+        patience: Duration,
+        what: &str,
+        suits: impl Fn(&Event) -> Option<T>,
+    ) -> T {
+        let end = Instant::now() + patience;
         loop {
             let event = timeout_at(end, self.events.recv()).await;
             let event = event.unwrap_or_else(|_| panic!("never: {what}: {:#?}", self.robot.status()));
@@ -159,13 +168,17 @@ impl Watched {
 
     /// Opens a round, and waits for a decision of a later round than `before`, of a gesture.
     async fn decide(&mut self, before: u32) -> Decision {
+        self.decide_within(PATIENCE, before).await
+    }
+
+    async fn decide_within(&mut self, patience: Duration, before: u32) -> Decision {
         sleep(MindConfig::default().refractory).await;
         self.robot.open_round();
         let suits = |event: &Event| match event {
             Event::Held(held) if held.round.counter > before && held.class.is_some() => Some(held.clone()),
             _ => None,
         };
-        self.event("decided", suits).await
+        self.event_within(patience, "decided", suits).await
     }
 
     async fn stop(self) {
