@@ -2,15 +2,13 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{
-    ClassId, Envelope, Give, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote,
-};
+use gestalt_protocol::{Envelope, Give, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote};
 use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, agreed, start, unique};
 use gestalt_trust::statement;
 use zenoh::qos::CongestionControl;
 
-use crate::stranger::{enter, key, sealed, with_eve};
+use crate::stranger::{enter, key, sealed, star, with_eve};
 use crate::trouble::counted;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -19,14 +17,7 @@ pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
     let swarm = unique("liar");
     let members = with_eve(&swarm, 5);
     let swarm_id = members.clone().sign(&key(1000)).unwrap().swarm_id();
-    let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
-    let locators = robots[0].robot.locators().to_vec();
-    for id in 1..3 {
-        robots.push(start(sealed(id, &members, &locators), Some(ClassId(4))).await);
-    }
-    for robot in &robots {
-        assert!(robot.sees_alive(2, PATIENCE).await);
-    }
+    let (mut robots, locators) = star(3, |id, connect| sealed(id, &members, connect)).await;
     let keys = Keys::new(&swarm).unwrap();
     let liar = enter(&members, &locators).await;
     let put = async |topic: Topic, bytes: Vec<u8>| {

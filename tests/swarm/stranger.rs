@@ -36,6 +36,19 @@ pub fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig 
     RobotConfig { seal: Some(seal), link: LinkConfig { listen, ..plain.link }, ..plain }
 }
 
+/// So many robots that are shown one gesture, each but the first linked to the first, once all know of all; and where the first is reached.
+pub async fn star(n: u32, config: impl Fn(u32, &[String]) -> RobotConfig) -> (Vec<Watched>, Vec<String>) {
+    let mut robots = vec![start(config(0, &[]), Some(ClassId(4))).await];
+    let locators = robots[0].robot.locators().to_vec();
+    for id in 1..n {
+        robots.push(start(config(id, &locators), Some(ClassId(4))).await);
+    }
+    for robot in &robots {
+        assert!(robot.sees_alive(n as usize - 1, PATIENCE).await);
+    }
+    (robots, locators)
+}
+
 /// The endpoints at which a sealed robot is dialled.
 pub fn by_tls(locators: &[String]) -> Vec<String> {
     locators.iter().filter(|locator| locator.starts_with("tls/")).cloned().collect()

@@ -15,7 +15,7 @@ use tokio::net::TcpStream;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
-use crate::stranger::{by_tls, credentials, key, sealed, with_eve};
+use crate::stranger::{by_tls, credentials, key, sealed, star, with_eve};
 use crate::trouble::{counted, invented};
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -66,14 +66,7 @@ fn standing(robots: &[Watched]) -> Vec<Standing> {
 pub async fn a_stranger_in_any_mode_neither_reads_nor_changes_anything() {
     let swarm = unique("walled");
     let members = with_eve(&swarm, 3);
-    let mut robots = vec![start(walled(0, &members, &[]), Some(ClassId(4))).await];
-    let locators = robots[0].robot.locators().to_vec();
-    for id in 1..3 {
-        robots.push(start(walled(id, &members, &locators), Some(ClassId(4))).await);
-    }
-    for robot in &robots {
-        assert!(robot.sees_alive(2, PATIENCE).await);
-    }
+    let (mut robots, locators) = star(3, |id, connect| walled(id, &members, connect)).await;
     robots[0].robot.open_round();
     agreed(&mut robots, 1, PATIENCE).await;
     // All that is still under way arrives.
@@ -154,14 +147,7 @@ pub async fn clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more() {
     let ada = Instructor { key: key(90).public_key(), roles: Roles::up_to(Role::Teach) };
     members.instructors.insert("ada".parse().unwrap(), ada);
     members.local = Roles::up_to(Role::Open);
-    let mut robots = vec![start(sealed(0, &members, &[]), Some(ClassId(4))).await];
-    let locators = robots[0].robot.locators().to_vec();
-    for id in 1..3 {
-        robots.push(start(sealed(id, &members, &locators), Some(ClassId(4))).await);
-    }
-    for robot in &robots {
-        assert!(robot.sees_alive(2, PATIENCE).await);
-    }
+    let (mut robots, locators) = star(3, |id, connect| sealed(id, &members, connect)).await;
     let (tls, here) = (by_tls(&locators), vec![robots[0].robot.for_clients().unwrap().to_owned()]);
     let ada = client(&swarm, &tls, Some(credentials(&members, "ada", key(90)))).await;
     let eve = client(&swarm, &tls, Some(credentials(&members, "eve", key(666)))).await;
@@ -223,14 +209,7 @@ pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_ba
         mind: patient.clone(),
         ..sealed(id, members, connect)
     };
-    let mut robots = vec![start(robot(0, &members, &[]), Some(ClassId(4))).await];
-    let locators = robots[0].robot.locators().to_vec();
-    for id in 1..4 {
-        robots.push(start(robot(id, &members, &locators), Some(ClassId(4))).await);
-    }
-    for robot in &robots {
-        assert!(robot.sees_alive(3, PATIENCE).await);
-    }
+    let (mut robots, locators) = star(4, |id, connect| robot(id, &members, connect)).await;
     robots[0].robot.open_round();
     let first = voters(&mut robots, 1).await;
     assert!(first.iter().all(|voters| voters.contains(&3)), "{first:?}");
