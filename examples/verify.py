@@ -19,8 +19,10 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 ROLES = ("open", "teach", "overrule")
 VERSION, VOTE, ANNOUNCED = 3, 0, 8
-POOLS = ("log_pool", "confidence_weighted")
-RULES = ("majority", "mean_probability", *POOLS)
+POOLS = ("log_pool", "confidence_weighted", "correlated_pool")
+# In the order of their numbers on the wire; 4 is a rule of somebody's own.
+RULES = ("majority", "mean_probability", "log_pool", "confidence_weighted", None, "correlated_pool")
+PRIOR = {"likeness": 0.5, "temperature": 1.25, "rounds": 0}
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
 
@@ -96,7 +98,12 @@ def maybe(value, write) -> bytes:
 
 
 def the_vote(vote: dict) -> bytes:
-    return name(vote["round"]) + varint(vote["vocabulary"]) + vector(vote["evidence"], "f") + struct.pack("<f", vote["looks"])
+    return name(vote["round"]) + varint(vote["vocabulary"]) + vector(vote["evidence"], "f") + struct.pack("<f", vote["looks"]) \
+        + maybe(vote.get("unknown"), lambda nats: struct.pack("<f", nats))
+
+
+def the_pool(pool: dict) -> bytes:
+    return struct.pack("<2d", pool["likeness"], pool["temperature"]) + varint(pool["rounds"])
 
 
 def statement(held: dict) -> bytes:
@@ -120,7 +127,8 @@ def aloud(said: dict) -> bytes:
     votes, others = certificate["votes"], certificate["others"]
     body = name(said["round"]) + maybe(said["class"], lambda one: bytes([one])) + struct.pack("<d", said["confidence"])
     body += varint(said["author"]) + bytes([said["final"] is True]) + varint(certificate["vocabulary"])
-    body += varint(RULES.index(certificate["rule"])) + vector(certificate["probabilities"], "d")
+    body += varint(RULES.index(certificate["rule"])) + maybe(certificate.get("pool"), the_pool)
+    body += vector(certificate["probabilities"], "d") + maybe(certificate.get("unknown"), lambda p: struct.pack("<d", p))
     body += varint(len(votes)) + b"".join(map(counted, votes)) + varint(len(others)) + b"".join(map(other, others))
     body += varint(certificate["robots"]) + varint(certificate["quorum"]) + varint(certificate["elapsed_ms"])
     body += maybe(said["label"], text)
@@ -136,7 +144,28 @@ def certainty(row: list) -> float:
     return 1 + sum(p * math.log(p) for p in softmax(row) if p > 0) / math.log(len(row))
 
 
-def fuse(rule: str, votes: list, clip: float) -> tuple:
+def rows_of(held: list) -> list:
+    """The evidence of each vote; where any robot can tell what is unknown, that is a class more."""
+    votes = [vote["vote"] for vote in held]
+    if all(vote.get("unknown") is None for vote in votes):
+        return [vote["evidence"] for vote in votes]
+    neutral = [max(vote["evidence"]) if vote.get("unknown") is None else vote["unknown"] for vote in votes]
+    return [vote["evidence"] + [unknown] for vote, unknown in zip(votes, neutral)]
+
+
+def sharpness(pool: dict, voices: float) -> float:
+    """By what the sum of the evidence of so many equal voices is multiplied, for they repeat each other."""
+    return 1 / (pool["temperature"] * (1 + max(voices - 1, 0) * pool["likeness"]))
+
+
+def voices(rows: list) -> float:
+    """How many equal voices there are: Kish's effective number."""
+    strengths = [math.sqrt(sum((value - sum(row) / len(row)) ** 2 for value in row)) for row in rows]
+    squares = sum(strength * strength for strength in strengths)
+    return sum(strengths) ** 2 / squares if squares > 0 else 1.0
+
+
+def fuse(rule: str, votes: list, clip: float, pool: dict) -> tuple:
     """The probability of each class, and what each vote adds to its total."""
     rows = [[min(max(value, -clip), clip) for value in vote] for vote in votes]
     if rule == "majority":
@@ -144,13 +173,15 @@ def fuse(rule: str, votes: list, clip: float) -> tuple:
         parts = [[float(value == max(row)) for value in row] for row in rows if row.count(max(row)) == 1]
         require(bool(parts), "all abstain")
     else:
-        parts = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows,
+        parts = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows, "correlated_pool": rows,
                  "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
     totals = [sum(column) for column in zip(*parts)]
+    if rule == "correlated_pool":
+        totals = [sharpness(pool, voices(rows)) * total for total in totals]
     return softmax(totals) if rule in POOLS else [total / len(parts) for total in totals], parts
 
 
-def least(rule: str, parts: list, top: int, liars: int) -> float:
+def least(rule: str, parts: list, top: int, liars: int, probability: float) -> float:
     """The least probability that a class keeps, whichever so many votes are left out; 0 where another class may lead."""
     def left(values) -> float:
         return sum(sorted(values)[:len(parts) - liars])
@@ -158,19 +189,24 @@ def least(rule: str, parts: list, top: int, liars: int) -> float:
     leads = [left(part[top] - part[rival] for part in parts) for rival in range(len(parts[0])) if rival != top]
     if len(parts) <= liars or min(leads) <= 0:
         return 0.0
+    if rule == "correlated_pool":
+        if liars == 0:
+            return probability
+        leads = [sharpness(PRIOR, len(parts) - liars) * lead for lead in leads]
     if rule in POOLS:
         return 1 / (1 + sum(math.exp(-lead) for lead in leads))
     return left(part[top] for part in parts) / (len(parts) - liars)
 
 
-def decides(rule: str, evidence: list, given: argparse.Namespace, alpha: float) -> bool:
+def decides(rule: str, evidence: list, given: argparse.Namespace, alpha: float, pool: dict, gestures: int) -> bool:
     """Whether votes that are enough make a gesture likely enough."""
     try:
-        probabilities, parts = fuse(rule, evidence, given.clip)
+        probabilities, parts = fuse(rule, evidence, given.clip, pool)
     except Refused:
         return False
     top = probabilities.index(max(probabilities))
-    return least(rule, parts, top, given.liars) - TOLERANCE >= 1 - alpha
+    # What is likeliest unknown is no gesture.
+    return top < gestures and least(rule, parts, top, given.liars, probabilities[top]) - TOLERANCE >= 1 - alpha
 
 
 def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
@@ -197,20 +233,25 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     majority = reached >= (certificate["robots"] + given.liars) // 2 + 1
     enough = given.liars == 0 or len(votes) > 2 * given.liars
     rule = certificate["rule"]
-    alpha = given.alpha or ALPHA.get(rule, 0.5)
-    evidence = [held["vote"]["evidence"] for held in votes]
+    pool, unknown = certificate.get("pool"), certificate.get("unknown")
+    require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
+    require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
+    require(pool is None or 0 <= pool["likeness"] <= 1 and 0.1 <= pool["temperature"] <= 10, "an impossible pool")
+    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), rows_of(votes)
     if decision["class"] is None:
         if majority and enough and votes:
-            require(not decides(rule, evidence, given, alpha), "the votes suffice for a gesture")
+            require(not decides(rule, evidence, given, alpha, pool, classes), "the votes suffice for a gesture")
         return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
     require(majority, "no majority took part")
     require(enough, "too few votes for so many liars")
-    probabilities, parts = fuse(rule, evidence, given.clip)
+    probabilities, parts = fuse(rule, evidence, given.clip, pool)
     of_class = probabilities[decision["class"]]
-    require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, certificate["probabilities"])), "other probabilities")
+    said = certificate["probabilities"] + ([] if unknown is None else [unknown])
+    require(len(said) == len(probabilities), "unknown where no vote tells it, or none where one does")
+    require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, said)), "other probabilities")
     require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
     require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")
-    sure = least(rule, parts, decision["class"], given.liars)
+    sure = least(rule, parts, decision["class"], given.liars, of_class)
     require(sure + TOLERANCE >= 1 - alpha, "the votes do not suffice")
     return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
 

@@ -8,6 +8,7 @@ use crate::bounded;
 use crate::fusion_rule::FusionRule;
 use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::pool::Pool;
 use crate::signature::Signature;
 use crate::vote::{HeldVote, Vote};
 
@@ -23,7 +24,7 @@ pub struct Decision {
     pub round: RoundId,
     /// The gesture; `None` says "no decision": the deadline passed and the votes did not suffice.
     pub class: Option<ClassId>,
-    /// The fused probability of the top class, `0.0..=1.0`.
+    /// The fused probability of the likeliest class, or of "unknown" where that is likelier, `0.0..=1.0`.
     pub confidence: f64,
     /// The robot that drew the conclusion.
     pub author: RobotId,
@@ -42,9 +43,15 @@ pub struct Certificate {
     pub vocabulary: VocabularyId,
     /// How the votes were fused.
     pub rule: FusionRule,
+    /// By which likeness and temperature, where the rule is a correlated pool.
+    #[serde(default)]
+    pub pool: Option<Pool>,
     /// The fused probability of each class.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
     pub probabilities: Vec<f64>,
+    /// The fused probability of a gesture that nobody taught, or of none: with it the probabilities sum to 1. `None` where no robot could tell.
+    #[serde(default)]
+    pub unknown: Option<f64>,
     /// The votes counted, by robot.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<CountedVote>,

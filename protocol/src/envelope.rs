@@ -137,6 +137,12 @@ impl Vote {
         if !self.evidence.iter().all(|e| e.is_finite()) {
             return Err(DecodeError::Impossible("evidence that is not finite"));
         }
+        if !self.unknown.is_none_or(f32::is_finite) {
+            return Err(DecodeError::Impossible("evidence for unknown that is not finite"));
+        }
+        if self.unknown.is_some() && self.evidence.is_empty() {
+            return Err(DecodeError::Impossible("evidence for unknown where nothing was seen"));
+        }
         if !(self.looks.is_finite() && self.looks >= 0.0) {
             return Err(DecodeError::Impossible("a negative or infinite number of looks"));
         }
@@ -150,11 +156,14 @@ impl Decision {
     /// # Errors
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
-        let Certificate { probabilities, votes, others, .. } = &self.certificate;
+        let Certificate { pool, probabilities, unknown, votes, others, .. } = &self.certificate;
         let probability = |p: f64| (0.0..=1.0).contains(&p);
         let known = |class: ClassId| class.index() < probabilities.len();
-        if !(probability(self.confidence) && probabilities.iter().copied().all(probability)) {
+        if !(probability(self.confidence) && probabilities.iter().chain(unknown).copied().all(probability)) {
             return Err(DecodeError::Impossible("a probability outside 0..=1"));
+        }
+        if !pool.is_none_or(|pool| pool.is_sound()) {
+            return Err(DecodeError::Impossible("a pool of an impossible likeness or temperature"));
         }
         if !self.class.is_none_or(known) || !votes.iter().all(|counted| known(counted.class)) {
             return Err(DecodeError::Impossible("a class outside the vocabulary"));

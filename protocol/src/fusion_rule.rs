@@ -21,12 +21,19 @@ pub enum FusionRule {
     ConfidenceWeighted,
     /// A rule of somebody's own, by its name. Who does not have it cannot draw the decision again from its votes.
     Other(RuleName),
+    /// A logarithmic opinion pool that knows how alike its robots are: the sum is divided by how far they repeat each other.
+    CorrelatedPool,
 }
 
 impl FusionRule {
     /// Those that come with Gestalt.
-    pub const ALL: [Self; 4] =
-        [Self::Majority, Self::MeanProbability, Self::LogPool, Self::ConfidenceWeighted];
+    pub const ALL: [Self; 5] = [
+        Self::Majority,
+        Self::MeanProbability,
+        Self::LogPool,
+        Self::ConfidenceWeighted,
+        Self::CorrelatedPool,
+    ];
 
     /// The name it has in a configuration and in a certificate.
     #[must_use]
@@ -37,6 +44,7 @@ impl FusionRule {
             Self::LogPool => "log_pool",
             Self::ConfidenceWeighted => "confidence_weighted",
             Self::Other(name) => name.as_str(),
+            Self::CorrelatedPool => "correlated_pool",
         }
     }
 }

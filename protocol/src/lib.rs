@@ -27,6 +27,8 @@ mod key;
 mod lesson;
 mod limits;
 mod message;
+mod pool;
+mod round_outcome;
 mod sample;
 mod signature;
 mod status;
@@ -49,6 +51,8 @@ pub use key::{Keys, SwarmNameError, Topic};
 pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
 pub use message::{Give, Have, Message};
+pub use pool::Pool;
+pub use round_outcome::{Reason, RoundOutcome};
 pub use sample::{
     Batches, Digest, HeldBatch, Know, Known, Lessons, MAX_BATCH_BYTES, MAX_BATCHES, MAX_COMPONENTS,
     MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,

@@ -21,6 +21,10 @@ pub struct Vote {
     pub evidence: Vec<f32>,
     /// The sum of the frames' weights behind the evidence: the number of independent looks, `0.0..`.
     pub looks: f32,
+    /// The log-evidence for a gesture that the author was never taught, or none at all, on the scale of `evidence` and clipped like it. `None`: the
+    /// author cannot tell, or has seen nothing. A gesture of the list that it was never taught is as likely as this.
+    #[serde(default)]
+    pub unknown: Option<f32>,
 }
 
 /// A vote as its author stamped it, passed on by another robot.

@@ -23,12 +23,16 @@ fn stamp() -> impl Strategy<Value = Stamp> {
 
 fn vote() -> impl Strategy<Value = Vote> {
     let evidence = prop_oneof![Just(vec![]), prop::collection::vec(-1e30f32..1e30, 2..=MAX_CLASSES)];
-    (round(), any::<u32>(), evidence, 0f32..1e6).prop_map(|(round, vocabulary, evidence, looks)| Vote {
-        round,
-        vocabulary: VocabularyId(vocabulary),
-        evidence,
-        looks,
-    })
+    let unknown = prop::option::of(-1e30f32..1e30);
+    (round(), any::<u32>(), evidence, 0f32..1e6, unknown).prop_map(
+        |(round, vocabulary, evidence, looks, unknown)| Vote {
+            round,
+            vocabulary: VocabularyId(vocabulary),
+            unknown: unknown.filter(|_| !evidence.is_empty()),
+            evidence,
+            looks,
+        },
+    )
 }
 
 fn decision() -> impl Strategy<Value = Decision> {
@@ -79,7 +83,9 @@ fn decision() -> impl Strategy<Value = Decision> {
                 certificate: Certificate {
                     vocabulary,
                     rule,
+                    pool: None,
                     probabilities,
+                    unknown: None,
                     votes,
                     others,
                     robots,
@@ -282,7 +288,7 @@ proptest! {
 
 fn vote_of(evidence: Vec<f32>) -> Vote {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0 }
+    Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0, unknown: None }
 }
 
 fn read(message: Message) -> Result<Envelope, DecodeError> {
@@ -312,6 +318,8 @@ fn a_vote_says_only_what_a_robot_can_mean() {
         (vote_of(vec![f32::INFINITY, 0.0]), "not finite"),
         (Vote { looks: -1.0, ..vote_of(vec![]) }, "looks"),
         (Vote { looks: f32::NAN, ..vote_of(vec![]) }, "looks"),
+        (Vote { unknown: Some(f32::NAN), ..vote_of(vec![1.0, -1.0]) }, "unknown"),
+        (Vote { unknown: Some(0.0), ..vote_of(vec![]) }, "nothing was seen"),
     ] {
         let Err(DecodeError::Impossible(why)) = read(Message::Vote(vote.clone())) else { panic!("{vote:?}") };
         assert!(why.contains(what), "{why}");
@@ -448,7 +456,7 @@ fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
 #[test]
 fn a_decision_that_contradicts_itself_is_refused() {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    let vote = |evidence| Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0 };
+    let vote = |evidence| Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0, unknown: None };
     let counted = |robot, class| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp::default(),
@@ -472,7 +480,9 @@ fn a_decision_that_contradicts_itself_is_refused() {
         certificate: Certificate {
             vocabulary: VocabularyId(1),
             rule: FusionRule::LogPool,
+            pool: None,
             probabilities: vec![0.25, 0.75],
+            unknown: None,
             votes: vec![counted(1, 0), counted(2, 1)],
             others: vec![null(3), null(4)],
             robots: 5,
@@ -522,6 +532,7 @@ fn no_message_takes_more_memory_than_promised() {
         vocabulary: VocabularyId(0),
         evidence: vec![],
         looks: 0.0,
+        unknown: None,
     };
     let have = |votes| {
         Message::Have(Have { round: None, decision: None, holders: 0, votes, knowledge: None, answer: false })

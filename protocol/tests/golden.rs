@@ -4,14 +4,20 @@
 use gestalt_protocol::{
     Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
     FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known,
-    Lesson, Lessons, Message, Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
+    Lesson, Lessons, Message, Outcome, Pool, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
     Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
 
 fn vote() -> Vote {
-    Vote { round: ROUND, vocabulary: VocabularyId(0x0102_0304), evidence: vec![1.5, -1.5], looks: 2.0 }
+    Vote {
+        round: ROUND,
+        vocabulary: VocabularyId(0x0102_0304),
+        evidence: vec![1.5, -1.5],
+        looks: 2.0,
+        unknown: None,
+    }
 }
 
 fn decision() -> Decision {
@@ -24,7 +30,9 @@ fn decision() -> Decision {
         certificate: Certificate {
             vocabulary: VocabularyId(0x0102_0304),
             rule: FusionRule::LogPool,
+            pool: None,
             probabilities: vec![0.25, 0.75],
+            unknown: None,
             votes: vec![CountedVote {
                 robot: RobotId(7),
                 stamp: Stamp { boot: 1, sequence: 9 },
@@ -73,10 +81,15 @@ const DIGEST: &str = "c300000000000000 2c01000000000000 0100000000000000";
 
 #[test]
 fn a_vote() {
-    // round, vocabulary (varint), two f32 in little-endian order, looks
+    // round, vocabulary (varint), two f32 in little-endian order, looks, nothing of unknown
     travels_as(
         Message::Vote(vote()),
-        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040"),
+        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00"),
+    );
+    // Five bytes for what is unknown.
+    travels_as(
+        Message::Vote(Vote { unknown: Some(-3.0), ..vote() }),
+        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 01 000040c0"),
     );
 }
 
@@ -93,7 +106,7 @@ fn a_signed_vote() {
 #[test]
 fn a_null_vote() {
     let null = Vote { evidence: vec![], looks: 0.0, ..vote() };
-    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000"));
+    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000 00"));
 }
 
 #[test]
@@ -121,10 +134,11 @@ fn what_a_robot_has() {
 fn what_a_robot_gives() {
     let held =
         HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote(), signature: None };
-    // The decision; its certificate: vocabulary, rule, probabilities, one vote as it was said, unsigned, no others, n, q, time.
-    let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
-    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00";
+    // The decision; its certificate: vocabulary, rule, no pool, probabilities, nothing of
+    // unknown, one vote as it was said, unsigned, no others, n, q, time.
+    let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 03 02 e209";
+    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00";
     // One word on what a robot holds: robot, boot, sequence, the word as it was said, unsigned.
     let (stamp, holding) = (Stamp { boot: 2, sequence: 6 }, decision().holding(true));
     let holder = Holder { robot: RobotId(3), stamp, holding, signature: None };
@@ -147,8 +161,8 @@ fn what_a_robot_holds() {
 fn what_an_announcer_signs() {
     let announcement = announcement();
     // The decision as it is given, but here it is final; some label.
-    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 02 000000000000d03f 000000000000e83f \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 03 02 e209";
+    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 03 02 e209";
     let envelope = Envelope::from(announcement.clone());
     let expected = format!("{HEAD} 08 {decided} 01 04 70616c6d");
     assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));
@@ -244,11 +258,26 @@ fn what_instructors_said() {
     );
 }
 
+fn json_of_before(decision: &Decision) -> String {
+    let json = serde_json::to_string(decision).unwrap();
+    json.replace(r#""pool":null,"#, "").replace(r#""unknown":null,"#, "").replace(r#","unknown":null"#, "")
+}
+
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","probabilities":[0.25,0.75],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","pool":null,"probabilities":[0.25,0.75],"unknown":null,"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0,"unknown":null},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
+    // One recorded before robots could tell what is unknown.
+    let before = json_of_before(&decision());
+    assert_eq!(decode_json::<Decision>(before.as_bytes()), Ok(decision()));
+    let pool =
+        Certificate { pool: Some(Pool::PRIOR), rule: FusionRule::CorrelatedPool, ..decision().certificate };
+    assert!(
+        serde_json::to_string(&pool)
+            .unwrap()
+            .contains(r#""rule":"correlated_pool","pool":{"likeness":0.5,"temperature":1.25,"rounds":0}"#)
+    );
     let more = r#","label":"palm","announcer":7,"stamp":{"boot":1,"sequence":130},"signature":null}"#;
     let json = format!("{}{more}", json.strip_suffix('}').unwrap());
     assert_eq!(serde_json::to_string(&announcement()).unwrap(), json);

@@ -126,7 +126,8 @@ pub async fn a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise() 
     }
     assert_eq!((&ledger["received"], &ledger["unattached_ms"]), (&ledger["written"], &Value::from(0)));
 
-    let mut words = vec!["--rule", "majority,mean_probability,log_pool,confidence_weighted", "--quorum"];
+    let mut words =
+        vec!["--rule", "majority,mean_probability,log_pool,confidence_weighted,correlated_pool", "--quorum"];
     let quorums = QUORUMS.join(",");
     words.push(&quorums);
     let began = Instant::now();
@@ -159,7 +160,7 @@ pub async fn a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise() 
             compared += 1;
         }
     }
-    assert_eq!(compared as u64, 12 * rounds, "all rules and quorums, all rounds");
+    assert_eq!(compared as u64, 15 * rounds, "all rules and quorums, all rounds");
 
     // What robots say that they said is what was heard.
     let counts = recount["counts"].as_object().unwrap();

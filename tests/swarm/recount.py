@@ -8,7 +8,8 @@ import math
 import struct
 import sys
 
-CLIP, RULES = 6.0, ("majority", "mean_probability", "log_pool", "confidence_weighted")
+CLIP, RULES = 6.0, ("majority", "mean_probability", "log_pool", "confidence_weighted", "correlated_pool")
+PRIOR = {"likeness": 0.5, "temperature": 1.25}
 
 
 def records(data):
@@ -53,6 +54,9 @@ def softmax(row):
 
 def decide(rule, quorum, certificate):
     votes = [vote["vote"]["evidence"] for vote in certificate["votes"]]
+    gestures, unknown = len(certificate["probabilities"]), [vote["vote"].get("unknown") for vote in certificate["votes"]]
+    if any(value is not None for value in unknown):
+        votes = [vote + [max(vote) if value is None else value] for vote, value in zip(votes, unknown)]
     reached = len(votes) + len(certificate["others"])
     needed, counted = (certificate["robots"] // 2 + 1, reached) if quorum == "majority" else (int(quorum), len(votes))
     if not votes or counted < needed:
@@ -75,11 +79,17 @@ def decide(rule, quorum, certificate):
     if not parts:
         return None
     totals = [sum(part[k] for part in parts) for k in range(classes)]
+    if rule == "correlated_pool":
+        pool = certificate.get("pool") or PRIOR
+        means = [sum(row) / classes for row in rows]
+        lengths = [math.sqrt(sum((value - mean) ** 2 for value in row)) for row, mean in zip(rows, means)]
+        voices = sum(lengths) ** 2 / sum(length**2 for length in lengths) if any(lengths) else 1
+        totals = [total / (pool["temperature"] * (1 + (voices - 1) * pool["likeness"])) for total in totals]
     shares = rule in ("majority", "mean_probability")
     p = [value / len(parts) for value in totals] if shares else softmax(totals)
     top = p.index(max(p))
     leads = totals[top] > max(value for k, value in enumerate(totals) if k != top)
-    return top if leads and p[top] >= (0.5 if shares else 0.95) else None
+    return top if leads and top < gestures and p[top] >= (0.5 if shares else 0.95) else None
 
 
 def check(path):

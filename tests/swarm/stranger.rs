@@ -113,7 +113,13 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     };
     let vote = |counter: u32, robot: u32| {
         let round = RoundId { counter, opener: RobotId(0), life: 9 };
-        let vote = Vote { round, vocabulary, evidence: vec![-1.0, 5.0, -1.0, -1.0, -1.0, -1.0], looks: 16.0 };
+        let vote = Vote {
+            round,
+            vocabulary,
+            evidence: vec![-1.0, 5.0, -1.0, -1.0, -1.0, -1.0],
+            looks: 16.0,
+            unknown: None,
+        };
         let (author, stamp) = (RobotId(robot), Stamp { boot: u32::MAX, sequence: counter });
         Envelope { author, stamp, message: Message::Vote(vote), signature: None }
     };

@@ -3,7 +3,7 @@
 //! ```json
 //! {"author": 7, "stamp": {"boot": 1, "sequence": 130}, "signature": null,
 //!  "message": {"kind": "vote", "body": {"round": {"counter": 1, "opener": 2, "life": 161}, "vocabulary": 1890817326,
-//!                                       "evidence": [1.5, -1.5], "looks": 2.0}}}
+//!                                       "evidence": [1.5, -1.5], "looks": 2.0, "unknown": null}}}
 //! ```
 //!
 //! Kinds are `vote`, `have`, `give`, `samples`, `know`, `lessons`, `batches`, `holding` and `announced`, with the fields of the types of that name in

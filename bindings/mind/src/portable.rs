@@ -10,7 +10,7 @@ use gestalt_protocol::{
 };
 use gestalt_strategies::{
     Classifier, Classify, ClassifyError, Input, Instructed, LearnError, Learner, LearningSetup, Mind,
-    Observation, Output, OwnRules, TrainingChange, Vocabulary,
+    Observation, Output, OwnRules, TrainingChange, Vocabulary, outcome,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -393,6 +393,8 @@ impl PortableMind {
         let decision = self.mind.held()?;
         let mut value = json!(decision);
         value["label"] = json!(self.mind.label_of(decision));
+        let (came_to, reason) = outcome(decision, self.mind.config());
+        (value["outcome"], value["reason"]) = (json!(came_to), json!(reason));
         Some(value.to_string())
     }
 

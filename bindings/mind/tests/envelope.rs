@@ -37,7 +37,7 @@ fn comes_back(bytes: &[u8]) -> String {
 fn a_golden_vote_is_spelt_as_documented() {
     // As in protocol/tests/golden.rs.
     let head = [3, 7, 1, 0x82, 1, 0, 0xac, 2, 2, 0xa1, 1, 0x84, 0x86, 0x88, 8, 2];
-    let bytes = [&head[..], &[0, 0, 0xc0, 0x3f, 0, 0, 0xc0, 0xbf, 0, 0, 0, 0x40]].concat();
+    let bytes = [&head[..], &[0, 0, 0xc0, 0x3f, 0, 0, 0xc0, 0xbf, 0, 0, 0, 0x40, 0]].concat();
     let json = comes_back(&bytes);
     let start = r#"{"author":7,"stamp":{"boot":1,"sequence":130},"signature":null,"message":{"kind":"vote","body":{"round":{"counter":300"#;
     assert!(json.starts_with(start), "{json}");
@@ -73,7 +73,8 @@ fn lessons_and_signed_votes_come_back_byte_for_byte() {
         word: Word::Was(ClassId(3)),
     };
     comes_back(&envelope(Message::Lessons(Lessons { lessons: vec![lesson] })));
-    let vote = Vote { round: ROUND, vocabulary: VocabularyId(1), evidence: vec![], looks: 0.0 };
+    let vote =
+        Vote { round: ROUND, vocabulary: VocabularyId(1), evidence: vec![], looks: 0.0, unknown: None };
     let signature = Some(Signature::from_bytes([0xA5; 64]));
     comes_back(
         &Envelope { author: RobotId(7), stamp: STAMP, message: Message::Vote(vote), signature }.encode(),
@@ -102,7 +103,7 @@ proptest! {
     fn every_finite_float_survives_the_way_through_text(bits in prop::collection::vec(any::<u32>(), 2..64), looks in 0.0..1e9_f32) {
         let evidence: Vec<f32> = bits.into_iter().map(f32::from_bits).filter(|x| x.is_finite()).collect();
         prop_assume!(evidence.len() != 1);
-        let vote = Vote { round: ROUND, vocabulary: VocabularyId(1), evidence, looks };
+        let vote = Vote { round: ROUND, vocabulary: VocabularyId(1), evidence, looks, unknown: None };
         comes_back(&envelope(Message::Vote(vote)));
     }
 

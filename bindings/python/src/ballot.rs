@@ -76,7 +76,7 @@ impl Ballot {
             )));
         }
         let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
-        let vote = Vote { round, vocabulary: self.vocabulary.id(), evidence, looks };
+        let vote = Vote { round, vocabulary: self.vocabulary.id(), evidence, looks, unknown: None };
         vote.check().map_err(data)?;
         let (boot, sequence) = stamp;
         let stamp = Stamp { boot, sequence };

@@ -93,12 +93,13 @@ function showDecision() {
     $("shares").replaceChildren();
     return;
   }
-  const label = it.label ?? "undecided";
+  const label = it.label ?? it.outcome;
   text("gesture", label);
   $("gesture").classList.toggle("long", [...label].length > 12);
   const sure = it.label === null ? "" : `${percent(it.confidence)} sure · ${it.final ? "final" : "not final yet"} · `;
   const there = state.swarm ? state.swarm.robots.length : it.robots;
-  text("facts", `${sure}held by ${it.held} of ${there} · round ${it.round.counter}, ${it.elapsed_ms} ms`);
+  const why = it.label === null && it.why ? `${it.why} · ` : "";
+  text("facts", `${sure}${why}held by ${it.held} of ${there} · round ${it.round.counter}, ${it.elapsed_ms} ms`);
   const against = it.votes.filter((vote) => !vote.agrees);
   const dissent = it.label === null ? "" : against.length === 0 ? ", all agree" : `, ${against.length} for something else`;
   text("quorum", `${it.reached} of ${counted(it.robots, "robot")} took part, ${it.quorum} needed · ` +
@@ -274,7 +275,7 @@ function showRounds() {
     put(cell.children[0], it.label ?? "–");
     put(cell.children[1], MARKS[it.verdict]);
     const verdict = { right: "right", wrong: it.truth ? `wrong, it was ${it.truth}` : "wrong", unknown: "not judged" }[it.verdict];
-    cell.title = `round ${it.round.counter}: ${it.label ?? "undecided"}, ${percent(it.confidence)}, ${verdict}`;
+    cell.title = `round ${it.round.counter}: ${it.label ?? it.outcome ?? "undecided"}, ${percent(it.confidence)}, ${verdict}`;
   });
   showCurve(curve.slice(-120));
   const told = { was: (it) => `it was ${it.gesture}`, right: () => "right", wrong: () => "wrong", retract: () => "took it back" };

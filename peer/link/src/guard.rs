@@ -49,6 +49,10 @@ impl Classify for Guarded {
         self.ask(|classifier| classifier.probabilities_in_space(coordinates))?
     }
 
+    fn unknown(&self, features: &[f32]) -> Option<f64> {
+        self.ask(|classifier| classifier.unknown(features))?
+    }
+
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
         self.ask(|classifier| classifier.view(features))?
     }

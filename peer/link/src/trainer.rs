@@ -21,8 +21,8 @@ const MAX_RETRY: Duration = Duration::from_secs(30);
 /// until the training under way is over; what still waits is not trained.
 pub(super) struct Trainer(Worker<Samples>);
 
-/// What a sample shows, and where it lies.
-type Sample = (ClassId, Arc<[f32]>);
+/// What a sample shows, where it lies, and of which showing it is.
+type Sample = (ClassId, Arc<[f32]>, u64);
 
 /// All samples there are to train on, so that training can begin anew; and those that changed since the last time.
 #[derive(Default)]
@@ -36,8 +36,8 @@ struct Samples {
 impl Samples {
     fn apply(&mut self, change: TrainingChange) {
         let key = match change {
-            TrainingChange::Insert { key, class, vector } => {
-                self.all.insert(key, (class, vector));
+            TrainingChange::Insert { key, class, vector, showing } => {
+                self.all.insert(key, (class, vector, showing));
                 key
             }
             TrainingChange::Remove(key) => {
@@ -151,9 +151,9 @@ fn train_all(
 fn follow(learner: &mut Learner, key: u64, sample: Option<&Sample>) -> Result<(), LearnError> {
     match sample {
         // A sample that only changed its class keeps its place, which spares its row of the kernel.
-        Some((class, vector)) => {
+        Some((class, vector, showing)) => {
             learner.relabel(key, *class)?;
-            learner.insert(key, *class, vector)
+            learner.insert_shown(key, *class, vector, *showing)
         }
         None => {
             learner.remove(key);

@@ -16,7 +16,7 @@ fn one_of<T: DeserializeOwned + Clone + Send + Sync + 'static>(
 
 /// `--rule`.
 pub(super) fn rule() -> impl TypedValueParser<Value = FusionRule> {
-    one_of(&["log_pool", "majority", "mean_probability", "confidence_weighted"])
+    one_of(&["log_pool", "majority", "mean_probability", "confidence_weighted", "correlated_pool"])
 }
 
 /// `--learn`.

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use gestalt_protocol::{
-    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, RobotId, RoundId, Status,
+    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, Reason, RobotId, RoundId,
+    RoundOutcome, Status,
 };
-use gestalt_strategies::Vocabulary;
+use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde_json::Value;
 
 use super::Failure;
@@ -84,10 +85,15 @@ pub(super) fn quoted(label: &str) -> String {
 /// A decision with its certificate in short: `round 18 (opened by robot 1) → "2", p = 1.000 · 8 votes in 252 ms, log-pool · by
 /// robot 1:"1" 2:"2" 3:"2"`.
 pub(super) fn decision(decision: &Decision, label: Option<&str>, names: &Names) -> String {
+    in_words(decision, label, None, names)
+}
+
+fn in_words(decision: &Decision, label: Option<&str>, why: Option<String>, names: &Names) -> String {
     let Decision { round, class, confidence, certificate, .. } = decision;
     let what = match (class, label) {
         (Some(_), Some(label)) => format!("{}, p = {confidence:.3}", quoted(label)),
         (Some(class), None) => format!("{}, p = {confidence:.3}", names.gesture(*class, certificate)),
+        (None, _) if why.is_some() => why.unwrap_or_default(),
         (None, _) if certificate.reached() < certificate.quorum as usize => format!(
             "undecided: {} of {} took part, {} needed",
             certificate.reached(),
@@ -122,7 +128,33 @@ pub(super) fn decision(decision: &Decision, label: Option<&str>, names: &Names) 
 
 /// The same of a decision as it was announced.
 pub(super) fn announced(announcement: &Announcement, names: &Names) -> String {
-    decision(&announcement.decision, announcement.label.as_deref(), names)
+    let Announcement { decision, label, .. } = announcement;
+    let config = MindConfig { rule: decision.certificate.rule, ..MindConfig::default() };
+    let (came_to, reason) = outcome(decision, &config);
+    let why = decision.class.is_none().then(|| because(came_to, &reason, decision, names));
+    in_words(decision, label.as_deref(), why, names)
+}
+
+/// What a round without a gesture came to, and why: `unknown: nearest is "fist", and less likely by 2.3 nats`.
+fn because(outcome: RoundOutcome, reason: &Reason, decision: &Decision, names: &Names) -> String {
+    let certificate = &decision.certificate;
+    let name = |class: ClassId| names.gesture(class, certificate);
+    let why = match *reason {
+        Reason::Sure => return outcome.name().to_owned(),
+        Reason::FarFromAll { nearest, nats } => {
+            format!("nearest is {}, and less likely by {nats:.1} nats", name(nearest))
+        }
+        Reason::NothingSeen => "no robot saw a hand".to_owned(),
+        Reason::TooFewRobots { counted: number, needed } => format!(
+            "{number} of {} took part, {needed} needed",
+            counted(certificate.robots as usize, "robot")
+        ),
+        Reason::Disagreement { between: [a, b], robots: [for_a, for_b] } => {
+            format!("{for_a} for {}, {for_b} for {}", name(a), name(b))
+        }
+        Reason::Unsure { nearest, probability } => format!("{} with p = {probability:.3}", name(nearest)),
+    };
+    format!("{}: {why}", outcome.name())
 }
 
 /// `round 18 (opened by robot 1)`.
@@ -172,7 +204,7 @@ mod tests {
             stamp: Stamp { boot: 1, sequence: 1 },
             class: ClassId(class),
             weight: 1.0,
-            vote: Vote { round, vocabulary, evidence: Vec::new(), looks: 1.0 },
+            vote: Vote { round, vocabulary, evidence: Vec::new(), looks: 1.0, unknown: None },
             signature: None,
         };
         Decision {
@@ -184,7 +216,9 @@ mod tests {
             certificate: Certificate {
                 vocabulary,
                 rule: FusionRule::LogPool,
+                pool: None,
                 probabilities: Vec::new(),
+                unknown: None,
                 votes: votes.iter().map(vote).collect(),
                 others: Vec::new(),
                 robots: 3,

@@ -70,12 +70,7 @@ mod tests {
         let names = |of: &[Value]| of.iter().map(|it| it.as_str().unwrap().to_owned()).collect::<Vec<_>>();
         let fields = |of: Value| of.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
         let some = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
-        let rules = [
-            FusionRule::LogPool,
-            FusionRule::Majority,
-            FusionRule::MeanProbability,
-            FusionRule::ConfidenceWeighted,
-        ];
+        let rules = FusionRule::ALL;
         for (key, choices) in [
             (
                 "camera.source",

@@ -97,7 +97,9 @@ mod tests {
             certificate: Certificate {
                 vocabulary: VocabularyId(0),
                 rule: FusionRule::LogPool,
+                pool: None,
                 probabilities: Vec::new(),
+                unknown: None,
                 votes: Vec::new(),
                 others: Vec::new(),
                 robots: 1,

@@ -1,6 +1,6 @@
 //! Counts votes as a robot does when it concludes.
 
-use gestalt_protocol::{Certificate, ClassId, CountedVote, HeldVote};
+use gestalt_protocol::{Certificate, ClassId, CountedVote, HeldVote, Pool};
 use gestalt_rounds::fusion::Fusion;
 use gestalt_rounds::{Ballot, Fuse, RoundsConfig, Scale};
 
@@ -16,15 +16,23 @@ pub(crate) struct Count {
 }
 
 /// Counts the votes that are on that scale, of so many robots, by that configuration.
-pub(crate) fn count(ballot: &Ballot, scale: Option<Scale>, robots: u32, config: &RoundsConfig) -> Count {
+/// A correlated pool knows of its robots what `pool` says.
+pub(crate) fn count(
+    ballot: &Ballot,
+    scale: Option<Scale>,
+    robots: u32,
+    config: &RoundsConfig,
+    pool: Option<Pool>,
+) -> Count {
     let Some(scale) = scale else { return Count::default() };
-    let (rule, clip) = (&config.rule, config.clip);
+    let fitted = pool.and_then(|pool| config.rule.with(pool));
+    let (rule, clip) = (fitted.as_deref().unwrap_or(&config.rule), config.clip);
     let Some(fusion) = ballot.fuse(rule, clip, scale) else { return Count::default() };
     let counted = ballot.counted(rule, clip, scale);
-    let rows: Vec<&[f32]> = counted.iter().map(|counted| counted.vote.evidence.as_slice()).collect();
     let decides = config.suffice(ballot.len(), counted.len(), robots)
-        && config.convinces(rule.withstands(clip, &rows, &fusion, config.liars));
-    let class = decides.then_some(fusion.top);
+        && config.convinces(ballot.withstands(rule, config, scale, &fusion));
+    let known = fusion.top.index() < scale.classes;
+    let class = (decides && known).then_some(fusion.top);
     Count { fusion: Some(fusion), counted, class }
 }
 

@@ -71,10 +71,18 @@ impl Proof {
         let config = RoundsConfig { rule: certificate.rule, ..config.clone() };
         let same = Same(decision.round);
         same.check("the quorum", CONFIGURED, certificate.quorum, config.needs(certificate.robots))?;
-        let drawn = count(&ballot(votes(certificate)), scale(certificate), certificate.robots, &config);
+        let drawn = count(
+            &ballot(votes(certificate)),
+            scale(certificate),
+            certificate.robots,
+            &config,
+            certificate.pool,
+        );
         let probabilities = drawn.fusion.as_ref().map_or(&[][..], |fusion| &fusion.probabilities);
-        same.check("the number of probabilities", "", certificate.probabilities.len(), probabilities.len())?;
-        for (class, (recorded, drawn)) in certificate.probabilities.iter().zip(probabilities).enumerate() {
+        let recorded: Vec<f64> =
+            certificate.probabilities.iter().chain(&certificate.unknown).copied().collect();
+        same.check("the number of probabilities", "", recorded.len(), probabilities.len())?;
+        for (class, (recorded, drawn)) in recorded.iter().zip(probabilities).enumerate() {
             same.bits(&format!("the probability of class {class}"), *recorded, *drawn)?;
         }
         let confidence = drawn.fusion.as_ref().map_or(0.0, |fusion| fusion.probabilities[fusion.top.index()]);

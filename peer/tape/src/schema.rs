@@ -157,6 +157,10 @@ fn vote() -> Value {
             must("vocabulary", count("Which list of gestures; 0: it can tell none.")),
             must("evidence", evidence()),
             must("looks", number("How many independent looks are behind it.")),
+            may(
+                "unknown",
+                number("Nats for a gesture that the robot was never taught, on the scale of the evidence."),
+            ),
         ],
     )
 }
@@ -178,10 +182,17 @@ fn decision() -> Vec<Field> {
         must("vote", vote()),
         may("signature", signature()),
     ];
+    let pool = vec![
+        must("likeness", probability("How alike the evidence of two robots is.")),
+        must("temperature", number("By how much one robot overstates its evidence.")),
+        must("rounds", count("On how many confirmed rounds these rest.")),
+    ];
     let certificate = vec![
         must("vocabulary", count("The list of gestures that the probabilities stand for.")),
         must("rule", text("The fusion rule.")),
+        may("pool", object("How alike a correlated pool takes its robots to be.", pool)),
         must("probabilities", list("The fused probability of each class.", probability("Of one class."))),
+        may("unknown", probability("The fused probability of a gesture that nobody taught.")),
         must("votes", list("The votes counted, by robot.", object("One of them.", counted))),
         must("others", list("Votes of those who took part and are not counted.", object("One.", vote_of()))),
         must("robots", count("n: how many robots its author had heard lately.")),

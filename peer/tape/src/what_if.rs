@@ -62,7 +62,8 @@ impl WhatIf {
             }
         };
         let scale = scale(certificate).or_else(|| ballot.prevailing_scale());
-        Some(count(&ballot, scale, robots, config).class)
+        let pool = certificate.pool.filter(|_| config.rule == certificate.rule);
+        Some(count(&ballot, scale, robots, config, pool).class)
     }
 }
 

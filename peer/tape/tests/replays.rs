@@ -12,6 +12,11 @@ use gestalt_tape::{Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, pro
 use made::{BEGIN, SECOND, decisions, json, keys, round, run, said};
 use proptest::prelude::*;
 
+/// The rule by which the rounds here were made: what it takes to decide is plain to see.
+fn log_pool() -> RoundsConfig {
+    RoundsConfig { rule: FusionRule::LogPool, ..RoundsConfig::default() }
+}
+
 /// These, recorded and read again.
 fn replayed(passed: &[Passing]) -> Run {
     let mut writer = TapeWriter::new(Vec::new(), BTreeMap::new()).unwrap();
@@ -29,7 +34,7 @@ fn every_decision_is_drawn_again_bit_for_bit() {
     let run = replayed(&run());
     assert_eq!((run.showings.len(), run.strange), (3, 0));
     assert_eq!(run.robots().len(), 4);
-    let proof = prove(&run.showings, &RoundsConfig::default());
+    let proof = prove(&run.showings, &log_pool());
     assert_eq!((proof.reproduced, proof.differences), (3, vec![]));
     assert!(proof.heard >= 10 && proof.unheard == 0, "{} votes", proof.heard);
     let classes: Vec<_> = run.showings.iter().map(|showing| showing.decision().unwrap().class).collect();
@@ -58,7 +63,7 @@ fn the_first_difference_is_named() {
         change(&mut announced);
         let mut passed = passed.clone();
         passed[at].payload = json(&announced);
-        let proof = prove(&replayed(&passed).showings, &RoundsConfig::default());
+        let proof = prove(&replayed(&passed).showings, &log_pool());
         assert_eq!((proof.reproduced, proof.differences.len()), (2, 1), "{named}: {:?}", proof.differences);
         let words = proof.differences[0].to_string();
         assert!(words.contains(named) && words.contains("round 1@"), "{words}");
@@ -68,7 +73,7 @@ fn the_first_difference_is_named() {
 #[test]
 fn votes_that_passed_the_recorder_by_are_counted_and_take_nothing_from_the_proof() {
     let only: Vec<Passing> = run().into_iter().filter(|passing| passing.topic == Topic::Decision).collect();
-    let proof = prove(&replayed(&only).showings, &RoundsConfig::default());
+    let proof = prove(&replayed(&only).showings, &log_pool());
     assert_eq!((proof.reproduced, proof.heard), (3, 0));
     assert!(proof.unheard >= 10);
 }
@@ -76,7 +81,7 @@ fn votes_that_passed_the_recorder_by_are_counted_and_take_nothing_from_the_proof
 #[test]
 fn another_configuration_than_the_swarms_is_suspected_by_name() {
     let run = replayed(&run());
-    let config = RoundsConfig { quorum: Quorum::Evidence(2), ..RoundsConfig::default() };
+    let config = RoundsConfig { quorum: Quorum::Evidence(2), ..log_pool() };
     let words = prove(&run.showings, &config).differences[0].to_string();
     assert!(words.contains("the quorum is 3") && words.contains("--config"), "{words}");
     assert_eq!(run.quorum(), Some(Quorum::Majority), "the certificates say it");
@@ -85,7 +90,7 @@ fn another_configuration_than_the_swarms_is_suspected_by_name() {
 #[test]
 fn as_it_was_it_ends_as_it_did() {
     let run = replayed(&run());
-    let config = RoundsConfig::default();
+    let config = log_pool();
     let outcomes = outcomes(&run, &WhatIf::default(), &config);
     assert!(outcomes.iter().all(|outcome| outcome.would == outcome.happened), "{outcomes:?}");
     let score = Score::of(&outcomes);
@@ -99,7 +104,7 @@ fn as_it_was_it_ends_as_it_did() {
 #[test]
 fn each_question_changes_what_it_asks_about_and_nothing_else() {
     let run = replayed(&run());
-    let was = RoundsConfig::default();
+    let was = log_pool();
     let would = |what: WhatIf| -> Vec<Option<u8>> {
         let config = what.config(&was).unwrap();
         outcomes(&run, &what, &config).iter().map(|it| it.would.map(|class| class.0)).collect()
@@ -154,7 +159,7 @@ fn the_last_word_of_each_person_counts_and_contradiction_is_no_truth() {
 
 #[test]
 fn a_count_that_begins_anew_is_another_showing() {
-    let config = RoundsConfig::default();
+    let config = log_pool();
     let sees = [Some([0.1, 0.2, 0.7]); 3];
     let later = 3600 * SECOND;
     let mut passed = round(&config, &sees, BEGIN);
@@ -175,7 +180,7 @@ proptest! {
         sees in prop::collection::vec(prop::option::weighted(0.8, [0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0]), 1..7),
         rule in 0..4usize, liars in 0..2u32, alpha in prop::option::of(0.01f64..0.49),
     ) {
-        let config = RoundsConfig { rule: FusionRule::ALL[rule], liars, alpha, ..RoundsConfig::default() };
+        let config = RoundsConfig { rule: FusionRule::ALL[rule], liars, alpha, ..log_pool() };
         let normed = |values: [f32; 3]| values.map(|value| value / values.iter().sum::<f32>());
         let sees: Vec<_> = sees.into_iter().map(|seen| seen.map(normed)).collect();
         let run = replayed(&round(&config, &sees, BEGIN));

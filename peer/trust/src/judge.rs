@@ -284,7 +284,9 @@ mod tests {
             certificate: gestalt_protocol::Certificate {
                 vocabulary: gestalt_protocol::VocabularyId(9),
                 rule: gestalt_protocol::FusionRule::LogPool,
+                pool: None,
                 probabilities: vec![],
+                unknown: None,
                 votes: vec![],
                 others: vec![],
                 robots: 1,
@@ -325,6 +327,7 @@ mod tests {
                 vocabulary: gestalt_protocol::VocabularyId(9),
                 evidence: vec![],
                 looks: 0.0,
+                unknown: None,
             },
             signature: None,
         };

@@ -33,7 +33,11 @@ pub(crate) fn roster(epoch: u64) -> Roster {
 pub(crate) fn vote(author: u32, sequence: u32, evidence: f32) -> Vec<u8> {
     let round = RoundId { counter: 1, opener: RobotId(0), life: 7 };
     let evidence = vec![evidence, -evidence];
-    said(author, sequence, Message::Vote(Vote { round, vocabulary: VocabularyId(9), evidence, looks: 1.0 }))
+    said(
+        author,
+        sequence,
+        Message::Vote(Vote { round, vocabulary: VocabularyId(9), evidence, looks: 1.0, unknown: None }),
+    )
 }
 
 /// Another kind of message of that robot.

@@ -197,7 +197,13 @@ mod tests {
             stamp: Stamp::default(),
             class: ClassId(0),
             weight: 1.0,
-            vote: Vote { round, vocabulary: VocabularyId(0), evidence: vec![0.0; 4], looks: 1.0 },
+            vote: Vote {
+                round,
+                vocabulary: VocabularyId(0),
+                evidence: vec![0.0; 4],
+                looks: 1.0,
+                unknown: None,
+            },
             signature: None,
         };
         Decision {
@@ -209,7 +215,9 @@ mod tests {
             certificate: Certificate {
                 vocabulary: VocabularyId(0),
                 rule: FusionRule::LogPool,
+                pool: None,
                 probabilities: vec![0.5; 4],
+                unknown: None,
                 votes: (0..robots).map(vote).collect(),
                 others: Vec::new(),
                 robots,

@@ -8,6 +8,7 @@ use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, Vocabu
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 use crate::fusion::{self, Fusion};
+use crate::rows::Rows;
 
 /// What became of a vote put into a [`Ballot`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,22 +123,18 @@ impl Ballot {
         self.on(scale).count()
     }
 
-    /// All evidence on that scale as one distribution; `None` when there is none, or the rule makes none of it.
+    /// All evidence on that scale as one distribution, with "unknown" as a last class where any of the robots can tell; `None` when there is
+    /// none, or the rule makes none of it.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
-        rule.fuse(clip, scale.classes, &self.rows(scale)).filter(|fusion| fusion.is_sound(scale.classes))
+        let rows = self.rows(scale);
+        rule.fuse(clip, rows.classes, &rows.as_slices()).filter(|fusion| fusion.is_sound(rows.classes))
     }
 
     /// How likely the top class of a fusion of this ballot is if as many of the robots lied as are expected.
     #[must_use]
-    pub(crate) fn withstands(
-        &self,
-        rule: &dyn Fuse,
-        config: &RoundsConfig,
-        scale: Scale,
-        fusion: &Fusion,
-    ) -> f64 {
-        rule.withstands(config.clip, &self.rows(scale), fusion, config.liars)
+    pub fn withstands(&self, rule: &dyn Fuse, config: &RoundsConfig, scale: Scale, fusion: &Fusion) -> f64 {
+        rule.withstands(config.clip, &self.rows(scale).as_slices(), fusion, config.liars)
     }
 
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
@@ -167,14 +164,15 @@ impl Ballot {
     #[must_use]
     pub(crate) fn confirms(&self, robot: RobotId, stamp: Stamp, vote: &Vote) -> Option<bool> {
         let held = self.votes.get(&robot).filter(|held| held.stamp == stamp)?;
-        Some(held.vote.vocabulary == vote.vocabulary && held.vote.evidence == vote.evidence)
+        let same = held.vote.vocabulary == vote.vocabulary && held.vote.evidence == vote.evidence;
+        Some(same && held.vote.unknown == vote.unknown)
     }
 
-    fn rows(&self, scale: Scale) -> Vec<&[f32]> {
-        self.on(scale).map(|held| held.vote.evidence.as_slice()).collect()
+    fn rows(&self, scale: Scale) -> Rows {
+        Rows::of(scale.classes, self.on(scale).map(|held| &held.vote))
     }
 
-    fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> {
+    fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {
         self.votes.values().filter(move |held| scale.is_of(&held.vote))
     }
 }
@@ -195,6 +193,7 @@ mod tests {
             vocabulary: SCALE.vocabulary,
             evidence: evidence.to_vec(),
             looks: 1.0,
+            unknown: None,
         }
     }
 

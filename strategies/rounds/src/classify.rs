@@ -39,7 +39,15 @@ pub trait Classify: Debug + Send + Sync {
     /// See [`ClassifyError`].
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError>;
 
-    /// The same of a vector already reduced: coordinates in the feature space it judges in.
+    /// How likely a further gesture would be that it was never taught, if it were on the list: on the scale of [`Self::probabilities`], which a
+    /// gesture of the list that it was never taught has too, and above 1 where it is likelier than all of them. `None` for a classifier that cannot
+    /// tell, and for what it cannot judge.
+    fn unknown(&self, features: &[f32]) -> Option<f64> {
+        let _ = features;
+        None
+    }
+
+    /// The probabilities of a vector already reduced: coordinates in the feature space it judges in.
     /// `None` for a classifier without such a space, and for coordinates of another length or that are not finite.
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
         let _ = coordinates;

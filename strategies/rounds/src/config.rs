@@ -25,8 +25,8 @@ pub enum RoundsConfigError {
     },
     /// A rule that Gestalt does not have.
     #[error(
-        "the fusion rule '{0}' is none of Gestalt's: take one of majority, mean_probability, log_pool and \
-         confidence_weighted; a user's rule is handed to the robot by its program"
+        "the fusion rule '{0}' is none of Gestalt's: take one of majority, mean_probability, log_pool, \
+         confidence_weighted and correlated_pool; a user's rule is handed to the robot by its program"
     )]
     Rule(RuleName),
     /// A quorum that is always or never met.
@@ -190,7 +190,10 @@ impl RoundsConfig {
     pub fn alpha(&self) -> f64 {
         let by_rule = match self.rule {
             FusionRule::Majority | FusionRule::MeanProbability => 0.5,
-            FusionRule::LogPool | FusionRule::ConfidenceWeighted | FusionRule::Other(_) => 0.05,
+            FusionRule::LogPool
+            | FusionRule::ConfidenceWeighted
+            | FusionRule::CorrelatedPool
+            | FusionRule::Other(_) => 0.05,
         };
         self.alpha.unwrap_or(by_rule)
     }
@@ -268,7 +271,7 @@ mod tests {
 
     #[test]
     fn every_rule_decides_by_an_alpha_of_its_own() {
-        for (rule, alpha) in FusionRule::ALL.into_iter().zip([0.5, 0.5, 0.05, 0.05]) {
+        for (rule, alpha) in FusionRule::ALL.into_iter().zip([0.5, 0.5, 0.05, 0.05, 0.05]) {
             let config = RoundsConfig { rule, ..RoundsConfig::default() };
             assert_eq!((config.alpha(), config.validate()), (alpha, Ok(())), "{rule}");
             assert!(config.convinces(1.0 - alpha) && !config.convinces(0.99 - alpha));

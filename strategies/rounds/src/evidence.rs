@@ -18,6 +18,8 @@ pub struct JudgedFrame<'a> {
     pub at: Duration,
     /// The probability of each class.
     pub probabilities: &'a [f64],
+    /// That of a further one, see [`Classify::unknown`](crate::Classify::unknown).
+    pub unknown: Option<f64>,
     /// How far it is to be trusted, `0.0..=1.0`.
     pub quality: f64,
     /// Where it lies among all views, see [`Classify::view`](crate::Classify::view); empty when that is not known.
@@ -32,8 +34,10 @@ pub struct JudgedFrame<'a> {
 /// frames per second with one bad view does not outvote ten of 2 with good ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
-    /// Of the looks that are over.
+    /// Of the looks that are over: for each class, for "unknown", and the odds of that.
     sums: Vec<f64>,
+    /// Whether every frame told what is unknown.
+    tells: bool,
     weight: f64,
     views: Vec<Vec<f64>>,
     current: Option<Current>,
@@ -67,7 +71,7 @@ impl Evidence {
     /// No evidence yet over that many classes.
     #[must_use]
     pub fn new(classes: usize) -> Self {
-        Self { sums: vec![0.0; classes], weight: 0.0, views: Vec::new(), current: None }
+        Self { sums: vec![0.0; classes + 2], tells: true, weight: 0.0, views: Vec::new(), current: None }
     }
 
     /// Counts a frame over as many classes; `decorrelation` is τ, above zero. Says whether it weighed anything.
@@ -90,10 +94,15 @@ impl Evidence {
         let Some(current) = &mut self.current else { return false };
         current.frames += 1.0;
         current.quality += frame.quality;
+        self.tells &= frame.unknown.is_some();
         let logs: Vec<f64> = frame.probabilities.iter().map(|p| p.max(FLOOR).ln()).collect();
         let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-        for (sum, log) in current.logs.iter_mut().zip(logs) {
-            *sum += frame.quality * (log - mean);
+        let (unknown, odds) = unknown_and_odds(&frame);
+        let unknown = unknown - mean;
+        for (sum, log) in
+            current.logs.iter_mut().zip(logs.into_iter().map(|log| log - mean).chain([unknown, odds]))
+        {
+            *sum += frame.quality * log;
         }
         for (sum, x) in current.view.iter_mut().zip(frame.view) {
             *sum += frame.quality * f64::from(*x);
@@ -133,7 +142,7 @@ impl Evidence {
     /// How many classes it is about.
     #[must_use]
     pub fn classes(&self) -> usize {
-        self.sums.len()
+        self.sums.len() - 2
     }
 
     /// Σ w: the number of independent looks.
@@ -142,18 +151,53 @@ impl Evidence {
         self.weight + self.current.as_ref().map_or(0.0, Current::weight)
     }
 
+    /// Whether a gesture is one that was taught does not become another question by looking longer, as which one it is does with another view of it: of
+    /// the odds of "unknown", and of what was never taught, √n of n looks count: they repeat each other more.
+    fn count_odds_once(&self, totals: &mut [f64]) {
+        let (classes, looks) = (self.classes(), self.looks());
+        let [unknown, odds] = [totals[classes], totals[classes + 1]];
+        let taught = || totals[..classes].iter().filter(|total| **total != unknown);
+        let greatest = taught().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !self.tells || looks <= 1.0 || !greatest.is_finite() {
+            return;
+        }
+        let together = greatest + taught().map(|total| (total - greatest).exp()).sum::<f64>().ln();
+        for total in totals[..=classes].iter_mut().filter(|total| **total == unknown) {
+            *total = together + odds / looks.sqrt();
+        }
+    }
+
     /// The sums as a vote carries them, within ±`clip`; empty when nothing was seen.
     ///
     /// Where the greatest is beyond the clip, all are lowered by what it has too much: a robot that has looked for long is as sure as may be
     /// of the likeliest class, and not of two.
     #[must_use]
     pub fn clipped(&self, clip: f64) -> Vec<f32> {
-        let Some(current) = &self.current else { return Vec::new() };
-        let totals: Vec<f64> =
-            self.sums.iter().enumerate().map(|(class, sum)| sum + current.part(class)).collect();
-        let excess = totals.iter().map(|total| total - clip).fold(0.0, f64::max);
-        totals.iter().map(|total| (total - excess).min(clip).max(-clip) as f32).collect()
+        self.clipped_with_unknown(clip).0
     }
+
+    /// The same, and beside it that for a gesture that nobody taught, where every frame told.
+    #[must_use]
+    pub fn clipped_with_unknown(&self, clip: f64) -> (Vec<f32>, Option<f32>) {
+        let Some(current) = &self.current else { return (Vec::new(), None) };
+        let mut totals: Vec<f64> =
+            self.sums.iter().enumerate().map(|(class, sum)| sum + current.part(class)).collect();
+        self.count_odds_once(&mut totals);
+        let counted = &totals[..self.classes() + usize::from(self.tells)];
+        let excess = counted.iter().map(|total| total - clip).fold(0.0, f64::max);
+        let mut clipped: Vec<f32> =
+            counted.iter().map(|total| (total - excess).min(clip).max(-clip) as f32).collect();
+        let unknown = if self.tells { clipped.pop() } else { None };
+        (clipped, unknown)
+    }
+}
+
+/// The logarithms of the probability of "unknown", and of its odds against all classes that are not as likely, which were taught.
+fn unknown_and_odds(frame: &JudgedFrame<'_>) -> (f64, f64) {
+    let Some(unknown) = frame.unknown else { return (0.0, 0.0) };
+    let taught: f64 = frame.probabilities.iter().filter(|p| **p != unknown).sum();
+    let unknown = unknown.max(FLOOR).ln();
+    (unknown, if taught > 0.0 { unknown - taught.max(FLOOR).ln() } else { 0.0 })
 }
 
 #[cfg(test)]
@@ -167,7 +211,7 @@ mod tests {
     }
 
     fn look(ms: u64, probabilities: &[f64], quality: f64) -> JudgedFrame<'_> {
-        JudgedFrame { at: at(ms), probabilities, quality, view: &[] }
+        JudgedFrame { at: at(ms), probabilities, unknown: None, quality, view: &[] }
     }
 
     #[test]
@@ -252,6 +296,27 @@ mod tests {
         evidence.add(look(100, &[0.2, 0.8], 1.0), TAU);
         assert!(evidence.clipped(6.0)[0].abs() < 1e-6, "one for, one against");
         assert_eq!(evidence.looks(), 1.0);
+    }
+
+    #[test]
+    fn looking_longer_makes_a_gesture_little_better_known() {
+        let mut evidence = Evidence::new(3);
+        // The third was never taught.
+        let p = [0.6, 0.3, 0.1];
+        let frame = |ms| JudgedFrame { unknown: Some(0.1), ..look(ms, &p, 1.0) };
+        evidence.add(frame(0), TAU);
+        let (first, of_first) = evidence.clipped_with_unknown(9.0);
+        let lead = |vote: &[f32]| vote[0] - vote[1];
+        assert_eq!(of_first, Some(first[2]));
+        for look in 1..4 {
+            evidence.add(frame(500 * look), TAU);
+        }
+        let (fourth, of_fourth) = evidence.clipped_with_unknown(9.0);
+        assert_eq!((of_fourth, fourth.len()), (Some(fourth[2]), 3));
+        assert!((lead(&fourth) - 4.0 * lead(&first)).abs() < 1e-4, "which of those taught: {fourth:?}");
+        // P(unknown) / P(taught) of four looks: that of two.
+        let known: f32 = (fourth[0].exp() + fourth[1].exp()).ln();
+        assert!((fourth[2] - known - 2.0 * (0.1_f32 / 0.9).ln()).abs() < 1e-4, "{fourth:?}");
     }
 
     #[test]

@@ -2,10 +2,9 @@
 
 use std::fmt::Debug;
 
-use gestalt_protocol::FusionRule;
+use gestalt_protocol::{FusionRule, Pool};
 
-use crate::fusion::{self, Fusion};
-use crate::withstand;
+use crate::fusion::Fusion;
 
 /// Makes one distribution over the classes of the votes of many robots.
 ///
@@ -56,7 +55,7 @@ pub trait Fuse: Debug + Send + Sync {
     fn rule(&self) -> FusionRule;
 
     /// Fuses the votes: centred log-evidence, each of `classes` values in nats, as said and not yet clipped to ±`clip`, in
-    /// the order of the robots. `None` when they say nothing.
+    /// the order of the robots. `None` when they say nothing. Where robots can tell what is unknown, that is one class more, the last.
     ///
     /// A result that is no distribution over the classes counts as `None`.
     fn fuse(&self, clip: f64, classes: usize, votes: &[&[f32]]) -> Option<Fusion>;
@@ -68,31 +67,20 @@ pub trait Fuse: Debug + Send + Sync {
         if fusion.margin > f64::from(liars) { fusion.probabilities[fusion.top.index()] } else { 0.0 }
     }
 
+    /// The parameters of a correlated pool, for the certificate; `None` for any other rule.
+    fn pool(&self) -> Option<Pool> {
+        None
+    }
+
+    /// The same rule by other parameters; `None` for one that has none.
+    fn with(&self, pool: Pool) -> Option<Box<dyn Fuse>> {
+        let _ = pool;
+        None
+    }
+
     /// What one robot's vote weighs, for the certificate: `0.0..`, finite; anything else is listed as 0.
     fn weight(&self, clip: f64, evidence: &[f32]) -> f64 {
         let _ = (clip, evidence);
         1.0
-    }
-}
-
-impl Fuse for FusionRule {
-    fn rule(&self) -> FusionRule {
-        *self
-    }
-
-    fn fuse(&self, clip: f64, classes: usize, votes: &[&[f32]]) -> Option<Fusion> {
-        fusion::fuse(*self, clip, classes, votes.iter().copied())
-    }
-
-    fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
-        match liars {
-            0 if fusion.margin > 0.0 => fusion.probabilities[fusion.top.index()],
-            0 => 0.0,
-            liars => withstand::least(*self, clip, votes, fusion, liars as usize),
-        }
-    }
-
-    fn weight(&self, clip: f64, evidence: &[f32]) -> f64 {
-        fusion::weight(*self, clip, evidence)
     }
 }

@@ -4,7 +4,9 @@
 //! go to the smaller class, so that robots of one kind with the same votes get the same bits. Robots of different kinds may
 //! differ in the last ones: exponentials and logarithms are those of the platform.
 
-use gestalt_protocol::{ClassId, FusionRule};
+use gestalt_protocol::{ClassId, FusionRule, Pool};
+
+use crate::alike::{sharpness, strength, voices};
 
 /// What a set of votes amounts to.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +16,7 @@ pub struct Fusion {
     /// The likeliest class; of equals the smaller.
     pub top: ClassId,
     /// By how much the top class leads the second, in units of the most that one robot can add to that lead
-    /// (`2c` for the log pools, one vote for majority, one probability for the mean). A margin above `f` stands
+    /// (`2c` of the sum for the log pools, one vote for majority, one probability for the mean). A margin above `f` stands
     /// whatever `f` of the robots said.
     pub margin: f64,
 }
@@ -36,7 +38,8 @@ impl Fusion {
 ///   abstains;
 /// - mean of probabilities: Σ p(k); P is the mean (the linear opinion pool);
 /// - log pool: Σ ℓ(k); P is the softmax (Genest & Zidek 1986, external Bayes, equal weights of 1);
-/// - confidence-weighted: Σ (1 − H(p) / ln K) ℓ(k); P is the softmax.
+/// - confidence-weighted: Σ (1 − H(p) / ln K) ℓ(k); P is the softmax;
+/// - correlated pool: Σ ℓ(k); P is the softmax of β times that, with the β of [`CorrelatedPool`](crate::CorrelatedPool) before any round was confirmed.
 ///
 /// `None` when there is no row, when all abstain, and for a rule that is not Gestalt's own. A row of another length is a mistake of the caller; its excess or lack is ignored.
 pub fn fuse<'a>(
@@ -45,6 +48,10 @@ pub fn fuse<'a>(
     classes: usize,
     rows: impl IntoIterator<Item = &'a [f32]>,
 ) -> Option<Fusion> {
+    if rule == FusionRule::CorrelatedPool {
+        let rows: Vec<&[f32]> = rows.into_iter().collect();
+        return fuse_correlated(Pool::PRIOR, clip, classes, &rows);
+    }
     let mut totals = vec![0.0; classes];
     let mut row = vec![0.0; classes];
     let mut robots = 0.0;
@@ -59,7 +66,7 @@ pub fn fuse<'a>(
     let one_robot = match rule {
         FusionRule::Majority | FusionRule::MeanProbability => 1.0,
         FusionRule::LogPool | FusionRule::ConfidenceWeighted => 2.0 * clip,
-        FusionRule::Other(_) => return None,
+        FusionRule::CorrelatedPool | FusionRule::Other(_) => return None,
     };
     let mut probabilities = totals.clone();
     match rule {
@@ -67,8 +74,32 @@ pub fn fuse<'a>(
             probabilities.iter_mut().for_each(|p| *p /= robots);
         }
         FusionRule::LogPool | FusionRule::ConfidenceWeighted => softmax(&mut probabilities),
-        FusionRule::Other(_) => return None,
+        FusionRule::CorrelatedPool | FusionRule::Other(_) => return None,
     }
+    Some(summed_up(probabilities, &totals, one_robot))
+}
+
+/// The correlated pool by these parameters.
+pub(crate) fn fuse_correlated(pool: Pool, clip: f64, classes: usize, rows: &[&[f32]]) -> Option<Fusion> {
+    if rows.is_empty() || classes < 2 {
+        return None;
+    }
+    let mut totals = vec![0.0; classes];
+    let mut row = vec![0.0; classes];
+    let mut strengths = Vec::with_capacity(rows.len());
+    for evidence in rows {
+        clip_into(&mut row, evidence, clip);
+        totals.iter_mut().zip(&row).for_each(|(total, part)| *total += part);
+        strengths.push(strength(&row));
+    }
+    let sharpness = sharpness(pool, voices(strengths.into_iter()));
+    let mut probabilities: Vec<f64> = totals.iter().map(|total| sharpness * total).collect();
+    softmax(&mut probabilities);
+    Some(summed_up(probabilities, &totals, 2.0 * clip))
+}
+
+/// A fusion of these probabilities and totals, to the lead of which one robot adds so much at most.
+fn summed_up(probabilities: Vec<f64>, totals: &[f64], one_robot: f64) -> Fusion {
     // The top is that of the probabilities, which the certificate shows: totals a rounding apart may be equal there.
     let top = top_of(&probabilities);
     let second = totals
@@ -78,7 +109,7 @@ pub fn fuse<'a>(
         .map(|(_, total)| *total)
         .fold(f64::NEG_INFINITY, f64::max);
     let margin = ((totals[top.index()] - second) / one_robot).max(0.0);
-    Some(Fusion { probabilities, top, margin })
+    Fusion { probabilities, top, margin }
 }
 
 /// What one robot's row counts in [`fuse`], `0.0..=1.0`: its certainty in a confidence-weighted pool, nothing where it abstains, else 1.
@@ -93,7 +124,10 @@ pub fn weight(rule: FusionRule, clip: f64, evidence: &[f32]) -> f64 {
             clip_into(&mut row, evidence, clip);
             certainty(&mut row)
         }
-        FusionRule::MeanProbability | FusionRule::LogPool | FusionRule::Other(_) => 1.0,
+        FusionRule::MeanProbability
+        | FusionRule::LogPool
+        | FusionRule::CorrelatedPool
+        | FusionRule::Other(_) => 1.0,
     }
 }
 
@@ -111,7 +145,7 @@ pub(crate) fn part_into(row: &mut [f64], rule: FusionRule, clip: f64, evidence: 
             }
         }
         FusionRule::MeanProbability => softmax(row),
-        FusionRule::LogPool => {}
+        FusionRule::LogPool | FusionRule::CorrelatedPool => {}
         FusionRule::ConfidenceWeighted => {
             let certainty = certainty(&mut row.to_vec());
             row.iter_mut().for_each(|part| *part *= certainty);
@@ -140,14 +174,14 @@ pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
     ClassId(u8::try_from(top).unwrap_or(u8::MAX))
 }
 
-fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {
+pub(crate) fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {
     row.fill(0.0);
     for (value, said) in row.iter_mut().zip(evidence) {
         *value = f64::from(*said).min(clip).max(-clip);
     }
 }
 
-fn softmax(row: &mut [f64]) {
+pub(crate) fn softmax(row: &mut [f64]) {
     let greatest = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     row.iter_mut().for_each(|value| *value = (*value - greatest).exp());
     let sum: f64 = row.iter().sum();
@@ -165,7 +199,7 @@ fn certainty(row: &mut [f64]) -> f64 {
 mod tests {
     use super::*;
 
-    const RULES: [FusionRule; 4] = FusionRule::ALL;
+    const RULES: [FusionRule; 5] = FusionRule::ALL;
 
     fn fused(rule: FusionRule, rows: &[&[f32]]) -> Fusion {
         fuse(rule, 6.0, rows[0].len(), rows.iter().copied()).unwrap()

@@ -1,17 +1,21 @@
 //! Whether a decision follows from the votes in its certificate.
 
-use gestalt_protocol::{Certificate, Decision};
+use gestalt_protocol::{Certificate, Decision, Pool};
 
 use crate::ballot::Scale;
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
+use crate::rows::Rows;
 
 /// What the exponentials of two platforms may differ by, in a probability: a decision that is one at its author is one everywhere.
 const TOLERANCE: f64 = 1e-9;
 
 /// Whether robots of that configuration, so many of them, decide so on the votes that the decision brings with it, fused by that
 /// rule. What it says of itself counts for nothing. Whether the votes were cast is another question, for `gestalt-trust`.
+///
+/// How alike robots are is taken from the certificate, for robots learn that from what instructors confirmed, and not all have heard all of it. Where
+/// liars are expected it must be what is believed beforehand.
 ///
 /// A decision without a class follows from votes that do not suffice for any. Its probabilities may be others than those found here by
 /// 1e-9, as exponentials of different platforms are; nothing else may.
@@ -21,24 +25,39 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
         return false;
     }
     let certificate = &decision.certificate;
-    let Certificate { vocabulary, probabilities, votes, others, .. } = certificate;
+    let Certificate { vocabulary, probabilities, unknown, votes, others, .. } = certificate;
     let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
     let of_the_round = |counter| counter == decision.round.counter;
     let sound = certificate.rule == rule.rule()
         && votes.iter().all(|counted| scale.is_of(&counted.vote) && of_the_round(counted.vote.round.counter))
         && others.iter().all(|held| of_the_round(held.vote.round.counter));
     let suffice = config.suffice(certificate.reached(), votes.len(), robots);
-    let rows: Vec<&[f32]> = votes.iter().map(|counted| counted.vote.evidence.as_slice()).collect();
-    let fusion = rule.fuse(config.clip, scale.classes, &rows).filter(|fusion| fusion.is_sound(scale.classes));
+    let said;
+    let rule = match (rule.pool(), certificate.pool) {
+        (None, None) => rule,
+        (Some(_), Some(pool)) if config.liars == 0 || pool == Pool::PRIOR => {
+            let Some(by_its_pool) = rule.with(pool) else { return false };
+            said = by_its_pool;
+            &*said
+        }
+        _ => return false,
+    };
+    let rows = Rows::of(scale.classes, votes.iter().map(|counted| &counted.vote));
+    let (classes, rows) = (rows.classes, rows.as_slices());
+    let fusion = rule.fuse(config.clip, classes, &rows).filter(|fusion| fusion.is_sound(classes));
     let withstands = |fusion: &Fusion| rule.withstands(config.clip, &rows, fusion, config.liars);
     let Some(class) = decision.class else {
+        let known = |fusion: &&Fusion| fusion.top.index() < scale.classes;
         let decides = |fusion: &Fusion| config.convinces(withstands(fusion) - TOLERANCE);
-        return sound && !(suffice && fusion.as_ref().is_some_and(decides));
+        return sound && !(suffice && fusion.as_ref().filter(known).is_some_and(decides));
     };
     let Some(fusion) = fusion.filter(|_| sound && suffice) else { return false };
+    if unknown.is_some() != (classes > scale.classes) {
+        return false;
+    }
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
     let likeliest = fusion.probabilities[class.index()];
-    fusion.probabilities.iter().zip(probabilities).all(|(a, b)| close(*a, *b))
+    fusion.probabilities.iter().zip(probabilities.iter().chain(unknown)).all(|(a, b)| close(*a, *b))
         && close(likeliest, decision.confidence)
         && close(likeliest, fusion.probabilities[fusion.top.index()])
         && config.convinces(withstands(&fusion) + TOLERANCE)

@@ -99,7 +99,9 @@ impl Round {
                 } else {
                     Vec::new()
                 };
-                self.add(JudgedFrame { at: now, probabilities: &p, quality, view: &view }, config);
+                let unknown =
+                    classifier.unknown(&observation.features).filter(|p| p.is_finite() && *p >= 0.0);
+                self.add(JudgedFrame { at: now, probabilities: &p, unknown, quality, view: &view }, config);
                 true
             }
             Ok(_) | Err(_) => false,
@@ -147,11 +149,14 @@ impl Round {
 
     /// This robot's evidence as a vote.
     fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
-        let (evidence, looks) = match &self.evidence {
-            Some(evidence) => (evidence.clipped(clip), evidence.looks() as f32),
-            None => (Vec::new(), 0.0),
+        let (evidence, unknown, looks) = match &self.evidence {
+            Some(evidence) => {
+                let (clipped, unknown) = evidence.clipped_with_unknown(clip);
+                (clipped, unknown, evidence.looks() as f32)
+            }
+            None => (Vec::new(), None, 0.0),
         };
-        Vote { round: self.id, vocabulary, evidence, looks }
+        Vote { round: self.id, vocabulary, evidence, looks, unknown }
     }
 
     /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next.
@@ -262,17 +267,20 @@ impl Round {
             let scale = scale.filter(|_| suffice);
             scale.is_some_and(|scale| config.convinces(self.ballot.withstands(rule, config, scale, fusion)))
         };
-        let class = fusion.as_ref().filter(convinces).map(|fusion| fusion.top);
+        let gestures = scale.map_or(0, |scale| scale.classes);
+        let known = |fusion: &&Fusion| fusion.top.index() < gestures;
+        let class = fusion.as_ref().filter(known).filter(convinces).map(|fusion| fusion.top);
         if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {
             return;
         }
         // Where nothing was fused nothing was counted.
         let counted = scale.filter(|_| fusion.is_some());
         let votes = counted.map_or(Vec::new(), |scale| self.ballot.counted(rule, config.clip, scale));
-        let (probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
+        let (mut probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
             let confidence = fusion.probabilities[fusion.top.index()];
             (fusion.probabilities, confidence)
         });
+        let unknown = if probabilities.len() > gestures { probabilities.pop() } else { None };
         self.concluded = true;
         self.agreement.believe(Decision {
             round: self.id,
@@ -283,7 +291,9 @@ impl Round {
             certificate: Certificate {
                 vocabulary: scale.map_or(VocabularyId::NONE, |scale| scale.vocabulary),
                 rule: rule.rule(),
+                pool: rule.pool(),
                 probabilities,
+                unknown,
                 votes,
                 others: self.ballot.uncounted(counted),
                 robots: view.robots,

@@ -252,7 +252,9 @@ mod tests {
             certificate: gestalt_protocol::Certificate {
                 vocabulary: VocabularyId(1),
                 rule: gestalt_protocol::FusionRule::LogPool,
+                pool: None,
                 probabilities: vec![0.1, 0.9],
+                unknown: None,
                 votes: vec![],
                 others: vec![],
                 robots: 1,

@@ -1,7 +1,8 @@
 //! What a fused opinion is worth when some of those who voted may have lied.
 
-use gestalt_protocol::FusionRule;
+use gestalt_protocol::{FusionRule, Pool};
 
+use crate::alike::sharpness;
 use crate::fusion::{Fusion, part_into};
 
 /// The least probability that the top class of a fusion keeps, whichever `liars` of its votes are left out; 0 where another class may
@@ -10,6 +11,8 @@ use crate::fusion::{Fusion, part_into};
 /// All of Gestalt's rules add up one part a(k) of each robot. Let d be a robot's a(top) − a(k), and D the sum of all d but the f greatest: the
 /// lead over class k that is sure.
 /// - log pools: 1 / (1 + Σ exp(−D)), over all k but the top;
+/// - correlated pool: the same of β D, with the β of as many equal voices as are left, which is the least it can be: its likeness is what
+///   is believed before any round was confirmed, so that nobody who lies can move it;
 /// - majority, mean of probabilities: the sum of all a(top) but the f greatest, shared by the robots but f. Who abstains from a majority is none
 ///   of them.
 ///
@@ -26,6 +29,10 @@ pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusi
             None => return 0.0,
         }
     }
+    let sharpness = match rule {
+        FusionRule::CorrelatedPool => sharpness(Pool::PRIOR, parts.len().saturating_sub(liars) as f64),
+        _ => 1.0,
+    };
     let mut against = 0.0;
     for rival in (0..classes).filter(|class| *class != top) {
         let lead = all_but_greatest(parts.iter().map(|part| part[top] - part[rival]), liars);
@@ -33,10 +40,12 @@ pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusi
         if !lead.is_some_and(|lead| lead > 0.0) {
             return 0.0;
         }
-        against += lead.map_or(0.0, |lead| (-lead).exp());
+        against += lead.map_or(0.0, |lead| (-sharpness * lead).exp());
     }
     match rule {
-        FusionRule::LogPool | FusionRule::ConfidenceWeighted => 1.0 / (1.0 + against),
+        FusionRule::LogPool | FusionRule::ConfidenceWeighted | FusionRule::CorrelatedPool => {
+            1.0 / (1.0 + against)
+        }
         FusionRule::Majority | FusionRule::MeanProbability => {
             let sure = all_but_greatest(parts.iter().map(|part| part[top]), liars);
             sure.map_or(0.0, |sure| sure / (parts.len() - liars) as f64)

@@ -78,7 +78,8 @@ fn rounds(me: u32, rule: Option<Arc<dyn Fuse>>) -> Rounds {
 
 fn vote(author: u32, evidence: [f32; 2]) -> Input {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    let vote = Vote { round, vocabulary: vocabulary().id(), evidence: evidence.to_vec(), looks: 1.0 };
+    let vote =
+        Vote { round, vocabulary: vocabulary().id(), evidence: evidence.to_vec(), looks: 1.0, unknown: None };
     let stamp = Stamp { boot: 1, sequence: 1 };
     Input::Received(Envelope {
         author: RobotId(author),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gestalt_protocol::ClassId;
+use gestalt_protocol::{ClassId, Fnv1a, RoundId};
 use gestalt_svm::{LearnError, Learner};
 
 use crate::sample::HeldSample;
@@ -18,6 +18,8 @@ pub enum TrainingChange {
         class: ClassId,
         /// Its coordinates in the feature space.
         vector: Arc<[f32]>,
+        /// Names the round it was seen in: samples of one repeat each other.
+        showing: u64,
     },
     /// That sample is gone.
     Remove(u64),
@@ -37,7 +39,9 @@ impl TrainingChange {
     /// [`LearnError`] for a sample that cannot be trained on; the learner is unchanged.
     pub fn apply_to(&self, learner: &mut Learner) -> Result<(), LearnError> {
         match self {
-            Self::Insert { key, class, vector } => learner.insert(*key, *class, vector),
+            Self::Insert { key, class, vector, showing } => {
+                learner.insert_shown(*key, *class, vector, *showing)
+            }
             Self::Remove(key) => {
                 learner.remove(*key);
                 Ok(())
@@ -49,5 +53,13 @@ impl TrainingChange {
 
 /// A sample of the training set as one to be trained on.
 pub(super) fn inserted(sample: &HeldSample) -> TrainingChange {
-    TrainingChange::Insert { key: sample.key, class: sample.class, vector: sample.vector.clone() }
+    let HeldSample { key, class, round, vector, .. } = sample;
+    TrainingChange::Insert { key: *key, class: *class, vector: vector.clone(), showing: showing(*round) }
+}
+
+/// A number for a round, the same at every robot.
+pub(super) fn showing(round: RoundId) -> u64 {
+    let mut fnv = Fnv1a::default();
+    fnv.add([round.counter, round.opener.0, round.life].into_iter().flat_map(u32::to_le_bytes));
+    fnv.hash()
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use gestalt_protocol::{ClassId, RoundId};
 use gestalt_rounds::Classify;
 
-use super::changes::TrainingChange;
+use super::changes::{TrainingChange, showing};
 use super::memory::Item;
 use super::state::Learning;
 use super::unresolved::{self, UnresolvedSample};
@@ -98,7 +98,12 @@ impl Learning {
         self.dirty.insert(Item::Aside(number));
         let key = unresolved::training_key(number);
         self.training.push(match (class, self.aside.get(number)) {
-            (Some(class), Some(aside)) => TrainingChange::Insert { key, class, vector: aside.vector.clone() },
+            (Some(class), Some(aside)) => TrainingChange::Insert {
+                key,
+                class,
+                vector: aside.vector.clone(),
+                showing: showing(aside.round),
+            },
             _ => TrainingChange::Remove(key),
         });
     }

@@ -2,6 +2,8 @@
 
 mod changes;
 mod config;
+mod following;
+mod judged;
 mod labelling;
 mod memory;
 mod own_rules;

@@ -10,13 +10,14 @@ use gestalt_protocol::{
     ClassId, Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
     SharedSample, Word,
 };
-use gestalt_rounds::{Follow, Vocabulary};
+use gestalt_rounds::Vocabulary;
 use gestalt_svm::FeatureSpace;
 use rand::Rng;
 use siphasher::sip::SipHasher24;
 
-use super::changes::{TrainingChange, inserted};
+use super::changes::{TrainingChange, inserted, showing};
 use super::config::LearningConfig;
+use super::judged::JudgedRounds;
 use super::memory::{self, Counters, Item, Owner, RecordChange, RobotMemory};
 use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
@@ -54,6 +55,7 @@ pub(crate) enum Declined {
 /// | batches they were shared in | one a sample held, of 32 KiB at most |
 /// | series of samples seen | 4,096; 64 lives of an author; 16,384 intervals of numbers in all |
 /// | lessons | 1,024 rounds, 16 instructors each; who was heard of first: 256 |
+/// | rounds whose votes are kept | 64, of 16 robots each |
 /// | rounds lived through | 32, with 1,024 names and [`keep`](LearningConfig::keep) looks each |
 /// | shared and not yet on the disk | 64 times of sharing |
 /// | robots met | 4,096, or those alive |
@@ -71,6 +73,7 @@ pub(crate) struct Learning {
     pub(super) set: TrainingSet,
     pub(super) lessons: LessonBook,
     pub(super) recent: RecentRounds,
+    pub(super) judged: JudgedRounds,
     pub(super) aside: Unresolved,
     /// The highest counter of a round that this robot knows of.
     newest: Option<u32>,
@@ -124,7 +127,8 @@ impl Learning {
         });
         let guesses = aside.iter().filter_map(|(number, aside)| {
             let key = unresolved::training_key(*number);
-            Some(TrainingChange::Insert { key, class: aside.guess?, vector: aside.vector.clone() })
+            let (vector, showing) = (aside.vector.clone(), showing(aside.round));
+            Some(TrainingChange::Insert { key, class: aside.guess?, vector, showing })
         });
         let training = set.iter().map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
@@ -146,6 +150,7 @@ impl Learning {
             set,
             lessons,
             recent: RecentRounds::default(),
+            judged: JudgedRounds::default(),
             newest,
             credit: 0.0,
             training,
@@ -210,6 +215,7 @@ impl Learning {
         let recent = &self.recent;
         let (heard, forgotten) = self.lessons.hear_among(lesson, |round| recent.contains(round));
         if heard == LessonReceipt::New {
+            self.judged.doubt();
             self.dirty.insert(Item::Lessons(lesson.round));
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
@@ -223,7 +229,7 @@ impl Learning {
     }
 
     /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.
-    fn note_counter(&mut self, counter: u32) {
+    pub(super) fn note_counter(&mut self, counter: u32) {
         if self.newest >= Some(counter) {
             return;
         }
@@ -406,29 +412,5 @@ impl Learning {
             memory: String::new(),
             trainings: 0,
         }
-    }
-}
-
-impl Follow for Learning {
-    fn entered(&mut self, round: RoundId) {
-        self.note_counter(round.counter);
-        if self.recent.enter(round) {
-            self.apply_to_round(round);
-        }
-    }
-
-    fn merged(&mut self, round: RoundId, other: RoundId) {
-        self.note_counter(round.counter);
-        if self.recent.merge(round, other) {
-            self.apply_to_round(round);
-        }
-    }
-
-    fn wants_more(&self, round: RoundId) -> bool {
-        (1..self.config.keep).contains(&self.recent.looks(round))
-    }
-
-    fn knowledge(&self) -> Option<Digest> {
-        Some(self.digest())
     }
 }

@@ -11,6 +11,7 @@ use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, ClassifyError, Vocabulary};
 
 use crate::calibration::Calibration;
+use crate::familiarity::{Familiarity, Shown};
 use crate::feature_space::FeatureSpace;
 use crate::machine::Machine;
 
@@ -19,10 +20,13 @@ use crate::machine::Machine;
 /// .42, .19, .13, .04 at squared distances of .0035, .01, .035, .15, .3, .6, 1.2 variances; exp(−d² / .17) fits that.
 const REPEATS: f64 = 0.17;
 
+/// How much less likely a gesture that is not on the list is shown than one that is, to a robot that was taught all of them.
+const RARE: f64 = 0.2;
+
 /// A trained classifier. [`Learner`](crate::Learner) and `train` make one, [`Classifier::decode`] reads one.
 ///
-/// It need not have met all gestures of its vocabulary. After n samples, one that it has never met gets the
-/// probability 1 / (n + classes), Laplace's rule of succession; the others share the rest.
+/// It need not have met all gestures of its vocabulary. One that it has never met is as likely as "unknown": as what is seen would be if it were of
+/// no gesture that it has met, by how far it lies from all of those. Before much is known, that says little, and all gestures are nearly as likely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classifier {
     pub(crate) vocabulary: Vocabulary,
@@ -31,6 +35,8 @@ pub struct Classifier {
     pub(crate) learned: Vec<u32>,
     pub(crate) machine: Machine,
     pub(crate) calibration: Calibration,
+    /// How much what is seen looks like any gesture met; `None` where none was.
+    pub(crate) familiarity: Option<Familiarity>,
 }
 
 impl Classifier {
@@ -40,8 +46,24 @@ impl Classifier {
         learned: Vec<u32>,
         machine: Machine,
         calibration: Calibration,
+        familiarity: Option<Familiarity>,
     ) -> Self {
-        Self { vocabulary, space, learned, machine, calibration }
+        Self { vocabulary, space, learned, machine, calibration, familiarity }
+    }
+
+    /// The same, where nothing is left of the samples but the support vectors: each counts as a showing of its own. They lie where classes meet, so
+    /// it finds more of what is known far away than there is, and less of it unknown.
+    pub(crate) fn by_its_vectors(self) -> Self {
+        let vectors: Vec<(ClassId, &[f32])> = self.vectors().collect();
+        let shown = vectors.iter().zip(0..).map(|((class, vector), showing)| Shown {
+            class: class.index(),
+            showing,
+            vector,
+        });
+        let familiarity = Familiarity::learn(&shown.collect::<Vec<_>>(), self.space.spread());
+        let whole =
+            familiarity.filter(|familiarity| familiarity.check(self.met().count(), self.machine.width));
+        Self { familiarity: whole, ..self }
     }
 
     /// The space it judges in.
@@ -74,11 +96,21 @@ impl Classifier {
         self.learned.iter().enumerate().filter(|(_, count)| **count > 0).map(|(class, _)| class)
     }
 
+    /// The probability of each gesture that it has not met.
+    ///
+    /// With as many gestures met as not as the vocabulary has, all as likely beforehand, and r = P(x | unknown) / P(x | one met): r / (met + r · unmet).
+    fn of_unknown(&self, coordinates: &[f32]) -> f64 {
+        let (classes, met) = (self.learned.len(), self.met().count());
+        let log_ratio = self.familiarity.as_ref().map_or(0.0, |known| known.log_ratio(coordinates));
+        // Who was taught all there is to the list is seldom shown what is not on it.
+        let ratio = log_ratio.exp() * if met == classes { RARE } else { 1.0 };
+        ratio / (met as f64 + ratio * (classes - met).max(usize::from(met == 0)) as f64)
+    }
+
     /// Judges coordinates in its space.
     fn judge(&self, coordinates: &[f32]) -> Vec<f64> {
         let (classes, met) = (self.learned.len(), self.met().count());
-        let learned: f64 = self.learned.iter().map(|count| f64::from(*count)).sum();
-        let unmet = 1.0 / (learned + classes as f64);
+        let unmet = self.of_unknown(coordinates);
         let mut probabilities = vec![unmet; classes];
         if met > 0 {
             let mut decisions = Vec::with_capacity(self.machine.offsets.len());
@@ -99,6 +131,11 @@ impl Classify for Classifier {
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
         Ok(self.judge(&self.space.project(features)?))
+    }
+
+    fn unknown(&self, features: &[f32]) -> Option<f64> {
+        self.familiarity.as_ref()?;
+        Some(self.of_unknown(&self.space.project(features).ok()?))
     }
 
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {

@@ -15,6 +15,7 @@ mod calibration;
 mod classifier;
 mod coupling;
 mod evaluation;
+mod familiarity;
 mod feature_space;
 mod labelled;
 mod learner;

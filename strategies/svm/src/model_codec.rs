@@ -8,13 +8,16 @@ use thiserror::Error;
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
+use crate::familiarity::Familiarity;
 use crate::feature_space::FeatureSpace;
 use crate::machine::{MAX_COORDINATE, Machine, pairs};
 
 /// Longest encoding that is read, in bytes.
 pub const MAX_MODEL: usize = 64 * 1024 * 1024;
 /// The layout below; another layout gets another number.
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
+/// The layout before, which had no familiarity: it is read too.
+const BEFORE: u8 = 3;
 
 /// Bytes that are no classifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -24,7 +27,9 @@ pub enum ModelError {
     #[error("{0} bytes are more than a classifier takes ({MAX_MODEL})")]
     TooLarge(usize),
     /// Written by another version of the program.
-    #[error("the classifier has layout {0}, this program reads layout {VERSION}: train it anew")]
+    #[error(
+        "the classifier has layout {0}, this program reads layouts {BEFORE} and {VERSION}: train it anew"
+    )]
     Version(u8),
     /// Cut short, or not a classifier at all.
     #[error("the classifier is cut short or damaged")]
@@ -43,6 +48,9 @@ struct Parts {
     calibration: Calibration,
 }
 
+/// What follows them since layout 4.
+type Since = Option<Familiarity>;
+
 impl Classifier {
     /// The classifier as bytes: a layout number, then its parts in postcard.
     #[must_use]
@@ -54,7 +62,8 @@ impl Classifier {
             machine: self.machine.clone(),
             calibration: self.calibration.clone(),
         };
-        postcard::to_extend(&parts, vec![VERSION])
+        let since: &Since = &self.familiarity;
+        postcard::to_extend(&(parts, since), vec![VERSION])
             .expect("postcard writes every value of known length into a vector")
     }
 
@@ -68,16 +77,23 @@ impl Classifier {
             return Err(ModelError::TooLarge(bytes.len()));
         }
         let (&version, body) = bytes.split_first().ok_or(ModelError::Malformed)?;
-        if version != VERSION {
-            return Err(ModelError::Version(version));
+        let ((parts, familiarity), rest) = match version {
+            VERSION => postcard::take_from_bytes::<(Parts, Since)>(body),
+            BEFORE => postcard::take_from_bytes::<Parts>(body).map(|(parts, rest)| ((parts, None), rest)),
+            other => return Err(ModelError::Version(other)),
         }
-        let (parts, rest) = postcard::take_from_bytes::<Parts>(body).map_err(|_| ModelError::Malformed)?;
+        .map_err(|_| ModelError::Malformed)?;
         if !rest.is_empty() {
             return Err(ModelError::Inconsistent("bytes after its end"));
         }
         parts.check().map_err(ModelError::Inconsistent)?;
+        let (classes, width) = (parts.machine.counts.len(), parts.machine.width);
+        if !familiarity.as_ref().is_none_or(|familiarity| familiarity.check(classes, width)) {
+            return Err(ModelError::Inconsistent("a familiarity with other classes"));
+        }
         let Parts { vocabulary, space, learned, machine, calibration } = parts;
-        Ok(Self::new(vocabulary, Arc::new(space), learned, machine, calibration))
+        let classifier = Self::new(vocabulary, Arc::new(space), learned, machine, calibration, familiarity);
+        Ok(if version == BEFORE { classifier.by_its_vectors() } else { classifier })
     }
 }
 

@@ -76,33 +76,59 @@ fn taught(space: &Arc<FeatureSpace>, samples: &[(ClassId, Vec<f32>)]) -> Learner
 }
 
 #[test]
-fn gestures_never_met_keep_the_chance_of_the_next_sample() {
+fn gestures_never_met_are_as_likely_as_unknown_and_less_so_the_more_is_known() {
     let space = space();
     let samples = samples(&space, 80, &mut generator(2));
     let mut learner = learner(&space);
-    let met = |class: u8| samples.iter().filter(move |(of, _)| of.0 < class).enumerate();
     let x = &samples[0].1;
-
-    let nothing = learner.learn().unwrap();
-    assert_eq!(judge(&nothing, x), [0.25; 4], "nothing met");
-    for (key, (class, vector)) in met(1) {
-        learner.insert(key as u64, *class, vector).unwrap();
+    let raw = features(0, &mut generator(3));
+    let mut by_classes = vec![learner.learn().unwrap()];
+    for class in 0..CLASSES as u8 {
+        for (key, (_, vector)) in samples.iter().enumerate().filter(|(_, (of, _))| of.0 == class) {
+            learner.insert(key as u64, ClassId(class), vector).unwrap();
+        }
+        by_classes.push(learner.learn().unwrap());
     }
-    let one = learner.learn().unwrap();
-    let unmet = 1.0 / (20.0 + 4.0);
-    assert_eq!(judge(&one, x), [1.0 - 3.0 * unmet, unmet, unmet, unmet], "one met");
-    for (key, (class, vector)) in met(2) {
-        learner.insert(key as u64, *class, vector).unwrap();
-    }
-    let two = learner.learn().unwrap();
-    let p = judge(&two, x);
-    let unmet = 1.0 / (40.0 + 4.0);
-    assert_eq!(p[2..], [unmet, unmet], "two met");
-    assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    for classifier in [nothing, one, two] {
+    assert_eq!(judge(&by_classes[0], x), [0.25; 4], "nothing met");
+    assert_eq!(by_classes[0].unknown(&raw), None);
+    let one = judge(&by_classes[1], x);
+    assert!(
+        one[0] <= 0.25 && one[1..] == [one[1]; 3],
+        "what other gestures look like it cannot know: {one:?}"
+    );
+    let two = judge(&by_classes[2], x);
+    assert!(two[0] > 0.6 && two[2] == two[3], "{two:?}");
+    let all = judge(&by_classes[4], x);
+    assert!(all[0] > two[0], "{all:?}");
+    for (met, classifier) in by_classes.iter().enumerate() {
+        let p = judge(classifier, x);
+        assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        if (1..CLASSES).contains(&met) {
+            let unmet = classifier.probabilities(&raw).unwrap()[CLASSES - 1];
+            assert_eq!(classifier.unknown(&raw), Some(unmet), "{met} met");
+        }
         let read = Classifier::decode(&classifier.encode()).unwrap();
-        assert_eq!(read, *classifier, "on disk");
+        assert_eq!(read, **classifier, "on disk");
     }
+    // Far from all it has met it is likelier unknown than any of them.
+    let far: Vec<f32> = raw.iter().map(|x| 40.0 - 9.0 * x).collect();
+    let (known, unknown) = (by_classes[4].probabilities(&far).unwrap(), by_classes[4].unknown(&far).unwrap());
+    assert!(known.iter().all(|p| *p < unknown), "{known:?} {unknown}");
+}
+
+#[test]
+fn samples_of_one_showing_tell_no_more_than_one_of_what_is_unknown() {
+    let space = space();
+    let samples = samples(&space, 8, &mut generator(2));
+    let of = |showings: &dyn Fn(u64) -> u64| {
+        let mut learner = learner(&space);
+        for (key, (class, vector)) in (0..).zip(&samples) {
+            learner.insert_shown(key, *class, vector, showings(key)).unwrap();
+        }
+        learner.learn().unwrap().unknown(&features(0, &mut generator(3))).unwrap()
+    };
+    // Of each gesture two samples: of two showings, or of one, whose class nothing is then known to look like twice.
+    assert!(of(&|key| key % 4) > of(&|key| key), "it is surer that it knows what it saw twice");
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! Messages as an adversary makes them up. What robots come to sign is signed here too, in one place for each kind.
 
 use gestalt_protocol::{
-    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, HeldBatch, HeldVote, Lesson,
-    Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Vote,
-    Word,
+    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, HeldBatch, HeldVote, Lesson, Lessons,
+    MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Vote, Word,
 };
 use gestalt_strategies::fusion::fuse;
-use gestalt_strategies::{MindConfig, decode_vector};
+use gestalt_strategies::{Fuse, MindConfig, decode_vector};
 use gestalt_trust::{Identity, SwarmId, statement};
 
 use crate::swarm::world::{CLASSES, instructor, space, vocabulary};
@@ -23,12 +22,12 @@ pub fn vote(round: RoundId, class: u8, looks: f32) -> Vote {
 pub fn vote_of(round: RoundId, class: u8, nats: f32, looks: f32) -> Vote {
     let mut evidence = vec![-nats / f32::from(CLASSES - 1); usize::from(CLASSES)];
     evidence[usize::from(class)] = nats;
-    Vote { round, vocabulary: vocabulary().id(), evidence, looks }
+    Vote { round, vocabulary: vocabulary().id(), evidence, looks, unknown: None }
 }
 
 /// A vote of one who has seen nothing.
 pub fn null_vote(round: RoundId) -> Vote {
-    Vote { round, vocabulary: vocabulary().id(), evidence: Vec::new(), looks: 0.0 }
+    Vote { round, vocabulary: vocabulary().id(), evidence: Vec::new(), looks: 0.0, unknown: None }
 }
 
 /// A vote in the name of that robot, signed by nobody.
@@ -56,7 +55,7 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
         votes.into_iter().partition(|held| !held.vote.evidence.is_empty());
     let counted: Vec<CountedVote> = votes.into_iter().map(counted).collect();
     let rows = counted.iter().map(|counted| counted.vote.evidence.as_slice());
-    let fusion = fuse(FusionRule::LogPool, MindConfig::default().clip, usize::from(CLASSES), rows);
+    let fusion = fuse(MindConfig::default().rule, MindConfig::default().clip, usize::from(CLASSES), rows);
     let (probabilities, top) = fusion
         .map_or((vec![0.0; usize::from(CLASSES)], ClassId(0)), |fusion| (fusion.probabilities, fusion.top));
     let robots = (counted.len() + others.len()) as u32;
@@ -68,8 +67,10 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
         is_final: true,
         certificate: Certificate {
             vocabulary: vocabulary().id(),
-            rule: FusionRule::LogPool,
+            rule: MindConfig::default().rule,
+            pool: MindConfig::default().rule.pool(),
             probabilities,
+            unknown: None,
             votes: counted,
             others,
             robots,

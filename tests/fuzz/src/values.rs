@@ -67,7 +67,8 @@ pub const VOCABULARY: VocabularyId = VocabularyId(9);
 pub fn vote(rng: &mut impl Rng, round: RoundId, classes: usize) -> Vote {
     let evidence: Vec<f32> = (0..classes).map(|_| rng.random_range(-6.0..6.0)).collect();
     let looks = if evidence.is_empty() { 0.0 } else { rng.random_range(0.5..4.0) };
-    Vote { round, vocabulary: VOCABULARY, evidence, looks }
+    let unknown = if evidence.is_empty() { None } else { maybe(rng, |rng| rng.random_range(-6.0..6.0)) };
+    Vote { round, vocabulary: VOCABULARY, evidence, looks, unknown }
 }
 
 fn held_vote(rng: &mut impl Rng, round: RoundId, classes: usize) -> HeldVote {
@@ -99,8 +100,10 @@ pub fn decision(rng: &mut impl Rng) -> Decision {
         is_final: rng.random(),
         certificate: Certificate {
             vocabulary: VOCABULARY,
-            rule: FusionRule::ALL[rng.random_range(0..4)],
+            rule: FusionRule::ALL[rng.random_range(0..5)],
+            pool: None,
             probabilities: vec![0.25, 0.5, 0.25],
+            unknown: None,
             votes: held.into_iter().map(counted).collect(),
             others,
             robots: number(rng),

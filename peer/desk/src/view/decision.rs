@@ -1,7 +1,7 @@
 //! One decision with its reasons.
 
-use gestalt_protocol::{Announcement, ClassId, CountedVote, RobotId, RoundId};
-use gestalt_strategies::Vocabulary;
+use gestalt_protocol::{Announcement, ClassId, CountedVote, Reason, RobotId, RoundId, RoundOutcome};
+use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde::Serialize;
 
 use super::text::{clipped, finite, gesture};
@@ -15,6 +15,10 @@ pub struct DecisionView {
     pub class: Option<ClassId>,
     /// Its label, or its number where there is no name for it; `None` for "no decision".
     pub label: Option<String>,
+    /// What the round came to: `gesture`, `unknown` or `undecided`.
+    pub outcome: RoundOutcome,
+    /// Why, in words; empty for a gesture.
+    pub why: String,
     /// The fused probability, `0.0..=1.0`.
     pub confidence: f64,
     /// Whether a majority is known to hold it.
@@ -71,6 +75,8 @@ pub struct VoteView {
 impl DecisionView {
     pub(super) fn new(announced: &Announcement, vocabulary: Option<&Vocabulary>, held: usize) -> Self {
         let Announcement { decision, label, .. } = announced;
+        let config = MindConfig { rule: decision.certificate.rule, ..MindConfig::default() };
+        let (outcome, reason) = outcome(decision, &config);
         let certificate = &decision.certificate;
         let name = |class| match label {
             Some(label) if Some(class) == decision.class => clipped(label),
@@ -89,6 +95,8 @@ impl DecisionView {
             round: decision.round,
             class: decision.class,
             label: decision.class.map(name),
+            outcome,
+            why: why(&reason, &name),
             confidence: finite(decision.confidence),
             is_final: decision.is_final,
             author: decision.author,
@@ -101,6 +109,22 @@ impl DecisionView {
             reached: certificate.reached(),
             held,
             elapsed_ms: certificate.elapsed_ms,
+        }
+    }
+}
+
+/// A reason in words, with the names of gestures.
+fn why(reason: &Reason, name: &dyn Fn(ClassId) -> String) -> String {
+    match *reason {
+        Reason::Sure => String::new(),
+        Reason::FarFromAll { nearest, .. } => format!("unlike all it knows; nearest is {}", name(nearest)),
+        Reason::NothingSeen => "no robot saw a hand".to_owned(),
+        Reason::TooFewRobots { counted, needed } => format!("{counted} robots took part, {needed} needed"),
+        Reason::Disagreement { between: [a, b], robots: [for_a, for_b] } => {
+            format!("{for_a} for {}, {for_b} for {}", name(a), name(b))
+        }
+        Reason::Unsure { nearest, probability } => {
+            format!("{}, but only {:.0} % sure", name(nearest), 100.0 * finite(probability))
         }
     }
 }

@@ -38,14 +38,16 @@ fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
             stamp: Stamp { boot: 1, sequence: 1 },
             class: ClassId(*class),
             weight: 1.0,
-            vote: Vote { round, vocabulary: vocabulary().id(), evidence, looks: 2.0 },
+            vote: Vote { round, vocabulary: vocabulary().id(), evidence, looks: 2.0, unknown: None },
             signature: None,
         }
     };
     let certificate = Certificate {
         vocabulary: vocabulary().id(),
         rule: FusionRule::LogPool,
+        pool: None,
         probabilities: vec![0.1, 0.2, 0.7],
+        unknown: None,
         votes: (1..).zip(votes).map(vote).collect(),
         others: Vec::new(),
         robots: 4,

@@ -4,6 +4,7 @@
 //! every machine, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
 //! shortest ways of what the robots believe to be connected, and are lost hop by hop.
 
+mod calibration;
 mod network;
 mod observer;
 mod pupil;
@@ -21,6 +22,7 @@ mod trace;
 use std::io;
 use std::sync::Arc;
 
+pub use calibration::Calibration;
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
 #[cfg(feature = "experiments")]

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, ClassifyError, Observation, Vocabulary};
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use super::scenario::View;
 
@@ -16,7 +17,12 @@ pub trait Observer {
     /// The time between two frames, in seconds.
     fn period(&self) -> f64;
 
-    /// Another gesture is being shown. All randomness of this showing comes from `rng`.
+    /// What all robots see alike of the next showing follows from this number.
+    fn share(&mut self, alike: u64) {
+        let _ = alike;
+    }
+
+    /// Another gesture is being shown. All other randomness of this showing comes from `rng`.
     fn show(&mut self, shown: ClassId, rng: &mut dyn rand::Rng);
 
     /// The next frame of this showing; `None` when there is no hand to be seen.
@@ -30,6 +36,8 @@ pub struct StatisticalObserver {
     classifier: Arc<ScoreClassifier>,
     shown: ClassId,
     lasting: Vec<f64>,
+    /// From which follows what all robots see alike of this showing.
+    alike: u64,
 }
 
 impl StatisticalObserver {
@@ -38,7 +46,7 @@ impl StatisticalObserver {
     pub fn new(view: View, vocabulary: Vocabulary) -> Self {
         let lasting = vec![0.0; vocabulary.classes()];
         let classifier = Arc::new(ScoreClassifier { vocabulary, signal: view.signal });
-        Self { view, classifier, shown: ClassId(0), lasting }
+        Self { view, classifier, shown: ClassId(0), lasting, alike: 0 }
     }
 }
 
@@ -51,10 +59,21 @@ impl Observer for StatisticalObserver {
         1.0 / self.view.fps
     }
 
+    fn share(&mut self, alike: u64) {
+        self.alike = alike;
+    }
+
     fn show(&mut self, shown: ClassId, rng: &mut dyn rand::Rng) {
         self.shown = shown;
-        let spread = self.view.persistence.sqrt();
-        self.lasting.iter_mut().for_each(|noise| *noise = spread * gaussian(rng));
+        let View { persistence, likeness, .. } = self.view;
+        let mut common = ChaCha8Rng::seed_from_u64(self.alike);
+        let (own, alike) = ((persistence * (1.0 - likeness)).sqrt(), (persistence * likeness).sqrt());
+        for noise in &mut self.lasting {
+            *noise = own * gaussian(rng);
+            if likeness > 0.0 {
+                *noise += alike * gaussian(&mut common);
+            }
+        }
     }
 
     fn frame(&mut self, rng: &mut dyn rand::Rng) -> Option<Observation> {
@@ -125,9 +144,6 @@ fn gaussian(rng: &mut dyn rand::Rng) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
     use super::*;
 
     fn vocabulary() -> Vocabulary {
@@ -154,7 +170,7 @@ mod tests {
     #[test]
     fn a_view_is_bad_but_its_probabilities_mean_what_they_say() {
         for persistence in [0.0, 0.5, 1.0] {
-            let (right, claimed) = judged(View { fps: 2.0, signal: 1.5, persistence });
+            let (right, claimed) = judged(View { fps: 2.0, signal: 1.5, persistence, likeness: 0.0 });
             assert!((0.5..0.7).contains(&right), "right in {right}");
             assert!((right - claimed).abs() < 0.03, "right in {right}, claims {claimed}");
         }
@@ -163,7 +179,7 @@ mod tests {
     #[test]
     fn persistence_makes_the_frames_of_a_showing_err_alike() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let view = View { fps: 2.0, signal: 1.0, persistence: 1.0 };
+        let view = View { fps: 2.0, signal: 1.0, persistence: 1.0, likeness: 0.0 };
         let mut observer = StatisticalObserver::new(view, vocabulary());
         observer.show(ClassId(2), &mut rng);
         assert_eq!(observer.frame(&mut rng), observer.frame(&mut rng));
@@ -171,8 +187,10 @@ mod tests {
 
     #[test]
     fn what_cannot_be_judged_is_said() {
-        let observer =
-            StatisticalObserver::new(View { fps: 2.0, signal: 1.0, persistence: 0.0 }, vocabulary());
+        let observer = StatisticalObserver::new(
+            View { fps: 2.0, signal: 1.0, persistence: 0.0, likeness: 0.0 },
+            vocabulary(),
+        );
         let judge = |features: &[f32]| observer.classifier.probabilities(features);
         assert_eq!(judge(&[0.0; 5]), Err(ClassifyError::Length { found: 5, expected: 6 }));
         assert_eq!(judge(&[0.0, f32::NAN, 0.0, 0.0, 0.0, 0.0]), Err(ClassifyError::NotFinite(1)));

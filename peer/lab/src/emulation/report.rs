@@ -6,6 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::FusionRule;
 use serde::Serialize;
 
+use super::calibration::{Calibration, Heard, Said};
 use super::network::{Network, Traffic};
 use super::record::{Record, Showing};
 use super::statistics::{Mean, Proportion};
@@ -55,6 +56,11 @@ pub struct Report {
     pub bytes_per_robot: BytesPerRobot,
     /// What robots have learned from at the end, if they learn.
     pub learned: Option<Learned>,
+    /// Its decisions for a gesture.
+    #[serde(skip)]
+    pub(super) said: Vec<Said>,
+    /// How many of the showings were of gestures that nobody had taught yet.
+    pub untaught: u64,
 }
 
 /// Bytes that a robot puts on its links, without what the transport adds.
@@ -112,6 +118,20 @@ impl Report {
             Mean::of(&opened.iter().filter_map(|s| Some(ms(s, at(s)?))).collect::<Vec<_>>())
         };
         let open = record.open.as_secs_f64();
+        // Robots that do not learn know all gestures; those that do were told of each that was shown.
+        let taught = |n: usize| {
+            let (showing, before) = (&record.showings[n], &record.showings[..n]);
+            learned.is_none() || before.iter().any(|b| b.counter.is_some() && b.shown == showing.shown)
+        };
+        let heard: Vec<usize> =
+            (0..record.showings.len()).filter(|n| record.showings[*n].counter.is_some()).collect();
+        let said = heard.iter().filter_map(|n| {
+            let showing = &record.showings[*n];
+            let made = decision(showing).filter(|made| made.class.is_some())?;
+            let right = made.class == Some(showing.shown);
+            Some(Said { confidence: made.confidence, right, taught: taught(*n) })
+        });
+        let said = said.collect();
         Self {
             seed,
             robots,
@@ -150,8 +170,15 @@ impl Report {
                 published_samples: share(total.published_samples),
                 samples_on_links: share(total.samples_on_links()),
             },
+            untaught: heard.iter().filter(|n| !taught(**n)).count() as u64,
             learned,
+            said,
         }
+    }
+
+    fn heard(&self) -> Heard<'_> {
+        let taught = self.right.trials - self.untaught;
+        Heard { said: &self.said, taught, untaught: self.untaught }
     }
 }
 
@@ -199,6 +226,8 @@ pub struct Summary {
     pub announcements: Mean,
     /// The values of the seeds.
     pub vote_bytes_per_open_second: Mean,
+    /// Of the decisions of all seeds.
+    pub calibration: Calibration,
 }
 
 impl Summary {
@@ -230,6 +259,7 @@ impl Summary {
             settled_ms: means(&|report| report.settled_ms),
             announcements: means(&|report| report.announcements),
             vote_bytes_per_open_second: mean(&|report| report.vote_bytes_per_open_second),
+            calibration: Calibration::of(&reports.iter().map(Report::heard).collect::<Vec<_>>()),
         }
     }
 }
@@ -272,6 +302,35 @@ impl fmt::Display for Table<'_> {
                 percent(summary.unanimous),
                 decided,
                 summary.vote_bytes_per_open_second.mean,
+            )?;
+        }
+        writeln!(
+            f,
+            "\n{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
+            "rule",
+            "alpha",
+            "calibration error",
+            "≥ .99 and wrong %",
+            "untaught, and ≥ .9 %",
+            "taught, and decided %",
+            "of these right %"
+        )?;
+        for summary in self.0 {
+            let Calibration { error, .. } = summary.calibration;
+            let of = |p: Proportion| match p.trials {
+                0 => "–".to_owned(),
+                trials => format!("{} of {trials}", percent(p)),
+            };
+            writeln!(
+                f,
+                "{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
+                summary.rule,
+                summary.alpha,
+                format!("{:.3} ± {:.3}", error.mean, error.half_width),
+                of(summary.calibration.sure_and_wrong),
+                of(summary.calibration.untaught_and_sure),
+                of(summary.calibration.taught_and_decided),
+                of(summary.calibration.taught_and_right),
             )?;
         }
         if let Some(any) = self.0.first() {

@@ -40,7 +40,7 @@ fn eyes() -> Result<u32, ExperimentError> {
 }
 
 fn minds() -> Result<u32, ExperimentError> {
-    let view = View { fps: 2.0, signal: 2.0, persistence: 0.5 };
+    let view = View { fps: 2.0, signal: 2.0, persistence: 0.5, likeness: 0.0 };
     let scenario = Scenario {
         robots: vec![Group { name: "robot".to_owned(), count: 4, view: Some(view), lies: None }],
         topology: NetworkShape::Ring,

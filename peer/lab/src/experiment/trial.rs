@@ -146,7 +146,7 @@ impl Exam {
             (pool.moments[*moment].class, seen.collect())
         };
         let questions = moments.iter().map(question).collect();
-        let fusion = rules.fusion.clone().unwrap_or(Arc::new(FusionRule::LogPool));
+        let fusion = rules.fusion.clone().unwrap_or(Arc::new(FusionRule::default()));
         Self {
             classes: pool.gestures.len(),
             robots: places.len(),
@@ -205,7 +205,7 @@ impl Exam {
 fn evidence_of(p: &[f64]) -> Vec<f32> {
     let mut evidence = Evidence::new(p.len());
     evidence.add(
-        JudgedFrame { at: Duration::ZERO, probabilities: p, quality: 1.0, view: &[] },
+        JudgedFrame { at: Duration::ZERO, probabilities: p, unknown: None, quality: 1.0, view: &[] },
         Duration::from_secs(1),
     );
     evidence.clipped(CLIP)

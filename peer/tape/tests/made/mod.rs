@@ -111,7 +111,7 @@ pub fn decisions(passed: &[Passing]) -> Vec<Decision> {
 
 /// Three rounds of a palm: clear, mistaken for a fist, and without enough who see. With what the person said of each.
 pub fn run() -> Vec<Passing> {
-    let config = RoundsConfig::default();
+    let config = RoundsConfig { rule: FusionRule::LogPool, ..RoundsConfig::default() };
     let mut passed = vec![said(Topic::Status(RobotId(1)), json(&status()), BEGIN)];
     let sees: [&[Option<[f32; 3]>]; 3] = [
         &[Some([0.1, 0.2, 0.7]), Some([0.2, 0.2, 0.6]), Some([0.3, 0.1, 0.6]), None],
@@ -160,7 +160,7 @@ pub fn one_of_each() -> Vec<Passing> {
     full.round = Some(round);
     all.push(said(Topic::Status(robot), json(&full), at));
     let mut own = decisions(&run()).remove(0);
-    own.certificate.rule = FusionRule::Other("approval".parse().unwrap());
+    (own.certificate.rule, own.certificate.pool) = (FusionRule::Other("approval".parse().unwrap()), None);
     let signature = Some(Signature::from_bytes([9; 64]));
     let own = Announcement { decision: own, label: None, announcer: robot, stamp, signature };
     all.push(said(Topic::Decision, json(&own), at));

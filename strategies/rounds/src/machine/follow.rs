@@ -1,6 +1,6 @@
 //! What goes along with the rounds of a robot without deciding any of them: its learning.
 
-use gestalt_protocol::{Digest, RoundId};
+use gestalt_protocol::{Decision, Digest, Pool, RoundId};
 
 /// Follows the rounds that a robot lives through: is told of them, and asked for the little they need to know of it.
 ///
@@ -22,6 +22,16 @@ pub trait Follow {
     fn wants_more(&self, round: RoundId) -> bool {
         let _ = round;
         false
+    }
+
+    /// This robot holds that decision of its round now, which may be for nothing; evidence counts up to ±`clip`.
+    fn settled(&mut self, decision: &Decision, clip: f64) {
+        let _ = (decision, clip);
+    }
+
+    /// How alike robots are, by the rounds that instructors confirmed. `None`: it does not know.
+    fn pool(&mut self) -> Option<Pool> {
+        None
     }
 
     /// All it knows, in two numbers, which neighbours are told with what is known of the round. `None`: it does not learn.

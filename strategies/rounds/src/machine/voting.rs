@@ -45,10 +45,15 @@ impl Rounds {
         let expected = self.electorate.expected(&self.alive);
         let view = View { me: self.me, expected: &expected, robots: self.electorate.count(), scale };
         let Some(round) = self.round.as_mut() else { return };
-        round.conclude(self.now, &view, &*self.fusion, &self.config);
+        // Where liars are expected nothing that anybody said moves the rule by which they are judged.
+        let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
+        let fitted = learned.and_then(|pool| self.fusion.with(pool));
+        let rule = fitted.as_deref().unwrap_or(&*self.fusion);
+        round.conclude(self.now, &view, rule, &self.config);
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
+            effects.follower.settled(decision, self.config.clip);
             effects.out.push(Output::Hold(decision.clone()));
             self.say_holding(effects);
         }

@@ -9,6 +9,7 @@ mod solution;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
@@ -21,6 +22,7 @@ use samples::{KernelMatrix, Key, Place};
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
+use crate::familiarity::{Familiarity, Shown};
 use crate::feature_space::FeatureSpace;
 use crate::machine::{MAX_COORDINATE, Machine, pairs};
 
@@ -38,6 +40,8 @@ pub struct Learner {
     options: LearnerOptions,
     gamma: f32,
     samples: KernelMatrix,
+    /// Of which showing each inserted sample is.
+    showings: BTreeMap<u64, u64>,
     supports: u32,
     /// All pairs of the vocabulary.
     pairs: Vec<Pair>,
@@ -67,6 +71,7 @@ impl Learner {
         Ok(Self {
             gamma,
             samples: KernelMatrix::new(classes, gamma),
+            showings: BTreeMap::new(),
             supports: 0,
             pairs: pairs(classes).map(|(i, j)| Pair::new([i, j])).collect(),
             touched: vec![false; classes],
@@ -112,11 +117,25 @@ impl Learner {
     }
 
     /// Takes in a sample: coordinates in the learner's space. `key` is any number that names it; a sample of that
-    /// key is replaced.
+    /// key is replaced. It is of a showing of its own.
     ///
     /// # Errors
     /// A vector of another length, with a coordinate out of range, or a class that the vocabulary does not have.
     pub fn insert(&mut self, key: u64, class: ClassId, vector: &[f32]) -> Result<(), LearnError> {
+        self.insert_shown(key, class, vector, key)
+    }
+
+    /// The same of one that has its showing in common with others, which repeat it: any number that names that.
+    ///
+    /// # Errors
+    /// As of [`Self::insert`].
+    pub fn insert_shown(
+        &mut self,
+        key: u64,
+        class: ClassId,
+        vector: &[f32],
+        showing: u64,
+    ) -> Result<(), LearnError> {
         self.check_class(class)?;
         if vector.len() != self.space.components() {
             return Err(LearnError::Length { found: vector.len(), expected: self.space.components() });
@@ -126,6 +145,7 @@ impl Learner {
         if let Some(coordinate) = vector.iter().position(|x| !range.contains(x)) {
             return Err(LearnError::Range(coordinate));
         }
+        self.showings.insert(key, showing);
         let key = Key::Inserted(key);
         if let Some(place) = self.samples.place(key) {
             if place.class == class.index() && self.samples.at(place).vector == vector {
@@ -140,6 +160,7 @@ impl Learner {
     /// Takes out a sample; whether it was there.
     pub fn remove(&mut self, key: u64) -> bool {
         let place = self.samples.place(Key::Inserted(key));
+        self.showings.remove(&key);
         if let Some(place) = place {
             self.take(place);
         }
@@ -201,8 +222,14 @@ impl Learner {
         let calibration = Calibration { sigmoids, sharpness: 1.0 };
         let learned = self.classes().map(|class| self.samples.of(class).len() as u32).collect();
         let machine = self.machine(&present);
-        let classifier =
-            Classifier::new(self.vocabulary.clone(), self.space.clone(), learned, machine, calibration);
+        let classifier = Classifier::new(
+            self.vocabulary.clone(),
+            self.space.clone(),
+            learned,
+            machine,
+            calibration,
+            self.familiarity(),
+        );
         Ok(self.classifier.insert(Arc::new(classifier)).clone())
     }
 
@@ -220,6 +247,17 @@ impl Learner {
                 self.pairs[*index].calibrate(&self.samples, cost, &self.folds, folds);
             }
         }
+    }
+
+    fn familiarity(&self) -> Option<Familiarity> {
+        let shown = self.samples.places().iter().map(|(key, place)| {
+            let showing = match key {
+                Key::Inserted(key) => self.showings.get(key).copied().unwrap_or(*key),
+                Key::Support(index) => !u64::from(*index),
+            };
+            Shown { class: place.class, showing, vector: &self.samples.at(*place).vector }
+        });
+        Familiarity::learn(&shown.collect::<Vec<_>>(), self.space.spread())
     }
 
     /// The machines of all pairs with a sample each.

@@ -10,6 +10,8 @@ use super::folds::Folding;
 use super::options::TrainOptions;
 use super::search::{Choice, Fold, HeldOut, Search};
 use crate::classifier::Classifier;
+use crate::familiarity::{Familiarity, Shown};
+use crate::feature_space::FeatureSpace;
 use crate::labelled::LabelledFeatures;
 
 /// How far training has come.
@@ -72,8 +74,20 @@ pub fn train(
     let machine = all.fit(cost, gamma)?;
     progress(TrainProgress { done: total, total });
     let learned = all.counts();
-    let classifier =
-        Classifier::new(vocabulary.clone(), Arc::new(all.space), learned, machine, held_out.calibration);
+    let familiarity = familiarity(&all.space, samples);
+    let (space, calibration) = (Arc::new(all.space), held_out.calibration);
+    let classifier = Classifier::new(vocabulary.clone(), space, learned, machine, calibration, familiarity);
     let HeldOut { accuracy, log_loss, .. } = held_out;
     Ok(Trained { classifier, cost, gamma, folding: search.folding, accuracy, log_loss })
+}
+
+/// How the classes of these samples lie in that space; all that one person shows of a gesture is one showing.
+fn familiarity(space: &FeatureSpace, samples: &[LabelledFeatures]) -> Option<Familiarity> {
+    let coordinates: Vec<Option<Vec<f32>>> =
+        samples.iter().map(|sample| space.project(&sample.features).ok()).collect();
+    let shown = (0..).zip(samples).zip(&coordinates).filter_map(|((n, sample), vector)| {
+        let showing = sample.group.map_or(1 << 32 | n, u64::from);
+        Some(Shown { class: sample.class.index(), showing, vector: vector.as_deref()? })
+    });
+    Familiarity::learn(&shown.collect::<Vec<_>>(), space.spread())
 }

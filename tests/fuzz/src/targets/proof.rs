@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, CountedVote, Decision, Envelope, Message, RobotId, Stamp, decode_json};
-use gestalt_strategies::{MindConfig, Quorum, follows, fusion};
+use gestalt_protocol::{
+    ClassId, CountedVote, Decision, Envelope, FusionRule, Message, RobotId, Stamp, decode_json,
+};
+use gestalt_strategies::{Fuse, MindConfig, Quorum, follows, fusion};
 
 use crate::gate::{Gate, votes};
 use crate::memory::bounded;
@@ -22,7 +24,11 @@ pub fn run(bytes: &[u8]) {
     let [how, which, change, rest @ ..] = bytes else { return };
     let Some(mut decision) = read(how & 1 == 1, rest) else { return };
     let config = MindConfig {
-        rule: gestalt_protocol::FusionRule::ALL[usize::from(how >> 2 & 3)],
+        rule: if how & 64 == 0 {
+            FusionRule::ALL[usize::from(how >> 2 & 3)]
+        } else {
+            FusionRule::CorrelatedPool
+        },
         quorum: if how & 16 == 0 { Quorum::Majority } else { Quorum::Evidence(3) },
         liars: u32::from(how >> 5 & 1),
         ..MindConfig::default()
@@ -64,7 +70,9 @@ fn given(decision: Decision) -> Vec<u8> {
 /// Makes of a decision what its votes make of it.
 fn draw(decision: &mut Decision, config: &MindConfig) {
     let certificate = &mut decision.certificate;
-    certificate.rule = config.rule;
+    (certificate.rule, certificate.pool) = (config.rule, config.rule.pool());
+    certificate.unknown = None;
+    certificate.votes.iter_mut().for_each(|counted| counted.vote.unknown = None);
     let classes = certificate.votes.first().map_or(0, |counted| counted.vote.evidence.len());
     let rows = certificate.votes.iter().map(|counted| counted.vote.evidence.as_slice());
     if let Some(fusion) = fusion::fuse(config.rule, config.clip, classes, rows) {

@@ -44,4 +44,8 @@ pub struct View {
     /// of a showing errs alike.
     #[serde(default)]
     pub persistence: f64,
+    /// The share of that lasting noise which is the same for all robots, `0.0..=1.0`: at 1 all robots err alike, for they look at one hand in one
+    /// light.
+    #[serde(default)]
+    pub likeness: f64,
 }

@@ -36,6 +36,9 @@ impl Scenario {
             if !(view.signal >= 0.0 && view.signal <= 100.0) {
                 return wrong("robots.view.signal", format!("is {}: choose 0 to 100", view.signal));
             }
+            if !(0.0..=1.0).contains(&view.likeness) {
+                return wrong("robots.view.likeness", format!("is {}: choose 0 to 1", view.likeness));
+            }
             if !(0.0..=1.0).contains(&view.persistence) {
                 return wrong("robots.view.persistence", format!("is {}: choose 0 to 1", view.persistence));
             }

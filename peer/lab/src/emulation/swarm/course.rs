@@ -30,6 +30,7 @@ impl Swarm<'_> {
         let luck = self.course.random::<u64>();
         for (i, robot) in self.robots.iter_mut().enumerate() {
             robot.rng = stream(self.seed, frames(n, i));
+            robot.observer.share(luck);
             robot.observer.show(self.shown, &mut robot.rng);
         }
         let up = self.honest();

@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::{
     Certificate, ClassId, Decision, HeldVote, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
-use gestalt_strategies::{Ballot, MindConfig, follows};
+use gestalt_strategies::{Ballot, Fuse, MindConfig, follows};
 
 /// Looks that liars say are behind their votes: as many as count.
 const LOOKS: f32 = 16.0;
@@ -65,7 +65,7 @@ impl Plot {
     pub fn vote(&self, class: ClassId, classes: usize, clip: f64) -> Option<Vote> {
         let mut evidence = vec![-clip as f32; classes];
         evidence[class.index()] = clip as f32;
-        Some(Vote { round: self.round?, vocabulary: self.vocabulary?, evidence, looks: LOOKS })
+        Some(Vote { round: self.round?, vocabulary: self.vocabulary?, evidence, looks: LOOKS, unknown: None })
     }
 
     /// The next stamp of a liar.
@@ -140,7 +140,9 @@ impl Plot {
             certificate: Certificate {
                 vocabulary: scale.vocabulary,
                 rule: config.rule,
+                pool: config.rule.pool(),
                 probabilities: fusion.probabilities,
+                unknown: None,
                 votes: ballot.counted(&config.rule, config.clip, scale),
                 others: ballot.uncounted(Some(scale)),
                 robots: robots as u32,

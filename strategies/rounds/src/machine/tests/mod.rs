@@ -22,6 +22,7 @@ use gestalt_protocol::{
 use super::{Input, Output, Rounds};
 use crate::classify::{Classify, ClassifyError};
 use crate::config::RoundsConfig;
+use crate::fuse::Fuse;
 use crate::fusion::fuse;
 use crate::life::Life;
 use crate::observation::Observation;
@@ -89,7 +90,7 @@ const LEANING: f32 = 1.0;
 fn vote(counter: u32, class: usize, strength: f32) -> Vote {
     let mut evidence = vec![-strength / 2.0; 3];
     evidence[class] = strength;
-    Vote { round: round(counter, 1), vocabulary: vocabulary().id(), evidence, looks: 1.0 }
+    Vote { round: round(counter, 1), vocabulary: vocabulary().id(), evidence, looks: 1.0, unknown: None }
 }
 
 fn null(counter: u32) -> Vote {
@@ -129,7 +130,8 @@ fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decisi
 /// What a robot makes of these votes, as the default has it.
 fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u32) -> Decision {
     let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
-    let fused = fuse(FusionRule::LogPool, RoundsConfig::default().clip, 3, rows);
+    let RoundsConfig { rule, clip, .. } = RoundsConfig::default();
+    let fused = fuse(rule, clip, 3, rows);
     let (probabilities, confidence) = fused.map_or((Vec::new(), 0.0), |fused| {
         (fused.probabilities.clone(), fused.probabilities[fused.top.index()])
     });
@@ -142,8 +144,10 @@ fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u
         is_final: false,
         certificate: gestalt_protocol::Certificate {
             vocabulary: vocabulary().id(),
-            rule: FusionRule::LogPool,
+            rule,
+            pool: rule.pool(),
             probabilities,
+            unknown: None,
             votes,
             others: Vec::new(),
             robots,

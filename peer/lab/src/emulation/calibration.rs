@@ -1,0 +1,116 @@
+//! Whether confidence means what it says.
+
+use serde::Serialize;
+
+use super::statistics::{Mean, Proportion};
+
+/// One decision for a gesture, against what was shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Said {
+    /// Its confidence.
+    pub confidence: f64,
+    /// Whether that was shown.
+    pub right: bool,
+    /// Whether robots that learn had been told before what was shown.
+    pub taught: bool,
+}
+
+/// How sure decisions were, and how right.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// The expected calibration error: the mean distance of confidence and share right, in ten bins of confidence, with the interval of a jackknife over
+    /// seeds.
+    pub error: Mean,
+    /// Wrong decisions, of those of a confidence of at least .99.
+    pub sure_and_wrong: Proportion,
+    /// Decisions of a confidence of at least .9, of the showings of a gesture that nobody had taught yet.
+    pub untaught_and_sure: Proportion,
+    /// Decisions, of the showings of a gesture that had been taught.
+    pub taught_and_decided: Proportion,
+    /// Those of them that are right.
+    pub taught_and_right: Proportion,
+}
+
+/// The decisions of a seed, and how many showings it had.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heard<'a> {
+    pub said: &'a [Said],
+    /// Showings of gestures that somebody had taught.
+    pub taught: u64,
+    /// Showings of gestures that nobody had taught yet.
+    pub untaught: u64,
+}
+
+impl Calibration {
+    /// Of several seeds.
+    pub(super) fn of(seeds: &[Heard<'_>]) -> Self {
+        let all = || seeds.iter().flat_map(|seed| seed.said);
+        let sure = all().filter(|said| said.confidence >= 0.99);
+        let taken = all().filter(|said| !said.taught && said.confidence >= 0.9).count() as u64;
+        let taught = all().filter(|said| said.taught);
+        let decided = taught.clone().count() as u64;
+        Self {
+            error: jackknife(seeds),
+            sure_and_wrong: Proportion::new(
+                sure.clone().filter(|said| !said.right).count() as u64,
+                sure.count() as u64,
+            ),
+            untaught_and_sure: Proportion::new(taken, seeds.iter().map(|seed| seed.untaught).sum()),
+            taught_and_decided: Proportion::new(decided, seeds.iter().map(|seed| seed.taught).sum()),
+            taught_and_right: Proportion::new(taught.filter(|said| said.right).count() as u64, decided),
+        }
+    }
+}
+
+fn error<'a>(decisions: impl Iterator<Item = &'a Said>) -> f64 {
+    let mut bins = [(0.0_f64, 0.0_f64); 10];
+    let mut count = 0.0;
+    for said in decisions {
+        let (confidence, right) = &mut bins[((said.confidence * 10.0) as usize).min(9)];
+        *confidence += said.confidence;
+        *right += f64::from(u8::from(said.right));
+        count += 1.0;
+    }
+    bins.iter().map(|(confidence, right)| (confidence - right).abs()).sum::<f64>() / f64::max(count, 1.0)
+}
+
+fn jackknife(seeds: &[Heard<'_>]) -> Mean {
+    let all = error(seeds.iter().flat_map(|seed| seed.said));
+    let n = seeds.len();
+    let without = |left: usize| {
+        error(seeds.iter().enumerate().filter(|(k, _)| *k != left).flat_map(|(_, seed)| seed.said))
+    };
+    let without: Vec<f64> = (0..n).map(without).collect();
+    let mean = without.iter().sum::<f64>() / n.max(1) as f64;
+    let squares: f64 = without.iter().map(|error| (error - mean).powi(2)).sum();
+    let half_width = 1.96 * (squares * n.saturating_sub(1) as f64 / n.max(1) as f64).sqrt();
+    Mean { n, mean: all, half_width }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_said_is_held_against_what_is_right() {
+        let said = |confidence, right| Said { confidence, right, taught: true };
+        let honest: Vec<Said> = (0..100).map(|n| said(0.75, n % 4 != 0)).collect();
+        let boasting: Vec<Said> = (0..100).map(|n| said(0.995, n % 4 != 0)).collect();
+        let of = |said: &[Said]| {
+            Calibration::of(&[
+                Heard { said, taught: 100, untaught: 0 },
+                Heard { said, taught: 150, untaught: 0 },
+            ])
+        };
+        assert!(of(&honest).error.mean < 1e-9);
+        assert!((of(&boasting).error.mean - 0.245).abs() < 1e-9);
+        assert_eq!(of(&boasting).sure_and_wrong, Proportion::new(50, 200));
+        assert_eq!(of(&honest).sure_and_wrong.trials, 0);
+        assert_eq!(of(&honest).taught_and_decided, Proportion::new(200, 250));
+        assert_eq!(of(&honest).taught_and_right, Proportion::new(150, 200));
+        let unheard = [Said { confidence: 0.95, right: false, taught: false }];
+        let of = Calibration::of(&[Heard { said: &unheard, taught: 3, untaught: 4 }]);
+        assert_eq!(of.untaught_and_sure, Proportion::new(1, 4));
+        assert_eq!(of.taught_and_decided, Proportion::new(0, 3));
+    }
+}

@@ -1,0 +1,42 @@
+//! What learning is told of the rounds, and tells them.
+
+use gestalt_protocol::{Decision, Digest, Pool, RoundId};
+use gestalt_rounds::{Follow, Testimony};
+
+use super::state::Learning;
+
+impl Follow for Learning {
+    fn entered(&mut self, round: RoundId) {
+        self.note_counter(round.counter);
+        if self.recent.enter(round) {
+            self.apply_to_round(round);
+        }
+    }
+
+    fn merged(&mut self, round: RoundId, other: RoundId) {
+        self.note_counter(round.counter);
+        if self.recent.merge(round, other) {
+            self.apply_to_round(round);
+        }
+    }
+
+    fn settled(&mut self, decision: &Decision, clip: f64) {
+        let own = decision.certificate.vocabulary == self.vocabulary.id();
+        if let Some(testimony) = Testimony::of(decision, clip).filter(|_| own) {
+            self.judged.note(decision.round, testimony);
+        }
+    }
+
+    fn pool(&mut self) -> Option<Pool> {
+        let Self { judged, lessons, recent, vocabulary, .. } = self;
+        Some(judged.pool(|round| lessons.verdict_by_names(recent.names(round), vocabulary.classes())))
+    }
+
+    fn wants_more(&self, round: RoundId) -> bool {
+        (1..self.config.keep).contains(&self.recent.looks(round))
+    }
+
+    fn knowledge(&self) -> Option<Digest> {
+        Some(self.digest())
+    }
+}

@@ -1,0 +1,145 @@
+//! What rounds were about that instructors have spoken of: from them it follows how alike the robots are.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{Pool, RoundId};
+use gestalt_rounds::{Testimony, Weights, fit};
+
+use crate::lessons::Verdict;
+
+/// How many rounds are kept, the newest: classifiers learn, and what they said long ago tells little of them.
+const MAX_ROUNDS: usize = 64;
+
+/// The votes of rounds, and what follows from them and from what instructors said. Every robot that lived through the same rounds holds the same
+/// decisions of them and has heard the same words, so it finds the same.
+#[derive(Clone, Debug, Default)]
+pub(super) struct JudgedRounds {
+    rounds: BTreeMap<RoundId, Judged>,
+    pool: Option<Pool>,
+}
+
+#[derive(Clone, Debug)]
+struct Judged {
+    testimony: Testimony,
+    /// What it says, by which verdict.
+    weights: Option<(Verdict, Option<Weights>)>,
+}
+
+impl JudgedRounds {
+    /// Notes the votes of a round as the decision held of it has them.
+    pub fn note(&mut self, round: RoundId, testimony: Testimony) {
+        let known = self.rounds.get(&round).is_some_and(|judged| judged.testimony == testimony);
+        if known {
+            return;
+        }
+        self.rounds.insert(round, Judged { testimony, weights: None });
+        while self.rounds.len() > MAX_ROUNDS {
+            self.rounds.pop_first();
+        }
+        self.pool = None;
+    }
+
+    /// Something was said of some round.
+    pub fn doubt(&mut self) {
+        self.pool = None;
+    }
+
+    /// How alike the robots are, given what instructors said of each round.
+    pub fn pool(&mut self, verdict: impl Fn(RoundId) -> Verdict) -> Pool {
+        if let Some(pool) = self.pool {
+            return pool;
+        }
+        for (round, judged) in &mut self.rounds {
+            let verdict = verdict(*round);
+            if judged.weights.as_ref().is_some_and(|(known, _)| *known == verdict) {
+                continue;
+            }
+            let weigh = |possible: &dyn Fn(usize) -> bool| Some((verdict, judged.testimony.weigh(possible)));
+            judged.weights = match verdict {
+                Verdict::Class(class) => weigh(&|k| k == class.index()),
+                Verdict::Among(candidates) => weigh(&|k| {
+                    u8::try_from(k).is_ok_and(|k| candidates.contains(gestalt_protocol::ClassId(k)))
+                }),
+                Verdict::Unsaid | Verdict::Retracted => None,
+            };
+        }
+        let judged = self.rounds.values().filter_map(|judged| judged.weights.as_ref()?.1.as_ref());
+        *self.pool.insert(fit(judged))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{
+        Certificate, ClassId, CountedVote, Decision, FusionRule, RobotId, Stamp, VocabularyId, Vote,
+    };
+
+    use super::*;
+
+    /// Five robots that are all sure of that gesture.
+    fn testimony(class: usize) -> Testimony {
+        let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
+        let evidence: Vec<f32> = (0..3).map(|k| if k == class { 4.0 } else { -2.0 }).collect();
+        let vocabulary = VocabularyId(1);
+        let vote = |robot| CountedVote {
+            robot: RobotId(robot),
+            stamp: Stamp::default(),
+            class: ClassId(class as u8),
+            weight: 1.0,
+            vote: Vote { round, vocabulary, evidence: evidence.clone(), looks: 1.0, unknown: None },
+            signature: None,
+        };
+        let certificate = Certificate {
+            vocabulary,
+            rule: FusionRule::CorrelatedPool,
+            pool: Some(Pool::PRIOR),
+            probabilities: vec![1.0 / 3.0; 3],
+            unknown: None,
+            votes: (0..5).map(vote).collect(),
+            others: Vec::new(),
+            robots: 5,
+            quorum: 3,
+            elapsed_ms: 1,
+        };
+        let author = RobotId(0);
+        let decision = Decision { round, class: None, confidence: 0.0, author, is_final: false, certificate };
+        Testimony::of(&decision, 6.0).unwrap()
+    }
+
+    fn round(counter: u32) -> RoundId {
+        RoundId { counter, opener: RobotId(0), life: 0 }
+    }
+
+    #[test]
+    fn the_same_rounds_and_words_give_the_same_pool_in_any_order_and_words_taken_back_no_longer_count() {
+        let was = |class: u8| Verdict::Class(ClassId(class));
+        // Of thirty rounds every third was another gesture than all five robots were sure of.
+        let verdict = |round: RoundId| if round.counter % 3 == 0 { was(1) } else { was(0) };
+        let mut heard = JudgedRounds::default();
+        assert_eq!(heard.pool(verdict), Pool::PRIOR);
+        (0..30).for_each(|n| heard.note(round(n), testimony(0)));
+        assert_eq!(heard.pool(|_| Verdict::Unsaid), Pool::PRIOR, "nobody said what they were");
+        heard.doubt();
+        let pool = heard.pool(verdict);
+        assert_eq!(pool.rounds, 30);
+        assert!(
+            pool.likeness > Pool::PRIOR.likeness && pool.temperature > Pool::PRIOR.temperature,
+            "{pool:?}"
+        );
+
+        let mut turned = JudgedRounds::default();
+        (0..30).rev().chain(5..10).for_each(|n| turned.note(round(n), testimony(0)));
+        turned.doubt();
+        assert_eq!(turned.pool(verdict), pool);
+        heard.doubt();
+        assert_eq!(heard.pool(|_| Verdict::Retracted), Pool::PRIOR);
+    }
+
+    #[test]
+    fn what_is_kept_is_bounded_and_the_newest() {
+        let mut judged = JudgedRounds::default();
+        (0..3 * MAX_ROUNDS as u32).for_each(|n| judged.note(round(n), testimony(0)));
+        assert_eq!(judged.rounds.len(), MAX_ROUNDS);
+        assert_eq!(judged.rounds.keys().next(), Some(&round(2 * MAX_ROUNDS as u32)));
+    }
+}

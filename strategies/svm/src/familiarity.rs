@@ -1,0 +1,111 @@
+//! How much what is seen looks like any gesture that was ever taught.
+//!
+//! One-vs-one machines cannot say: their probabilities always sum to 1 over the gestures they know. Classes of one shared covariance can (SLDA: T. L.
+//! Hayes, C. Kanan, "Lifelong machine learning with deep streaming linear discriminant analysis", CVPR workshops 2020): the distance to the nearest
+//! class tells another hand from a known one, the lead over the second nearest a blurred thing from a clear one.
+
+mod calibrating;
+mod scatter;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+use calibrating::{calibrate, log_ratio};
+use scatter::Scatter;
+
+/// A sample as it is learned from: its class, the showing it is of, and where it lies.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shown<'a> {
+    pub class: usize,
+    /// Samples of one showing repeat each other: together they count once.
+    pub showing: u64,
+    pub vector: &'a [f32],
+}
+
+/// How classes lie in a feature space, and what distances say.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Familiarity {
+    width: usize,
+    /// The inverse of the Cholesky factor of the shared covariance, row by row; its diagonal alone in a wide space.
+    whitening: Vec<f32>,
+    /// The mean of each class met, whitened, by class.
+    means: Vec<f32>,
+    /// How many showings each of them rests on.
+    showings: Vec<u32>,
+    /// Of the logarithm of P(x | unknown) / P(x | known): offset, of the distance, of the lead.
+    weights: [f64; 3],
+    /// How far it may go either way: nobody has seen more of what is known, and of what is not, than so many showings tell.
+    bounds: [f64; 2],
+}
+
+/// What a view says of being known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Score {
+    /// The logarithm of the squared Mahalanobis distance to the nearest class, a coordinate.
+    pub distance: f64,
+    /// By how much the second nearest is farther, `0.0..=1.0`; `None` where there is none.
+    pub lead: Option<f64>,
+}
+
+impl Score {
+    /// Of squared distances to classes, a coordinate.
+    fn of(distances: impl Iterator<Item = f64>) -> Option<Self> {
+        let (mut first, mut second) = (f64::INFINITY, f64::INFINITY);
+        for distance in distances {
+            if distance < first {
+                (first, second) = (distance, first);
+            } else if distance < second {
+                second = distance;
+            }
+        }
+        let lead = second.is_finite().then(|| (second - first) / (second + first).max(f64::MIN_POSITIVE));
+        first.is_finite().then(|| Self { distance: first.max(1e-6).ln(), lead })
+    }
+}
+
+impl Familiarity {
+    /// Learns how the classes lie, in a space whose coordinates spread so far; and calibrates what distances say by leaving out, of what is
+    /// known, one showing, and of what is not, a whole class. `None` where there is no sample.
+    pub fn learn(samples: &[Shown<'_>], spread: &[f32]) -> Option<Self> {
+        let scatter = Scatter::of(samples, spread)?;
+        let (known, unknown) = scatter.left_out();
+        let (weights, bounds) = calibrate(&known, &unknown);
+        let Scatter { width, whitening, classes, .. } = scatter;
+        Some(Self {
+            width,
+            whitening,
+            means: classes.iter().flat_map(|class| class.mean.iter().map(|x| *x as f32)).collect(),
+            showings: classes.iter().map(|class| class.showings.len() as u32).collect(),
+            weights,
+            bounds,
+        })
+    }
+
+    /// The logarithm of P(x | a gesture never taught) / P(x | one of those taught), as far as it is known.
+    pub fn log_ratio(&self, vector: &[f32]) -> f64 {
+        let white = scatter::whiten(&self.whitening, vector);
+        let class = |(mean, showings): (&[f32], &u32)| {
+            let squared: f64 = mean.iter().zip(&white).map(|(m, x)| (f64::from(*m) - x).powi(2)).sum();
+            scatter::a_coordinate(squared, self.width, f64::from(*showings))
+        };
+        let distances = self.means.chunks_exact(self.width).zip(&self.showings).map(class);
+        let Some(score) = Score::of(distances) else { return 0.0 };
+        log_ratio(&self.weights, score).clamp(-self.bounds[0], self.bounds[1])
+    }
+
+    /// Whether it fits so many classes in a space of that width, and its numbers lie where sums of them stay finite.
+    pub fn check(&self, classes: usize, width: usize) -> bool {
+        let within = |values: &[f32]| values.iter().all(|v| v.abs() <= 1e9);
+        self.width == width
+            && width > 0
+            && self.whitening.len() == scatter::entries(width)
+            && self.showings.len() == classes
+            && self.showings.iter().all(|showings| *showings > 0)
+            && self.means.len() == classes.saturating_mul(width)
+            && within(&self.whitening)
+            && within(&self.means)
+            && self.weights.iter().all(|w| w.abs() <= 1e6)
+            && self.bounds.iter().all(|bound| (0.0..=100.0).contains(bound))
+    }
+}
