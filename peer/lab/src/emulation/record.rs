@@ -43,8 +43,11 @@ pub(super) struct Record {
     pub showings: Vec<Showing>,
     /// The newest decision each robot holds.
     pub holds: Vec<Option<Decision>>,
+    /// Frames judged before the instructor said what they show: afterwards robots have learned these very ones.
     pub frames: u64,
     pub frames_right: u64,
+    /// Whether what is being shown has been said.
+    told: bool,
     /// For how long robots had a round open, all added up.
     pub open: Duration,
     opened: Vec<Option<Duration>>,
@@ -59,12 +62,14 @@ impl Record {
             holds: vec![None; robots],
             frames: 0,
             frames_right: 0,
+            told: false,
             open: Duration::ZERO,
             opened: vec![None; robots],
         }
     }
 
     pub fn show(&mut self, at: Duration, shown: ClassId, counter: Option<u32>) {
+        self.told = false;
         self.showings.push(Showing {
             at,
             shown,
@@ -100,7 +105,15 @@ impl Record {
         });
     }
 
+    /// The instructor spoke.
+    pub fn tell(&mut self) {
+        self.told = true;
+    }
+
     pub fn frame(&mut self, probabilities: &[f64], shown: ClassId) {
+        if self.told {
+            return;
+        }
         let top = probabilities.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map(|(k, _)| k);
         self.frames += 1;
         self.frames_right += u64::from(top == Some(shown.index()));

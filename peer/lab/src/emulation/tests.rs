@@ -270,7 +270,7 @@ fn robots_that_share_learn_faster_than_robots_that_do_not() {
         scenario.rounds = 18;
         scenario.learning.as_mut().unwrap().robots.keep = 2;
         // Nobody is ever sure, so every showing lasts equally long, and weighs alike.
-        scenario.mind.alpha = Some(1e-12);
+        scenario.mind = MindConfig { alpha: Some(1e-12), clip: 0.5, ..scenario.mind };
         (0..3).map(|seed| run(&scenario, seed).unwrap().frames_right.share).sum::<f64>() / 3.0
     };
     let (alone, together) = (frames_right(0.0), frames_right(1.0));

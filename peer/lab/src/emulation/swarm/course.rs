@@ -107,6 +107,7 @@ impl Swarm<'_> {
             (Feedback::Partial, None) | (Feedback::None, _) => return,
         };
         let robot = self.robots[i].id;
+        self.record.tell();
         self.note(&Happening::Instruct { robot, instruction: &instruction });
         let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
         let bytes = json_bytes(&instruction);
