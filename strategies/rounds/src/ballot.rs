@@ -124,17 +124,16 @@ impl Ballot {
     }
 
     /// All evidence on that scale as one distribution, with "unknown" as a last class where any of the robots can tell; `None` when there is
-    /// none, or the rule makes none of it.
+    /// none, or the rule makes none of it. Of the gestures it is asked only which of those it is that any of the robots was taught.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
-        let rows = self.rows(scale);
-        rule.fuse(clip, rows.classes, &rows.as_slices()).filter(|fusion| fusion.is_sound(rows.classes))
+        self.rows(clip, scale).fuse(rule, clip)
     }
 
     /// How likely the top class of a fusion of this ballot is if as many of the robots lied as are expected.
     #[must_use]
     pub fn withstands(&self, rule: &dyn Fuse, config: &RoundsConfig, scale: Scale, fusion: &Fusion) -> f64 {
-        rule.withstands(config.clip, &self.rows(scale).as_slices(), fusion, config.liars)
+        self.rows(config.clip, scale).withstands(rule, config.clip, fusion, config.liars)
     }
 
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
@@ -168,8 +167,8 @@ impl Ballot {
         Some(same && held.vote.unknown == vote.unknown)
     }
 
-    fn rows(&self, scale: Scale) -> Rows {
-        Rows::of(scale.classes, self.on(scale).map(|held| &held.vote))
+    fn rows(&self, clip: f64, scale: Scale) -> Rows {
+        Rows::of(scale.classes, clip, self.on(scale).map(|held| &held.vote))
     }
 
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {

@@ -4,7 +4,6 @@ use gestalt_protocol::{Certificate, Decision, Pool};
 
 use crate::alike::{sharpness, strength, voices};
 use crate::fusion::{clip_into, softmax};
-use crate::outcome::is_taught;
 use crate::rows::Rows;
 
 /// The most robots of a round whose own votes are looked into: those of the smallest ids. All count in its sum.
@@ -36,8 +35,8 @@ pub struct Testimony {
     totals: Vec<f64>,
     voices: f64,
     singles: Vec<Vec<f64>>,
-    /// Which gestures any of the robots had been taught.
-    taught: Vec<bool>,
+    /// The gestures that any of the robots had been taught, over which the others are.
+    taught: Vec<usize>,
 }
 
 impl Testimony {
@@ -45,39 +44,39 @@ impl Testimony {
     #[must_use]
     pub fn of(decision: &Decision, clip: f64) -> Option<Self> {
         let Certificate { probabilities, votes, .. } = &decision.certificate;
-        let rows = Rows::of(probabilities.len(), votes.iter().map(|counted| &counted.vote));
-        let mut totals = vec![0.0; rows.classes];
+        let rows = Rows::of(probabilities.len(), clip, votes.iter().map(|counted| &counted.vote));
+        let taught = rows.taught();
+        let mut totals = vec![0.0; taught.len()];
         let mut strengths = Vec::with_capacity(votes.len());
         let mut singles = Vec::new();
-        for row in rows.as_slices() {
-            let mut clipped = vec![0.0; rows.classes];
-            clip_into(&mut clipped, row, clip);
+        for row in rows.of_taught() {
+            let mut clipped = vec![0.0; taught.len()];
+            clip_into(&mut clipped, &row, clip);
             totals.iter_mut().zip(&clipped).for_each(|(total, part)| *total += part);
             strengths.push(strength(&clipped));
             if singles.len() < MAX_SINGLES {
                 singles.push(clipped);
             }
         }
-        let taught = |class| is_taught(class, votes.iter().map(|counted| &counted.vote));
-        let taught = (0..probabilities.len()).map(taught).collect();
         (!singles.is_empty()).then(|| Self { totals, voices: voices(strengths.into_iter()), singles, taught })
     }
 
-    /// How likely each likeness and temperature makes it that one of the possible gestures was shown. `None` where no robot had been taught any of
-    /// them: what it could not have known says nothing of how robots err.
+    /// How likely each likeness and temperature makes it that one of the possible gestures was shown, of those that any robot had been taught. `None`
+    /// where there are none: what it could not have known says nothing of how robots err; and where there is nothing to choose from.
     #[must_use]
     pub fn weigh(&self, possible: &dyn Fn(usize) -> bool) -> Option<Weights> {
-        if !(0..self.taught.len()).any(|class| self.taught[class] && possible(class)) {
+        let possible = |place: usize| self.taught.get(place).is_some_and(|class| possible(*class));
+        if self.taught.len() < 2 || !(0..self.taught.len()).any(possible) {
             return None;
         }
         let mut weights = Vec::with_capacity(grid().count());
         for exponent in 0..TEMPERATURES {
             let temperature = temperature(exponent);
-            let of_one = |row: &Vec<f64>| log_likelihood(row, 1.0 / temperature, possible);
+            let of_one = |row: &Vec<f64>| log_likelihood(row, 1.0 / temperature, &possible);
             let singles = self.singles.iter().map(of_one).sum::<f64>() / self.singles.len() as f64;
             for step in 0..=STEPS {
                 let pool = Pool { likeness: likeness(step), temperature, rounds: 0 };
-                let together = log_likelihood(&self.totals, sharpness(pool, self.voices), possible);
+                let together = log_likelihood(&self.totals, sharpness(pool, self.voices), &possible);
                 weights.push(together + SINGLES * singles);
             }
         }

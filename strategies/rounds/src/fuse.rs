@@ -55,7 +55,10 @@ pub trait Fuse: Debug + Send + Sync {
     fn rule(&self) -> FusionRule;
 
     /// Fuses the votes: centred log-evidence, each of `classes` values in nats, as said and not yet clipped to ±`clip`, in
-    /// the order of the robots. `None` when they say nothing. Where robots can tell what is unknown, that is one class more, the last.
+    /// the order of the robots. `None` when they say nothing.
+    ///
+    /// Where robots tell what is unknown, these are the gestures of the list that any of them was taught, in its order, and the result is what it is if it
+    /// is one of them; where there is but one, no rule is asked.
     ///
     /// A result that is no distribution over the classes counts as `None`.
     fn fuse(&self, clip: f64, classes: usize, votes: &[&[f32]]) -> Option<Fusion>;

@@ -1,9 +1,10 @@
 //! What a round came to, and why.
 
-use gestalt_protocol::{Certificate, ClassId, Decision, Reason, RoundOutcome, Vote};
+use gestalt_protocol::{Certificate, ClassId, Decision, Reason, RoundOutcome};
 
 use crate::config::RoundsConfig;
 use crate::fusion::top_of;
+use crate::rows::knows;
 
 /// What a round came to, and why: from its decision alone, which may be one for nothing. Says the same to whoever asks.
 #[must_use]
@@ -28,7 +29,7 @@ pub fn outcome(decision: &Decision, config: &RoundsConfig) -> (RoundOutcome, Rea
         return undecided(Reason::NothingSeen);
     }
     let votes_of = || certificate.votes.iter().map(|counted| &counted.vote);
-    let taught: Vec<bool> = (0..probabilities.len()).map(|class| is_taught(class, votes_of())).collect();
+    let taught: Vec<bool> = (0..probabilities.len()).map(|class| votes_of().any(|vote| knows(vote, class))).collect();
     // A gesture of the list that nobody was taught is as unknown as one that is not on it.
     let unknown: f64 = certificate.unknown.unwrap_or(0.0)
         + taught.iter().zip(probabilities).filter(|(taught, _)| !**taught).map(|(_, p)| p).sum::<f64>();
@@ -44,11 +45,6 @@ pub fn outcome(decision: &Decision, config: &RoundsConfig) -> (RoundOutcome, Rea
         Some((between, robots)) => undecided(Reason::Disagreement { between, robots }),
         None => undecided(Reason::Unsure { nearest, probability }),
     }
-}
-
-/// Whether any of these robots was taught that gesture: one that was not is as likely to it as "unknown", to the bit.
-pub(crate) fn is_taught<'a>(class: usize, mut votes: impl Iterator<Item = &'a Vote>) -> bool {
-    votes.any(|vote| vote.unknown.is_none_or(|unknown| vote.evidence.get(class) != Some(&unknown)))
 }
 
 /// The two gestures that most robots find likeliest, where at least two gestures have a robot for them, with how many; of equals the likelier.
@@ -71,7 +67,9 @@ fn rivals(certificate: &Certificate) -> Option<([ClassId; 2], [u32; 2])> {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, VocabularyId};
+    use gestalt_protocol::{
+        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, Vote, VocabularyId,
+    };
 
     use super::*;
     use crate::ballot::{Ballot, Scale};

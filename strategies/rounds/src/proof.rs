@@ -42,17 +42,16 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
         }
         _ => return false,
     };
-    let rows = Rows::of(scale.classes, votes.iter().map(|counted| &counted.vote));
-    let (classes, rows) = (rows.classes, rows.as_slices());
-    let fusion = rule.fuse(config.clip, classes, &rows).filter(|fusion| fusion.is_sound(classes));
-    let withstands = |fusion: &Fusion| rule.withstands(config.clip, &rows, fusion, config.liars);
+    let rows = Rows::of(scale.classes, config.clip, votes.iter().map(|counted| &counted.vote));
+    let fusion = rows.fuse(rule, config.clip);
+    let withstands = |fusion: &Fusion| rows.withstands(rule, config.clip, fusion, config.liars);
     let Some(class) = decision.class else {
         let known = |fusion: &&Fusion| fusion.top.index() < scale.classes;
         let decides = |fusion: &Fusion| config.convinces(withstands(fusion) - TOLERANCE);
         return sound && !(suffice && fusion.as_ref().filter(known).is_some_and(decides));
     };
     let Some(fusion) = fusion.filter(|_| sound && suffice) else { return false };
-    if unknown.is_some() != (classes > scale.classes) {
+    if unknown.is_some() != (rows.classes() > scale.classes) {
         return false;
     }
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;

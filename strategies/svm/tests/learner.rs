@@ -119,16 +119,20 @@ fn gestures_never_met_are_as_likely_as_unknown_and_less_so_the_more_is_known() {
 #[test]
 fn samples_of_one_showing_tell_no_more_than_one_of_what_is_unknown() {
     let space = space();
-    let samples = samples(&space, 8, &mut generator(2));
-    let of = |showings: &dyn Fn(u64) -> u64| {
+    let samples = samples(&space, 16, &mut generator(2));
+    let of = |copies: u64, showings: &dyn Fn(u64) -> u64| {
         let mut learner = learner(&space);
-        for (key, (class, vector)) in (0..).zip(&samples) {
+        for key in 0..copies * samples.len() as u64 {
+            let (class, vector) = &samples[key as usize % samples.len()];
             learner.insert_shown(key, *class, vector, showings(key)).unwrap();
         }
         learner.learn().unwrap().unknown(&features(0, &mut generator(3))).unwrap()
     };
-    // Of each gesture two samples: of two showings, or of one, whose class nothing is then known to look like twice.
-    assert!(of(&|key| key % 4) > of(&|key| key), "it is surer that it knows what it saw twice");
+    let once = of(1, &|key| key);
+    let repeated = of(5, &|key| key % samples.len() as u64);
+    assert!((once - repeated).abs() < 1e-6, "{once} {repeated}");
+    let shown_anew = of(5, &|key| key);
+    assert!(shown_anew < 0.5 * once, "it is surer that it knows what it was shown five times: {shown_anew} {once}");
 }
 
 #[test]
