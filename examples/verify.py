@@ -144,13 +144,10 @@ def certainty(row: list) -> float:
     return 1 + sum(p * math.log(p) for p in softmax(row) if p > 0) / math.log(len(row))
 
 
-def rows_of(held: list) -> list:
-    """The evidence of each vote; where any robot can tell what is unknown, that is a class more."""
-    votes = [vote["vote"] for vote in held]
-    if all(vote.get("unknown") is None for vote in votes):
-        return [vote["evidence"] for vote in votes]
-    neutral = [max(vote["evidence"]) if vote.get("unknown") is None else vote["unknown"] for vote in votes]
-    return [vote["evidence"] + [unknown] for vote, unknown in zip(votes, neutral)]
+def knows(vote: dict, gesture: int) -> bool:
+    """Whether that robot was taught that gesture: to one that was not, it is exactly as likely as what is unknown."""
+    evidence, unknown = vote["evidence"], vote.get("unknown")
+    return evidence[gesture] != unknown if unknown is not None else len(set(evidence)) > 1
 
 
 def sharpness(pool: dict, voices: float) -> float:
@@ -198,15 +195,65 @@ def least(rule: str, parts: list, top: int, liars: int, probability: float) -> f
     return left(part[top] for part in parts) / (len(parts) - liars)
 
 
-def decides(rule: str, evidence: list, given: argparse.Namespace, alpha: float, pool: dict, gestures: int) -> bool:
+def judge(rule: str, votes: list, given: argparse.Namespace, pool: dict) -> tuple:
+    """The probability of each gesture, and of unknown where any robot tells; and of the likeliest what is left of it if so many of the robots lied.
+
+    First whether it is a gesture that any robot was taught, of which all are one witness; then, by the rule, which of these."""
+    clip, gestures = given.clip, range(len(votes[0]["evidence"]))
+    tell = [vote for vote in votes if vote.get("unknown") is not None]
+    known_by = [sum(knows(vote, k) for vote in votes) for k in gestures]
+
+    def clipped(value: float) -> float:
+        return min(max(value, -clip), clip)
+
+    def more_than(robots: int) -> list:
+        return [k for k in gestures if not tell or known_by[k] > robots]
+
+    def which(of: list) -> tuple:
+        rows = [[vote["evidence"][k] for k in of] for vote in votes]
+        return fuse(rule, rows, clip, pool) if len(of) > 1 else ([1.0] * len(of), [])
+
+    def which_at_least(of: list, top: int, liars: int) -> float:
+        probabilities, parts = which(of)
+        if top not in of or probabilities[of.index(top)] < max(probabilities):
+            return 0.0
+        return least(rule, parts, of.index(top), liars, probabilities[of.index(top)]) if len(of) > 1 else 1.0
+
+    def taught(of: list, liars: int) -> tuple:
+        """How likely it is one of these, and each other one."""
+        odds = sorted(math.log(sum(math.exp(clipped(vote["evidence"][k]) - clipped(vote["unknown"])) for k in of)) if of else -math.inf
+                      for vote in tell)[:len(tell) - liars]
+        odds = math.exp(sum(odds) / len(odds)) if odds else 0.0
+        others = len(gestures) - len(of) + 1
+        return odds / (odds + others), 1 / (odds + others)
+
+    of, liars = more_than(0), given.liars
+    chosen, _ = which(of)
+    probabilities = chosen
+    if tell:
+        known, each = taught(of, 0)
+        probabilities = [each] * (len(gestures) + 1)
+        for k, p in zip(of, chosen):
+            probabilities[k] = p * known
+    top = probabilities.index(max(probabilities))
+    if top not in of:
+        return probabilities, 0.0
+    sure = which_at_least(of, top, liars)
+    if tell and liars == 0:
+        sure = min(sure, probabilities[top]) if sure > 0 else 0.0
+    elif tell:
+        # What liars pretend to have been taught is nobody's gesture without them.
+        firm = more_than(liars)
+        sure = taught(firm, liars)[0] * min(sure, which_at_least(firm, top, liars))
+    return probabilities, sure
+
+
+def decides(rule: str, votes: list, given: argparse.Namespace, alpha: float, pool: dict) -> bool:
     """Whether votes that are enough make a gesture likely enough."""
     try:
-        probabilities, parts = fuse(rule, evidence, given.clip, pool)
+        return judge(rule, votes, given, pool)[1] - TOLERANCE >= 1 - alpha
     except Refused:
         return False
-    top = probabilities.index(max(probabilities))
-    # What is likeliest unknown is no gesture.
-    return top < gestures and least(rule, parts, top, given.liars, probabilities[top]) - TOLERANCE >= 1 - alpha
 
 
 def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
@@ -237,21 +284,20 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
     require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
     require(pool is None or 0 <= pool["likeness"] <= 1 and 0.1 <= pool["temperature"] <= 10, "an impossible pool")
-    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), rows_of(votes)
+    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), [held["vote"] for held in votes]
     if decision["class"] is None:
         if majority and enough and votes:
-            require(not decides(rule, evidence, given, alpha, pool, classes), "the votes suffice for a gesture")
+            require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")
         return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
     require(majority, "no majority took part")
     require(enough, "too few votes for so many liars")
-    probabilities, parts = fuse(rule, evidence, given.clip, pool)
+    probabilities, sure = judge(rule, evidence, given, pool)
     of_class = probabilities[decision["class"]]
     said = certificate["probabilities"] + ([] if unknown is None else [unknown])
     require(len(said) == len(probabilities), "unknown where no vote tells it, or none where one does")
     require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, said)), "other probabilities")
     require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
     require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")
-    sure = least(rule, parts, decision["class"], given.liars, of_class)
     require(sure + TOLERANCE >= 1 - alpha, "the votes do not suffice")
     return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
 

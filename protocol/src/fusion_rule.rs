@@ -15,13 +15,13 @@ pub enum FusionRule {
     /// Averaging: the mean of the robots' probabilities.
     MeanProbability,
     /// Logarithmic opinion pool: the softmax of the sum of the robots' log-evidence.
-    #[default]
     LogPool,
     /// A log-opinion pool in which each robot weighs by its own certainty.
     ConfidenceWeighted,
     /// A rule of somebody's own, by its name. Who does not have it cannot draw the decision again from its votes.
     Other(RuleName),
     /// A logarithmic opinion pool that knows how alike its robots are: the sum is divided by how far they repeat each other.
+    #[default]
     CorrelatedPool,
 }
 

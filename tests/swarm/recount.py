@@ -53,16 +53,43 @@ def softmax(row):
 
 
 def decide(rule, quorum, certificate):
-    votes = [vote["vote"]["evidence"] for vote in certificate["votes"]]
-    gestures, unknown = len(certificate["probabilities"]), [vote["vote"].get("unknown") for vote in certificate["votes"]]
-    if any(value is not None for value in unknown):
-        votes = [vote + [max(vote) if value is None else value] for vote, value in zip(votes, unknown)]
+    votes = [vote["vote"] for vote in certificate["votes"]]
+    gestures = len(certificate["probabilities"])
     reached = len(votes) + len(certificate["others"])
     needed, counted = (certificate["robots"] // 2 + 1, reached) if quorum == "majority" else (int(quorum), len(votes))
     if not votes or counted < needed:
         return None
-    rows = [[max(-CLIP, min(CLIP, value)) for value in vote] for vote in votes]
+    clip = lambda value: max(-CLIP, min(CLIP, value))
+    tell = [vote for vote in votes if vote.get("unknown") is not None]
+
+    def learned(vote, k):
+        if vote.get("unknown") is None:
+            return len(set(vote["evidence"])) > 1
+        return vote["evidence"][k] != vote["unknown"]
+
+    of = [k for k in range(gestures) if not tell or any(learned(vote, k) for vote in votes)]
+    if not of:
+        return None
+    chosen = choose(rule, [[clip(vote["evidence"][k]) for k in of] for vote in votes], certificate)
+    if chosen is None:
+        return None
+    top, p, leads = chosen
+    if tell:
+        odds = [math.log(sum(math.exp(clip(vote["evidence"][k]) - clip(vote["unknown"])) for k in of)) for vote in tell]
+        odds = math.exp(sum(odds) / len(odds))
+        others = gestures - len(of) + 1
+        p, other = p * odds / (odds + others), 1 / (odds + others)
+        # Of equals the first: a gesture that nobody was taught may stand before it.
+        if other > p or other == p and any(k not in of for k in range(of[top])):
+            return None
+    return of[top] if leads and p >= (0.5 if rule in ("majority", "mean_probability") else 0.95) else None
+
+
+def choose(rule, rows, certificate):
+    """Which of the gestures, how likely among them, and whether it leads."""
     classes, parts = len(rows[0]), []
+    if classes == 1:
+        return 0, 1.0, True
     for row in rows:
         if rule == "majority":
             if row.count(max(row)) > 1:
@@ -85,11 +112,9 @@ def decide(rule, quorum, certificate):
         lengths = [math.sqrt(sum((value - mean) ** 2 for value in row)) for row, mean in zip(rows, means)]
         voices = sum(lengths) ** 2 / sum(length**2 for length in lengths) if any(lengths) else 1
         totals = [total / (pool["temperature"] * (1 + (voices - 1) * pool["likeness"])) for total in totals]
-    shares = rule in ("majority", "mean_probability")
-    p = [value / len(parts) for value in totals] if shares else softmax(totals)
+    p = [value / len(parts) for value in totals] if rule in ("majority", "mean_probability") else softmax(totals)
     top = p.index(max(p))
-    leads = totals[top] > max(value for k, value in enumerate(totals) if k != top)
-    return top if leads and top < gestures and p[top] >= (0.5 if shares else 0.95) else None
+    return top, p[top], totals[top] > max(value for k, value in enumerate(totals) if k != top)
 
 
 def check(path):

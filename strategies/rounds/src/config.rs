@@ -126,7 +126,7 @@ pub struct RoundsConfig {
 impl Default for RoundsConfig {
     fn default() -> Self {
         Self {
-            rule: FusionRule::LogPool,
+            rule: FusionRule::default(),
             alpha: None,
             quorum: Quorum::Majority,
             lately: Duration::from_secs(120),

@@ -21,7 +21,7 @@ use crate::machine::Machine;
 const REPEATS: f64 = 0.17;
 
 /// How much less likely a gesture that is not on the list is shown than one that is, to a robot that was taught all of them.
-const RARE: f64 = 0.2;
+const RARE: f64 = 0.05;
 
 /// A trained classifier. [`Learner`](crate::Learner) and `train` make one, [`Classifier::decode`] reads one.
 ///

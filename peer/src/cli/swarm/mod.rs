@@ -58,7 +58,7 @@ pub struct Args {
     pause: Duration,
 
     /// Fusion rule
-    #[arg(long, default_value = "log_pool", value_parser = super::choice::rule())]
+    #[arg(long, default_value_t, value_parser = super::choice::rule())]
     rule: FusionRule,
 
     /// Model file written by `gestalt train`, `hands` (bare hands before any camera) or `rendered` (synthetic hands)

@@ -9,6 +9,9 @@ const SPREAD: [f64; 3] = [1.0, 1.0, 1.0];
 /// The lead where only one class is there to be near to: that at which it says nothing.
 const NO_LEAD: f64 = 0.3;
 
+/// A view of what is known, as it is expected to be before any was left out: as far from its class as its class scatters.
+const EXPECTED: (Score, f64) = (Score { distance: 0.0, lead: None }, 1.0);
+
 /// No more showings than this count, of the known and of the unknown: what is left out is not quite what will be shown.
 const MOST: f64 = 60.0;
 
@@ -27,6 +30,7 @@ fn terms(score: Score) -> [f64; 3] {
 /// Logistic regression with both sides weighing alike, so that its logit is a likelihood ratio; Newton's method.
 pub(super) fn calibrate(known: &[(Score, f64)], unknown: &[(Score, f64)]) -> ([f64; 3], [f64; 2]) {
     let total = |scores: &[(Score, f64)]| scores.iter().map(|(_, weight)| weight).sum::<f64>();
+    let known = &*[known, &[EXPECTED]].concat();
     let (of_known, of_unknown) = (total(known), total(unknown));
     let bounds = [(1.0 + of_unknown).ln(), (1.0 + of_known).ln()];
     let each = of_known.min(of_unknown).min(MOST);
