@@ -22,7 +22,7 @@ VERSION, VOTE, ANNOUNCED = 3, 0, 8
 POOLS = ("log_pool", "confidence_weighted", "correlated_pool")
 # In the order of their numbers on the wire; 4 is a rule of somebody's own.
 RULES = ("majority", "mean_probability", "log_pool", "confidence_weighted", None, "correlated_pool")
-PRIOR = {"likeness": 0.5, "temperature": 1.25, "rounds": 0}
+PRIOR = {"likeness": 0.5, "temperature": 1.1, "rounds": 0}
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
 
@@ -283,7 +283,10 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     pool, unknown = certificate.get("pool"), certificate.get("unknown")
     require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
     require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
-    require(pool is None or 0 <= pool["likeness"] <= 1 and 0.1 <= pool["temperature"] <= 10, "an impossible pool")
+    if pool is not None:
+        likeness, temperature = pool["likeness"], pool["temperature"]
+        require(0 <= likeness <= 1 and 0.1 <= temperature <= 10, "an impossible pool")
+        require(round(likeness * 20) / 20 == likeness and round(temperature * 100) / 100 == temperature, "a pool between the steps")
     alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), [held["vote"] for held in votes]
     if decision["class"] is None:
         if majority and enough and votes:

@@ -126,7 +126,7 @@ mod tests {
             due.push((k, Input::Blind(k == 3)));
             due.push((k, Input::Open));
             if k < 3 {
-                due.push((k, Input::Observed(Observation { features: vec![0.1, 0.9], quality: 1.0 })));
+                due.push((k, Input::Observed(Observation { features: vec![0.01, 0.99], quality: 1.0 })));
             }
         }
         for ms in 1..3000 {

@@ -276,7 +276,7 @@ fn a_decision_for_clients() {
     assert!(
         serde_json::to_string(&pool)
             .unwrap()
-            .contains(r#""rule":"correlated_pool","pool":{"likeness":0.5,"temperature":1.25,"rounds":0}"#)
+            .contains(r#""rule":"correlated_pool","pool":{"likeness":0.5,"temperature":1.1,"rounds":0}"#)
     );
     let more = r#","label":"palm","announcer":7,"stamp":{"boot":1,"sequence":130},"signature":null}"#;
     let json = format!("{}{more}", json.strip_suffix('}').unwrap());

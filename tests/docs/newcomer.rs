@@ -24,16 +24,16 @@ const PATIENCE: Duration = Duration::from_secs(120);
 pub fn photographs_and_a_video_lead_to_a_model_and_a_robot_that_decides() {
     let stage = Stage::new(99);
     let photographs = data().join("webcam-fingers");
-    let mut filmed = None;
+    let mut filmed = Vec::new();
     for gesture in 1..=5_u8 {
         let (from, to) = (photographs.join(gesture.to_string()), stage.path("DIR").join(gesture.to_string()));
         fs::create_dir_all(&to).unwrap();
         let mut files: Vec<_> = fs::read_dir(&from).unwrap().map(|entry| entry.unwrap().path()).collect();
         files.sort();
-        // Who is filmed is not among the photographs.
-        let last = files.pop().expect("photographs");
+        // What is filmed is not among the photographs.
+        let last = files.split_off(files.len() - 3);
         if gesture == SHOWN {
-            filmed = Some(last);
+            filmed = last;
         }
         // Several sittings, as a person would take them who reads that file names tell subjects apart.
         for (number, file) in files.iter().enumerate() {
@@ -41,7 +41,8 @@ pub fn photographs_and_a_video_lead_to_a_model_and_a_robot_that_decides() {
         }
     }
     let empty = fs::read_dir(photographs.join("background")).unwrap().next().unwrap().unwrap().path();
-    film(&stage.path("hand.mp4"), &read_image(&empty).unwrap(), &read_image(&filmed.unwrap()).unwrap());
+    let hands: Vec<Mat> = filmed.iter().map(|file| read_image(file).unwrap()).collect();
+    film(&stage.path("hand.mp4"), &read_image(&empty).unwrap(), &hands);
 
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
     let line = |begins: &str| {
@@ -78,10 +79,11 @@ fn said(stage: &Stage) -> String {
     logs.map(|log| fs::read_to_string(log).unwrap_or_default()).collect()
 }
 
-/// A video of an empty scene into which a hand comes, holds still, and leaves.
-fn film(path: &Path, empty: &Mat, hand: &Mat) {
+/// A video of an empty scene into which a hand comes, is held up and turned a little, and leaves.
+fn film(path: &Path, empty: &Mat, hands: &[Mat]) {
     let size = empty.size().unwrap();
-    assert_eq!(hand.size().unwrap(), size, "photographs of one camera");
+    let (first, last) = (hands.first().unwrap(), hands.last().unwrap());
+    assert!(hands.iter().all(|hand| hand.size().unwrap() == size), "photographs of one camera");
     let codec = VideoWriter::fourcc('m', 'p', '4', 'v').unwrap();
     let mut writer =
         VideoWriter::new_with_backend(path.to_str().unwrap(), CAP_FFMPEG, codec, FPS, size, true).unwrap();
@@ -94,11 +96,13 @@ fn film(path: &Path, empty: &Mat, hand: &Mat) {
     };
     show(empty, seconds(5.0));
     for part in [0.25, 0.5, 0.75] {
-        show(&slid(empty, hand, part), 2);
+        show(&slid(empty, first, part), 2);
     }
-    show(hand, seconds(4.0));
+    for hand in hands {
+        show(hand, seconds(4.0 / hands.len() as f64));
+    }
     for part in [0.75, 0.5, 0.25] {
-        show(&slid(empty, hand, part), 2);
+        show(&slid(empty, last, part), 2);
     }
     show(empty, seconds(3.0));
     writer.release().unwrap();

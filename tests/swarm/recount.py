@@ -9,7 +9,7 @@ import struct
 import sys
 
 CLIP, RULES = 6.0, ("majority", "mean_probability", "log_pool", "confidence_weighted", "correlated_pool")
-PRIOR = {"likeness": 0.5, "temperature": 1.25}
+PRIOR = {"likeness": 0.5, "temperature": 1.1}
 
 
 def records(data):

@@ -12,6 +12,7 @@ use gestalt_peer::config::{CameraChoice, CameraSection, Config, RosSection, Sour
 use gestalt_protocol::{CameraState, ClassId, RobotId};
 use gestalt_ros::RosMessage;
 use gestalt_ros::message::{CompressedImage, Header};
+use gestalt_strategies::MindConfig;
 use gestalt_tests::{Process, config, learning, model, short_rounds, start_learning, unique};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Pose;
@@ -103,7 +104,8 @@ pub async fn a_ros_system_hears_what_a_swarm_decides_and_teaches_it() {
     let mut connect = Vec::new();
     for id in 1..=2 {
         let config = RobotConfig {
-            mind: short_rounds(),
+            // Two robots that were shown each gesture once are not sure.
+            mind: MindConfig { alpha: Some(0.4), ..short_rounds() },
             learning: Some(learning(8, 1.0, None)),
             ..config(id, &swarm, &connect)
         };
@@ -136,8 +138,8 @@ pub async fn a_ros_system_hears_what_a_swarm_decides_and_teaches_it() {
     };
     let decided = |said: &str| Some(serde_json::from_str::<Value>(said).expect("a decision in JSON"));
 
-    // From nothing: the first rounds decide nothing, and are told what they showed.
-    for class in [3, 1] {
+    // From nothing: the first rounds decide nothing, and are told what they showed. As long as a gesture of the list was not, any may be that one.
+    for class in [4, 1, 5, 0, 2, 3] {
         shown.store(class, Ordering::Relaxed);
         say("open").await;
         next(&decisions, decided).await;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::RoundId;
+use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -34,7 +35,17 @@ impl Human {
     pub fn shows(&self, round: RoundId) -> Scene {
         let mut chance = ChaCha8Rng::seed_from_u64(self.seed);
         chance.set_stream(u64::from(round.counter));
-        Scene { gesture: Some(chance.random_range(0..=5)), seed: chance.random() }
+        Scene { gesture: Some(self.in_turn(round.counter.saturating_sub(1))), seed: chance.random() }
+    }
+
+    /// Each of the gestures once, in some order, before any is shown again: who teaches leaves none out.
+    fn in_turn(&self, showing: u32) -> u8 {
+        let mut gestures = [0, 1, 2, 3, 4, 5];
+        let mut chance = ChaCha8Rng::seed_from_u64(self.seed);
+        // Beyond those of single rounds.
+        chance.set_stream(1 << 32 | u64::from(showing / 6));
+        gestures.shuffle(&mut chance);
+        gestures[showing as usize % 6]
     }
 
     /// What they show at that time since 1970, and how far their hand is from its place, in metres. In every period there is
@@ -103,8 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn every_gesture_is_shown_sooner_or_later() {
-        let shown: BTreeSet<_> = (0..60).filter_map(|c| Human::new(3).shows(round(c, 1)).gesture).collect();
-        assert_eq!(shown, (0..=5).collect());
+    fn each_gesture_is_shown_before_any_is_shown_again_in_another_order_each_time() {
+        let turn = |n: u32| (1..=6).map(move |k| Human::new(3).shows(round(6 * n + k, 1)).gesture);
+        for n in 0..5 {
+            assert_eq!(turn(n).collect::<BTreeSet<_>>(), (0..=5).map(Some).collect());
+        }
+        let orders: BTreeSet<Vec<_>> = (0..5).map(|n| turn(n).collect()).collect();
+        assert!(orders.len() > 1, "always in one order: {orders:?}");
     }
 }

@@ -93,9 +93,11 @@ fn who_knows_little_says_little() {
         let ratios = (0..40).map(|n| taught.log_ratio(&world.showing(n % 4, 1, rng)[0]));
         ratios.fold((0.0_f64, 0.0_f64), |(low, high), ratio| (low.min(ratio), high.max(ratio)))
     };
-    assert_eq!(of(1, 1, &mut rng), (0.0, 0.0), "one showing of one gesture tells nothing");
+    let most = 2.0_f64.ln() + 1e-12;
+    let (low, high) = of(1, 1, &mut rng);
+    assert!(low >= 0.0 && high <= most, "one showing of one gesture knows nothing for certain: {low}..{high}");
     let (low, high) = of(2, 1, &mut rng);
-    assert!(low >= -(3.0_f64.ln()) && high <= 0.0, "no gesture was shown twice: {low}..{high}");
+    assert!(low >= -(3.0_f64.ln()) && high <= most, "no gesture was shown twice: {low}..{high}");
     let (low, high) = of(3, 10, &mut rng);
     assert!(low < -1.0 && high > 1.0, "{low}..{high}");
 }

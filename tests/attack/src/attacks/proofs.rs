@@ -121,6 +121,7 @@ fn what_is_proven(mut decision: Decision) -> Decision {
     (decision.round.opener, decision.round.life) = (RobotId(0), 0);
     let certificate = &mut decision.certificate;
     (certificate.robots, certificate.quorum, certificate.elapsed_ms) = (0, 0, 0);
+    certificate.pool.iter_mut().for_each(|pool| pool.rounds = 0);
     for counted in &mut certificate.votes {
         (counted.class, counted.weight) = (gestalt_protocol::ClassId(0), 0.0);
     }

@@ -101,7 +101,7 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
         change(&mut decision);
         decision
     };
-    let config = RoundsConfig { quorum: Quorum::Evidence(3), ..RoundsConfig::default() };
+    let config = RoundsConfig { quorum: Quorum::Evidence(3), ..adding_up() };
     for (lie, refusal) in [
         (changed(&|d| d.certificate.vocabulary = VocabularyId(77)), Refusal::Vocabulary),
         (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Impossible),

@@ -38,7 +38,7 @@ fn a_round_waits_until_every_live_robot_has_seen_something_but_not_beyond_patien
 
 #[test]
 fn fewer_robots_than_the_quorum_decide_nothing() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(2), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(2), ..adding_up() });
     mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
     mind.handle(ms(1), votes(2, 1, null(1)));
     assert_eq!(mind.held(), None);
@@ -79,7 +79,7 @@ fn a_robot_draws_one_conclusion_per_round_and_none_after_adopting_one() {
     mind.handle(ms(10), votes(2, 1, vote(1, 1, SURE)));
     let out = mind.handle(ms(20), votes(3, 1, vote(1, 1, SURE)));
     assert!(holds(&out).is_empty());
-    let mut other = mind_with(8, RoundsConfig::default());
+    let mut other = mind_with(8, adding_up());
     other.handle(ms(0), Input::Open);
     other.handle(ms(5), gives(7, decision(1, Some(2), 1, 7)));
     let out = other.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
@@ -89,7 +89,7 @@ fn a_robot_draws_one_conclusion_per_round_and_none_after_adopting_one() {
 
 #[test]
 fn a_liars_vote_is_clipped_and_f_liars_cannot_make_a_decision() {
-    let config = RoundsConfig { liars: 1, ..RoundsConfig::default() };
+    let config = RoundsConfig { liars: 1, ..adding_up() };
     let mut mind = mind_with(7, config);
     mind.handle(ms(0), votes(66, 1, vote(1, 2, 1e30)));
     mind.handle(ms(1), votes(1, 1, vote(1, 0, LEANING)));
@@ -102,7 +102,7 @@ fn a_liars_vote_is_clipped_and_f_liars_cannot_make_a_decision() {
 
 #[test]
 fn with_liars_a_decision_heard_needs_more_than_two_votes_for_each_and_their_margin() {
-    let mut mind = mind_with(7, RoundsConfig { liars: 1, ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { liars: 1, ..adding_up() });
     mind.handle(ms(0), gives(66, decision(1, Some(2), 2, 66)));
     assert_eq!((mind.held(), mind.refusals().count(Refusal::Unfounded)), (None, 1));
     mind.handle(ms(2), gives(1, decision(1, Some(2), 5, 1)));
@@ -187,7 +187,7 @@ fn a_robot_without_a_classifier_fuses_what_the_others_saw() {
 
 #[test]
 fn liars_tip_no_balance_that_honest_votes_leave() {
-    let config = RoundsConfig { liars: 1, ..RoundsConfig::default() };
+    let config = RoundsConfig { liars: 1, ..adding_up() };
     let mut mind = mind_with(7, config);
     mind.handle(ms(0), votes(66, 1, vote(1, 2, 6.0)));
     // The two others together favour class 2 by a hair: with the liar, by more than one robot could make up for.
@@ -210,12 +210,12 @@ fn liars_tip_no_balance_that_honest_votes_leave() {
 
 #[test]
 fn where_liars_are_expected_a_decision_that_leaves_out_what_is_known_is_not_believed() {
-    let config = RoundsConfig { liars: 1, ..RoundsConfig::default() };
+    let config = RoundsConfig { liars: 1, ..adding_up() };
     let mut mind = mind_with(7, config);
     for robot in 1..=9 {
         mind.handle(ms(0), votes(robot, 1, vote(1, 0, SURE)));
     }
-    let mut early = mind_with(7, RoundsConfig { liars: 1, ..RoundsConfig::default() });
+    let mut early = mind_with(7, RoundsConfig { liars: 1, ..adding_up() });
     let forged = || gives(66, decision(1, Some(2), 8, 66));
     mind.handle(ms(1), forged());
     assert_ne!(mind.held().and_then(|held| held.class), Some(ClassId(2)));

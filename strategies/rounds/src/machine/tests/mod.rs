@@ -55,6 +55,11 @@ fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
 }
 
+/// By a rule in which the votes of the tests add up.
+fn adding_up() -> RoundsConfig {
+    RoundsConfig { rule: FusionRule::LogPool, ..RoundsConfig::default() }
+}
+
 /// A mind whose camera shows nothing, so that it waits for no frame of its own; it takes those it is given all the same.
 fn mind_with(me: u32, config: RoundsConfig) -> Rounds {
     let mut mind = Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, config).unwrap();
@@ -64,11 +69,11 @@ fn mind_with(me: u32, config: RoundsConfig) -> Rounds {
 }
 
 fn mind(me: u32) -> Rounds {
-    mind_with(me, RoundsConfig::default())
+    mind_with(me, adding_up())
 }
 
 fn blind(me: u32) -> Rounds {
-    Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap()
+    Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, adding_up()).unwrap()
 }
 
 fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
@@ -130,7 +135,7 @@ fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decisi
 /// What a robot makes of these votes, as the default has it.
 fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u32) -> Decision {
     let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
-    let RoundsConfig { rule, clip, .. } = RoundsConfig::default();
+    let RoundsConfig { rule, clip, .. } = adding_up();
     let fused = fuse(rule, clip, 3, rows);
     let (probabilities, confidence) = fused.map_or((Vec::new(), 0.0), |fused| {
         (fused.probabilities.clone(), fused.probabilities[fused.top.index()])

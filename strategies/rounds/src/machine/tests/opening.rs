@@ -14,7 +14,7 @@ fn opening_says_a_null_vote_to_all_at_once() {
 
 #[test]
 fn a_request_to_open_has_no_effect_while_a_round_is_open_or_has_just_begun() {
-    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..adding_up() });
     mind.handle(ms(0), Input::Open);
     assert!(mind.handle(ms(5), Input::Open).is_empty());
     mind.handle(ms(10), gives(1, decision(1, Some(0), 2, 1)));
@@ -52,7 +52,7 @@ fn equal_counters_merge_on_the_smaller_opener_and_keep_what_was_seen() {
 #[test]
 fn a_vote_under_another_name_of_a_round_begins_no_other_however_late() {
     let mut mind = mind(7);
-    let deadline = RoundsConfig::default().deadline;
+    let deadline = adding_up().deadline;
     let of_nine = |sequence| votes(9, sequence, Vote { round: round(1, 9), ..null(1) });
     mind.handle(ms(0), Input::Open);
     mind.handle(ms(10), of_nine(1));
@@ -199,7 +199,7 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
 
 #[test]
 fn equal_counters_of_rounds_opened_at_other_times_are_two_rounds() {
-    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..adding_up() });
     mind.handle(ms(0), Input::Open);
     mind.handle(ms(10), gives(9, decision(1, Some(0), 2, 9)));
     assert_eq!(mind.round(), Some(round(1, 1)), "heard while it is shown: another name of it");

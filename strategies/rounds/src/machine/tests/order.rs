@@ -45,7 +45,7 @@ fn heard() -> impl Strategy<Value = Input> {
 /// The ballot and the decision that a mind ends with which only listens: it waits for a robot that says nothing, and no time passes.
 fn outcome(heard: &[Input]) -> (Option<RoundId>, BTreeMap<RobotId, Stamp>, Option<Decision>) {
     let quorum = Quorum::Evidence(1);
-    let mut mind = mind_with(100, RoundsConfig { quorum, refractory: ms(0), ..RoundsConfig::default() });
+    let mut mind = mind_with(100, RoundsConfig { quorum, refractory: ms(0), ..adding_up() });
     mind.handle(ms(1), Input::Alive(robots([99])));
     for input in heard {
         mind.handle(ms(1), input.clone());

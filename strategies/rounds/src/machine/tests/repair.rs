@@ -33,7 +33,7 @@ fn a_new_neighbour_is_greeted_at_once_and_the_neighbours_in_turn_from_then_on() 
 
 #[test]
 fn a_neighbour_is_given_the_votes_it_lacks_and_asked_for_those_lacking_here() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..adding_up() });
     mind.handle(ms(0), votes(1, 5, vote(1, 0, LEANING)));
     mind.handle(ms(0), votes(2, 5, vote(1, 0, LEANING)));
     let out = mind.handle(ms(10), says(3, 1, Message::Have(have(1, &[(1, 4), (2, 6), (7, 1)]))));
@@ -49,7 +49,7 @@ fn a_neighbour_is_given_the_votes_it_lacks_and_asked_for_those_lacking_here() {
 
 #[test]
 fn what_was_given_and_is_news_goes_on_to_the_other_neighbours_and_nothing_else_does() {
-    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(9), ..adding_up() });
     mind.handle(ms(0), Input::Neighbours(robots([3, 4])));
     mind.handle(ms(0), votes(1, 5, vote(1, 0, LEANING)));
     let held = |robot, sequence| HeldVote {

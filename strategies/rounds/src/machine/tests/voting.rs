@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn votes_are_said_on_change_at_a_bounded_rate_and_repeated_while_open() {
-    let mut mind = mind_with(7, RoundsConfig { alpha: Some(1e-9), ..RoundsConfig::default() });
+    let mut mind = mind_with(7, RoundsConfig { alpha: Some(1e-9), ..adding_up() });
     mind.handle(ms(0), Input::Open);
     let mut said = Vec::new();
     for t in (20..2000).step_by(20) {
