@@ -258,7 +258,7 @@ impl TrainingSet {
             let stays = |robot| robot == self.me() || self.shares.is_alive(robot);
             self.seen.series().filter(|series| !stays(series.author)).collect()
         } else {
-            Vec::new()
+            return Vec::new();
         };
         let mut held: BTreeMap<SampleSeries, Vec<u64>> =
             may_go.into_iter().map(|series| (series, Vec::new())).collect();

@@ -43,6 +43,8 @@ impl Scale {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ballot {
     votes: BTreeMap<RobotId, HeldVote>,
+    /// How many votes there are of each vocabulary and number of gestures: asked at every input, in a swarm of thousands too.
+    scales: BTreeMap<(u32, usize), usize>,
 }
 
 impl Ballot {
@@ -52,11 +54,13 @@ impl Ballot {
         match self.votes.entry(held.robot) {
             Entry::Occupied(known) if known.get().stamp >= held.stamp => Cast::Known,
             Entry::Occupied(mut known) => {
-                known.insert(held);
+                count(&mut self.scales, &held);
+                discount(&mut self.scales, &known.insert(held));
                 Cast::Counted
             }
             Entry::Vacant(_) if full => Cast::Full,
             Entry::Vacant(place) => {
+                count(&mut self.scales, &held);
                 place.insert(held);
                 Cast::Counted
             }
@@ -65,7 +69,11 @@ impl Ballot {
 
     /// Takes the votes of these robots out.
     pub fn strike(&mut self, robots: &BTreeSet<RobotId>) {
-        self.votes.retain(|robot, _| !robots.contains(robot));
+        for robot in robots {
+            if let Some(struck) = self.votes.remove(robot) {
+                discount(&mut self.scales, &struck);
+            }
+        }
     }
 
     /// How many robots take part, seeing or not.
@@ -108,19 +116,16 @@ impl Ballot {
     /// The scale most votes with evidence are on; of equals the one of the smaller vocabulary, then of fewer classes.
     #[must_use]
     pub fn prevailing_scale(&self) -> Option<Scale> {
-        let mut scales = BTreeMap::<(u32, usize), usize>::new();
-        for HeldVote { vote, .. } in self.votes.values().filter(|held| !held.vote.evidence.is_empty()) {
-            *scales.entry((vote.vocabulary.0, vote.evidence.len())).or_default() += 1;
-        }
+        let with_evidence = self.scales.iter().filter(|((_, classes), _)| *classes > 0);
         // Reversed, because of equal maxima the last one is returned.
-        let ((vocabulary, classes), _) = scales.into_iter().rev().max_by_key(|(_, votes)| *votes)?;
+        let (&(vocabulary, classes), _) = with_evidence.rev().max_by_key(|(_, votes)| **votes)?;
         Some(Scale { vocabulary: VocabularyId(vocabulary), classes })
     }
 
     /// How many robots gave evidence on that scale.
     #[must_use]
     pub fn contributors(&self, scale: Scale) -> usize {
-        self.on(scale).count()
+        self.scales.get(&(scale.vocabulary.0, scale.classes)).copied().unwrap_or_default()
     }
 
     /// All evidence on that scale as one distribution, with "unknown" as a last class where any of the robots can tell; `None` when there is
@@ -173,6 +178,23 @@ impl Ballot {
 
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {
         self.votes.values().filter(move |held| scale.is_of(&held.vote))
+    }
+}
+
+fn scale_of(held: &HeldVote) -> (u32, usize) {
+    (held.vote.vocabulary.0, held.vote.evidence.len())
+}
+
+fn count(scales: &mut BTreeMap<(u32, usize), usize>, held: &HeldVote) {
+    *scales.entry(scale_of(held)).or_default() += 1;
+}
+
+fn discount(scales: &mut BTreeMap<(u32, usize), usize>, held: &HeldVote) {
+    if let Entry::Occupied(mut votes) = scales.entry(scale_of(held)) {
+        *votes.get_mut() -= 1;
+        if *votes.get() == 0 {
+            votes.remove();
+        }
     }
 }
 
@@ -287,6 +309,9 @@ mod tests {
             };
             let (once, again) = (count(&votes), count(&shuffled));
             prop_assert_eq!(&once, &again);
+            for scale in [SCALE, Scale { classes: 0, ..SCALE }] {
+                prop_assert_eq!(once.contributors(scale), once.on(scale).count());
+            }
             for rule in FusionRule::ALL {
                 prop_assert_eq!(once.fuse(&rule, 6.0, SCALE), again.fuse(&rule, 6.0, SCALE));
             }

@@ -257,9 +257,8 @@ impl Round {
         {
             return;
         }
-        let heard_all = self.has_heard_all(now, view, config);
         let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
-        if !(late || suffice && heard_all) {
+        if !(late || suffice && self.has_heard_all(now, view, config)) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));

@@ -36,6 +36,10 @@ impl Follow for Learning {
         (1..self.config.keep).contains(&self.recent.looks(round))
     }
 
+    fn learns(&self) -> bool {
+        true
+    }
+
     fn knowledge(&self) -> Option<Digest> {
         Some(self.digest())
     }

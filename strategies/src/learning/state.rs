@@ -1,5 +1,6 @@
 //! What a robot makes of what it saw and was told: samples, labelled, kept, shared and forgotten.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use std::hash::Hasher;
@@ -77,7 +78,9 @@ pub(crate) struct Learning {
     pub(super) aside: Unresolved,
     /// The highest counter of a round that this robot knows of.
     newest: Option<u32>,
-    digest: Digest,
+    /// The key of the digest, and that itself once somebody asked for it: most change again before.
+    key: u64,
+    digest: OnceCell<Digest>,
     /// From which the keys of the digest follow, and how many were drawn.
     secret: u64,
     drawn: u64,
@@ -136,8 +139,9 @@ impl Learning {
         let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
         let mut rng = rng;
         let secret = rng.next_u64();
-        let mut learning = Self {
-            digest: Digest::default(),
+        Ok(Self {
+            key: secret,
+            digest: OnceCell::new(),
             secret,
             drawn: 0,
             aside: Unresolved::new(aside, counters.next_aside, config.aside),
@@ -162,9 +166,7 @@ impl Learning {
             // What is held and what was told of it may have been written at different times.
             thinned,
             unsent: VecDeque::new(),
-        };
-        learning.digest = learning.digest_under(secret);
-        Ok(learning)
+        })
     }
 
     /// Notes a look at the gesture of a round; says whether it was kept.
@@ -236,6 +238,8 @@ impl Learning {
         let first = self.newest.is_none();
         self.newest = Some(counter);
         if first {
+            // Under this key stands what was known when it was drawn.
+            self.digest();
             let forgotten = self.lessons.forget_beyond(self.furthest());
             self.dirty.extend(forgotten.into_iter().map(Item::Lessons));
         }
@@ -371,7 +375,7 @@ impl Learning {
 
     /// What it knows, under its own key.
     pub fn digest(&self) -> Digest {
-        self.digest
+        *self.digest.get_or_init(|| self.digest_under(self.key))
     }
 
     /// What it knows, under another's key.
@@ -386,7 +390,7 @@ impl Learning {
             self.drawn += 1;
             let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
             sip.write(&self.drawn.to_le_bytes());
-            self.digest = self.digest_under(sip.finish());
+            (self.key, self.digest) = (sip.finish(), OnceCell::new());
         }
     }
 

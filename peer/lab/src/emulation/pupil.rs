@@ -76,7 +76,7 @@ impl Pupil {
     /// The classifier, brought up to date, and whether that changed it.
     pub fn learn(&mut self) -> Option<Arc<Classifier>> {
         let learner = self.learner.as_mut().filter(|_| !self.due.is_empty())?;
-        for change in self.due.drain(..) {
+        for change in what_lasts(std::mem::take(&mut self.due)) {
             change.apply_to(learner).expect("a mind trains on vectors of the school's space and classes");
         }
         self.classifier = Some(learner.learn().expect("a learner learns from any samples it took"));
@@ -85,5 +85,45 @@ impl Pupil {
 
     pub fn classifier(&self) -> Option<&Arc<Classifier>> {
         self.classifier.as_ref()
+    }
+}
+
+/// The changes without those of samples that came and went meanwhile. Of a large swarm's samples most do: each costs its kernel with
+/// all others.
+fn what_lasts(mut changes: Vec<TrainingChange>) -> Vec<TrainingChange> {
+    let gone: BTreeMap<u64, usize> = changes
+        .iter()
+        .enumerate()
+        .filter_map(
+            |(at, change)| if let TrainingChange::Remove(key) = change { Some((*key, at)) } else { None },
+        )
+        .collect();
+    let mut at = 0;
+    changes.retain(|change| {
+        let (TrainingChange::Insert { key, .. }
+        | TrainingChange::Relabel { key, .. }
+        | TrainingChange::Remove(key)) = change;
+        let lasts = gone.get(key).is_none_or(|last| *last <= at);
+        at += 1;
+        lasts
+    });
+    changes
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::ClassId;
+
+    use super::*;
+
+    #[test]
+    fn what_came_and_went_is_not_trained_and_all_else_is_in_its_order() {
+        let insert = |key| TrainingChange::Insert { key, class: ClassId(0), vector: [0.0].into() };
+        let relabel = |key| TrainingChange::Relabel { key, class: ClassId(1) };
+        let remove = TrainingChange::Remove;
+        let changes =
+            vec![insert(1), insert(2), relabel(1), remove(1), insert(3), remove(4), insert(4), relabel(3)];
+        // Whether the learner had one of that key before is not known here: it is told that it goes.
+        assert_eq!(what_lasts(changes), [insert(2), remove(1), insert(3), remove(4), insert(4), relabel(3)]);
     }
 }

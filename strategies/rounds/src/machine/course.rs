@@ -102,7 +102,7 @@ impl Rounds {
     /// Until when this robot looks at a round that is over: it saw something, and is to learn from more of it.
     pub(super) fn looking_until(&self, follower: &dyn Follow) -> Option<Duration> {
         let round = self.round.as_ref().filter(|round| !round.open)?;
-        if self.looking.is_none() || follower.knowledge().is_none() {
+        if self.looking.is_none() || !follower.learns() {
             return None;
         }
         let (_, deadline) = round.patience_and_deadline(&self.config);

@@ -34,6 +34,11 @@ pub trait Follow {
         None
     }
 
+    /// Whether the robot learns: asked at every input, and so without working out what it knows.
+    fn learns(&self) -> bool {
+        self.knowledge().is_some()
+    }
+
     /// All it knows, in two numbers, which neighbours are told with what is known of the round. `None`: it does not learn.
     fn knowledge(&self) -> Option<Digest> {
         None

@@ -237,7 +237,7 @@ impl Rounds {
             Input::Left => self.on_left(),
             Input::Blind(blind) => self.on_blind(blind),
             Input::Observed(observation) => {
-                self.on_observed(&observation, effects.follower.knowledge().is_some());
+                self.on_observed(&observation, effects.follower.learns());
             }
             Input::Received(envelope) => self.on_received(envelope, &mut effects),
             Input::Announced(announcement) => self.on_announced(announcement, &mut effects),
