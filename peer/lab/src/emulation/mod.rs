@@ -6,6 +6,7 @@
 
 mod network;
 mod observer;
+mod poison;
 mod pupil;
 mod record;
 mod report;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
+pub use poison::Poison;
 #[cfg(feature = "experiments")]
 pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};
