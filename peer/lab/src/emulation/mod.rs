@@ -7,6 +7,7 @@
 mod calibration;
 mod network;
 mod observer;
+mod poison;
 mod pupil;
 mod record;
 mod report;
@@ -25,6 +26,7 @@ use std::sync::Arc;
 pub use calibration::Calibration;
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
+pub use poison::Poison;
 #[cfg(feature = "experiments")]
 pub(crate) use report::likeliest;
 pub use report::{BytesPerRobot, Learned, Report, Summary, Table};

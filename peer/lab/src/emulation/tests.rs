@@ -19,8 +19,8 @@ fn calm(seeing: usize, blind: usize, topology: NetworkShape, rounds: u32) -> Sce
     let view = Some(View { fps: 2.0, signal: 1.5, persistence: 0.0, likeness: 0.0 });
     Scenario {
         robots: vec![
-            Group { name: "seeing".to_owned(), count: seeing, view, lies: None },
-            Group { name: "blind".to_owned(), count: blind, view: None, lies: None },
+            Group { name: "seeing".to_owned(), count: seeing, view, lies: None, poison: None },
+            Group { name: "blind".to_owned(), count: blind, view: None, lies: None, poison: None },
         ],
         topology,
         rounds,
@@ -183,7 +183,7 @@ fn another_number_of_eyes_than_robots_is_refused() {
 }
 
 /// Robots on a ring that are shown each gesture once, see five looks of it and learn from nothing.
-fn learning(robots: usize, fraction: f64, topology: NetworkShape) -> Scenario {
+pub(super) fn learning(robots: usize, fraction: f64, topology: NetworkShape) -> Scenario {
     let json = "{ keep: 5, share_bytes: null, precision: 'f32' }";
     let mut teaching = Teaching { robots: json5::from_str(json).unwrap(), ..Teaching::default() };
     teaching.robots.share_fraction = fraction;
@@ -195,7 +195,7 @@ fn learning(robots: usize, fraction: f64, topology: NetworkShape) -> Scenario {
 }
 
 /// A run without a trace, to be looked into.
-fn emulation(scenario: &Scenario, seed: u64) -> Emulation<'_> {
+pub(super) fn emulation(scenario: &Scenario, seed: u64) -> Emulation<'_> {
     let mut observers = statistical_observers(scenario).unwrap();
     let school = school_of_scores(scenario, &mut observers).unwrap();
     Emulation::new(scenario, seed, observers, school, Trace::none()).unwrap()

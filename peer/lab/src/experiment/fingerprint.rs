@@ -42,7 +42,13 @@ fn eyes() -> Result<u32, ExperimentError> {
 fn minds() -> Result<u32, ExperimentError> {
     let view = View { fps: 2.0, signal: 2.0, persistence: 0.5, likeness: 0.0 };
     let scenario = Scenario {
-        robots: vec![Group { name: "robot".to_owned(), count: 4, view: Some(view), lies: None }],
+        robots: vec![Group {
+            name: "robot".to_owned(),
+            count: 4,
+            view: Some(view),
+            lies: None,
+            poison: None,
+        }],
         topology: NetworkShape::Ring,
         link: LinkModel { loss: 0.1, ..LinkModel::default() },
         classes: 3,

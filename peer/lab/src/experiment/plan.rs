@@ -277,6 +277,6 @@ mod tests {
             assert!(experiment.seeds >= 20, "{}", path.display());
             found += 1;
         }
-        assert!(found >= 11);
+        assert!(found >= 12);
     }
 }

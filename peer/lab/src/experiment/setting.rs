@@ -7,7 +7,7 @@ use gestalt_strategies::{LearningConfig, MindConfig, Ranking};
 use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
-use crate::emulation::{Feedback, Group, Order, Scenario, Teaching};
+use crate::emulation::{Feedback, Group, Order, Poison, Scenario, Teaching};
 use crate::shape::NetworkShape;
 
 /// A swarm that learns, and everything that an experiment may vary. What is left out is the default.
@@ -15,6 +15,8 @@ use crate::shape::NetworkShape;
 /// | name | default | meaning |
 /// |---|---|---|
 /// | `robots` | 10 | how many |
+/// | `liars` | 0 | how many of them, the last, share what poisons others |
+/// | `poison` | silent | what the liars share |
 /// | `rounds` | 12 | gestures shown, one after the other in a random order, then all again |
 /// | `topology` | ring | who is linked to whom |
 /// | `start` | nothing | what robots know before |
@@ -30,6 +32,10 @@ use crate::shape::NetworkShape;
 pub struct Setting {
     /// How many robots, `1..=1000`.
     pub robots: usize,
+    /// How many of them, the last ones, share what poisons others. What is measured is how well the honest ones judge.
+    pub liars: usize,
+    /// What the liars share.
+    pub poison: Poison,
     /// How many gestures are shown.
     pub rounds: u32,
     /// Who is linked to whom.
@@ -116,6 +122,8 @@ impl Default for Setting {
     fn default() -> Self {
         Self {
             robots: 10,
+            liars: 0,
+            poison: Poison::Silent,
             rounds: 12,
             topology: NetworkShape::Ring,
             start: Start::default(),
@@ -139,6 +147,12 @@ impl Setting {
         if self.components == 0 || !(2..=MAX_CLASSES).contains(&classes) {
             return Err(ExperimentError::Setting("components is 0: choose at least 1".to_owned()));
         }
+        if self.liars >= self.robots {
+            return Err(ExperimentError::Setting(format!(
+                "{} liars of {} robots: leave at least one that is honest",
+                self.liars, self.robots
+            )));
+        }
         let seconds = Duration::from_secs;
         let mind = MindConfig {
             // All look for as long; nobody needs to vote twice, and what nothing loses needs no hurried repair.
@@ -150,8 +164,18 @@ impl Setting {
             repair_idle: seconds(120),
             ..MindConfig::default()
         };
+        let group = |name: &str, count, poison| Group {
+            name: name.to_owned(),
+            count,
+            view: None,
+            lies: None,
+            poison,
+        };
         let scenario = Scenario {
-            robots: vec![Group { name: "robot".to_owned(), count: self.robots, view: None, lies: None }],
+            robots: vec![
+                group("robot", self.robots - self.liars, None),
+                group("liar", self.liars, Some(self.poison)),
+            ],
             topology: self.topology,
             link: crate::emulation::LinkModel::default(),
             classes,

@@ -57,7 +57,8 @@ pub fn run(
     let observers = places.iter().map(eyes).collect();
     let mut emulation =
         Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
-    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], &places, rules));
+    let honest = &places[..setting.robots - setting.liars];
+    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], honest, rules));
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
         if stop.load(Ordering::Relaxed) {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::emulation::poison::Poison;
+
 /// Robots of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -16,6 +18,9 @@ pub struct Group {
     /// How they lie, if they do. All liars of a swarm are in league, and have no mind: what they see does not matter.
     #[serde(default)]
     pub lies: Option<Lies>,
+    /// What they share in place of what they saw, if they poison. They take part in rounds in earnest.
+    #[serde(default)]
+    pub poison: Option<Poison>,
 }
 
 /// What liars do. They know what is shown, hear what all hear, and vote for the other gesture that has most in its favour, with the

@@ -52,6 +52,9 @@ impl Scenario {
                 "robots that learn are not lied to here: leave out learning".to_owned(),
             );
         }
+        if self.members().any(|group| group.poison.is_some()) && self.learning.is_none() {
+            return wrong("robots.poison", "nobody learns who could be poisoned: give learning".to_owned());
+        }
         self.mind.validate()?;
         if let Some(teaching) = &self.learning {
             teaching.robots.validate()?;

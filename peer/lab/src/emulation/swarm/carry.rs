@@ -40,23 +40,27 @@ impl Swarm<'_> {
         let robot = self.robots[i].id;
         match output {
             Output::Broadcast(envelope) => {
-                let (envelope, bytes) = over_the_wire(&envelope);
-                let kind = match envelope.message {
-                    Message::Samples(_) => Kind::Samples,
-                    Message::Holding(_) => Kind::Decision,
-                    _ => Kind::Vote,
-                };
-                let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope));
-                self.note(&Happening::Broadcast { robot, bytes, reaches });
+                for envelope in self.poisoned(i, envelope) {
+                    let (envelope, bytes) = over_the_wire(&envelope);
+                    let kind = match envelope.message {
+                        Message::Samples(_) => Kind::Samples,
+                        Message::Holding(_) => Kind::Decision,
+                        _ => Kind::Vote,
+                    };
+                    let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope));
+                    self.note(&Happening::Broadcast { robot, bytes, reaches });
+                }
             }
             Output::Tell(to, envelope) => {
-                let (envelope, bytes) = over_the_wire(&envelope);
-                let target = to.0 as usize - 1;
-                let samples = matches!(envelope.message, Message::Batches(_));
-                let taken = self.network.tell(i, target, bytes, samples);
-                self.note(&Happening::Tell { robot, to, bytes, arrives: taken.is_some() });
-                if let Some(taken) = taken {
-                    self.at(self.now + taken, Due::Arrive(target, Parcel::Said(envelope)));
+                for envelope in self.poisoned(i, envelope) {
+                    let (envelope, bytes) = over_the_wire(&envelope);
+                    let target = to.0 as usize - 1;
+                    let samples = matches!(envelope.message, Message::Batches(_));
+                    let taken = self.network.tell(i, target, bytes, samples);
+                    self.note(&Happening::Tell { robot, to, bytes, arrives: taken.is_some() });
+                    if let Some(taken) = taken {
+                        self.at(self.now + taken, Due::Arrive(target, Parcel::Said(envelope)));
+                    }
                 }
             }
             Output::Hold(decision) => {

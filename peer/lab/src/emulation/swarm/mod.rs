@@ -8,6 +8,7 @@
 //! | `lives` | who starts, goes on, and knows of whom? |
 //! | `carry` | what does a mind want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
+//! | `poisoning` | what do poisoners share? |
 
 mod carry;
 mod course;
@@ -16,6 +17,7 @@ mod faults;
 mod lives;
 mod parcel;
 mod plot;
+mod poisoning;
 mod queue;
 mod robot;
 mod seed;
@@ -38,6 +40,7 @@ use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
 use plot::Plot;
+use poisoning::Poisoner;
 use queue::{Due, Queue};
 use robot::Robot;
 use seed::{COURSE, NETWORK, stream};
@@ -75,7 +78,10 @@ impl<'a> Swarm<'a> {
         let learns = school.is_some();
         let robots: Vec<_> = (1..)
             .zip(observers.into_iter().zip(scenario.members()))
-            .map(|(id, (observer, group))| Robot::new(RobotId(id), observer, seed, learns, group.lies))
+            .map(|(id, (observer, group))| {
+                let poison = group.poison.map(|strategy| Poisoner::new(strategy, seed, id));
+                Robot::new(RobotId(id), observer, seed, learns, (group.lies, poison))
+            })
             .collect();
         let record = Record::new(robots.iter().map(|robot| robot.lies.is_none()).collect());
         let mut swarm = Self {

@@ -8,6 +8,7 @@ use gestalt_strategies::Mind;
 use rand_chacha::ChaCha8Rng;
 
 use super::parcel::Parcel;
+use super::poisoning::Poisoner;
 use super::seed::stream;
 use crate::emulation::observer::Observer;
 use crate::emulation::pupil::Pupil;
@@ -30,6 +31,7 @@ pub(super) struct Robot {
     /// Whom it believes alive, and whom it believes itself linked to.
     pub knows: (BTreeSet<usize>, Vec<usize>),
     pub lies: Option<Lies>,
+    pub poison: Option<Poisoner>,
 }
 
 impl Robot {
@@ -39,7 +41,7 @@ impl Robot {
         observer: Box<dyn Observer>,
         seed: u64,
         learns: bool,
-        lies: Option<Lies>,
+        (lies, poison): (Option<Lies>, Option<Poisoner>),
     ) -> Self {
         Self {
             id,
@@ -54,6 +56,7 @@ impl Robot {
             pupil: learns.then(Pupil::default),
             knows: Default::default(),
             lies,
+            poison,
         }
     }
 }

@@ -13,6 +13,9 @@ const LEARNING: u64 = 1 << 63;
 /// The first of those that lives draw their numbers from.
 const LIFE: u64 = 1 << 62;
 
+/// The first of those that poisoners draw from.
+const POISON: u64 = 1 << 61;
+
 /// The generator of one stream of a seed.
 pub(super) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -28,6 +31,11 @@ pub(super) fn frames(n: u32, robot: usize) -> u64 {
 /// One of a robot's lives.
 pub(super) fn life(seed: u64, robot: usize, boot: u32) -> Life {
     Life { boot, nonce: stream(seed, LIFE | u64::from(boot) << 32 | robot as u64).next_u32() }
+}
+
+/// How a robot poisons.
+pub(super) fn poison(robot: u32) -> u64 {
+    POISON | u64::from(robot)
 }
 
 /// How a robot shares and forgets in one of its lives.

@@ -41,7 +41,13 @@ fn show(
     (seed, stop): (u64, &AtomicBool),
 ) -> Result<Outcome, ExperimentError> {
     let scenario = Scenario {
-        robots: vec![Group { name: "robot".to_owned(), count: swarm.size(), view: None, lies: None }],
+        robots: vec![Group {
+            name: "robot".to_owned(),
+            count: swarm.size(),
+            view: None,
+            lies: None,
+            poison: None,
+        }],
         topology: NetworkShape::Ring,
         link: LinkModel::default(),
         classes: GESTURES,
