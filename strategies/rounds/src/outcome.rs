@@ -29,7 +29,8 @@ pub fn outcome(decision: &Decision, config: &RoundsConfig) -> (RoundOutcome, Rea
         return undecided(Reason::NothingSeen);
     }
     let votes_of = || certificate.votes.iter().map(|counted| &counted.vote);
-    let taught: Vec<bool> = (0..probabilities.len()).map(|class| votes_of().any(|vote| knows(vote, class))).collect();
+    let taught: Vec<bool> =
+        (0..probabilities.len()).map(|class| votes_of().any(|vote| knows(vote, class))).collect();
     // A gesture of the list that nobody was taught is as unknown as one that is not on it.
     let unknown: f64 = certificate.unknown.unwrap_or(0.0)
         + taught.iter().zip(probabilities).filter(|(taught, _)| !**taught).map(|(_, p)| p).sum::<f64>();
@@ -68,7 +69,7 @@ fn rivals(certificate: &Certificate) -> Option<([ClassId; 2], [u32; 2])> {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, Vote, VocabularyId,
+        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
     };
 
     use super::*;

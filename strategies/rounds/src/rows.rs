@@ -125,11 +125,9 @@ impl Rows {
         let rows = self.restricted(&of);
         let fusion = match of[..] {
             [] => Fusion { probabilities: Vec::new(), top: ClassId(0), margin: 0.0 },
-            [class] => Fusion {
-                probabilities: vec![1.0],
-                top: ClassId(0),
-                margin: self.known_by[class] as f64,
-            },
+            [class] => {
+                Fusion { probabilities: vec![1.0], top: ClassId(0), margin: self.known_by[class] as f64 }
+            }
             _ => rule.fuse(clip, of.len(), &as_slices(&rows)).filter(|fusion| fusion.is_sound(of.len()))?,
         };
         Some(Choice { of, rows, fusion })

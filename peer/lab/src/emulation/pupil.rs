@@ -118,7 +118,8 @@ mod tests {
 
     #[test]
     fn what_came_and_went_is_not_trained_and_all_else_is_in_its_order() {
-        let insert = |key| TrainingChange::Insert { key, class: ClassId(0), vector: [0.0].into() };
+        let insert =
+            |key| TrainingChange::Insert { key, class: ClassId(0), vector: [0.0].into(), showing: key };
         let relabel = |key| TrainingChange::Relabel { key, class: ClassId(1) };
         let remove = TrainingChange::Remove;
         let changes =

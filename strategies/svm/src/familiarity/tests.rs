@@ -95,7 +95,10 @@ fn who_knows_little_says_little() {
     };
     let most = 2.0_f64.ln() + 1e-12;
     let (low, high) = of(1, 1, &mut rng);
-    assert!(low >= 0.0 && high <= most, "one showing of one gesture knows nothing for certain: {low}..{high}");
+    assert!(
+        low >= 0.0 && high <= most,
+        "one showing of one gesture knows nothing for certain: {low}..{high}"
+    );
     let (low, high) = of(2, 1, &mut rng);
     assert!(low >= -(3.0_f64.ln()) && high <= most, "no gesture was shown twice: {low}..{high}");
     let (low, high) = of(3, 10, &mut rng);
