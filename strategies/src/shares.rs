@@ -19,6 +19,8 @@ pub(crate) struct Shares {
     alive: BTreeSet<RobotId>,
     /// Those that were alive at any time in this life: at most [`MAX_ROBOTS`], and those alive now.
     met: BTreeSet<RobotId>,
+    /// How many samples of strangers are held; `None` before they are counted.
+    strange: Option<usize>,
 }
 
 impl Shares {
@@ -27,11 +29,36 @@ impl Shares {
         let new = alive.difference(&self.alive).copied().filter(|robot| *robot != me).collect();
         self.alive.clone_from(alive);
         self.alive.remove(&me);
+        self.strange = None;
         self.met.extend(&self.alive);
         if self.met.len() > MAX_ROBOTS {
             self.met.clone_from(&self.alive);
         }
         new
+    }
+
+    /// The set is another.
+    pub fn recount(&mut self) {
+        self.strange = None;
+    }
+
+    /// A sample came into the set.
+    pub fn came(&mut self, sample: &HeldSample) {
+        if self.is_strange(sample) {
+            self.strange = self.strange.map(|strange| strange + 1);
+        }
+    }
+
+    /// A sample went.
+    pub fn went(&mut self, sample: &HeldSample) {
+        if self.is_strange(sample) {
+            self.strange = self.strange.map(|strange| strange.saturating_sub(1));
+        }
+    }
+
+    fn is_strange(&self, sample: &HeldSample) -> bool {
+        let author = sample.author().filter(|_| sample.part == SetPart::External);
+        author.is_some_and(|author| !self.met.contains(&author))
     }
 
     pub fn is_alive(&self, robot: RobotId) -> bool {
@@ -40,13 +67,15 @@ impl Shares {
 
     /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
     /// above, the oldest of the class that it has most of.
-    pub fn above(&self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
+    pub fn above(&mut self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
         let n = self.robots()?;
         let each = LEAST.max((5 * capacity).div_ceil(4 * n));
         let strangers = LEAST.max(capacity.div_ceil(4));
-        let of_strangers: usize =
-            samples.authors().filter(|(a, _)| !self.met.contains(a)).map(|(_, n)| n).sum();
-        let most = samples.authors().filter(|(a, _)| self.met.contains(a)).max_by_key(|(_, held)| *held);
+        let met = &self.met;
+        let of_strangers = *self.strange.get_or_insert_with(|| {
+            samples.authors().filter(|(author, _)| !met.contains(author)).map(|(_, held)| held).sum()
+        });
+        let most = samples.authors_of_most().find(|(author, _)| self.met.contains(author));
         let (author, excess) = most.map_or((None, 0), |(a, held)| (Some(a), held.saturating_sub(each)));
         let excess_of_strangers = of_strangers.saturating_sub(strangers);
         if excess == 0 && excess_of_strangers == 0 {

@@ -169,6 +169,7 @@ impl TrainingSet {
             self.forgetting.inserted(sample);
         }
         self.samples = restored;
+        self.shares.recount();
         self.seen = seen;
         self.next_key = next_key.max(1);
         Ok(())
@@ -401,6 +402,7 @@ impl TrainingSet {
         let sample = HeldSample { key, part, id, class, round, vector };
         self.selection.inserted(&sample);
         self.forgetting.inserted(&sample);
+        self.shares.came(&sample);
         self.samples.insert(sample);
         let mut changes = vec![SetChange::Added(key)];
         changes.append(&mut self.trim(rng));
@@ -416,6 +418,7 @@ impl TrainingSet {
 
     fn remove(&mut self, key: u64) -> Option<HeldSample> {
         let sample = self.samples.remove(key)?;
+        self.shares.went(&sample);
         self.selection.removed(&sample);
         self.forgetting.removed(&sample);
         Some(sample)

@@ -13,7 +13,7 @@ use crate::sample::{HeldSample, HeldSamples, draw};
 /// arg min over x of min over x' ≠ x in K of ‖x − x'‖. The two of the closest pair tie: one of them goes at random.
 /// Of equally close pairs it is the one with the smaller keys.
 ///
-/// From the source research. Cost: two passes over K per sample that comes, and one per sample whose nearest
+/// From the source research. Cost: a pass over K per sample that comes, one to find the closest pair, and one per sample whose nearest
 /// neighbour has gone once it may be of the closest pair. Plainly: all pairs of K each time.
 ///
 /// Forgetting after k-center greedy (Sener & Savarese 2018) comes to the same pair: the sample without which the
@@ -26,20 +26,19 @@ pub struct Redundancy {
 
 impl Forgetting for Redundancy {
     fn inserted(&mut self, sample: &HeldSample) {
-        let class = self.classes.entry(sample.class).or_default();
-        class.add_seeker(sample.key, &sample.vector);
-        class.add_neighbour(sample.key, &sample.vector);
+        let class = self.classes.entry(sample.class).or_insert_with(Neighbours::of_each_other);
+        class.add(sample.key, &sample.vector);
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let class = self.classes.entry(sample.class).or_default();
-        class.remove_seeker(sample.key);
-        class.remove_neighbour(sample.key);
+        if let Some(class) = self.classes.get_mut(&sample.class) {
+            class.remove(sample.key);
+        }
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let class = samples.draw_largest_class(rng)?;
-        let pair = self.classes.entry(class).or_default().closest()?;
+        let pair = self.classes.get_mut(&class)?.closest()?;
         match pair.neighbour {
             Some(neighbour) => draw(&[pair.seeker, neighbour], rng),
             None => Some(pair.seeker),

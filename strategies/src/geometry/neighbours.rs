@@ -12,12 +12,13 @@ use super::points::Points;
 ///
 /// Ask for the [`farthest`](Self::farthest) or for the [`closest`](Self::closest), not for both: the first does not
 /// look which of equally near neighbours has the smallest key.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Neighbours {
     seekers: Points,
     /// By place of the seeker.
     nearest: Vec<Nearest>,
-    neighbours: Points,
+    /// `None`: the seekers are each other's.
+    neighbours: Option<Points>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +30,24 @@ struct Nearest {
     stale: bool,
 }
 
+impl Default for Nearest {
+    fn default() -> Self {
+        Self { distance: f32::INFINITY, key: None, stale: false }
+    }
+}
+
+impl Nearest {
+    /// There is a neighbour at that distance.
+    fn meet(&mut self, key: u64, distance: f32) {
+        // At the lower bound of a stale entry another one with a smaller key may lie.
+        let closer = distance < self.distance
+            || !self.stale && distance == self.distance && self.key.is_none_or(|held| key < held);
+        if closer {
+            *self = Self { distance, key: Some(key), stale: false };
+        }
+    }
+}
+
 /// A seeker and its nearest neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestPair {
@@ -38,7 +57,45 @@ pub struct NearestPair {
     pub neighbour: Option<u64>,
 }
 
+impl Default for Neighbours {
+    /// Seekers and neighbours apart.
+    fn default() -> Self {
+        Self { seekers: Points::default(), nearest: Vec::new(), neighbours: Some(Points::default()) }
+    }
+}
+
 impl Neighbours {
+    /// Points that each seek the nearest of the others: [`add`](Self::add) and [`remove`](Self::remove) are for these, and cost half of
+    /// what a seeker and a neighbour do.
+    #[must_use]
+    pub fn of_each_other() -> Self {
+        Self { neighbours: None, ..Self::default() }
+    }
+
+    /// Takes in a point that is both.
+    ///
+    /// # Panics
+    /// If seekers and neighbours are apart.
+    pub fn add(&mut self, key: u64, vector: &[f32]) {
+        assert!(self.neighbours.is_none(), "seekers and neighbours are apart");
+        let mut own = Nearest::default();
+        let keys = self.seekers.keys();
+        self.seekers.measure(vector, |place, distance| {
+            if keys[place] != key {
+                self.nearest[place].meet(key, distance);
+                own.meet(keys[place], distance);
+            }
+        });
+        self.seekers.push(key, vector);
+        self.nearest.push(own);
+    }
+
+    /// Takes out a point that is both.
+    pub fn remove(&mut self, key: u64) {
+        self.remove_seeker(key);
+        self.lose(key);
+    }
+
     /// Takes a seeker in.
     pub fn add_seeker(&mut self, key: u64, vector: &[f32]) {
         self.seekers.push(key, vector);
@@ -56,29 +113,34 @@ impl Neighbours {
 
     /// Takes a neighbour in.
     pub fn add_neighbour(&mut self, key: u64, vector: &[f32]) {
-        self.neighbours.push(key, vector);
+        if let Some(neighbours) = &mut self.neighbours {
+            neighbours.push(key, vector);
+        }
         let seekers = self.seekers.keys();
         self.seekers.measure(vector, |place, distance| {
-            let nearest = &mut self.nearest[place];
-            // At the lower bound of a stale entry another one with a smaller key may lie.
-            let closer = distance < nearest.distance
-                || !nearest.stale
-                    && distance == nearest.distance
-                    && nearest.key.is_none_or(|held| key < held);
-            if closer && seekers[place] != key {
-                *nearest = Nearest { distance, key: Some(key), stale: false };
+            if seekers[place] != key {
+                self.nearest[place].meet(key, distance);
             }
         });
     }
 
     /// Takes a neighbour out.
     pub fn remove_neighbour(&mut self, key: u64) {
-        if let Some(place) = self.neighbours.place(key) {
-            self.neighbours.swap_remove(place);
-            for nearest in self.nearest.iter_mut().filter(|nearest| nearest.key == Some(key)) {
-                (nearest.key, nearest.stale) = (None, true);
-            }
+        let Some(neighbours) = &mut self.neighbours else { return };
+        if let Some(place) = neighbours.place(key) {
+            neighbours.swap_remove(place);
+            self.lose(key);
         }
+    }
+
+    fn lose(&mut self, key: u64) {
+        for nearest in self.nearest.iter_mut().filter(|nearest| nearest.key == Some(key)) {
+            (nearest.key, nearest.stale) = (None, true);
+        }
+    }
+
+    fn neighbours(&self) -> &Points {
+        self.neighbours.as_ref().unwrap_or(&self.seekers)
     }
 
     /// The seekers.
@@ -90,7 +152,7 @@ impl Neighbours {
     /// Whether there is a neighbour at all.
     #[must_use]
     pub fn has_neighbours(&self) -> bool {
-        !self.neighbours.keys().is_empty()
+        !self.neighbours().keys().is_empty()
     }
 
     /// The seeker whose nearest neighbour is farthest; of equals the smaller key.
@@ -140,9 +202,10 @@ impl Neighbours {
     }
 
     fn nearest_to(&self, seeker: u64, vector: &[f32], enough: impl Fn(f32) -> bool) -> Nearest {
-        let keys = self.neighbours.keys();
-        let mut nearest = Nearest { distance: f32::INFINITY, key: None, stale: false };
-        self.neighbours.measure_until(vector, |place, distance| {
+        let neighbours = self.neighbours();
+        let keys = neighbours.keys();
+        let mut nearest = Nearest::default();
+        neighbours.measure_until(vector, |place, distance| {
             let key = keys[place];
             let closer = distance < nearest.distance
                 || distance == nearest.distance && nearest.key.is_none_or(|held| key < held);

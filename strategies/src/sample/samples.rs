@@ -1,6 +1,6 @@
 //! The samples a robot holds, found by key, by identifier, by class and by part.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
@@ -56,6 +56,8 @@ pub struct HeldSamples {
     classes: BTreeMap<ClassId, ClassKeys>,
     /// How many external ones there are, by author.
     authors: BTreeMap<RobotId, usize>,
+    /// The same the other way round: who has most is asked for each sample that comes into a full set.
+    by_number: BTreeSet<(usize, RobotId)>,
     arrivals: u64,
 }
 
@@ -110,6 +112,19 @@ impl HeldSamples {
     /// The other robots of whom a sample is held, ascending, each with how many.
     pub fn authors(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
         self.authors.iter().map(|(author, held)| (*author, *held))
+    }
+
+    /// The same in the order of how many, the most first; of equals the greater name first.
+    pub(crate) fn authors_of_most(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
+        self.by_number.iter().rev().map(|(held, author)| (*author, *held))
+    }
+
+    fn count_author(&mut self, author: RobotId, held: usize) {
+        let before = if held == 0 { self.authors.remove(&author) } else { self.authors.insert(author, held) };
+        self.by_number.remove(&(before.unwrap_or_default(), author));
+        if held > 0 {
+            self.by_number.insert((held, author));
+        }
     }
 
     /// How many samples of a class are in a part.
@@ -176,7 +191,8 @@ impl HeldSamples {
         if let Some(id) = sample.id {
             self.ids.insert(id, sample.key);
             if sample.part == SetPart::External {
-                *self.authors.entry(id.author).or_default() += 1;
+                let held = self.authors.get(&id.author).copied().unwrap_or_default();
+                self.count_author(id.author, held + 1);
             }
         }
         let keys = self.classes.entry(sample.class).or_default();
@@ -191,12 +207,9 @@ impl HeldSamples {
         let sample = self.held.remove(&key)?;
         if let Some(id) = sample.id {
             self.ids.remove(&id);
-            if let Some(held) = self.authors.get_mut(&id.author).filter(|_| sample.part == SetPart::External)
-            {
-                *held -= 1;
-                if *held == 0 {
-                    self.authors.remove(&id.author);
-                }
+            let held = self.authors.get(&id.author).filter(|_| sample.part == SetPart::External);
+            if let Some(held) = held.copied() {
+                self.count_author(id.author, held.saturating_sub(1));
             }
         }
         if let Some(keys) = self.classes.get_mut(&sample.class) {
