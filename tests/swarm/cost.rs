@@ -166,9 +166,9 @@ pub async fn signatures_cost_a_link_less_than_as_much_again() {
     assert!(sealed < 2.0 * open, "{sealed} and {open}");
     // At rest nothing is said that is not said in an open swarm too: what is more is the records of TLS. Each end of a link shows four times a
     // second that it is there, by a few bytes, in a record of its own.
-    // Room for one longer message that comes late: with compilers beside it, 37 bytes a second more were seen once.
+    // Room for longer messages that come late: with compilers beside it, 37 and 74 bytes a second more were seen once each.
     assert!(
-        sealed_idle - RECORD * records <= 1.1 * open_idle + 40.0,
+        sealed_idle - RECORD * records <= 1.1 * open_idle + 100.0,
         "{sealed_idle} and {open_idle}, {records}"
     );
     assert!(records <= 10.0, "{records} records a second");
