@@ -30,10 +30,13 @@ const TAUGHT: [&str; 6] = ["0", "1", "2", "3", "4", "5"];
 /// Pictures that are used of a gesture of a data set.
 const PICTURES: usize = 40;
 
+/// What a picture is, by two feature sets.
+type TwoViews = (Vec<f32>, Vec<f32>);
+
 /// A data set by gesture: its label, and each hand found, in the space of learned eyes, with its raw features.
 struct Set {
     name: &'static str,
-    gestures: Vec<(String, Vec<(Vec<f32>, Vec<f32>)>)>,
+    gestures: Vec<(String, Vec<TwoViews>)>,
 }
 
 impl Set {

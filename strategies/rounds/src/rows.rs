@@ -210,7 +210,8 @@ mod tests {
     fn a_thousand_robots_know_no_better_than_one_whether_it_was_ever_taught() {
         for rule in FusionRule::ALL {
             let doubtful = vote(&[2.0, -1.0, 1.0], Some(1.0));
-            let (one, many) = (fused(rule, &[doubtful.clone()]), fused(rule, &vec![doubtful; 1000]));
+            let (one, many) =
+                (fused(rule, std::slice::from_ref(&doubtful)), fused(rule, &vec![doubtful; 1000]));
             assert!((one.probabilities[3] - many.probabilities[3]).abs() < 1e-9, "{rule}: {one:?} {many:?}");
             // Of what was taught more are surer.
             assert!(many.probabilities[0] >= one.probabilities[0] - 1e-9, "{rule}");

@@ -114,7 +114,7 @@ mod tests {
     fn the_same_rounds_and_words_give_the_same_pool_in_any_order_and_words_taken_back_no_longer_count() {
         let was = |class: u8| Verdict::Class(ClassId(class));
         // Of thirty rounds every third was another gesture than all five robots were sure of.
-        let verdict = |round: RoundId| if round.counter % 3 == 0 { was(1) } else { was(0) };
+        let verdict = |round: RoundId| if round.counter.is_multiple_of(3) { was(1) } else { was(0) };
         let mut heard = JudgedRounds::default();
         assert_eq!(heard.pool(verdict), Pool::PRIOR);
         (0..30).for_each(|n| heard.note(round(n), testimony(0)));

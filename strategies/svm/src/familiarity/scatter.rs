@@ -12,6 +12,12 @@ const WIDEST: usize = 128;
 const PRIOR_PART: f64 = 0.35;
 const PRIOR_SHOWINGS: f64 = 10.0;
 
+/// The mean of a showing, and its samples.
+type Showing<'a> = (Vec<f64>, Vec<&'a [f32]>);
+
+/// What views score, with what each weighs.
+type Scores = Vec<(Score, f64)>;
+
 /// A class.
 #[derive(Debug)]
 pub(super) struct OfClass {
@@ -38,7 +44,7 @@ impl Scatter {
         for sample in samples.iter().filter(|sample| sample.vector.len() == width) {
             showings.entry((sample.class, sample.showing)).or_default().push(sample.vector);
         }
-        let mut by_class: BTreeMap<usize, Vec<(Vec<f64>, Vec<&[f32]>)>> = BTreeMap::new();
+        let mut by_class: BTreeMap<usize, Vec<Showing<'_>>> = BTreeMap::new();
         for ((class, _), vectors) in showings {
             by_class.entry(class).or_default().push((mean(&vectors, width), vectors));
         }
@@ -71,7 +77,7 @@ impl Scatter {
     }
 
     /// What views of known gestures score, each without its showing, and views of unknown ones, each without its class; with what each weighs.
-    pub fn left_out(&self) -> (Vec<(Score, f64)>, Vec<(Score, f64)>) {
+    pub fn left_out(&self) -> (Scores, Scores) {
         let (mut known, mut unknown) = (Vec::new(), Vec::new());
         for (class, showing, weight, white) in &self.samples {
             let to = |(k, of_class): (usize, &OfClass)| {
