@@ -54,5 +54,7 @@ pub use sample::{
     MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
 pub use signature::Signature;
-pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
+pub use status::{
+    Camera, CameraState, Doubted, LearningStatus, Motion, MotionState, Opinion, Reported, Status,
+};
 pub use vote::{HeldVote, Vote};

@@ -21,6 +21,7 @@ mod learning;
 mod lessons;
 pub mod mind;
 pub mod sample;
+mod scrutiny;
 pub mod selection;
 mod shares;
 mod training_set;
@@ -45,6 +46,7 @@ pub use learning::{
 pub use lessons::{Candidates, LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
 pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};
+pub use scrutiny::PoisonDefence;
 pub use selection::{Selection, SelectionRule};
 pub use training_set::{RestoreError, SampleReceipt, SetChange, TrainingSet};
 pub use vector_codec::{Precision, VectorError, decode_vector};

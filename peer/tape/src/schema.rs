@@ -265,6 +265,11 @@ fn status() -> Vec<Field> {
         may("opinion", object("What its last frame showed, in its own opinion.", opinion)),
     ];
     let classes = |about| list(about, count("Of one class."));
+    let doubted = vec![
+        must("robot", robot()),
+        must("held", count("How many samples of it are held.")),
+        must("trained", count("How many of these are trained on.")),
+    ];
     let learning = vec![
         must("space", text("The feature space of its samples.")),
         must("capacity", count("T: how many samples it may hold.")),
@@ -276,6 +281,10 @@ fn status() -> Vec<Field> {
         must("lessons", count("Rounds of which it knows what an instructor said.")),
         must("memory", text("Where it keeps all this.")),
         must("trainings", count("How often it has trained.")),
+        may(
+            "doubted",
+            list("Other robots whose samples it does not all train on.", object("One of them.", doubted)),
+        ),
     ];
     let error = vec![must("at_ms", count("Since the robot's start.")), must("what", text("Cause and mend."))];
     vec![

@@ -22,7 +22,8 @@ use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
 use super::unresolved::{self, Unresolved};
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
-use crate::sample::{Batches, SetPart};
+use crate::sample::{Batches, HeldSample, SetPart};
+use crate::scrutiny::Scrutiny;
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
@@ -69,6 +70,7 @@ pub(crate) struct Learning {
     pub(super) vocabulary: Vocabulary,
     pub(super) rng: Box<dyn rand::Rng + Send>,
     pub(super) set: TrainingSet,
+    pub(super) scrutiny: Scrutiny,
     pub(super) lessons: LessonBook,
     pub(super) recent: RecentRounds,
     pub(super) aside: Unresolved,
@@ -126,7 +128,9 @@ impl Learning {
             let key = unresolved::training_key(*number);
             Some(TrainingChange::Insert { key, class: aside.guess?, vector: aside.vector.clone() })
         });
-        let training = set.iter().map(inserted).chain(guesses).collect();
+        let scrutiny = Scrutiny::new(config.poison.clone(), me, space.variance(), &set);
+        let heeded = |sample: &&HeldSample| scrutiny.is_trained_on(sample);
+        let training = set.iter().filter(heeded).map(inserted).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
         let mut batches = Batches::default();
         let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
@@ -144,6 +148,7 @@ impl Learning {
             vocabulary,
             rng,
             set,
+            scrutiny,
             lessons,
             recent: RecentRounds::default(),
             newest,
@@ -213,6 +218,7 @@ impl Learning {
             self.dirty.insert(Item::Lessons(lesson.round));
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
+            self.scrutinise();
         }
         heard
     }
@@ -279,11 +285,14 @@ impl Learning {
             match change {
                 SetChange::Added(key) => {
                     self.dirty.insert(Item::Sample(key));
-                    self.training.extend(self.set.get(key).map(inserted));
+                    if self.scrutiny.judge(&self.set, key) {
+                        self.training.extend(self.set.get(key).map(inserted));
+                    }
                 }
                 SetChange::Removed(sample) => {
                     self.dirty.insert(Item::Sample(sample.key));
                     self.note_gone(sample.id);
+                    self.scrutiny.forget(sample.key);
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
                 SetChange::Unseen(series) => {
@@ -291,9 +300,7 @@ impl Learning {
                 }
                 SetChange::Relabelled(key) => {
                     self.dirty.insert(Item::Sample(key));
-                    self.training.extend(
-                        self.set.get(key).map(|sample| TrainingChange::Relabel { key, class: sample.class }),
-                    );
+                    self.train_anew(key);
                 }
                 SetChange::Shared(key, id) => {
                     self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);
@@ -405,6 +412,7 @@ impl Learning {
             lessons: self.lessons.len(),
             memory: String::new(),
             trainings: 0,
+            doubted: self.doubted(),
         }
     }
 }

@@ -75,6 +75,12 @@ impl Mind {
         self.learning.as_ref().map(Learning::set)
     }
 
+    /// Of each other robot: how many of its samples are held, and how many of these are trained on.
+    #[must_use]
+    pub fn heeded(&self) -> Vec<(RobotId, usize, usize)> {
+        self.learning.as_ref().map_or(Vec::new(), Learning::heeded)
+    }
+
     /// What it refused so far, by cause.
     #[must_use]
     pub fn refusals(&self) -> &Refusals {

@@ -37,7 +37,8 @@ pub use statistics::{Mean, Proportion};
 pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
-use gestalt_strategies::{Classifier, Refusals, TrainingSet, Vocabulary};
+use gestalt_protocol::RobotId;
+use gestalt_strategies::{Classifier, Mind, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -166,6 +167,12 @@ impl<'a> Emulation<'a> {
     #[must_use]
     pub fn training_set(&self, robot: usize) -> Option<&TrainingSet> {
         self.swarm.mind(robot)?.training_set()
+    }
+
+    /// Of each other robot: how many of its samples that robot holds, and how many of these it trains on.
+    #[must_use]
+    pub fn heeded(&self, robot: usize) -> Vec<(RobotId, usize, usize)> {
+        self.swarm.mind(robot).map_or(Vec::new(), Mind::heeded)
     }
 
     /// What a robot has refused so far, by its position; `None` of one that is down, or lies.

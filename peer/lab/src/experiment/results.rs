@@ -25,6 +25,9 @@ struct Row {
     published_bytes: f64,
     link_bytes: f64,
     samples: f64,
+    heeded_honest: f64,
+    heeded_liars: f64,
+    least_heeded: f64,
 }
 
 /// `results.csv`: all rounds of each run that ended.
@@ -87,7 +90,18 @@ fn rows(runs: &BTreeMap<Run, Vec<Standing>>) -> Vec<Row> {
 }
 
 fn row((line, value, seed): &Run, standing: &Standing) -> Row {
-    let Standing { round, single, swarm, majority, published, on_links, samples } = *standing;
+    let Standing {
+        round,
+        single,
+        swarm,
+        majority,
+        published,
+        on_links,
+        samples,
+        heeded_honest,
+        heeded_liars,
+        least_heeded,
+    } = *standing;
     Row {
         line: line.clone(),
         value: value.clone(),
@@ -99,11 +113,28 @@ fn row((line, value, seed): &Run, standing: &Standing) -> Row {
         published_bytes: published,
         link_bytes: on_links,
         samples,
+        heeded_honest,
+        heeded_liars,
+        least_heeded,
     }
 }
 
 fn taken_apart(row: Row) -> (Run, Standing) {
-    let Row { line, value, seed, round, single, swarm, majority, published_bytes, link_bytes, samples } = row;
+    let Row {
+        line,
+        value,
+        seed,
+        round,
+        single,
+        swarm,
+        majority,
+        published_bytes,
+        link_bytes,
+        samples,
+        heeded_honest,
+        heeded_liars,
+        least_heeded,
+    } = row;
     let standing = Standing {
         round,
         single,
@@ -112,6 +143,9 @@ fn taken_apart(row: Row) -> (Run, Standing) {
         published: published_bytes,
         on_links: link_bytes,
         samples,
+        heeded_honest,
+        heeded_liars,
+        least_heeded,
     };
     ((line, value, seed), standing)
 }
@@ -129,6 +163,9 @@ mod tests {
             published: 10.5,
             on_links: 20.0,
             samples: 3.0,
+            heeded_honest: 1.0,
+            heeded_liars: 1.0,
+            least_heeded: 1.0,
         };
         (0..=rounds).map(standing).collect()
     }

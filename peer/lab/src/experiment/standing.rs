@@ -18,4 +18,10 @@ pub struct Standing {
     pub on_links: f64,
     /// Samples that a robot holds, on average.
     pub samples: f64,
+    /// Of the samples that honest robots hold of other honest ones, and of liars, the share that they train on.
+    pub heeded_honest: f64,
+    /// The same of those of liars.
+    pub heeded_liars: f64,
+    /// The least share that any honest robot trains on of the samples of another honest one.
+    pub least_heeded: f64,
 }

@@ -199,6 +199,9 @@ mod tests {
             published: 0.0,
             on_links: 0.0,
             samples: 0.0,
+            heeded_honest: 1.0,
+            heeded_liars: 1.0,
+            least_heeded: 1.0,
         };
         let mut runs = BTreeMap::new();
         for (seed, ease) in [(0, 0.2), (1, 0.6)] {

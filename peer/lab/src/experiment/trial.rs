@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, FusionRule};
+use gestalt_protocol::{ClassId, FusionRule, RobotId};
 use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, JudgedFrame};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -69,6 +69,13 @@ pub fn run(
         standings.push(exams[after].sit(&mut emulation, round));
     }
     Ok(standings)
+}
+
+/// Which part of the samples held is trained on.
+fn share(of: &[(RobotId, usize, usize)]) -> f64 {
+    let held: usize = of.iter().map(|(_, held, _)| held).sum();
+    let trained: usize = of.iter().map(|(.., trained)| trained).sum();
+    if held == 0 { 1.0 } else { trained as f64 / held as f64 }
 }
 
 /// Draws where robots stand: no two at one place, as long as there are places.
@@ -190,6 +197,11 @@ impl Exam {
         let traffic = (0..self.robots).map(|robot| emulation.traffic(robot));
         let traffic: crate::emulation::Traffic = traffic.sum();
         let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
+        let heeded: Vec<_> = (0..self.robots).flat_map(|robot| emulation.heeded(robot)).collect();
+        // The honest robots are the first.
+        let (of_honest, of_liars): (Vec<_>, Vec<_>) =
+            heeded.into_iter().partition(|(author, ..)| author.0 as usize <= self.robots);
+        let least = of_honest.iter().map(|one| share(std::slice::from_ref(one)));
         Standing {
             round,
             single: single / f64::max(seen, 1.0),
@@ -198,6 +210,9 @@ impl Exam {
             published: traffic.published_samples as f64 / robots,
             on_links: traffic.samples_on_links() as f64 / robots,
             samples: samples.sum::<usize>() as f64 / robots,
+            heeded_honest: share(&of_honest),
+            heeded_liars: share(&of_liars),
+            least_heeded: least.fold(1.0, f64::min),
         }
     }
 }
