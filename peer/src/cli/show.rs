@@ -84,6 +84,7 @@ pub(super) fn quoted(label: &str) -> String {
 
 /// A decision with its certificate in short: `round 18 (opened by robot 1) → "2", p = 1.000 · 8 votes in 252 ms, log-pool · by
 /// robot 1:"1" 2:"2" 3:"2"`.
+#[cfg(any(feature = "opencv", test))]
 pub(super) fn decision(decision: &Decision, label: Option<&str>, names: &Names) -> String {
     in_words(decision, label, None, names)
 }
