@@ -4,7 +4,6 @@ use gestalt_protocol::{FusionRule, Pool};
 
 use crate::fuse::Fuse;
 use crate::fusion::{self, Fusion};
-use crate::withstand;
 
 /// The correlated pool with parameters of its own: those of [`Pool::PRIOR`] are [`FusionRule::CorrelatedPool`] itself.
 ///
@@ -29,11 +28,8 @@ impl Fuse for CorrelatedPool {
     }
 
     fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
-        match liars {
-            0 if fusion.margin > 0.0 => fusion.probabilities[fusion.top.index()],
-            0 => 0.0,
-            liars => withstand::least(self.rule(), clip, votes, fusion, liars as usize),
-        }
+        // Where liars are expected its parameters are those believed beforehand.
+        self.rule().withstands(clip, votes, fusion, liars)
     }
 
     fn pool(&self) -> Option<Pool> {

@@ -69,7 +69,7 @@ impl Rows {
         if self.rows.is_empty() {
             return None;
         }
-        let choice = self.choose(rule, clip, self.known_by_more_than(0))?;
+        let choice = self.choose(rule, clip, self.taught())?;
         if !self.tells() {
             return Some(choice.fusion);
         }

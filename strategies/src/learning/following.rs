@@ -22,7 +22,7 @@ impl Follow for Learning {
 
     fn settled(&mut self, decision: &Decision, clip: f64) {
         let own = decision.certificate.vocabulary == self.vocabulary.id();
-        if let Some(testimony) = Testimony::of(decision, clip).filter(|_| own) {
+        if own && let Some(testimony) = Testimony::of(decision, clip) {
             self.judged.note(decision.round, testimony);
         }
     }

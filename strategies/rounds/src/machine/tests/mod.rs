@@ -132,7 +132,7 @@ fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decisi
     decided(round(counter, 1), class, votes, author)
 }
 
-/// What a robot makes of these votes, as the default has it.
+/// What a robot makes of these votes, by the rule of [`adding_up`].
 fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u32) -> Decision {
     let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
     let RoundsConfig { rule, clip, .. } = adding_up();
