@@ -56,7 +56,7 @@ impl Fuse for Approval {
         order.sort_by(|a, b| approved[*b].total_cmp(&approved[*a]));
         (all > 0.0).then(|| Fusion {
             probabilities: approved.iter().map(|n| n / all).collect(),
-            top: ClassId(order[0] as u8),
+            top: ClassId(order[0] as u32),
             margin: approved[order[0]] - approved[order[1]],
         })
     }

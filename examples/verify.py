@@ -8,6 +8,7 @@ A member of the roster must have announced it so, every vote that it rests on mu
 `--clip` and `--liars` are those of the swarm's `rounds`.
 """
 import argparse
+import collections
 import hashlib
 import json
 import math
@@ -25,6 +26,7 @@ RULES = ("majority", "mean_probability", "log_pool", "confidence_weighted", None
 PRIOR = {"likeness": 0.5, "temperature": 1.1, "rounds": 0}
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
+GESTURES = 64
 
 
 class Refused(Exception):
@@ -97,9 +99,15 @@ def maybe(value, write) -> bytes:
     return b"\0" if value is None else b"\1" + write(value)
 
 
+def gestures(of: dict) -> bytes:
+    """Those that were named since the list was made."""
+    named = of.get("named", [])
+    return varint(len(named)) + b"".join(map(varint, named))
+
+
 def the_vote(vote: dict) -> bytes:
     return name(vote["round"]) + varint(vote["vocabulary"]) + vector(vote["evidence"], "f") + struct.pack("<f", vote["looks"]) \
-        + maybe(vote.get("unknown"), lambda nats: struct.pack("<f", nats))
+        + maybe(vote.get("unknown"), lambda nats: struct.pack("<f", nats)) + gestures(vote)
 
 
 def the_pool(pool: dict) -> bytes:
@@ -112,7 +120,7 @@ def statement(held: dict) -> bytes:
 
 
 def counted(held: dict) -> bytes:
-    beside = bytes([held["class"]]) + struct.pack("<f", held["weight"])
+    beside = varint(held["class"]) + struct.pack("<f", held["weight"])
     signature = maybe(held["signature"], bytes.fromhex)
     return varint(held["robot"]) + number(held["stamp"]) + beside + the_vote(held["vote"]) + signature
 
@@ -125,10 +133,10 @@ def aloud(said: dict) -> bytes:
     """The decision as its announcer said and signed it, with all that is beside the votes."""
     certificate = said["certificate"]
     votes, others = certificate["votes"], certificate["others"]
-    body = name(said["round"]) + maybe(said["class"], lambda one: bytes([one])) + struct.pack("<d", said["confidence"])
+    body = name(said["round"]) + maybe(said["class"], varint) + struct.pack("<d", said["confidence"])
     body += varint(said["author"]) + bytes([said["final"] is True]) + varint(certificate["vocabulary"])
     body += varint(RULES.index(certificate["rule"])) + maybe(certificate.get("pool"), the_pool)
-    body += vector(certificate["probabilities"], "d") + maybe(certificate.get("unknown"), lambda p: struct.pack("<d", p))
+    body += vector(certificate["probabilities"], "d") + maybe(certificate.get("unknown"), lambda p: struct.pack("<d", p)) + gestures(certificate)
     body += varint(len(votes)) + b"".join(map(counted, votes)) + varint(len(others)) + b"".join(map(other, others))
     body += varint(certificate["robots"]) + varint(certificate["quorum"]) + varint(certificate["elapsed_ms"])
     body += maybe(said["label"], text)
@@ -147,7 +155,26 @@ def certainty(row: list) -> float:
 def knows(vote: dict, gesture: int) -> bool:
     """Whether that robot was taught that gesture: to one that was not, it is exactly as likely as what is unknown."""
     evidence, unknown = vote["evidence"], vote.get("unknown")
+    if gesture in vote["lacks"]:
+        return False
     return evidence[gesture] != unknown if unknown is not None else len(set(evidence)) > 1
+
+
+def named_by(votes: list, listed: int) -> list:
+    """The gestures beyond the list that any of these robots knows; of too many those that most know, then those of the smaller numbers."""
+    known_by = collections.Counter(gesture for vote in votes for gesture in vote.get("named", []))
+    return sorted(sorted(known_by, key=lambda gesture: (-known_by[gesture], gesture))[:GESTURES - listed])
+
+
+def spread(vote: dict, named: list) -> dict:
+    """The vote over those of the list and these: of one that its robot does not know, it says what it says of unknown."""
+    of_vote = vote.get("named", [])
+    listed = len(vote["evidence"]) - len(of_vote)
+    beyond = dict(zip(of_vote, vote["evidence"][listed:]))
+    unknown = vote.get("unknown")
+    evidence = vote["evidence"][:listed] + [beyond.get(gesture, 0.0 if unknown is None else unknown) for gesture in named]
+    lacks = {listed + place for place, gesture in enumerate(named) if gesture not in beyond}
+    return {"evidence": evidence, "unknown": unknown, "lacks": lacks}
 
 
 def sharpness(pool: dict, voices: float) -> float:
@@ -272,8 +299,11 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     for held in votes + others:
         require(held["vote"]["round"]["counter"] == decision["round"]["counter"], "a vote of another round")
         signed(held["robot"], statement(held), held["signature"], "the vote")
-    classes = len(certificate["probabilities"])
-    require(all(len(held["vote"]["evidence"]) == classes for held in votes), "a vote over other gestures")
+    named = certificate.get("named", [])
+    listed = len(certificate["probabilities"]) - len(named)
+    over = [len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) for held in votes]
+    require(all(gestures == listed for gestures in over), "a vote over other gestures")
+    require(named == (named_by([held["vote"] for held in votes], listed) if certificate["probabilities"] else []), "gestures that no vote names")
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
     # What a robot said before it saw anything proves nothing where liars are expected.
     reached = len(votes) if given.liars else len(robots)
@@ -287,7 +317,7 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
         likeness, temperature = pool["likeness"], pool["temperature"]
         require(0 <= likeness <= 1 and 0.1 <= temperature <= 10, "an impossible pool")
         require(round(likeness * 20) / 20 == likeness and round(temperature * 100) / 100 == temperature, "a pool between the steps")
-    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), [held["vote"] for held in votes]
+    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), [spread(held["vote"], named) for held in votes]
     if decision["class"] is None:
         if majority and enough and votes:
             require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")
@@ -295,7 +325,9 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require(majority, "no majority took part")
     require(enough, "too few votes for so many liars")
     probabilities, sure = judge(rule, evidence, given, pool)
-    of_class = probabilities[decision["class"]]
+    places = list(range(listed)) + named
+    require(decision["class"] in places, "a gesture that no vote is about")
+    of_class = probabilities[places.index(decision["class"])]
     said = certificate["probabilities"] + ([] if unknown is None else [unknown])
     require(len(said) == len(probabilities), "unknown where no vote tells it, or none where one does")
     require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, said)), "other probabilities")

@@ -52,7 +52,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name");
     let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
     let boot = orders["boot"].as_u64().and_then(|boot| u32::try_from(boot).ok()).unwrap_or(1);
-    let sees = orders["sees"].as_u64().and_then(|class| u8::try_from(class).ok()).map(ClassId);
+    let sees = orders["sees"].as_u64().and_then(|class| u32::try_from(class).ok()).map(ClassId);
     let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
     let quorum = serde_json::from_value(orders["quorum"].clone()).unwrap_or(MindConfig::default().quorum);
     // {"learn": {"keep": 3, "share": 0.5, "memory": "FILE"}}: learns what it is shown and told.

@@ -10,7 +10,7 @@ use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 use crate::pool::Pool;
 use crate::signature::Signature;
-use crate::vote::{HeldVote, Vote};
+use crate::vote::{HeldVote, Vote, place};
 
 /// More looks than this of one robot make no decision fresher.
 const MAX_LOOKS: f32 = 16.0;
@@ -52,6 +52,9 @@ pub struct Certificate {
     /// The fused probability of a gesture that nobody taught, or of none: with it the probabilities sum to 1. `None` where no robot could tell.
     #[serde(default)]
     pub unknown: Option<f64>,
+    /// The gestures that were named since, ascending: the last of the probabilities are theirs, all before of those of the list.
+    #[serde(default, deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
+    pub named: Vec<ClassId>,
     /// The votes counted, by robot.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_ROBOTS>")]
     pub votes: Vec<CountedVote>,
@@ -67,6 +70,23 @@ pub struct Certificate {
 }
 
 impl Certificate {
+    /// How many gestures of the list there are.
+    #[must_use]
+    pub fn listed(&self) -> usize {
+        self.probabilities.len().saturating_sub(self.named.len())
+    }
+
+    /// The place of a gesture among the probabilities.
+    #[must_use]
+    pub fn place(&self, class: ClassId) -> Option<usize> {
+        place(self.listed(), &self.named, class)
+    }
+
+    /// The gestures that the probabilities are of, in their order.
+    pub fn classes(&self) -> impl Iterator<Item = ClassId> + '_ {
+        (0..self.listed() as u32).map(ClassId).chain(self.named.iter().copied())
+    }
+
     /// How many robots took part, whether or not their votes are counted.
     #[must_use]
     pub fn reached(&self) -> usize {

@@ -121,6 +121,7 @@ impl Message {
             }
             Self::Holding(holding) => holding.check(),
             Self::Announced(announced) => announced.decision.check(),
+            Self::Namings(namings) => namings.check(),
         }
     }
 }
@@ -131,8 +132,13 @@ impl Vote {
     /// # Errors
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
-        if self.evidence.len() == 1 {
-            return Err(DecodeError::Impossible("evidence over a single class"));
+        if self.listed() < 2 && !self.evidence.is_empty() {
+            return Err(DecodeError::Impossible("evidence over fewer than two gestures of the list"));
+        }
+        let in_order =
+            self.named.is_sorted_by(|a, b| a < b) && self.named.iter().all(|class| class.is_named());
+        if self.named.len() > self.evidence.len() || !in_order {
+            return Err(DecodeError::Impossible("gestures that were not named, twice, or out of order"));
         }
         if !self.evidence.iter().all(|e| e.is_finite()) {
             return Err(DecodeError::Impossible("evidence that is not finite"));
@@ -156,9 +162,13 @@ impl Decision {
     /// # Errors
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
-        let Certificate { pool, probabilities, unknown, votes, others, .. } = &self.certificate;
+        let Certificate { pool, named, probabilities, unknown, votes, others, .. } = &self.certificate;
         let probability = |p: f64| (0.0..=1.0).contains(&p);
-        let known = |class: ClassId| class.index() < probabilities.len();
+        let known = |class: ClassId| self.certificate.place(class).is_some();
+        let in_order = named.is_sorted_by(|a, b| a < b) && named.iter().all(|class| class.is_named());
+        if named.len() > probabilities.len() || !in_order {
+            return Err(DecodeError::Impossible("gestures that were not named, twice, or out of order"));
+        }
         if !(probability(self.confidence) && probabilities.iter().chain(unknown).copied().all(probability)) {
             return Err(DecodeError::Impossible("a probability outside 0..=1"));
         }
@@ -177,7 +187,7 @@ impl Decision {
         if !in_order || others.iter().any(|held| counted(held.robot)) {
             return Err(DecodeError::Impossible("a robot counted twice, or out of order"));
         }
-        if votes.iter().any(|counted| counted.vote.evidence.len() != probabilities.len()) {
+        if votes.iter().any(|counted| counted.vote.listed() != self.certificate.listed()) {
             return Err(DecodeError::Impossible("a counted vote over other classes"));
         }
         votes

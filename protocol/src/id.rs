@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::fixed;
+use crate::fnv::Fnv1a;
+use crate::limits::MAX_CLASSES;
 
 /// A text that is no valid identifier.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -79,16 +81,44 @@ impl From<InstructorId> for String {
     }
 }
 
-/// A gesture, as an index into the swarm's vocabulary.
+/// A gesture: its place in the list that the swarm started with or, of one that was named since, a number that follows from who
+/// named it and how.
+///
+/// So nobody gives out numbers: all robots find the same for the same word, whenever they hear it, and two instructors who name a gesture at
+/// once name two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct ClassId(pub u8);
+pub struct ClassId(pub u32);
 
 impl ClassId {
-    /// The position of this class in a vector with one element per class.
+    /// The first number of a gesture that was named. They end before twice that, so that one travels as 4 bytes: of 64 gestures two share
+    /// a number once in 65,000 swarms.
+    const FIRST_NAMED: u32 = 1 << 27;
+
+    /// The gesture that this instructor names so. To name it again is to speak of the same.
+    #[must_use]
+    pub fn named(by: &InstructorId, label: &str) -> Self {
+        let mut hash = Fnv1a::default();
+        hash.add(by.0.bytes().chain([0]).chain(label.bytes()));
+        Self(Self::FIRST_NAMED + hash.hash() as u32 % Self::FIRST_NAMED)
+    }
+
+    /// Whether it was named, and is not of the list.
+    #[must_use]
+    pub fn is_named(self) -> bool {
+        (Self::FIRST_NAMED..2 * Self::FIRST_NAMED).contains(&self.0)
+    }
+
+    /// Whether it can be a gesture at all: of the largest list, or named.
+    #[must_use]
+    pub fn is_possible(self) -> bool {
+        self.index() < MAX_CLASSES || self.is_named()
+    }
+
+    /// The position of a gesture of the list in a vector with one element for each of them. Of one that was named, a number beyond any.
     #[must_use]
     pub fn index(self) -> usize {
-        usize::from(self.0)
+        self.0 as usize
     }
 }
 
@@ -244,6 +274,19 @@ mod tests {
         for bad in ["", "a/b", "**", "naïve", &"x".repeat(33)] {
             assert!(bad.parse::<InstructorId>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn what_is_named_has_a_number_of_its_own_for_each_who_names_it() {
+        let named = |by: &str, label| ClassId::named(&by.parse().unwrap(), label);
+        assert_eq!(named("ana", "circle"), named("ana", "circle"));
+        let others = [named("bob", "circle"), named("ana", "circles"), named("an", "acircle")];
+        for other in others.into_iter().chain([named("ana", "")]) {
+            assert_ne!(named("ana", "circle"), other);
+            assert!(other.is_named() && other.is_possible() && other.index() >= MAX_CLASSES);
+        }
+        assert!(ClassId(63).is_possible() && !ClassId(63).is_named());
+        assert!(!ClassId(64).is_possible() && !ClassId(1 << 28).is_possible());
     }
 
     #[test]

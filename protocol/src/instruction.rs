@@ -16,6 +16,11 @@ use crate::id::{ClassId, RobotId, RoundId};
 /// {"say": "right", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "of": 3}
 /// {"say": "wrong", "round": {"counter": 5, "opener": 2, "life": 1067057607}, "of": "three"}
 /// {"say": "retract", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
+/// {"say": "new", "label": "circle"}
+/// {"say": "new", "label": "circle", "round": {"counter": 5, "opener": 2, "life": 1067057607}}
+/// {"say": "same", "class": "ring", "of": "circle"}
+/// {"say": "retire", "class": "circle"}
+/// {"say": "restore", "class": "circle"}
 /// ```
 ///
 /// The round is named as in the [`Decision`](crate::Decision) it is about, and "right" and "wrong" name the gesture that they confirm or deny:
@@ -53,6 +58,31 @@ pub enum Instruction {
         /// The round.
         round: RoundId,
     },
+    /// "This is a new gesture": names one, for all robots, while they work; nothing else changes until it is shown. To name it again restores it.
+    New {
+        /// What it is called: 1 to 64 bytes. Two instructors who choose one label name two gestures; `circle (ana)` says whose.
+        label: String,
+        /// The round that it was shown in, if it was: full feedback on that.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        round: Option<RoundId>,
+    },
+    /// "These two are one": what was seen of the first is learned as the second.
+    Same {
+        /// One that was named.
+        class: Gesture,
+        /// What it is.
+        of: Gesture,
+    },
+    /// "This is shown no more": robots do not look for it any longer.
+    Retire {
+        /// One that was named.
+        class: Gesture,
+    },
+    /// Takes `same` or `retire` back.
+    Restore {
+        /// One that was named.
+        class: Gesture,
+    },
 }
 
 /// A gesture as people name it.
@@ -83,13 +113,14 @@ impl<'de> Deserialize<'de> for Gesture {
             type Value = Gesture;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a class from 0 to 255, or a label")
+                f.write_str("a class, or a label")
             }
 
             fn visit_u64<E: Error>(self, class: u64) -> Result<Gesture, E> {
-                let class =
-                    class.try_into().map_err(|_| E::invalid_value(Unexpected::Unsigned(class), &self));
-                class.map(|class| Gesture::Class(ClassId(class)))
+                let possible = u32::try_from(class).ok().map(ClassId).filter(|class| class.is_possible());
+                possible
+                    .map(Gesture::Class)
+                    .ok_or_else(|| E::invalid_value(Unexpected::Unsigned(class), &self))
             }
 
             fn visit_str<E: Error>(self, label: &str) -> Result<Gesture, E> {
@@ -113,6 +144,8 @@ struct Read {
     class: Option<Gesture>,
     #[serde(default, deserialize_with = "given")]
     of: Option<Gesture>,
+    #[serde(default, deserialize_with = "given")]
+    label: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -123,6 +156,10 @@ enum Say {
     Right,
     Wrong,
     Retract,
+    New,
+    Same,
+    Retire,
+    Restore,
 }
 
 /// Left out or not: `null` is no value.
@@ -134,27 +171,35 @@ impl TryFrom<Read> for Instruction {
     type Error = &'static str;
 
     fn try_from(read: Read) -> Result<Self, &'static str> {
-        let Read { say, round, class, of } = read;
-        Ok(match (say, round, class, of) {
-            (Say::Open, None, None, None) => Self::Open,
-            (Say::Was, Some(round), Some(class), None) => Self::Was { round, class },
-            (Say::Right, Some(round), None, Some(of)) => Self::Right { round, of },
-            (Say::Wrong, Some(round), None, Some(of)) => Self::Wrong { round, of },
-            (Say::Retract, Some(round), None, None) => Self::Retract { round },
+        let Read { say, round, class, of, label } = read;
+        Ok(match (say, round, class, of, label) {
+            (Say::Open, None, None, None, None) => Self::Open,
+            (Say::Was, Some(round), Some(class), None, None) => Self::Was { round, class },
+            (Say::Right, Some(round), None, Some(of), None) => Self::Right { round, of },
+            (Say::Wrong, Some(round), None, Some(of), None) => Self::Wrong { round, of },
+            (Say::Retract, Some(round), None, None, None) => Self::Retract { round },
+            (Say::New, round, None, None, Some(label)) => Self::New { label, round },
+            (Say::Same, None, Some(class), Some(of), None) => Self::Same { class, of },
+            (Say::Retire, None, Some(class), None, None) => Self::Retire { class },
+            (Say::Restore, None, Some(class), None, None) => Self::Restore { class },
             (Say::Open, ..) => return Err("open has nothing beside it"),
             (Say::Was, ..) => return Err("was has round and class beside it"),
             (Say::Right | Say::Wrong, ..) => return Err("right and wrong have round and of beside them"),
             (Say::Retract, ..) => return Err("retract has round beside it"),
+            (Say::New, ..) => return Err("new has label beside it, and may have round"),
+            (Say::Same, ..) => return Err("same has class and of beside it"),
+            (Say::Retire | Say::Restore, ..) => return Err("retire and restore have class beside them"),
         })
     }
 }
 
 impl Instruction {
-    /// The round it is about; none for [`Self::Open`].
+    /// The round it is about, if any.
     #[must_use]
     pub fn round(&self) -> Option<RoundId> {
         match self {
-            Self::Open => None,
+            Self::Open | Self::Same { .. } | Self::Retire { .. } | Self::Restore { .. } => None,
+            Self::New { round, .. } => *round,
             Self::Was { round, .. }
             | Self::Right { round, .. }
             | Self::Wrong { round, .. }
@@ -175,8 +220,11 @@ pub struct Answer {
     pub to: Instruction,
     /// What became of it.
     pub outcome: Outcome,
-    /// The gesture that the round's samples now stand for, if one is known.
+    /// The gesture that the round's samples now stand for, if one is known, or that was named.
     pub class: Option<ClassId>,
+    /// Of a gesture that was named: the one that the swarm took what was shown for, if any. Two that look alike are hard to tell apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub looks_like: Option<ClassId>,
     /// How many samples of that round the answering robot holds and trains on.
     pub samples: u32,
 }
@@ -193,8 +241,10 @@ pub enum Outcome {
     NothingSeen,
     /// No such round is known, or it is too long ago.
     UnknownRound,
-    /// The vocabulary has no such gesture.
+    /// There is no such gesture, or several of that label: `circle (ana)` says whose is meant.
     UnknownGesture,
+    /// As many gestures are known as can be told apart, or it has no label of 1 to 64 bytes: retire one that is shown no more.
+    NoRoom,
     /// The robots have no memory for samples: learning is not configured.
     NotLearning,
     /// In a sealed swarm: who said it may not do that. It changed nothing.
@@ -210,7 +260,10 @@ impl Outcome {
             Self::Known => "known already; nothing changed",
             Self::NothingSeen => "noted, but nothing seen in that round is held",
             Self::UnknownRound => "no such round is known, or it is too long ago",
-            Self::UnknownGesture => "the vocabulary has no such gesture",
+            Self::UnknownGesture => {
+                "there is no such gesture, or several: 'circle (ana)' is the one that ana named"
+            }
+            Self::NoRoom => "no room for another gesture: retire one that is shown no more",
             Self::NotLearning => "the robots are not set up to learn",
             Self::NotAllowed => {
                 "not allowed: ask whoever has the swarm's authority key for the role (gestalt trust roster shows who may do what, gestalt trust \

@@ -27,6 +27,7 @@ mod key;
 mod lesson;
 mod limits;
 mod message;
+mod naming;
 mod pool;
 mod round_outcome;
 mod sample;
@@ -51,6 +52,7 @@ pub use key::{Keys, SwarmNameError, Topic};
 pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
 pub use message::{Give, Have, Message};
+pub use naming::{Fate, MAX_LABEL, MAX_NAMED, Naming, Namings};
 pub use pool::Pool;
 pub use round_outcome::{Reason, RoundOutcome};
 pub use sample::{
@@ -58,5 +60,7 @@ pub use sample::{
     MAX_INTERVALS, MAX_SAMPLES, Samples, SharedSample, Vector,
 };
 pub use signature::Signature;
-pub use status::{Camera, CameraState, LearningStatus, Motion, MotionState, Opinion, Reported, Status};
+pub use status::{
+    Camera, CameraState, LearningStatus, Motion, MotionState, NamedGesture, Opinion, Reported, Status,
+};
 pub use vote::{HeldVote, Vote};

@@ -7,7 +7,7 @@ use crate::decode::DecodeError;
 use crate::fixed;
 use crate::id::{ClassId, FeatureSpaceId, RobotId, RoundId, SampleId, SampleSeries, Stamp};
 use crate::lesson::{Lesson, MAX_LESSONS, Word};
-use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
+use crate::limits::MAX_ROBOTS;
 use crate::signature::Signature;
 
 /// The most components of a shared vector.
@@ -201,8 +201,8 @@ impl Samples {
             return Err(DecodeError::Impossible("a batch beyond the largest"));
         }
         for sample in &self.samples {
-            if sample.class.index() >= MAX_CLASSES {
-                return Err(DecodeError::Impossible("a class beyond the largest vocabulary"));
+            if !sample.class.is_possible() {
+                return Err(DecodeError::Impossible("a gesture that can be none"));
             }
             if sample.id.number == 0 {
                 return Err(DecodeError::Impossible("a sample of number 0"));
@@ -263,7 +263,7 @@ pub struct Digest {
     /// Over the ids of all samples it ever had.
     #[serde(with = "fixed::u64")]
     pub samples: u64,
-    /// Over all that instructors said.
+    /// Over all that instructors said, and named.
     #[serde(with = "fixed::u64")]
     pub lessons: u64,
 }
@@ -287,7 +287,10 @@ pub struct Know {
     /// What instructors said of each round, as a digest under the key of `digest`.
     #[serde(deserialize_with = "bounded::vec::<_, _, MAX_LESSONS>")]
     pub lessons: Vec<(RoundId, u64)>,
-    /// Both in short. Where its author takes the reader to know the same, the list is left out.
+    /// What instructors named, as a digest under the key of `digest`.
+    #[serde(with = "fixed::u64")]
+    pub named: u64,
+    /// All in short. Where its author takes the reader to know the same, the list is left out.
     pub digest: Digest,
     /// Whether this is itself an answer to a [`Know`]; such a one is answered with what is lacking only.
     pub answer: bool,
@@ -325,11 +328,11 @@ pub struct Lessons {
 impl Lessons {
     pub(crate) fn check(&self) -> Result<(), DecodeError> {
         let possible = |lesson: &Lesson| match lesson.word {
-            Word::Was(class) | Word::Not(class) => class.index() < MAX_CLASSES,
+            Word::Was(class) | Word::Not(class) => class.is_possible(),
             Word::Retracted => true,
         };
         if !self.lessons.iter().all(possible) {
-            return Err(DecodeError::Impossible("a class beyond the largest vocabulary"));
+            return Err(DecodeError::Impossible("a gesture that can be none"));
         }
         Ok(())
     }

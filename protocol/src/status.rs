@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::bounded;
-use crate::id::{RobotId, RoundId};
+use crate::id::{ClassId, RobotId, RoundId};
 use crate::limits::{MAX_CLASSES, PROTOCOL_VERSION};
 
 /// A robot's account of itself, JSON: the reply to a query on `robot/<id>/status`.
@@ -176,10 +176,24 @@ pub struct LearningStatus {
     pub common: String,
     /// Rounds of which it knows what an instructor said.
     pub lessons: usize,
+    /// The gestures that were named since the swarm was made, and are in use.
+    #[serde(default)]
+    pub named: Vec<NamedGesture>,
     /// Where it keeps all this: a path, `none`, or what is wrong with it.
     pub memory: String,
     /// How often it has trained.
     pub trainings: u64,
+}
+
+/// A gesture that an instructor named.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NamedGesture {
+    /// Its number.
+    pub class: ClassId,
+    /// What it is called: its label, with who named it where another has the same.
+    pub label: String,
+    /// The samples that show it.
+    pub samples: usize,
 }
 
 /// An error as the status reports it.

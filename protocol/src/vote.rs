@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::bounded;
-use crate::id::{RobotId, RoundId, Stamp, VocabularyId};
+use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::MAX_CLASSES;
 use crate::signature::Signature;
 
@@ -25,6 +25,32 @@ pub struct Vote {
     /// author cannot tell, or has seen nothing. A gesture of the list that it was never taught is as likely as this.
     #[serde(default)]
     pub unknown: Option<f32>,
+    /// The gestures that were named since, ascending: the last components of `evidence` stand for them, all before for those of the list.
+    #[serde(default, deserialize_with = "bounded::vec::<_, _, MAX_CLASSES>")]
+    pub named: Vec<ClassId>,
+}
+
+impl Vote {
+    /// How many gestures of the list it is evidence for: all of them, or none.
+    #[must_use]
+    pub fn listed(&self) -> usize {
+        self.evidence.len().saturating_sub(self.named.len())
+    }
+
+    /// The evidence for that gesture; `None` where its author does not know it, or has seen nothing.
+    #[must_use]
+    pub fn evidence_for(&self, class: ClassId) -> Option<f32> {
+        place(self.listed(), &self.named, class).and_then(|place| self.evidence.get(place).copied())
+    }
+}
+
+/// The place of a gesture among so many of the list, which come first, and those that were named, which follow in ascending order.
+pub(crate) fn place(listed: usize, named: &[ClassId], class: ClassId) -> Option<usize> {
+    if class.is_named() {
+        named.binary_search(&class).ok().map(|place| listed + place)
+    } else {
+        Some(class.index()).filter(|place| *place < listed)
+    }
 }
 
 /// A vote as its author stamped it, passed on by another robot.

@@ -21,14 +21,22 @@ fn stamp() -> impl Strategy<Value = Stamp> {
     (any::<u32>(), any::<u32>()).prop_map(|(boot, sequence)| Stamp { boot, sequence })
 }
 
+/// Two, in order.
+fn named_gestures() -> impl Iterator<Item = ClassId> {
+    let mut named = ["circle", "fist"].map(|label| ClassId::named(&"ana".parse().unwrap(), label));
+    named.sort();
+    named.into_iter()
+}
+
 fn vote() -> impl Strategy<Value = Vote> {
     let evidence = prop_oneof![Just(vec![]), prop::collection::vec(-1e30f32..1e30, 2..=MAX_CLASSES)];
     let unknown = prop::option::of(-1e30f32..1e30);
-    (round(), any::<u32>(), evidence, 0f32..1e6, unknown).prop_map(
-        |(round, vocabulary, evidence, looks, unknown)| Vote {
+    (round(), any::<u32>(), evidence, 0f32..1e6, unknown, 0..=2_usize).prop_map(
+        |(round, vocabulary, evidence, looks, unknown, named)| Vote {
             round,
             vocabulary: VocabularyId(vocabulary),
             unknown: unknown.filter(|_| !evidence.is_empty()),
+            named: named_gestures().take(named.min(evidence.len().saturating_sub(2))).collect(),
             evidence,
             looks,
         },
@@ -42,11 +50,11 @@ fn decision() -> impl Strategy<Value = Decision> {
         Just(FusionRule::LogPool),
         Just(FusionRule::ConfidenceWeighted),
     ];
-    let counted = (stamp(), 0..2u8, 0f32..1e6, vote());
+    let counted = (stamp(), 0..2_u32, 0f32..1e6, vote());
     let votes = prop::collection::btree_map(any::<u32>(), counted, 0..8);
     let certificate =
         (rule, prop::collection::vec(0f64..=1.0, 2..=MAX_CLASSES), votes, any::<[u32; 3]>(), any::<bool>());
-    (round(), prop::option::of(0..2u8), 0f64..=1.0, any::<u32>(), certificate).prop_map(
+    (round(), prop::option::of(0..2_u32), 0f64..=1.0, any::<u32>(), certificate).prop_map(
         |(
             round,
             class,
@@ -62,7 +70,7 @@ fn decision() -> impl Strategy<Value = Decision> {
                 } else {
                     let evidence =
                         (0..probabilities.len()).map(|k| vote.evidence[k % vote.evidence.len()]).collect();
-                    let vote = Vote { evidence, ..vote };
+                    let vote = Vote { evidence, named: vec![], ..vote };
                     votes.push(CountedVote {
                         robot,
                         stamp,
@@ -91,6 +99,7 @@ fn decision() -> impl Strategy<Value = Decision> {
                     robots,
                     quorum,
                     elapsed_ms,
+                    named: vec![],
                 },
             }
         },
@@ -162,7 +171,7 @@ fn samples() -> impl Strategy<Value = Samples> {
             .prop_map(|halves| Vector::F16(halves.into_iter().flat_map(|(low, high)| [low, high]).collect())),
         prop::collection::vec(any::<i8>(), 1..40).prop_map(Vector::I8),
     ];
-    let sample = (0..MAX_CLASSES as u8, round(), vector);
+    let sample = (0..MAX_CLASSES as u32, round(), vector);
     let samples = prop::collection::btree_map(1..u32::MAX, sample, 1..5);
     (any::<u64>(), any::<(u32, u32)>(), samples).prop_map(|(space, (author, life), samples)| {
         let sample = |(number, (class, round, vector))| SharedSample {
@@ -201,14 +210,15 @@ fn know() -> impl Strategy<Value = Know> {
             digest,
             answer,
             nothing_for,
+            named: 0,
         },
     )
 }
 
 fn lesson() -> impl Strategy<Value = Lesson> {
     let word = prop_oneof![
-        (0..MAX_CLASSES as u8).prop_map(|class| Word::Was(ClassId(class))),
-        (0..MAX_CLASSES as u8).prop_map(|class| Word::Not(ClassId(class))),
+        (0..MAX_CLASSES as u32).prop_map(|class| Word::Was(ClassId(class))),
+        (0..MAX_CLASSES as u32).prop_map(|class| Word::Not(ClassId(class))),
         Just(Word::Retracted),
     ];
     (round(), "[a-zA-Z0-9_-]{1,32}", any::<(u64, u64)>(), word).prop_map(
@@ -288,7 +298,7 @@ proptest! {
 
 fn vote_of(evidence: Vec<f32>) -> Vote {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0, unknown: None }
+    Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0, unknown: None, named: vec![] }
 }
 
 fn read(message: Message) -> Result<Envelope, DecodeError> {
@@ -444,6 +454,7 @@ fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
             digest: Digest::default(),
             answer: false,
             nothing_for: None,
+            named: 0,
         }))
         .is_ok()
     };
@@ -456,7 +467,14 @@ fn intervals_that_overlap_touch_or_run_backwards_are_refused() {
 #[test]
 fn a_decision_that_contradicts_itself_is_refused() {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    let vote = |evidence| Vote { round, vocabulary: VocabularyId(1), evidence, looks: 1.0, unknown: None };
+    let vote = |evidence| Vote {
+        round,
+        vocabulary: VocabularyId(1),
+        evidence,
+        looks: 1.0,
+        unknown: None,
+        named: vec![],
+    };
     let counted = |robot, class| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp::default(),
@@ -488,6 +506,7 @@ fn a_decision_that_contradicts_itself_is_refused() {
             robots: 5,
             quorum: 3,
             elapsed_ms: 1,
+            named: vec![],
         },
     };
     assert_eq!(sound.check(), Ok(()));
@@ -533,6 +552,7 @@ fn no_message_takes_more_memory_than_promised() {
         evidence: vec![],
         looks: 0.0,
         unknown: None,
+        named: vec![],
     };
     let have = |votes| {
         Message::Have(Have { round: None, decision: None, holders: 0, votes, knowledge: None, answer: false })

@@ -2,10 +2,10 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
+    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
     FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known,
-    Lesson, Lessons, Message, Outcome, Pool, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
-    Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, RobotId, RoundId, SampleId, SampleSeries,
+    Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -17,6 +17,7 @@ fn vote() -> Vote {
         evidence: vec![1.5, -1.5],
         looks: 2.0,
         unknown: None,
+        named: vec![],
     }
 }
 
@@ -45,6 +46,7 @@ fn decision() -> Decision {
             robots: 3,
             quorum: 2,
             elapsed_ms: 1250,
+            named: vec![],
         },
     }
 }
@@ -81,15 +83,21 @@ const DIGEST: &str = "c300000000000000 2c01000000000000 0100000000000000";
 
 #[test]
 fn a_vote() {
-    // round, vocabulary (varint), two f32 in little-endian order, looks, nothing of unknown
+    // round, vocabulary (varint), two f32 in little-endian order, looks, nothing of unknown, nothing named
     travels_as(
         Message::Vote(vote()),
-        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00"),
+        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00"),
     );
     // Five bytes for what is unknown.
     travels_as(
         Message::Vote(Vote { unknown: Some(-3.0), ..vote() }),
-        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 01 000040c0"),
+        &format!("{HEAD} 00 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 01 000040c0 00"),
+    );
+    // Eight bytes for each gesture that was named: its number and the evidence for it.
+    let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
+    travels_as(
+        Message::Vote(Vote { evidence: vec![1.5, -1.5, 0.0], named: vec![circle], ..vote() }),
+        &format!("{HEAD} 00 ac0202a101 84868808 03 0000c03f 0000c0bf 00000000 00000040 00 01 a791c457"),
     );
 }
 
@@ -106,7 +114,7 @@ fn a_signed_vote() {
 #[test]
 fn a_null_vote() {
     let null = Vote { evidence: vec![], looks: 0.0, ..vote() };
-    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000 00"));
+    travels_as(Message::Vote(null), &format!("{HEAD} 00 ac0202a101 84868808 00 00000000 00 00"));
 }
 
 #[test]
@@ -135,10 +143,10 @@ fn what_a_robot_gives() {
     let held =
         HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote(), signature: None };
     // The decision; its certificate: vocabulary, rule, no pool, probabilities, nothing of
-    // unknown, one vote as it was said, unsigned, no others, n, q, time.
-    let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 03 02 e209";
-    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00";
+    // unknown, nothing named, one vote as it was said, unsigned, no others, n, q, time.
+    let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 00 \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209";
+    let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00";
     // One word on what a robot holds: robot, boot, sequence, the word as it was said, unsigned.
     let (stamp, holding) = (Stamp { boot: 2, sequence: 6 }, decision().holding(true));
     let holder = Holder { robot: RobotId(3), stamp, holding, signature: None };
@@ -161,8 +169,8 @@ fn what_a_robot_holds() {
 fn what_an_announcer_signs() {
     let announcement = announcement();
     // The decision as it is given, but here it is final; some label.
-    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 03 02 e209";
+    let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 00 \
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209";
     let envelope = Envelope::from(announcement.clone());
     let expected = format!("{HEAD} 08 {decided} 01 04 70616c6d");
     assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));
@@ -231,10 +239,13 @@ fn what_a_robot_knows() {
         digest: digest(300, 1),
         answer: true,
         nothing_for: None,
+        named: 7,
     };
     travels_as(
         Message::Know(know),
-        &format!("{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 {DIGEST} 01 00"),
+        &format!(
+            "{HEAD} 04 01 03b2000000 02 01ac02 ae02ae02 01 ac0202a101 05 0700000000000000 {DIGEST} 01 00"
+        ),
     );
     let nothing = Know {
         samples: vec![],
@@ -242,8 +253,9 @@ fn what_a_robot_knows() {
         digest: digest(300, 1),
         answer: true,
         nothing_for: Some(digest(300, 1)),
+        named: 0,
     };
-    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 {DIGEST} 01 01 {DIGEST}"));
+    travels_as(Message::Know(nothing), &format!("{HEAD} 04 00 00 0000000000000000 {DIGEST} 01 01 {DIGEST}"));
 }
 
 #[test]
@@ -258,14 +270,34 @@ fn what_instructors_said() {
     );
 }
 
+#[test]
+fn what_instructors_named() {
+    let (ana, bob) = ("ana".parse().unwrap(), "bob".parse().unwrap());
+    let circle = Naming {
+        by: ana,
+        label: "circle".into(),
+        count: 2,
+        at: 1,
+        said_by: bob,
+        fate: Fate::Same(ClassId(3)),
+    };
+    travels_as(
+        Message::Namings(Namings { namings: vec![circle] }),
+        &format!("{HEAD} 09 01 03616e61 06636972636c65 02 01 03626f62 0103"),
+    );
+}
+
 fn json_of_before(decision: &Decision) -> String {
     let json = serde_json::to_string(decision).unwrap();
-    json.replace(r#""pool":null,"#, "").replace(r#""unknown":null,"#, "").replace(r#","unknown":null"#, "")
+    json.replace(r#""pool":null,"#, "")
+        .replace(r#""unknown":null,"#, "")
+        .replace(r#","unknown":null,"named":[]"#, "")
+        .replace(r#""named":[],"#, "")
 }
 
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","pool":null,"probabilities":[0.25,0.75],"unknown":null,"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0,"unknown":null},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","pool":null,"probabilities":[0.25,0.75],"unknown":null,"named":[],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0,"unknown":null,"named":[]},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
     // One recorded before robots could tell what is unknown.
@@ -302,12 +334,23 @@ fn instructions_as_people_write_them() {
         ),
         (
             r#"{"say":"wrong","round":{"counter":300,"opener":2,"life":161},"of":3}"#,
-            Instruction::Wrong { round, of },
+            Instruction::Wrong { round, of: of.clone() },
         ),
         (
             r#"{"say":"retract","round":{"counter":300,"opener":2,"life":161}}"#,
             Instruction::Retract { round },
         ),
+        (r#"{"say":"new","label":"circle"}"#, Instruction::New { label: "circle".to_owned(), round: None }),
+        (
+            r#"{"say":"new","label":"circle","round":{"counter":300,"opener":2,"life":161}}"#,
+            Instruction::New { label: "circle".to_owned(), round: Some(round) },
+        ),
+        (
+            r#"{"say":"same","class":"ring","of":3}"#,
+            Instruction::Same { class: Gesture::Label("ring".to_owned()), of: of.clone() },
+        ),
+        (r#"{"say":"retire","class":3}"#, Instruction::Retire { class: of.clone() }),
+        (r#"{"say":"restore","class":3}"#, Instruction::Restore { class: of.clone() }),
     ] {
         assert_eq!(decode_json::<Instruction>(json.as_bytes()), Ok(instruction.clone()), "{json}");
         let written = serde_json::to_string(&instruction).unwrap();
@@ -318,6 +361,9 @@ fn instructions_as_people_write_them() {
         r#"{"say":"close"}"#,
         r#"{"say":"open","now":1}"#,
         "[]",
+        r#"{"say":"new"}"#,
+        r#"{"say":"same","class":"ring"}"#,
+        r#"{"say":"retire","class":"ring","round":{"counter":300,"opener":2,"life":161}}"#,
         "open",
         r#"{"say":"right"}"#,
         r#"{"say":"right","round":{"counter":300,"opener":2,"life":161}}"#,
@@ -337,6 +383,7 @@ fn an_answer_for_instructors() {
         outcome: Outcome::NothingSeen,
         class: Some(ClassId(3)),
         samples: 0,
+        looks_like: None,
     };
     let json = r#"{"robot":1,"at":7,"to":{"say":"right","round":{"counter":300,"opener":2,"life":161},"of":3},"outcome":"nothing_seen","class":3,"samples":0}"#;
     assert_eq!(serde_json::to_string(&answer).unwrap(), json);

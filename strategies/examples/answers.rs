@@ -32,7 +32,7 @@ fn taught(rng: &mut ChaCha8Rng) -> Result<Arc<Classifier>, Box<dyn Error>> {
     let mut learner = Learner::new(Arc::new(space), vocabulary, LearnerOptions::default())?;
     for (n, row) in rows.iter().enumerate() {
         let vector = learner.space().project(row)?;
-        learner.insert(n as u64, ClassId((n % CLASSES) as u8), &vector)?;
+        learner.insert(n as u64, ClassId((n % CLASSES) as u32), &vector)?;
     }
     Ok(learner.learn()?)
 }

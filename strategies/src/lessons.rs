@@ -1,10 +1,10 @@
 //! What instructors said of which round: one latest word per instructor and round, so that what is heard twice, late
 //! or in another order comes to the same.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_CLASSES, MAX_LESSONS, RoundId, Word};
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RoundId, Word};
 use siphasher::sip::SipHasher24;
 
 /// The most instructors of one round: beyond, those who were heard of first, on whatever round, are kept. Names made up
@@ -24,7 +24,7 @@ const FIRST_COUNT: u64 = u64::MAX / 2;
 type Said = (u64, u64, Word);
 
 /// Which gestures a round may have shown, by all that was said of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Nobody said anything.
     Unsaid,
@@ -37,34 +37,35 @@ pub enum Verdict {
 }
 
 /// A set of classes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Candidates(u64);
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidates(BTreeSet<ClassId>);
 
 impl Candidates {
-    /// All of a vocabulary of so many classes.
+    /// These.
     #[must_use]
-    pub fn all(classes: usize) -> Self {
-        Self(if classes >= MAX_CLASSES { u64::MAX } else { (1 << classes) - 1 })
+    pub fn of(classes: impl IntoIterator<Item = ClassId>) -> Self {
+        Self(classes.into_iter().collect())
     }
 
     /// Whether that class is one of them.
     #[must_use]
-    pub fn contains(self, class: ClassId) -> bool {
-        class.index() < MAX_CLASSES && self.0 >> class.index() & 1 == 1
+    pub fn contains(&self, class: ClassId) -> bool {
+        self.0.contains(&class)
     }
 
     /// The only one, if it is one.
     #[must_use]
-    pub fn only(self) -> Option<ClassId> {
-        (self.0.count_ones() == 1).then(|| ClassId(self.0.trailing_zeros() as u8))
+    pub fn only(&self) -> Option<ClassId> {
+        self.0.first().copied().filter(|_| self.0.len() == 1)
     }
 
-    fn restricted(self, word: Word) -> Self {
-        let bit = |class: ClassId| if class.index() < MAX_CLASSES { 1 << class.index() } else { 0 };
+    fn restrict(&mut self, word: Word) {
         match word {
-            Word::Was(class) => Self(self.0 & bit(class)),
-            Word::Not(class) => Self(self.0 & !bit(class)),
-            Word::Retracted => self,
+            Word::Was(class) => self.0.retain(|candidate| *candidate == class),
+            Word::Not(class) => {
+                self.0.remove(&class);
+            }
+            Word::Retracted => {}
         }
     }
 }
@@ -180,16 +181,20 @@ impl LessonBook {
         self.rounds.remove(&round);
     }
 
-    /// What all that was said of a round comes to, in a vocabulary of so many classes. Where instructors contradict
+    /// What all that was said of a round comes to, where these are the gestures there are. Where instructors contradict
     /// each other the latest word counts alone.
     #[must_use]
-    pub fn verdict(&self, round: RoundId, classes: usize) -> Verdict {
+    pub fn verdict(&self, round: RoundId, classes: &Candidates) -> Verdict {
         self.verdict_by_names([round], classes)
     }
 
     /// The same of a round that has several names: of what an instructor said under any of them, the latest counts.
     #[must_use]
-    pub fn verdict_by_names(&self, names: impl IntoIterator<Item = RoundId>, classes: usize) -> Verdict {
+    pub fn verdict_by_names(
+        &self,
+        names: impl IntoIterator<Item = RoundId>,
+        classes: &Candidates,
+    ) -> Verdict {
         let mut words: BTreeMap<&InstructorId, Said> = BTreeMap::new();
         for (instructor, said) in names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten() {
             words.entry(instructor).and_modify(|known| *known = *said.max(known)).or_insert(*said);
@@ -199,12 +204,22 @@ impl LessonBook {
         }
         let valid = words.values().filter(|(.., word)| *word != Word::Retracted);
         let Some((.., latest)) = valid.clone().max() else { return Verdict::Retracted };
-        let all = Candidates::all(classes);
-        let together = valid.fold(all, |candidates, (.., word)| candidates.restricted(*word));
-        let candidates = if together.0 == 0 { all.restricted(*latest) } else { together };
+        // What was shown has a name, also where nobody uses that any more, or this robot has not heard of it.
+        let named = match latest {
+            Word::Was(class) if class.is_named() => Some(*class),
+            _ => None,
+        };
+        let mut candidates = classes.clone();
+        candidates.0.extend(named);
+        valid.for_each(|(.., word)| candidates.restrict(*word));
+        if candidates.0.is_empty() {
+            candidates = classes.clone();
+            candidates.0.extend(named);
+            candidates.restrict(*latest);
+        }
         match candidates.only() {
             Some(class) => Verdict::Class(class),
-            None if candidates.0 == 0 => Verdict::Unsaid,
+            None if candidates.0.is_empty() => Verdict::Unsaid,
             None => Verdict::Among(candidates),
         }
     }
@@ -280,7 +295,7 @@ impl LessonBook {
         [round.counter, round.opener.0, round.life].iter().for_each(|part| sip.write(&part.to_le_bytes()));
         for (instructor, (count, at, word)) in words {
             let (kind, class) = match word {
-                Word::Was(class) => (1, class.0),
+                Word::Was(class) => (1_u8, class.0),
                 Word::Not(class) => (2, class.0),
                 Word::Retracted => (3, 0),
             };
@@ -288,7 +303,8 @@ impl LessonBook {
             sip.write(&[name.len() as u8]);
             sip.write(name.as_bytes());
             [count, at].into_iter().for_each(|when| sip.write(&when.to_le_bytes()));
-            sip.write(&[kind, class]);
+            sip.write(&[kind]);
+            sip.write(&class.to_le_bytes());
         }
         sip.finish()
     }
@@ -306,11 +322,15 @@ mod tests {
         Lesson { round, instructor: who.parse().unwrap(), count, at: 7, word }
     }
 
-    fn was(class: u8) -> Word {
+    fn six() -> Candidates {
+        Candidates::of((0..6).map(ClassId))
+    }
+
+    fn was(class: u32) -> Word {
         Word::Was(ClassId(class))
     }
 
-    fn not(class: u8) -> Word {
+    fn not(class: u32) -> Word {
         Word::Not(ClassId(class))
     }
 
@@ -319,7 +339,7 @@ mod tests {
         for (who, at, word) in words {
             book.hear(&lesson(1, who, *at, *word));
         }
-        book.verdict(RoundId { counter: 1, opener: RobotId(1), life: 0 }, 6)
+        book.verdict(RoundId { counter: 1, opener: RobotId(1), life: 0 }, &six())
     }
 
     #[test]
@@ -335,7 +355,7 @@ mod tests {
         let Verdict::Among(candidates) = verdict(&[("ada", 1, not(3)), ("bob", 2, not(5))]) else {
             panic!("not one alone")
         };
-        let left: Vec<u8> = (0..8).filter(|class| candidates.contains(ClassId(*class))).collect();
+        let left: Vec<u32> = (0..8).filter(|class| candidates.contains(ClassId(*class))).collect();
         assert_eq!(left, [0, 1, 2, 4]);
         let four = [("a", 1, not(0)), ("b", 1, not(1)), ("c", 1, not(2)), ("d", 1, not(3)), ("e", 1, not(5))];
         assert_eq!(verdict(&four), class(4), "only one is left");
@@ -344,7 +364,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_order_and_repetition_of_lessons_make_no_difference(
-            lessons in prop::collection::vec((0..4_u32, 0..3_usize, 0..5_u64, 0..3_u8, any::<bool>()), 0..40),
+            lessons in prop::collection::vec((0..4_u32, 0..3_usize, 0..5_u64, 0..3_u32, any::<bool>()), 0..40),
             order in any::<prop::sample::Index>(),
         ) {
             let lessons: Vec<Lesson> = lessons
@@ -395,7 +415,7 @@ mod tests {
         assert_eq!(book.hear(&lesson(2, "ada", 3, was(4))), LessonReceipt::New, "the newest name gives way");
         let round = lesson(2, "ada", 1, was(1)).round;
         assert_eq!(book.of(round).count(), MAX_INSTRUCTORS);
-        assert_eq!(book.verdict(round, 6), Verdict::Class(ClassId(4)));
+        assert_eq!(book.verdict(round, &six()), Verdict::Class(ClassId(4)));
         for i in 0..2 * MAX_FAMILIAR {
             book.hear(&lesson(3 + i as u32 / 10, &format!("flood{i}"), 1, was(1)));
         }
@@ -414,7 +434,7 @@ mod tests {
             assert_eq!(book.hear(&forged), LessonReceipt::New);
             let count = book.highest_count([round]) + 1;
             assert_eq!(book.hear(&lesson(1, "ada", count, was(2))), LessonReceipt::New);
-            assert_eq!(book.verdict(round, 6), Verdict::Class(ClassId(2)));
+            assert_eq!(book.verdict(round, &six()), Verdict::Class(ClassId(2)));
         }
     }
 

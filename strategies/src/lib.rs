@@ -20,6 +20,7 @@ pub mod geometry;
 mod learning;
 mod lessons;
 pub mod mind;
+mod names;
 pub mod sample;
 pub mod selection;
 mod shares;
@@ -44,6 +45,7 @@ pub use learning::{
 };
 pub use lessons::{Candidates, LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
+pub use names::{NameBook, NamingReceipt};
 pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};
 pub use selection::{Selection, SelectionRule};
 pub use training_set::{RestoreError, SampleReceipt, SetChange, TrainingSet};

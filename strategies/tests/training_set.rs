@@ -101,7 +101,7 @@ proptest! {
                     prop_assert_eq!(changes.len(), personal.min(*n));
                 }
                 Operation::Relabel { round: r, class } => {
-                    prop_assert!(held.values().all(|s| s.round != round(*r) || s.class == ClassId(*class)));
+                    prop_assert!(held.values().all(|s| s.round != round(*r) || s.class == ClassId((*class).into())));
                 }
                 Operation::Retract { round: r } => prop_assert!(held.values().all(|s| s.round != round(*r))),
                 // Only what was had and is not held is taken back.
@@ -135,7 +135,7 @@ proptest! {
                 0 => {
                     let tag = makers.len() as f32;
                     makers.push(i);
-                    robots[i].keep(ClassId(makers.len() as u8 % 2), round(1), vec![tag, 1.0], &mut rng);
+                    robots[i].keep(ClassId(makers.len() as u32 % 2), round(1), vec![tag, 1.0], &mut rng);
                 }
                 1 => {
                     for change in robots[i].share(2, None, &as_is, &mut rng) {
@@ -184,7 +184,7 @@ fn swarm(
             let mut robot = TrainingSet::new(me, 100_000, rules.0.build(), rules.1.build());
             for sample in 0..k * m {
                 let vector = vec![sample as f32, i as f32];
-                robot.keep(ClassId((sample % k) as u8), round(1), vector, &mut rng);
+                robot.keep(ClassId((sample % k) as u32), round(1), vector, &mut rng);
             }
             let share = (part * (k * m) as f64).round() as usize;
             robot.share(share, None, &as_is, &mut rng);
@@ -311,7 +311,7 @@ proptest! {
         let mut own = 0;
         for (who, class, place) in sent {
             let author = if who < 5 { who } else if who < 10 { 2 } else { 100 + who };
-            let (class, at) = (ClassId(class), vec![f32::from(place), if author == 2 { 1e4 } else { 0.0 }]);
+            let (class, at) = (ClassId(class.into()), vec![f32::from(place), if author == 2 { 1e4 } else { 0.0 }]);
             if author == 0 {
                 own += 1;
                 robot.keep(class, round(1), at, &mut rng);
@@ -395,7 +395,7 @@ fn a_set_stored_under_a_greater_capacity_is_trimmed() {
     let mut rng = generator(1);
     let mut large = set(10, SelectionRule::Random, ForgettingRule::Redundancy);
     for i in 0..10 {
-        large.keep(ClassId(i % 2), round(1), vec![f32::from(i * i)], &mut rng);
+        large.keep(ClassId(i % 2), round(1), vec![(i * i) as f32], &mut rng);
     }
     let mut small = set(4, SelectionRule::Random, ForgettingRule::Redundancy);
     let samples = large.iter().cloned().collect();

@@ -80,7 +80,7 @@ pub async fn start_learning(config: RobotConfig, shown: Arc<AtomicU8>) -> Watche
     let robot = Arc::new(Robot::start(config).await.expect("the robot starts"));
     let (events, of_eye) = (robot.events(), robot.events());
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let frame = move || gesture(ClassId(shown.load(Ordering::Relaxed)), &mut rng);
+    let frame = move || gesture(ClassId(shown.load(Ordering::Relaxed).into()), &mut rng);
     let period = Duration::from_millis(20);
     let looking = tokio::spawn(look_when_open(Arc::downgrade(&robot), of_eye, period, frame));
     Watched { robot, events, looking: Some(looking) }

@@ -132,7 +132,7 @@ async fn bytes_of_a_round(is_sealed: bool) -> (f64, f64, f64) {
         }
         let round = round.expect("there are robots");
         tokio::time::sleep(Duration::from_secs(1)).await;
-        let was = Instruction::Was { round, class: Gesture::Class(gestalt_protocol::ClassId(class)) };
+        let was = Instruction::Was { round, class: Gesture::Class(gestalt_protocol::ClassId(class.into())) };
         let answer = client.teach(&ada, &was, PATIENCE).await.unwrap().expect("an answer");
         assert_eq!(answer.outcome, Outcome::Learned);
         tokio::time::sleep(Duration::from_secs(2)).await;

@@ -57,7 +57,7 @@ impl School {
     /// Shows a gesture for a round and says what it was.
     async fn lesson(&mut self, class: u8) -> RoundId {
         let round = self.show(class).await;
-        let was = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+        let was = Instruction::Was { round, class: Gesture::Class(ClassId(class.into())) };
         let answer = self.client.teach(&self.ada, &was, PATIENCE).await.unwrap().expect("an answer");
         assert_eq!(answer.outcome, Outcome::Learned);
         round
@@ -124,7 +124,7 @@ pub async fn ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gesture
         let decision = school.robots[4].robot.status().round;
         assert!(decision.is_some());
         let last = school.client.last_decision(Duration::from_secs(2)).await.unwrap().unwrap();
-        assert_eq!(last.decision.class, Some(ClassId(class)), "what was learned is recognised");
+        assert_eq!(last.decision.class, Some(ClassId(class.into())), "what was learned is recognised");
     }
     school.end().await;
 }
@@ -252,7 +252,7 @@ pub async fn a_robot_votes_and_decides_while_it_trains() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut sample = |number| SharedSample {
         id: SampleId { author: RobotId(9), life: 0, number },
-        class: ClassId((rng.next_u32() % 6) as u8),
+        class: ClassId((rng.next_u32() % 6) as u32),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::I8((0..8).map(|_| (rng.next_u32() % 200) as i8).collect()),
     };

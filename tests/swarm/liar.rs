@@ -28,7 +28,8 @@ pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
     let vote = |by: u32, round: RoundId, sequence: u32, for_class: usize| {
         let mut evidence = vec![-1.0; 6];
         evidence[for_class] = 5.0;
-        let message = Message::Vote(Vote { round, vocabulary, evidence, looks: 4.0, unknown: None });
+        let message =
+            Message::Vote(Vote { round, vocabulary, evidence, looks: 4.0, unknown: None, named: vec![] });
         let stamp = Stamp { boot: 1, sequence };
         let said = Envelope { author: RobotId(3), stamp, message, signature: None };
         Envelope { signature: Some(statement::sign(&key(by), &swarm_id, &said.statement())), ..said }

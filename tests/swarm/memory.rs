@@ -102,8 +102,10 @@ pub async fn killed_at_any_moment_it_remembers_and_shares_nothing_twice() {
                 if taught.replace(last.decision.round) == Some(last.decision.round) {
                     continue;
                 }
-                let was =
-                    Instruction::Was { round: last.decision.round, class: Gesture::Class(ClassId(class)) };
+                let was = Instruction::Was {
+                    round: last.decision.round,
+                    class: Gesture::Class(ClassId(class.into())),
+                };
                 let _ = client.teach(&ada, &was, Duration::from_secs(2)).await;
             }
         };

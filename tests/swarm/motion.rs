@@ -99,7 +99,7 @@ pub async fn gestures_start_rounds_and_all_robots_decide_them_alike() {
         assert_eq!(heard.held.len(), 4, "round {counter}: all robots hold a decision");
         let decided = heard.held[&1];
         assert!(heard.held.values().all(|held| *held == decided), "round {counter}: {:?}", heard.held);
-        right += u64::from(decided == shown.map(ClassId));
+        right += u64::from(decided == shown.map(|fingers| ClassId(fingers.into())));
         by_showing.entry(showing - first).or_default().push((*counter, shown));
     }
     eprintln!("{right} of {} rounds right", rounds.len());

@@ -86,7 +86,7 @@ async fn lesson(client: &Client, shown: &AtomicU8, class: u8) -> u32 {
     let decided =
         tokio::time::timeout(PATIENCE, news.decision_after(before)).await.expect("a decision").unwrap();
     let round = decided.decision.round;
-    let was = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
+    let was = Instruction::Was { round, class: Gesture::Class(ClassId(class.into())) };
     client.teach(&ada, &was, Duration::from_secs(5)).await.unwrap();
     // A request that follows at once counts as a copy of the one before.
     tokio::time::sleep(Duration::from_millis(600)).await;

@@ -264,7 +264,7 @@ pub async fn a_robot_sees_through_a_camera_that_a_ros_driver_owns() {
         };
         let decision = timeout(PATIENCE, decided).await.expect("it decides");
         eprintln!("{gesture}: {:?} ({:.3})", decision.class, decision.confidence);
-        right += u32::from(decision.class == Some(ClassId(gesture)));
+        right += u32::from(decision.class == Some(ClassId(gesture.into())));
     }
     stop.store(true, Ordering::Relaxed);
     driver.join().unwrap();

@@ -119,6 +119,7 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
             evidence: vec![-1.0, 5.0, -1.0, -1.0, -1.0, -1.0],
             looks: 16.0,
             unknown: None,
+            named: vec![],
         };
         let (author, stamp) = (RobotId(robot), Stamp { boot: u32::MAX, sequence: counter });
         Envelope { author, stamp, message: Message::Vote(vote), signature: None }

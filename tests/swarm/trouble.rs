@@ -89,16 +89,23 @@ pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Deci
     let vote = |robot| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp { boot: 1, sequence: 1 },
-        class: ClassId(class),
+        class: ClassId(class.into()),
         weight: 1.0,
-        vote: Vote { round, vocabulary, evidence: evidence.clone(), looks: 1.0, unknown: None },
+        vote: Vote {
+            round,
+            vocabulary,
+            evidence: evidence.clone(),
+            looks: 1.0,
+            unknown: None,
+            named: vec![],
+        },
         signature: None,
     };
     let mut probabilities = vec![0.002; 6];
     probabilities[usize::from(class)] = 0.99;
     Decision {
         round,
-        class: Some(ClassId(class)),
+        class: Some(ClassId(class.into())),
         confidence: 0.99,
         author,
         is_final: false,
@@ -113,6 +120,7 @@ pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Deci
             robots,
             quorum: 1,
             elapsed_ms: 1,
+            named: vec![],
         },
     }
 }
@@ -136,8 +144,9 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     let keys = Keys::new(&swarm).unwrap();
     let (nine, round) = (RobotId(9), RoundId { counter: 2, opener: RobotId(0), life: 0 });
     let vocabulary = Fixed::default().vocabulary().id();
-    let vote =
-        |evidence: Vec<f32>| Message::Vote(Vote { round, vocabulary, evidence, looks: 1.0, unknown: None });
+    let vote = |evidence: Vec<f32>| {
+        Message::Vote(Vote { round, vocabulary, evidence, looks: 1.0, unknown: None, named: vec![] })
+    };
     let say = async |topic: Topic, author, message| {
         let stamp = Stamp { boot: 1, sequence: 1 };
         liar.put(keys.key(&topic), Envelope { author, stamp, message, signature: None }.encode())
@@ -175,7 +184,8 @@ pub async fn well_formed_lies_are_refused_and_the_swarm_goes_on() {
     // A round that nobody can have come to yet: who believed it would refuse all that follow.
     let before = refusals(&robots[0]);
     let far = RoundId { counter: u32::MAX, ..round };
-    let ahead = Vote { round: far, vocabulary, evidence: vec![0.0; 6], looks: 1.0, unknown: None };
+    let ahead =
+        Vote { round: far, vocabulary, evidence: vec![0.0; 6], looks: 1.0, unknown: None, named: vec![] };
     say(Topic::Vote(nine), nine, Message::Vote(ahead)).await;
     counted(&robots[0], "refused_", before + 1).await;
     // Decisions that cannot be.

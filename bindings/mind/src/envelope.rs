@@ -12,7 +12,8 @@
 
 use gestalt_protocol::{
     Announced, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons,
-    MAX_JSON, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector, Vote,
+    MAX_JSON, Message, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
+    Vote,
 };
 use half::f16;
 use serde::{Deserialize, Serialize};
@@ -69,6 +70,7 @@ enum SpeltMessage {
     Batches(SpeltBatches),
     Holding(Holding),
     Announced(Announced),
+    Namings(Namings),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -146,6 +148,7 @@ impl From<Message> for SpeltMessage {
             }
             Message::Holding(holding) => Self::Holding(holding),
             Message::Announced(announced) => Self::Announced(announced),
+            Message::Namings(namings) => Self::Namings(namings),
         }
     }
 }
@@ -167,6 +170,7 @@ impl From<SpeltMessage> for Message {
             }
             SpeltMessage::Holding(holding) => Self::Holding(holding),
             SpeltMessage::Announced(announced) => Self::Announced(announced),
+            SpeltMessage::Namings(namings) => Self::Namings(namings),
         }
     }
 }

@@ -73,8 +73,14 @@ fn lessons_and_signed_votes_come_back_byte_for_byte() {
         word: Word::Was(ClassId(3)),
     };
     comes_back(&envelope(Message::Lessons(Lessons { lessons: vec![lesson] })));
-    let vote =
-        Vote { round: ROUND, vocabulary: VocabularyId(1), evidence: vec![], looks: 0.0, unknown: None };
+    let vote = Vote {
+        round: ROUND,
+        vocabulary: VocabularyId(1),
+        evidence: vec![],
+        looks: 0.0,
+        unknown: None,
+        named: vec![],
+    };
     let signature = Some(Signature::from_bytes([0xA5; 64]));
     comes_back(
         &Envelope { author: RobotId(7), stamp: STAMP, message: Message::Vote(vote), signature }.encode(),
@@ -103,7 +109,7 @@ proptest! {
     fn every_finite_float_survives_the_way_through_text(bits in prop::collection::vec(any::<u32>(), 2..64), looks in 0.0..1e9_f32) {
         let evidence: Vec<f32> = bits.into_iter().map(f32::from_bits).filter(|x| x.is_finite()).collect();
         prop_assume!(evidence.len() != 1);
-        let vote = Vote { round: ROUND, vocabulary: VocabularyId(1), evidence, looks, unknown: None };
+        let vote = Vote { round: ROUND, vocabulary: VocabularyId(1), evidence, looks, unknown: None, named: vec![] };
         comes_back(&envelope(Message::Vote(vote)));
     }
 

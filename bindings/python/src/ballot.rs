@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::errors::{data, settings};
 
 /// Probabilities, the likeliest class, and by how much it leads.
-type Fused = (Vec<f64>, u8, f64);
+type Fused = (Vec<f64>, u32, f64);
 
 fn fused(Fusion { probabilities, top, margin }: Fusion) -> Fused {
     (probabilities, top.0, margin)
@@ -76,7 +76,8 @@ impl Ballot {
             )));
         }
         let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
-        let vote = Vote { round, vocabulary: self.vocabulary.id(), evidence, looks, unknown: None };
+        let vote =
+            Vote { round, vocabulary: self.vocabulary.id(), evidence, looks, unknown: None, named: vec![] };
         vote.check().map_err(data)?;
         let (boot, sequence) = stamp;
         let stamp = Stamp { boot, sequence };

@@ -123,7 +123,9 @@ impl Learner {
         let inserted = py.detach(|| {
             for (key, (row, class)) in (first..).zip(matrix.rows().zip(classes)) {
                 let vector = space.project(row).map_err(|error| (key, error.to_string()))?;
-                machines.insert(key, ClassId(*class), &vector).map_err(|error| (key, error.to_string()))?;
+                machines
+                    .insert(key, ClassId((*class).into()), &vector)
+                    .map_err(|error| (key, error.to_string()))?;
             }
             Ok(())
         });

@@ -15,7 +15,7 @@ pub(crate) struct Sample {
     id: Option<(u32, u32, u32)>,
     /// The gesture shown, as an index.
     #[pyo3(get)]
-    class_: u8,
+    class_: u32,
     /// The round it was seen in.
     #[pyo3(get)]
     round: String,

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use gestalt_protocol::{ClassId, MAX_CLASSES, RobotId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
 use gestalt_strategies::{Classify, SampleReceipt, SetChange, TrainingSet as Samples};
 use pyo3::prelude::*;
 use rand::SeedableRng;
@@ -46,7 +46,7 @@ impl TrainingSet {
     }
 
     /// Takes an own sample in; gives those that were forgotten for it.
-    fn keep(&mut self, class_: u8, round: &str, vector: Vec<f32>) -> PyResult<Vec<Sample>> {
+    fn keep(&mut self, class_: u32, round: &str, vector: Vec<f32>) -> PyResult<Vec<Sample>> {
         let (class, round) = (class(class_)?, round_of(round)?);
         self.fits(&vector)?;
         let (samples, rng) = self.parts();
@@ -78,7 +78,7 @@ impl TrainingSet {
     }
 
     /// Takes a shared sample in, unless it was seen before: whether it was new.
-    fn receive(&mut self, id: (u32, u32, u32), class_: u8, round: &str, vector: Vec<f32>) -> PyResult<bool> {
+    fn receive(&mut self, id: (u32, u32, u32), class_: u32, round: &str, vector: Vec<f32>) -> PyResult<bool> {
         let (author, life, number) = id;
         let id = SampleId { author: RobotId(author), life, number };
         let (class, round) = (class(class_)?, round_of(round)?);
@@ -94,7 +94,7 @@ impl TrainingSet {
     }
 
     /// Gives all samples of a round another class: how many had another.
-    fn relabel(&mut self, round: &str, class_: u8) -> PyResult<usize> {
+    fn relabel(&mut self, round: &str, class_: u32) -> PyResult<usize> {
         let (round, class) = (round_of(round)?, class(class_)?);
         Ok(self.parts().0.relabel(round, class).len())
     }
@@ -137,12 +137,12 @@ impl TrainingSet {
     }
 }
 
-fn class(class: u8) -> PyResult<ClassId> {
+fn class(class: u32) -> PyResult<ClassId> {
     let class = ClassId(class);
-    if class.index() < MAX_CLASSES {
+    if class.is_possible() {
         Ok(class)
     } else {
-        Err(data(format!("class {class}: at most {MAX_CLASSES}")))
+        Err(data(format!("class {class}: no gesture has that number")))
     }
 }
 

@@ -35,12 +35,12 @@ pub fn table(evaluation: &Evaluation, vocabulary: &Vocabulary) -> String {
     );
     let part =
         |p: Option<gestalt_strategies::Proportion>| p.map_or("–".to_owned(), |p| format!("{:.3}", p.value));
-    for ((class, label), row) in (0_u8..).zip(labels).zip(evaluation.confusion()) {
+    for ((class, label), row) in (0_u32..).zip(labels).zip(evaluation.confusion()) {
         let _ = write!(text, "  {label:>row_label$} │");
         for (answer, count) in row.iter().enumerate() {
             // Zeros off the diagonal are noise to the eye.
             let count =
-                if *count == 0 && answer != usize::from(class) { "·".to_owned() } else { count.to_string() };
+                if *count == 0 && answer != class as usize { "·".to_owned() } else { count.to_string() };
             let _ = write!(text, "{count:>column$}");
         }
         let (recall, precision) = (evaluation.recall(ClassId(class)), evaluation.precision(ClassId(class)));

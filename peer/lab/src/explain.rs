@@ -129,7 +129,7 @@ fn points(groups: &[Group]) -> Vec<Point> {
             // Apart enough for their numbers to be read.
             let apart = |(.., other): &(bool, u64, Point)| distance(other.at, at) > 0.3;
             if points.iter().all(apart) {
-                points.push((!common, rng.random(), Point { at, class: ClassId(class), common }));
+                points.push((!common, rng.random(), Point { at, class: ClassId(class.into()), common }));
             }
         }
     }

@@ -144,6 +144,7 @@ fn vote(counter: u32) -> Envelope {
         evidence: vec![6.0, -1.2, -1.2, -1.2, -1.2, -1.2],
         looks: 3.0,
         unknown: None,
+        named: vec![],
     };
     let stamp = Stamp { boot: 1, sequence: counter };
     Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }

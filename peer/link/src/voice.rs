@@ -108,6 +108,7 @@ impl Voice {
             | Message::Samples(_)
             | Message::Batches(_)
             | Message::Lessons(_)
+            | Message::Namings(_)
             | Message::Holding(_)
             | Message::Announced(_) => "give",
         };

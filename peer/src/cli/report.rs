@@ -34,7 +34,7 @@ pub fn text(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -
 
 /// The measurement as a JSON object.
 pub fn json(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -> serde_json::Value {
-    let classes: Vec<_> = (0_u8..)
+    let classes: Vec<_> = (0_u32..)
         .zip(vocabulary.labels())
         .map(|(class, label)| {
             json!({

@@ -1,6 +1,6 @@
 //! Decisions and robots in words, and results as lines on stdout.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use gestalt_protocol::{
@@ -56,9 +56,17 @@ impl Names {
     /// Those that the robots of a swarm report.
     pub(super) fn reported(statuses: &[Status]) -> Self {
         // A robot without a classifier reports none, which is not a vocabulary.
-        let labels: BTreeSet<&[String]> =
-            statuses.iter().map(|status| status.vocabulary.as_slice()).collect();
-        Self(labels.into_iter().filter_map(|labels| Vocabulary::new(labels.iter().cloned()).ok()).collect())
+        let mut known: BTreeMap<u32, Vocabulary> = BTreeMap::new();
+        for status in statuses {
+            let Some(vocabulary) = Vocabulary::of_status(status) else { continue };
+            // Not all may have heard of what was named.
+            let fuller =
+                known.get(&vocabulary.id().0).is_none_or(|known| known.titles() < vocabulary.titles());
+            if fuller {
+                known.insert(vocabulary.id().0, vocabulary);
+            }
+        }
+        Self(known.into_values().collect())
     }
 
     /// Whether they suffice for a decision.
@@ -198,14 +206,14 @@ mod tests {
 
     use super::*;
 
-    fn of(class: Option<u8>, votes: &[(u32, u8)], vocabulary: VocabularyId) -> Decision {
+    fn of(class: Option<u32>, votes: &[(u32, u32)], vocabulary: VocabularyId) -> Decision {
         let round = RoundId { counter: 18, opener: RobotId(1), life: 0 };
-        let vote = |&(robot, class): &(u32, u8)| CountedVote {
+        let vote = |&(robot, class): &(u32, u32)| CountedVote {
             robot: RobotId(robot),
             stamp: Stamp { boot: 1, sequence: 1 },
             class: ClassId(class),
             weight: 1.0,
-            vote: Vote { round, vocabulary, evidence: Vec::new(), looks: 1.0, unknown: None },
+            vote: Vote { round, vocabulary, evidence: Vec::new(), looks: 1.0, unknown: None, named: vec![] },
             signature: None,
         };
         Decision {
@@ -225,6 +233,7 @@ mod tests {
                 robots: 3,
                 quorum: u32::from(!votes.is_empty()),
                 elapsed_ms: 252,
+                named: vec![],
             },
         }
     }

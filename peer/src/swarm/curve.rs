@@ -105,6 +105,7 @@ mod tests {
                 robots: 1,
                 quorum: 1,
                 elapsed_ms: 0,
+                named: vec![],
             },
         }
     }

@@ -121,7 +121,7 @@ impl Run {
             Topic::Status(_) => {
                 let status: Status = decode_json(&payload).ok()?;
                 // A robot without a classifier reports no vocabulary.
-                if let Ok(vocabulary) = Vocabulary::new(status.vocabulary) {
+                if let Some(vocabulary) = Vocabulary::of_status(&status) {
                     self.vocabularies.insert(vocabulary.id().0, vocabulary);
                 }
             }
@@ -164,13 +164,18 @@ impl Run {
             Gesture::Label(label) => self.vocabularies.get(&vocabulary.0)?.class(label),
         };
         let mut truth = None;
-        for word in showing.words.values() {
+        for (by, word) in &showing.words {
             let said = match word {
                 Instruction::Was { class: gesture, .. } | Instruction::Right { of: gesture, .. } => {
                     Truth::Is(class(gesture)?)
                 }
                 Instruction::Wrong { of, .. } => Truth::IsNot(class(of)?),
-                Instruction::Open | Instruction::Retract { .. } => continue,
+                Instruction::New { label, .. } => Truth::Is(ClassId::named(by, label)),
+                Instruction::Open
+                | Instruction::Retract { .. }
+                | Instruction::Same { .. }
+                | Instruction::Retire { .. }
+                | Instruction::Restore { .. } => continue,
             };
             truth = Some(match (truth, said) {
                 (None, said) => said,

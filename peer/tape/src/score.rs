@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn each_round_is_judged_by_what_was_said_of_it_and_by_nothing_else() {
         let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-        let outcome = |truth, happened: Option<u8>, would: Option<u8>| Outcome {
+        let outcome = |truth, happened: Option<u32>, would: Option<u32>| Outcome {
             round,
             truth,
             happened: happened.map(ClassId),

@@ -164,11 +164,20 @@ fn instruction(word: &Instruction) -> Result<Value, DecodeError> {
     let named = match word {
         Instruction::Was { class, .. } => Some(("class", class)),
         Instruction::Right { of, .. } | Instruction::Wrong { of, .. } => Some(("of", of)),
-        Instruction::Open | Instruction::Retract { .. } => None,
+        Instruction::Same { class, .. } | Instruction::Retire { class } | Instruction::Restore { class } => {
+            Some(("class", class))
+        }
+        Instruction::Open | Instruction::Retract { .. } | Instruction::New { .. } => None,
     };
-    if let (Some((name, Gesture::Label(label))), Some(fields)) = (named, view.as_object_mut()) {
-        fields.remove(name);
-        fields.insert(format!("{name}_label"), json!(label));
+    let other = match word {
+        Instruction::Same { of, .. } => Some(("of", of)),
+        _ => None,
+    };
+    for (name, gesture) in named.into_iter().chain(other) {
+        if let (Gesture::Label(label), Some(fields)) = (gesture, view.as_object_mut()) {
+            fields.remove(name);
+            fields.insert(format!("{name}_label"), json!(label));
+        }
     }
     Ok(view)
 }

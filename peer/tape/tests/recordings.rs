@@ -199,7 +199,7 @@ proptest! {
     ) {
         let [robot, counter, opener, life, boot, sequence] = ids;
         let round = RoundId { counter, opener: RobotId(opener), life };
-        let vote = Vote { round, vocabulary: VocabularyId(ids[0] ^ ids[1]), evidence, looks, unknown: None };
+        let vote = Vote { round, vocabulary: VocabularyId(ids[0] ^ ids[1]), evidence, looks, unknown: None, named: vec![] };
         let (robot, stamp) = (RobotId(robot), Stamp { boot, sequence });
         let bytes = Envelope { author: robot, stamp, message: Message::Vote(vote.clone()), signature: None }.encode();
         let view = view(&Topic::Vote(robot), &bytes).unwrap();

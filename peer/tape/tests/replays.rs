@@ -105,7 +105,7 @@ fn as_it_was_it_ends_as_it_did() {
 fn each_question_changes_what_it_asks_about_and_nothing_else() {
     let run = replayed(&run());
     let was = log_pool();
-    let would = |what: WhatIf| -> Vec<Option<u8>> {
+    let would = |what: WhatIf| -> Vec<Option<u32>> {
         let config = what.config(&was).unwrap();
         outcomes(&run, &what, &config).iter().map(|it| it.would.map(|class| class.0)).collect()
     };

@@ -25,7 +25,14 @@ fn roster(robots: u32) -> Roster {
 fn vote(author: u32) -> Vec<u8> {
     let evidence = (0..6).map(|class| ((author * 7 + class * 13) as f32).sin() * 4.0).collect();
     let round = RoundId { counter: 1, opener: RobotId(0), life: 0xA1A1_A1A1 };
-    let vote = Vote { round, vocabulary: VocabularyId(0xDEAD_BEEF), evidence, looks: 3.0, unknown: None };
+    let vote = Vote {
+        round,
+        vocabulary: VocabularyId(0xDEAD_BEEF),
+        evidence,
+        looks: 3.0,
+        unknown: None,
+        named: vec![],
+    };
     let stamp = Stamp { boot: 1, sequence: 1000 };
     Envelope { author: RobotId(author), stamp, message: Message::Vote(vote), signature: None }.encode()
 }

@@ -292,6 +292,7 @@ mod tests {
                 robots: 1,
                 quorum: 1,
                 elapsed_ms: 1,
+                named: vec![],
             },
         };
         let message = |decision| {
@@ -328,6 +329,7 @@ mod tests {
                 evidence: vec![],
                 looks: 0.0,
                 unknown: None,
+                named: vec![],
             },
             signature: None,
         };

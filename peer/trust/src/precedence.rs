@@ -18,10 +18,11 @@ pub struct Precedence {
 impl Precedence {
     /// Whether somebody with these roles may say that.
     pub fn permits(&mut self, by: &InstructorId, roles: Roles, said: &Instruction) -> bool {
-        let Some(round) = said.round() else { return roles.has(Role::Open) };
-        if !roles.has(Role::Teach) {
+        if !roles.has(if *said == Instruction::Open { Role::Open } else { Role::Teach }) {
             return false;
         }
+        // Of gestures that are named anybody who teaches may say what becomes of them: nothing of that is lost.
+        let Some(round) = said.round() else { return true };
         let first = self.taught.iter().find(|(taught, _)| *taught == round);
         if let Some((_, first)) = first {
             // What one takes back is what one said oneself.

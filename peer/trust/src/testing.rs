@@ -36,7 +36,14 @@ pub(crate) fn vote(author: u32, sequence: u32, evidence: f32) -> Vec<u8> {
     said(
         author,
         sequence,
-        Message::Vote(Vote { round, vocabulary: VocabularyId(9), evidence, looks: 1.0, unknown: None }),
+        Message::Vote(Vote {
+            round,
+            vocabulary: VocabularyId(9),
+            evidence,
+            looks: 1.0,
+            unknown: None,
+            named: vec![],
+        }),
     )
 }
 

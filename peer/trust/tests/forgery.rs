@@ -20,7 +20,14 @@ fn roster(swarm: &str) -> Roster {
 
 fn vote(evidence: Vec<f32>) -> Message {
     let round = RoundId { counter: 3, opener: RobotId(1), life: 77 };
-    Message::Vote(Vote { round, vocabulary: VocabularyId(5), evidence, looks: 2.0, unknown: None })
+    Message::Vote(Vote {
+        round,
+        vocabulary: VocabularyId(5),
+        evidence,
+        looks: 2.0,
+        unknown: None,
+        named: vec![],
+    })
 }
 
 fn said(author: u8, message: Message) -> Vec<u8> {

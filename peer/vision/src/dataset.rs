@@ -191,7 +191,7 @@ impl Dataset {
 
     fn of(mut found: Folders, vocabulary: &Vocabulary) -> Self {
         let mut images = Vec::new();
-        for (class, label) in (0_u8..).zip(vocabulary.labels()) {
+        for (class, label) in (0_u32..).zip(vocabulary.labels()) {
             let paths = found.gestures.remove(label).unwrap_or_default().into_iter();
             images.extend(paths.map(|path| LabelledImage {
                 class: ClassId(class),

@@ -165,7 +165,7 @@ fn rendered_samples(
     for (done, frame) in (1..).zip(rendered) {
         let frame = frame?;
         if let Ok(observation) = perception.observe(&frame.image) {
-            let (class, group) = (ClassId(frame.class), Some(frame.group));
+            let (class, group) = (ClassId(frame.class.into()), Some(frame.group));
             samples.push(LabelledFeatures { features: observation.features, class, group });
         }
         progress(done);

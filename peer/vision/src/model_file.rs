@@ -265,7 +265,7 @@ mod tests {
     fn model() -> Model {
         let sample = |i: u8| LabelledFeatures {
             features: vec![f32::from(i % 2), f32::from(i) / 10.0],
-            class: ClassId(i % 2),
+            class: ClassId((i % 2).into()),
             group: None,
         };
         let samples: Vec<LabelledFeatures> = (0..10).map(sample).collect();

@@ -166,7 +166,7 @@ mod tests {
             let frame = source.next_frame(std::time::Duration::ZERO, &Scene { gesture, seed: 1 }).unwrap();
             let path = folder.join(format!("{k}.png"));
             assert!(imwrite(&path, &frame.image, &Vector::new()).unwrap());
-            LabelledImage { path, class: ClassId(gesture.unwrap_or_default()), person: None }
+            LabelledImage { path, class: ClassId(gesture.unwrap_or_default().into()), person: None }
         };
         fingers.iter().enumerate().map(&mut picture).collect()
     }

@@ -46,7 +46,7 @@ fn samples(
     let mut eyes = eyes(layer, camera);
     let sample = |frame: &LabelledFrame| {
         let observation = eyes.observe(&frame.image).ok()?;
-        let class = ClassId(frame.class);
+        let class = ClassId(frame.class.into());
         Some(LabelledFeatures { features: observation.features, class, group: Some(frame.group) })
     };
     frames.iter().map(sample).collect()
@@ -66,7 +66,7 @@ fn named(classifier: &Classifier, samples: &[Option<LabelledFeatures>]) -> f64 {
     let right = |sample: &&LabelledFeatures| {
         let p = classifier.probabilities(&sample.features).unwrap();
         let best = (0..p.len()).max_by(|&a, &b| p[a].total_cmp(&p[b]));
-        best == Some(usize::from(sample.class.0))
+        best == Some(sample.class.index())
     };
     100.0 * samples.iter().flatten().filter(right).count() as f64 / samples.len() as f64
 }
@@ -228,7 +228,7 @@ fn a_room_known_empty_does_no_harm() {
         let sample = |(camera, frame, room, gesture): &(CameraModel, Mat, Mat, u8)| {
             let room = with_room.then_some(room);
             let features = eyes(LayerConfig::ALL, camera).observe_before(frame, room).ok()?.features;
-            Some(LabelledFeatures { features, class: ClassId(*gesture), group: None })
+            Some(LabelledFeatures { features, class: ClassId((*gesture).into()), group: None })
         };
         named(&classifier, &scenes.iter().map(sample).collect::<Vec<_>>())
     };

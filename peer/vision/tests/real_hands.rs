@@ -338,7 +338,7 @@ fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
             let named = tested.iter().filter(|((image, _), sample)| {
                 let p = sample.as_ref().map(|s| classifier.probabilities(&s.features).unwrap());
                 let best = p.and_then(|p| (0..p.len()).max_by(|&a, &b| p[a].total_cmp(&p[b])));
-                best == Some(usize::from(image.class.0))
+                best == Some(image.class.index())
             });
             right += 100.0 * named.count() as f64 / tested.len() as f64 / SPLITS as f64;
         }

@@ -100,7 +100,7 @@ fn taught<'a>(
         for (class, (vector, _)) in set.known() {
             counts[class] += 1;
             if counts[class] <= each {
-                learner.insert(key, ClassId(class as u8), vector).unwrap();
+                learner.insert(key, ClassId(class as u32), vector).unwrap();
                 key += 1;
             }
         }

@@ -14,7 +14,8 @@ fn ballot(robots: u32) -> Ballot {
     for robot in 0..robots {
         let evidence = (0..6).map(|class| ((robot * 7 + class * 13) as f32).sin() * 4.0).collect();
         let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
-        let vote = Vote { round, vocabulary: SCALE.vocabulary, evidence, looks: 3.0, unknown: None };
+        let vote =
+            Vote { round, vocabulary: SCALE.vocabulary, evidence, looks: 3.0, unknown: None, named: vec![] };
         let stamp = Stamp { boot: 1, sequence: 1 };
         ballot.cast(HeldVote { robot: RobotId(robot), stamp, vote, signature: None });
     }

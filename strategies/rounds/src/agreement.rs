@@ -190,7 +190,7 @@ mod tests {
 
     use super::*;
 
-    fn decision(class: Option<u8>, robots: u32, confidence: f64, author: u32) -> Decision {
+    fn decision(class: Option<u32>, robots: u32, confidence: f64, author: u32) -> Decision {
         let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
         let vote = |robot| CountedVote {
             robot: RobotId(robot),
@@ -203,6 +203,7 @@ mod tests {
                 evidence: vec![0.0; 4],
                 looks: 1.0,
                 unknown: None,
+                named: vec![],
             },
             signature: None,
         };
@@ -223,6 +224,7 @@ mod tests {
                 robots,
                 quorum: 1,
                 elapsed_ms: 0,
+                named: vec![],
             },
         }
     }
@@ -377,13 +379,13 @@ mod tests {
         #[test]
         fn order_and_repetition_make_no_difference(
             (heard, shuffled) in prop::collection::vec(
-                (prop::option::of(0..3u8), 1..4u32, 0..3u32, 0..5u32), 1..20
+                (prop::option::of(0..3_u32), 1..4u32, 0..3u32, 0..5u32), 1..20
             ).prop_flat_map(|heard| {
                 let twice: Vec<_> = heard.iter().chain(&heard).copied().collect();
                 (Just(heard), Just(twice).prop_shuffle())
             }),
         ) {
-            let held = |heard: &[(Option<u8>, u32, u32, u32)]| {
+            let held = |heard: &[(Option<u32>, u32, u32, u32)]| {
                 let mut agreement = Agreement::default();
                 for &(class, robots, confidence, author) in heard {
                     // What has one rank is one decision: a robot makes one of its own per round.

@@ -5,9 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
 
+use crate::columns::Columns;
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
-use crate::fusion::{self, Fusion};
+use crate::fusion::Fusion;
 use crate::rows::Rows;
 
 /// What became of a vote put into a [`Ballot`].
@@ -26,7 +27,7 @@ pub enum Cast {
 pub struct Scale {
     /// The list.
     pub vocabulary: VocabularyId,
-    /// How many gestures are on it.
+    /// How many gestures are on it; those that were named since come beside them.
     pub classes: usize,
 }
 
@@ -34,7 +35,7 @@ impl Scale {
     /// Whether a vote is evidence on it.
     #[must_use]
     pub fn is_of(self, vote: &Vote) -> bool {
-        vote.evidence.len() == self.classes && vote.vocabulary == self.vocabulary
+        vote.listed() == self.classes && vote.vocabulary == self.vocabulary
     }
 }
 
@@ -128,7 +129,13 @@ impl Ballot {
         self.scales.get(&(scale.vocabulary.0, scale.classes)).copied().unwrap_or_default()
     }
 
-    /// All evidence on that scale as one distribution, with "unknown" as a last class where any of the robots can tell; `None` when there is
+    /// The gestures that the votes on that scale are evidence for: those of the list, and all that were named and any of the robots knows.
+    #[must_use]
+    pub fn columns(&self, scale: Scale) -> Columns {
+        Columns::of(scale.classes, self.on(scale).map(|held| &held.vote))
+    }
+
+    /// All evidence on that scale as one distribution over its [`columns`](Self::columns), with "unknown" as a last class where any of the robots can tell; `None` when there is
     /// none, or the rule makes none of it. Of the gestures it is asked only which of those it is that any of the robots was taught.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
@@ -144,12 +151,13 @@ impl Ballot {
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
     #[must_use]
     pub fn counted(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Vec<CountedVote> {
+        let columns = self.columns(scale);
         let weight = |vote: &Vote| Some(rule.weight(clip, &vote.evidence) as f32);
         self.on(scale)
             .map(|HeldVote { robot, stamp, vote, signature }| CountedVote {
                 robot: *robot,
                 stamp: *stamp,
-                class: fusion::top_of(&vote.evidence),
+                class: columns.top(vote),
                 weight: weight(vote).filter(|w| w.is_finite() && *w >= 0.0).unwrap_or(0.0),
                 vote: vote.clone(),
                 signature: *signature,
@@ -169,11 +177,11 @@ impl Ballot {
     pub(crate) fn confirms(&self, robot: RobotId, stamp: Stamp, vote: &Vote) -> Option<bool> {
         let held = self.votes.get(&robot).filter(|held| held.stamp == stamp)?;
         let same = held.vote.vocabulary == vote.vocabulary && held.vote.evidence == vote.evidence;
-        Some(same && held.vote.unknown == vote.unknown)
+        Some(same && held.vote.unknown == vote.unknown && held.vote.named == vote.named)
     }
 
     fn rows(&self, clip: f64, scale: Scale) -> Rows {
-        Rows::of(scale.classes, clip, self.on(scale).map(|held| &held.vote))
+        Rows::of(&self.columns(scale), clip, self.on(scale).map(|held| &held.vote))
     }
 
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {
@@ -182,7 +190,7 @@ impl Ballot {
 }
 
 fn scale_of(held: &HeldVote) -> (u32, usize) {
-    (held.vote.vocabulary.0, held.vote.evidence.len())
+    (held.vote.vocabulary.0, held.vote.listed())
 }
 
 fn count(scales: &mut BTreeMap<(u32, usize), usize>, held: &HeldVote) {
@@ -215,6 +223,7 @@ mod tests {
             evidence: evidence.to_vec(),
             looks: 1.0,
             unknown: None,
+            named: vec![],
         }
     }
 

@@ -1,8 +1,9 @@
 //! What confirmed rounds say of how alike robots are.
 
-use gestalt_protocol::{Certificate, Decision, Pool};
+use gestalt_protocol::{ClassId, Decision, Pool};
 
 use crate::alike::{sharpness, strength, voices};
+use crate::columns::Columns;
 use crate::fusion::{clip_into, softmax};
 use crate::rows::Rows;
 
@@ -36,18 +37,20 @@ pub struct Testimony {
     voices: f64,
     singles: Vec<Vec<f64>>,
     /// The gestures that any of the robots had been taught, over which the others are.
-    taught: Vec<usize>,
+    taught: Vec<ClassId>,
 }
 
 impl Testimony {
     /// That of the votes that a decision rests on, or a round without one: `None` where nobody gave any.
     #[must_use]
     pub fn of(decision: &Decision, clip: f64) -> Option<Self> {
-        let Certificate { probabilities, votes, .. } = &decision.certificate;
-        let rows = Rows::of(probabilities.len(), clip, votes.iter().map(|counted| &counted.vote));
-        let taught = rows.taught();
+        let votes = || decision.certificate.votes.iter().map(|counted| &counted.vote);
+        let columns = Columns::of(decision.certificate.listed(), votes());
+        let rows = Rows::of(&columns, clip, votes());
+        let taught: Vec<ClassId> =
+            rows.taught().into_iter().filter_map(|place| columns.class(place)).collect();
         let mut totals = vec![0.0; taught.len()];
-        let mut strengths = Vec::with_capacity(votes.len());
+        let mut strengths = Vec::with_capacity(decision.certificate.votes.len());
         let mut singles = Vec::new();
         for row in rows.of_taught() {
             let mut clipped = vec![0.0; taught.len()];
@@ -64,7 +67,7 @@ impl Testimony {
     /// How likely each likeness and temperature makes it that one of the possible gestures was shown, of those that any robot had been taught. `None`
     /// where there are none: what it could not have known says nothing of how robots err; and where there is nothing to choose from.
     #[must_use]
-    pub fn weigh(&self, possible: &dyn Fn(usize) -> bool) -> Option<Weights> {
+    pub fn weigh(&self, possible: &dyn Fn(ClassId) -> bool) -> Option<Weights> {
         let possible = |place: usize| self.taught.get(place).is_some_and(|class| possible(*class));
         if self.taught.len() < 2 || !(0..self.taught.len()).any(possible) {
             return None;

@@ -13,7 +13,7 @@ use crate::alike::{sharpness, strength, voices};
 pub struct Fusion {
     /// The fused probability of each class, each in `0.0..=1.0`, summing to 1.
     pub probabilities: Vec<f64>,
-    /// The likeliest class; of equals the smaller.
+    /// The place of the likeliest class; of equals the smaller.
     pub top: ClassId,
     /// By how much the top class leads the second, in units of the most that one robot can add to that lead
     /// (`2c` of the sum for the log pools, one vote for majority, one probability for the mean). A margin above `f` stands
@@ -171,7 +171,7 @@ pub(crate) fn top_of<T: Copy + PartialOrd>(values: &[T]) -> ClassId {
         }
     }
     // A vote carries at most MAX_CLASSES = 64 values.
-    ClassId(u8::try_from(top).unwrap_or(u8::MAX))
+    ClassId(top as u32)
 }
 
 pub(crate) fn clip_into(row: &mut [f64], evidence: &[f32], clip: f64) {

@@ -15,6 +15,7 @@ mod agreement;
 mod alike;
 mod ballot;
 mod classify;
+mod columns;
 mod config;
 mod correlated;
 mod electorate;
@@ -39,6 +40,7 @@ mod withstand;
 
 pub use ballot::{Ballot, Cast, Scale};
 pub use classify::{Classify, ClassifyError};
+pub use columns::Columns;
 pub use config::{RoundsConfig, RoundsConfigError};
 pub use correlated::CorrelatedPool;
 pub use evidence::{Evidence, JudgedFrame};

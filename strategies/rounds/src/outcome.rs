@@ -2,6 +2,7 @@
 
 use gestalt_protocol::{Certificate, ClassId, Decision, Reason, RoundOutcome};
 
+use crate::columns::Columns;
 use crate::config::RoundsConfig;
 use crate::fusion::top_of;
 use crate::rows::knows;
@@ -29,15 +30,16 @@ pub fn outcome(decision: &Decision, config: &RoundsConfig) -> (RoundOutcome, Rea
         return undecided(Reason::NothingSeen);
     }
     let votes_of = || certificate.votes.iter().map(|counted| &counted.vote);
+    let columns = Columns::of_certificate(certificate);
     let taught: Vec<bool> =
-        (0..probabilities.len()).map(|class| votes_of().any(|vote| knows(vote, class))).collect();
+        columns.classes().map(|class| votes_of().any(|vote| knows(vote, class))).collect();
     // A gesture of the list that nobody was taught is as unknown as one that is not on it.
     let unknown: f64 = certificate.unknown.unwrap_or(0.0)
         + taught.iter().zip(probabilities).filter(|(taught, _)| !**taught).map(|(_, p)| p).sum::<f64>();
     let likely = |class: usize| if taught[class] { probabilities[class] } else { 0.0 };
     let by_class: Vec<f64> = (0..probabilities.len()).map(likely).collect();
-    let nearest = top_of(&by_class);
-    let probability = by_class[nearest.index()];
+    let place = top_of(&by_class).index();
+    let (nearest, probability) = (columns.class(place).unwrap_or(ClassId(0)), by_class[place]);
     if certificate.unknown.is_some() && config.convinces(unknown) {
         let nats = (unknown.max(f64::MIN_POSITIVE) / probability.max(1e-9)).ln();
         return (RoundOutcome::Unknown, Reason::FarFromAll { nearest, nats });
@@ -53,7 +55,7 @@ fn rivals(certificate: &Certificate) -> Option<([ClassId; 2], [u32; 2])> {
     let mut robots = vec![0_u32; certificate.probabilities.len()];
     for counted in &certificate.votes {
         if counted.vote.unknown.is_none_or(|unknown| counted.vote.evidence.iter().any(|e| *e > unknown))
-            && let Some(count) = robots.get_mut(counted.class.index())
+            && let Some(count) = certificate.place(counted.class).and_then(|place| robots.get_mut(place))
         {
             *count += 1;
         }
@@ -62,8 +64,8 @@ fn rivals(certificate: &Certificate) -> Option<([ClassId; 2], [u32; 2])> {
     let probabilities = &certificate.probabilities;
     order.sort_by(|a, b| robots[*b].cmp(&robots[*a]).then(probabilities[*b].total_cmp(&probabilities[*a])));
     let [first, second, ..] = order[..] else { return None };
-    let class = |index: usize| ClassId(index as u8);
-    Some(([class(first), class(second)], [robots[first], robots[second]]))
+    let columns = Columns::of_certificate(certificate);
+    Some(([columns.class(first)?, columns.class(second)?], [robots[first], robots[second]]))
 }
 
 #[cfg(test)]
@@ -84,7 +86,7 @@ mod tests {
         let mut ballot = Ballot::default();
         for (robot, (evidence, unknown)) in (0..).zip(votes) {
             let (vocabulary, evidence) = (SCALE.vocabulary, evidence.to_vec());
-            let vote = Vote { round, vocabulary, evidence, looks: 1.0, unknown: *unknown };
+            let vote = Vote { round, vocabulary, evidence, looks: 1.0, unknown: *unknown, named: vec![] };
             ballot.cast(HeldVote { robot: RobotId(robot), stamp: Stamp::default(), vote, signature: None });
         }
         let fusion = ballot.fuse(&config.rule, config.clip, SCALE);
@@ -93,7 +95,14 @@ mod tests {
         let nothing = |robot| HeldVote {
             robot: RobotId(100 + robot),
             stamp: Stamp::default(),
-            vote: Vote { round, vocabulary: VocabularyId::NONE, evidence: vec![], looks: 0.0, unknown: None },
+            vote: Vote {
+                round,
+                vocabulary: VocabularyId::NONE,
+                evidence: vec![],
+                looks: 0.0,
+                unknown: None,
+                named: vec![],
+            },
             signature: None,
         };
         let votes: Vec<CountedVote> = ballot.counted(&config.rule, config.clip, SCALE);
@@ -108,6 +117,7 @@ mod tests {
             robots,
             quorum: config.needs(robots),
             elapsed_ms: 5000,
+            named: vec![],
         };
         let author = RobotId(1);
         let none = Decision { round, class: None, confidence: 0.5, author, is_final: true, certificate };
@@ -128,6 +138,7 @@ mod tests {
             robots: 1,
             quorum: 1,
             elapsed_ms: 9,
+            named: vec![],
         };
         let class = Some(ClassId(0));
         let made =

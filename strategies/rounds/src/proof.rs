@@ -3,6 +3,7 @@
 use gestalt_protocol::{Certificate, Decision, Pool};
 
 use crate::ballot::Scale;
+use crate::columns::Columns;
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
@@ -26,9 +27,11 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
     }
     let certificate = &decision.certificate;
     let Certificate { vocabulary, probabilities, unknown, votes, others, .. } = certificate;
-    let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
+    let scale = Scale { vocabulary: *vocabulary, classes: certificate.listed() };
+    let columns = Columns::of(scale.classes, votes.iter().map(|counted| &counted.vote));
     let of_the_round = |counter| counter == decision.round.counter;
     let sound = certificate.rule == rule.rule()
+        && columns == Columns::of_certificate(certificate)
         && votes.iter().all(|counted| scale.is_of(&counted.vote) && of_the_round(counted.vote.round.counter))
         && others.iter().all(|held| of_the_round(held.vote.round.counter));
     let suffice = config.suffice(certificate.reached(), votes.len(), robots);
@@ -42,20 +45,23 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
         }
         _ => return false,
     };
-    let rows = Rows::of(scale.classes, config.clip, votes.iter().map(|counted| &counted.vote));
+    let rows = Rows::of(&columns, config.clip, votes.iter().map(|counted| &counted.vote));
     let fusion = rows.fuse(rule, config.clip);
     let withstands = |fusion: &Fusion| rows.withstands(rule, config.clip, fusion, config.liars);
     let Some(class) = decision.class else {
-        let known = |fusion: &&Fusion| fusion.top.index() < scale.classes;
+        let known = |fusion: &&Fusion| fusion.top.index() < columns.len();
         let decides = |fusion: &Fusion| config.convinces(withstands(fusion) - TOLERANCE);
         return sound && !(suffice && fusion.as_ref().filter(known).is_some_and(decides));
     };
     let Some(fusion) = fusion.filter(|_| sound && suffice) else { return false };
-    if unknown.is_some() != (rows.classes() > scale.classes) {
+    if unknown.is_some() != (rows.classes() > columns.len()) {
         return false;
     }
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE;
-    let likeliest = fusion.probabilities[class.index()];
+    let Some(likeliest) = certificate.place(class).and_then(|place| fusion.probabilities.get(place).copied())
+    else {
+        return false;
+    };
     fusion.probabilities.iter().zip(probabilities.iter().chain(unknown)).all(|(a, b)| close(*a, *b))
         && close(likeliest, decision.confidence)
         && close(likeliest, fusion.probabilities[fusion.top.index()])

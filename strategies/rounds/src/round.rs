@@ -1,21 +1,23 @@
 //! One showing of a gesture, as one robot lives through it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, Decision, Envelope, HeldVote, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Certificate, ClassId, Decision, Envelope, HeldVote, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
 use crate::classify::Classify;
+use crate::columns::Columns;
 use crate::config::RoundsConfig;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
 use crate::observation::Observation;
 use crate::sign::Sign;
+use crate::vocabulary::Vocabulary;
 
 /// The most other names of a round that are remembered.
 const MAX_NAMES: usize = 64;
@@ -148,15 +150,23 @@ impl Round {
     }
 
     /// This robot's evidence as a vote.
-    fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
-        let (evidence, unknown, looks) = match &self.evidence {
+    fn vote(&self, vocabulary: Option<&Vocabulary>, clip: f64) -> Vote {
+        let (mut evidence, unknown, looks) = match &self.evidence {
             Some(evidence) => {
                 let (clipped, unknown) = evidence.clipped_with_unknown(clip);
                 (clipped, unknown, evidence.looks() as f32)
             }
             None => (Vec::new(), None, 0.0),
         };
-        Vote { round: self.id, vocabulary, evidence, looks, unknown }
+        let mut named = Vec::new();
+        if let Some(vocabulary) = vocabulary.filter(|vocabulary| vocabulary.classes() == evidence.len()) {
+            let beyond = evidence.split_off(evidence.len() - vocabulary.named().len());
+            let by_number: BTreeMap<ClassId, f32> = vocabulary.named().iter().copied().zip(beyond).collect();
+            evidence.extend(by_number.values());
+            named.extend(by_number.keys());
+        }
+        let vocabulary = vocabulary.map_or(VocabularyId::NONE, Vocabulary::id);
+        Vote { round: self.id, vocabulary, evidence, looks, unknown, named }
     }
 
     /// This robot's vote, when it is due: the one said last, when nothing was seen since, or the next.
@@ -173,7 +183,7 @@ impl Round {
             return Some(repeated);
         }
         let vocabulary = speaker.vocabulary.filter(|_| !speaker.blind || self.has_evidence());
-        let vote = self.vote(vocabulary.unwrap_or(VocabularyId::NONE), config.clip);
+        let vote = self.vote(vocabulary, config.clip);
         speaker.stamp.sequence = speaker.stamp.sequence.saturating_add(1);
         let (author, stamp) = (speaker.me, *speaker.stamp);
         let mut envelope = Envelope { author, stamp, message: Message::Vote(vote.clone()), signature: None };
@@ -230,9 +240,12 @@ impl Round {
         rule: &dyn Fuse,
         config: &RoundsConfig,
     ) -> bool {
-        let Certificate { vocabulary, probabilities, .. } = &decision.certificate;
-        let scale = Scale { vocabulary: *vocabulary, classes: probabilities.len() };
-        let likeliest = || self.ballot.fuse(rule, config.clip, scale).map(|fusion| fusion.top);
+        let certificate = &decision.certificate;
+        let scale = Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() };
+        let likeliest = || {
+            let fusion = self.ballot.fuse(rule, config.clip, scale)?;
+            self.ballot.columns(scale).class(fusion.top.index())
+        };
         (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
     }
 
@@ -266,9 +279,9 @@ impl Round {
             let scale = scale.filter(|_| suffice);
             scale.is_some_and(|scale| config.convinces(self.ballot.withstands(rule, config, scale, fusion)))
         };
-        let gestures = scale.map_or(0, |scale| scale.classes);
-        let known = |fusion: &&Fusion| fusion.top.index() < gestures;
-        let class = fusion.as_ref().filter(known).filter(convinces).map(|fusion| fusion.top);
+        let columns = scale.map(|scale| self.ballot.columns(scale));
+        let of_place = |place: usize| columns.as_ref().and_then(|columns| columns.class(place));
+        let class = fusion.as_ref().filter(convinces).and_then(|fusion| of_place(fusion.top.index()));
         if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {
             return;
         }
@@ -279,7 +292,11 @@ impl Round {
             let confidence = fusion.probabilities[fusion.top.index()];
             (fusion.probabilities, confidence)
         });
+        let gestures = columns.as_ref().map_or(0, Columns::len);
         let unknown = if probabilities.len() > gestures { probabilities.pop() } else { None };
+        let named = columns
+            .filter(|_| !probabilities.is_empty())
+            .map_or(Vec::new(), |columns| columns.named().to_vec());
         self.concluded = true;
         self.agreement.believe(Decision {
             round: self.id,
@@ -293,6 +310,7 @@ impl Round {
                 pool: rule.pool(),
                 probabilities,
                 unknown,
+                named,
                 votes,
                 others: self.ballot.uncounted(counted),
                 robots: view.robots,
@@ -309,7 +327,7 @@ pub(crate) struct Speaker<'a> {
     /// That of the last message said.
     pub stamp: &'a mut Stamp,
     /// The classifier's.
-    pub vocabulary: Option<VocabularyId>,
+    pub vocabulary: Option<&'a Vocabulary>,
     /// Who is blind and has seen nothing says that it cannot see.
     pub blind: bool,
     pub signer: Option<&'a dyn Sign>,

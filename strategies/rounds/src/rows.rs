@@ -2,6 +2,7 @@
 
 use gestalt_protocol::{ClassId, Vote};
 
+use crate::columns::Columns;
 use crate::fuse::Fuse;
 use crate::fusion::{Fusion, top_of};
 
@@ -32,21 +33,22 @@ struct Choice {
 }
 
 impl Rows {
-    /// Those of votes over so many gestures; "unknown" is compared after clipping both to ±`clip`.
-    pub fn of<'a>(gestures: usize, clip: f64, votes: impl Iterator<Item = &'a Vote> + Clone) -> Self {
-        let mut known_by = vec![0; gestures];
-        for vote in votes.clone() {
-            for (class, known_by) in known_by.iter_mut().enumerate() {
+    /// Those of votes over these gestures; "unknown" is compared after clipping both to ±`clip`.
+    pub fn of<'a>(columns: &Columns, clip: f64, votes: impl Iterator<Item = &'a Vote>) -> Self {
+        let mut known_by = vec![0; columns.len()];
+        let (mut rows, mut leads) = (Vec::new(), Vec::new());
+        let clipped = |value: f32| f64::from(value).min(clip).max(-clip);
+        for vote in votes {
+            for (class, known_by) in columns.classes().zip(&mut known_by) {
                 *known_by += usize::from(knows(vote, class));
             }
+            let row = columns.row(vote);
+            if let Some(unknown) = vote.unknown.map(clipped) {
+                leads.push(row.iter().map(|value| clipped(*value) - unknown).collect());
+            }
+            rows.push(row);
         }
-        let clipped = |value: f32| f64::from(value).min(clip).max(-clip);
-        let leads = votes.clone().filter_map(|vote| {
-            let unknown = clipped(vote.unknown?);
-            Some(vote.evidence.iter().map(|value| clipped(*value) - unknown).collect())
-        });
-        let leads = leads.collect();
-        Self { known_by, rows: votes.map(|vote| vote.evidence.clone()).collect(), leads }
+        Self { known_by, rows, leads }
     }
 
     /// How many probabilities a fusion has: one for each gesture, and where any robot tells, one for "unknown".
@@ -158,11 +160,11 @@ impl Choice {
 
 /// Whether that robot was taught that gesture: one that was not is as likely to it as "unknown", to the bit. Who tells nothing of that was taught all
 /// gestures, or none where all are as likely.
-pub(crate) fn knows(vote: &Vote, class: usize) -> bool {
-    let Some(of_class) = vote.evidence.get(class) else { return false };
+pub(crate) fn knows(vote: &Vote, class: ClassId) -> bool {
+    let Some(of_class) = vote.evidence_for(class) else { return false };
     match vote.unknown {
-        Some(unknown) => *of_class != unknown,
-        None => vote.evidence.iter().any(|other| other != of_class),
+        Some(unknown) => of_class != unknown,
+        None => vote.evidence.iter().any(|other| *other != of_class),
     }
 }
 
@@ -190,11 +192,18 @@ mod tests {
 
     fn vote(evidence: &[f32], unknown: Option<f32>) -> Vote {
         let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-        Vote { round, vocabulary: VocabularyId(1), evidence: evidence.to_vec(), looks: 1.0, unknown }
+        Vote {
+            round,
+            vocabulary: VocabularyId(1),
+            evidence: evidence.to_vec(),
+            looks: 1.0,
+            unknown,
+            named: vec![],
+        }
     }
 
     fn fused(rule: FusionRule, votes: &[Vote]) -> Fusion {
-        Rows::of(votes[0].evidence.len(), CLIP, votes.iter()).fuse(&rule, CLIP).unwrap()
+        Rows::of(&Columns::of(votes[0].listed(), votes.iter()), CLIP, votes.iter()).fuse(&rule, CLIP).unwrap()
     }
 
     #[test]
@@ -279,10 +288,10 @@ mod tests {
         fn whatever_liars_add_honest_votes_alone_give_as_much(honest in votes(1..8), lies in votes(0..4)) {
             for rule in [FusionRule::LogPool, FusionRule::CorrelatedPool, FusionRule::Majority] {
                 let all: Vec<Vote> = honest.iter().chain(&lies).cloned().collect();
-                let rows = Rows::of(4, CLIP, all.iter());
+                let rows = Rows::of(&Columns::of(4, [].iter()), CLIP, all.iter());
                 let Some(fusion) = rows.fuse(&rule, CLIP) else { continue };
                 let least = rows.withstands(&rule, CLIP, &fusion, lies.len() as u32);
-                let alone = Rows::of(4, CLIP, honest.iter()).fuse(&rule, CLIP);
+                let alone = Rows::of(&Columns::of(4, [].iter()), CLIP, honest.iter()).fuse(&rule, CLIP);
                 let left = alone.as_ref().map_or(0.0, |alone| alone.probabilities[fusion.top.index()]);
                 prop_assert!(left >= least - 1e-9, "{rule}: {left} {least} {alone:?}");
             }

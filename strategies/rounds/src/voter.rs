@@ -76,8 +76,8 @@ impl Voter {
 
     /// A classifier takes the place of the old one; what was judged by another vocabulary is forgotten.
     pub fn learned(&mut self, classifier: Arc<dyn Classify>) {
-        let before = self.classifier.as_ref().map(|old| old.vocabulary().id());
-        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary().id())) {
+        let before = self.classifier.as_ref().map(|old| old.vocabulary());
+        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary())) {
             round.look_afresh();
         }
         self.classifier = Some(classifier);
@@ -105,7 +105,7 @@ impl Voter {
 
     /// The vote to be said now, if one is due.
     pub fn speak(&mut self, now: Duration) -> Option<Envelope> {
-        let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary().id());
+        let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
         let signer = self.signer.as_deref();
         let mut speaker =
             Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
@@ -243,7 +243,7 @@ mod tests {
     #[test]
     fn it_says_itself_what_it_holds_once_for_each_gesture_and_whether_it_held_another() {
         let mut voter = voter();
-        let decided = |counter, class: Option<u8>| Decision {
+        let decided = |counter, class: Option<u32>| Decision {
             round: round(counter),
             class: class.map(ClassId),
             confidence: 0.9,
@@ -260,6 +260,7 @@ mod tests {
                 robots: 1,
                 quorum: 1,
                 elapsed_ms: 1,
+                named: vec![],
             },
         };
         let mut said = Vec::new();

@@ -59,6 +59,7 @@ fn decision(evidence: &[Vec<f32>], rule: &dyn Fuse) -> Decision {
             evidence: evidence.clone(),
             looks: 1.0,
             unknown: None,
+            named: vec![],
         },
         signature: None,
     };
@@ -79,6 +80,7 @@ fn decision(evidence: &[Vec<f32>], rule: &dyn Fuse) -> Decision {
             robots: evidence.len() as u32,
             quorum: evidence.len() as u32 / 2 + 1,
             elapsed_ms: 300,
+            named: vec![],
         },
     }
 }
@@ -120,9 +122,9 @@ fn compared(robots: usize, alike: f64, signal: f64) -> (Told, Told, Pool) {
                 (&mut independent, decision(&evidence, &FusionRule::LogPool)),
                 (&mut fitted, by_pool.clone()),
             ] {
-                told.0.push((decision.confidence, decision.class == Some(ClassId(shown as u8))));
+                told.0.push((decision.confidence, decision.class == Some(ClassId(shown as u32))));
             }
-            rounds.extend(Testimony::of(&by_pool, CLIP).unwrap().weigh(&|class| class == shown));
+            rounds.extend(Testimony::of(&by_pool, CLIP).unwrap().weigh(&|class| class.index() == shown));
         }
     }
     (independent, fitted, last)
@@ -162,7 +164,7 @@ fn rounds_without_a_mistake_are_no_proof_of_certainty() {
         .map(|_| {
             let evidence = votes(5, 0.5, 4.0, 2, &mut chance);
             let testimony = Testimony::of(&decision(&evidence, &FusionRule::LogPool), CLIP).unwrap();
-            testimony.weigh(&|class| class == 2).unwrap()
+            testimony.weigh(&|class| class.index() == 2).unwrap()
         })
         .collect();
     let pool = fit(easy.iter());

@@ -43,7 +43,7 @@ impl Fuse for First {
         let first = votes.first()?;
         let top = (0..classes).max_by(|a, b| first[*a].total_cmp(&first[*b]))?;
         let probabilities = (0..classes).map(|class| if class == top { 1.0 } else { 0.0 }).collect();
-        Some(Fusion { probabilities, top: ClassId(top as u8), margin: 1.0 })
+        Some(Fusion { probabilities, top: ClassId(top as u32), margin: 1.0 })
     }
 }
 
@@ -78,8 +78,14 @@ fn rounds(me: u32, rule: Option<Arc<dyn Fuse>>) -> Rounds {
 
 fn vote(author: u32, evidence: [f32; 2]) -> Input {
     let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
-    let vote =
-        Vote { round, vocabulary: vocabulary().id(), evidence: evidence.to_vec(), looks: 1.0, unknown: None };
+    let vote = Vote {
+        round,
+        vocabulary: vocabulary().id(),
+        evidence: evidence.to_vec(),
+        looks: 1.0,
+        unknown: None,
+        named: vec![],
+    };
     let stamp = Stamp { boot: 1, sequence: 1 };
     Input::Received(Envelope {
         author: RobotId(author),

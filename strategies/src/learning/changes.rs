@@ -5,8 +5,6 @@ use std::sync::Arc;
 use gestalt_protocol::{ClassId, Fnv1a, RoundId};
 use gestalt_svm::{LearnError, Learner};
 
-use crate::sample::HeldSample;
-
 /// One change of the samples that a classifier is to be trained on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrainingChange {
@@ -51,10 +49,17 @@ impl TrainingChange {
     }
 }
 
-/// A sample of the training set as one to be trained on.
-pub(super) fn inserted(sample: &HeldSample) -> TrainingChange {
-    let HeldSample { key, class, round, vector, .. } = sample;
-    TrainingChange::Insert { key: *key, class: *class, vector: vector.clone(), showing: showing(*round) }
+/// A sample as one to be trained on as that gesture, or no longer.
+pub(super) fn inserted_as(
+    class: Option<ClassId>,
+    key: u64,
+    vector: &Arc<[f32]>,
+    round: RoundId,
+) -> TrainingChange {
+    match class {
+        Some(class) => TrainingChange::Insert { key, class, vector: vector.clone(), showing: showing(round) },
+        None => TrainingChange::Remove(key),
+    }
 }
 
 /// A number for a round, the same at every robot.

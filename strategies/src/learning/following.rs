@@ -28,8 +28,8 @@ impl Follow for Learning {
     }
 
     fn pool(&mut self) -> Option<Pool> {
-        let Self { judged, lessons, recent, vocabulary, .. } = self;
-        Some(judged.pool(|round| lessons.verdict_by_names(recent.names(round), vocabulary.classes())))
+        let Self { judged, lessons, recent, gestures, .. } = self;
+        Some(judged.pool(|round| lessons.verdict_by_names(recent.names(round), gestures)))
     }
 
     fn wants_more(&self, round: RoundId) -> bool {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gestalt_protocol::{Pool, RoundId};
+use gestalt_protocol::{ClassId, Pool, RoundId};
 use gestalt_rounds::{Testimony, Weights, fit};
 
 use crate::lessons::Verdict;
@@ -54,12 +54,12 @@ impl JudgedRounds {
             if judged.weights.as_ref().is_some_and(|(known, _)| *known == verdict) {
                 continue;
             }
-            let weigh = |possible: &dyn Fn(usize) -> bool| Some((verdict, judged.testimony.weigh(possible)));
-            judged.weights = match verdict {
-                Verdict::Class(class) => weigh(&|k| k == class.index()),
-                Verdict::Among(candidates) => weigh(&|k| {
-                    u8::try_from(k).is_ok_and(|k| candidates.contains(gestalt_protocol::ClassId(k)))
-                }),
+            let weigh = |possible: &dyn Fn(ClassId) -> bool| {
+                Some((verdict.clone(), judged.testimony.weigh(possible)))
+            };
+            judged.weights = match &verdict {
+                Verdict::Class(class) => weigh(&|k| k == *class),
+                Verdict::Among(candidates) => weigh(&|k| candidates.contains(k)),
                 Verdict::Unsaid | Verdict::Retracted => None,
             };
         }
@@ -71,7 +71,7 @@ impl JudgedRounds {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        Certificate, ClassId, CountedVote, Decision, FusionRule, RobotId, Stamp, VocabularyId, Vote,
+        Certificate, CountedVote, Decision, FusionRule, RobotId, Stamp, VocabularyId, Vote,
     };
 
     use super::*;
@@ -84,9 +84,16 @@ mod tests {
         let vote = |robot| CountedVote {
             robot: RobotId(robot),
             stamp: Stamp::default(),
-            class: ClassId(class as u8),
+            class: ClassId(class as u32),
             weight: 1.0,
-            vote: Vote { round, vocabulary, evidence: evidence.clone(), looks: 1.0, unknown: None },
+            vote: Vote {
+                round,
+                vocabulary,
+                evidence: evidence.clone(),
+                looks: 1.0,
+                unknown: None,
+                named: vec![],
+            },
             signature: None,
         };
         let certificate = Certificate {
@@ -100,6 +107,7 @@ mod tests {
             robots: 5,
             quorum: 3,
             elapsed_ms: 1,
+            named: vec![],
         };
         let author = RobotId(0);
         let decision = Decision { round, class: None, confidence: 0.0, author, is_final: false, certificate };
@@ -112,7 +120,7 @@ mod tests {
 
     #[test]
     fn the_same_rounds_and_words_give_the_same_pool_in_any_order_and_words_taken_back_no_longer_count() {
-        let was = |class: u8| Verdict::Class(ClassId(class));
+        let was = |class: u32| Verdict::Class(ClassId(class));
         // Of thirty rounds every third was another gesture than all five robots were sure of.
         let verdict = |round: RoundId| if round.counter.is_multiple_of(3) { was(1) } else { was(0) };
         let mut heard = JudgedRounds::default();

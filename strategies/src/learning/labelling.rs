@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use gestalt_protocol::{ClassId, RoundId};
 use gestalt_rounds::Classify;
 
-use super::changes::{TrainingChange, showing};
+use super::changes::{TrainingChange, inserted_as};
 use super::memory::Item;
 use super::state::Learning;
 use super::unresolved::{self, UnresolvedSample};
@@ -41,7 +41,7 @@ impl Learning {
                     self.absorb(vec![change]);
                 }
                 let possible =
-                    |class| matches!(verdict, Verdict::Among(candidates) if candidates.contains(class));
+                    |class| matches!(&verdict, Verdict::Among(candidates) if candidates.contains(class));
                 let of_round = self.aside.iter().filter(|(_, aside)| names.contains(&aside.round));
                 let refuted = of_round.filter(|(_, aside)| aside.guess.is_some_and(|guess| !possible(guess)));
                 let refuted: Vec<u64> = refuted.map(|(number, _)| number).collect();
@@ -97,14 +97,10 @@ impl Learning {
         self.aside.guess(number, class);
         self.dirty.insert(Item::Aside(number));
         let key = unresolved::training_key(number);
-        self.training.push(match (class, self.aside.get(number)) {
-            (Some(class), Some(aside)) => TrainingChange::Insert {
-                key,
-                class,
-                vector: aside.vector.clone(),
-                showing: showing(aside.round),
-            },
-            _ => TrainingChange::Remove(key),
+        let class = class.and_then(|class| self.trained_as(class));
+        self.training.push(match self.aside.get(number) {
+            Some(aside) => inserted_as(class, key, &aside.vector, aside.round),
+            None => TrainingChange::Remove(key),
         });
     }
 
@@ -113,7 +109,9 @@ impl Learning {
         let sure = |aside: &UnresolvedSample| {
             let Verdict::Among(candidates) = self.verdict(aside.round) else { return None };
             let p = classifier.probabilities_in_space(&aside.vector)?;
-            likeliest(&p, candidates).filter(|(_, p)| *p >= self.config.sure).map(|(class, _)| class)
+            likeliest(classifier.vocabulary().all().zip(p), &candidates)
+                .filter(|(_, p)| *p >= self.config.sure)
+                .map(|(class, _)| class)
         };
         // Guesses at what others share would differ from robot to robot.
         let open = self.aside.iter().filter(|(_, aside)| aside.shared.is_none() && aside.guess.is_none());
@@ -124,9 +122,9 @@ impl Learning {
 }
 
 /// The likeliest of the candidates, and its probability among them.
-fn likeliest(p: &[f64], candidates: Candidates) -> Option<(ClassId, f64)> {
-    let possible = (0..).map(ClassId).zip(p.iter().copied()).filter(|(class, _)| candidates.contains(*class));
-    let sum: f64 = possible.clone().map(|(_, p)| p).sum();
-    let (class, p) = possible.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+fn likeliest(p: impl Iterator<Item = (ClassId, f64)>, candidates: &Candidates) -> Option<(ClassId, f64)> {
+    let possible: Vec<(ClassId, f64)> = p.filter(|(class, _)| candidates.contains(*class)).collect();
+    let sum: f64 = possible.iter().map(|(_, p)| p).sum();
+    let (class, p) = possible.into_iter().max_by(|(_, a), (_, b)| a.total_cmp(b))?;
     (sum > 0.0).then(|| (class, p / sum))
 }

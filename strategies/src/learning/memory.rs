@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, Envelope, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, RobotId, RoundId, SampleId,
-    SampleSeries, VocabularyId, Word,
+    ClassId, Envelope, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, Naming, RobotId, RoundId,
+    SampleId, SampleSeries, VocabularyId, Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
@@ -91,6 +91,8 @@ pub(super) enum Item {
     Sample(u64),
     Seen(SampleSeries),
     Lessons(RoundId),
+    /// What was said of a gesture that was named.
+    Naming(ClassId),
     Aside(u64),
     /// The batch that begins with that sample.
     Batch(SampleId),
@@ -131,6 +133,7 @@ impl Item {
                 let parts = [round.counter, round.opener.0, round.life].map(u32::to_be_bytes);
                 [&[4][..], parts.as_flattened()].concat()
             }
+            Self::Naming(gesture) => [&[7][..], &gesture.0.to_be_bytes()].concat(),
             Self::Aside(number) => [&[5][..], &number.to_be_bytes()].concat(),
             Self::Batch(SampleId { author, life, number }) => {
                 [&[6][..], [author.0, life, number].map(u32::to_be_bytes).as_flattened()].concat()
@@ -164,6 +167,7 @@ impl Item {
                 let [author, life, number] = three(number)?;
                 Some(Self::Batch(SampleId { author: RobotId(author), life, number }))
             }
+            7 => word(number).map(|gesture| Self::Naming(ClassId(gesture))),
             _ => None,
         }
     }
@@ -221,6 +225,7 @@ pub struct RobotMemory {
     pub(crate) samples: Vec<HeldSample>,
     pub(crate) seen: SeenSamples,
     pub(super) lessons: Vec<Lesson>,
+    pub(super) namings: Vec<Naming>,
     pub(super) aside: Vec<(u64, UnresolvedSample)>,
     pub(super) batches: Vec<HeldBatch>,
 }
@@ -260,6 +265,7 @@ impl RobotMemory {
                         word,
                     }));
                 }
+                Item::Naming(_) => memory.namings.push(decode(value)?),
                 Item::Batch(first) => memory.batches.push(decode_batch(first, value)?),
                 Item::Aside(number) => {
                     let StoredAside { part, shared, round, vector, guess } = decode(value)?;
@@ -313,7 +319,7 @@ impl RobotMemory {
         }
         let labels = self.samples.iter().map(|sample| sample.class);
         let mut labels = labels.chain(self.aside.iter().filter_map(|(_, aside)| aside.guess));
-        if !labels.all(|class| class.index() < classes) {
+        if !labels.all(|class| class.is_named() || class.index() < classes) {
             return Err(MemoryError::Damaged("a sample of an unknown class"));
         }
         Ok(())

@@ -6,6 +6,7 @@ mod following;
 mod judged;
 mod labelling;
 mod memory;
+mod naming;
 mod own_rules;
 mod recent_rounds;
 mod setup;

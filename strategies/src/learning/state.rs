@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
+    Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
     SharedSample, Word,
 };
 use gestalt_rounds::Vocabulary;
@@ -16,14 +16,15 @@ use gestalt_svm::FeatureSpace;
 use rand::Rng;
 use siphasher::sip::SipHasher24;
 
-use super::changes::{TrainingChange, inserted, showing};
+use super::changes::TrainingChange;
 use super::config::LearningConfig;
 use super::judged::JudgedRounds;
 use super::memory::{self, Counters, Item, Owner, RecordChange, RobotMemory};
 use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
-use super::unresolved::{self, Unresolved};
-use crate::lessons::{LessonBook, LessonReceipt, Verdict};
+use super::unresolved::Unresolved;
+use crate::lessons::{Candidates, LessonBook, LessonReceipt, Verdict};
+use crate::names::NameBook;
 use crate::sample::{Batches, SetPart};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
@@ -55,6 +56,7 @@ pub(crate) enum Declined {
 /// | samples of which it is open what they show | [`aside`](LearningConfig::aside) |
 /// | batches they were shared in | one a sample held, of 32 KiB at most |
 /// | series of samples seen | 4,096; 64 lives of an author; 16,384 intervals of numbers in all |
+/// | gestures that were named | 256 |
 /// | lessons | 1,024 rounds, 16 instructors each; who was heard of first: 256 |
 /// | rounds whose votes are kept | 64, of 16 robots each |
 /// | rounds lived through | 32, with 1,024 names and [`keep`](LearningConfig::keep) looks each |
@@ -73,6 +75,9 @@ pub(crate) struct Learning {
     pub(super) rng: Box<dyn rand::Rng + Send>,
     pub(super) set: TrainingSet,
     pub(super) lessons: LessonBook,
+    pub(super) names: NameBook,
+    /// All gestures there are to be told apart.
+    pub(super) gestures: Candidates,
     pub(super) recent: RecentRounds,
     pub(super) judged: JudgedRounds,
     pub(super) aside: Unresolved,
@@ -118,28 +123,28 @@ impl Learning {
         let newest = memory.newest_counter();
         let space_id = space.id();
         let owner = Owner::new(me, space_id, vocabulary.id());
-        memory.check(owner, space.components(), vocabulary.classes())?;
+        memory.check(owner, space.components(), vocabulary.labels().len())?;
         let (selection, forgetting) = rules.make(&config);
         let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
         let fresh = memory.is_empty();
-        let RobotMemory { counters, samples, seen, lessons: heard, aside, batches: told, .. } = memory;
+        let RobotMemory { counters, samples, seen, lessons: heard, namings, aside, batches: told, .. } =
+            memory;
         set.restore(samples, seen, counters.next_key)?;
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
             lessons.hear(lesson);
         });
-        let guesses = aside.iter().filter_map(|(number, aside)| {
-            let key = unresolved::training_key(*number);
-            let (vector, showing) = (aside.vector.clone(), showing(aside.round));
-            Some(TrainingChange::Insert { key, class: aside.guess?, vector, showing })
+        let mut names = NameBook::default();
+        namings.iter().for_each(|naming| {
+            names.hear_again(naming);
         });
-        let training = set.iter().map(inserted).chain(guesses).collect();
+        let gestures = Candidates::of(vocabulary.all());
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
         let mut batches = Batches::default();
         let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
         let mut rng = rng;
         let secret = rng.next_u64();
-        Ok(Self {
+        let mut learning = Self {
             key: secret,
             digest: OnceCell::new(),
             secret,
@@ -153,11 +158,13 @@ impl Learning {
             rng,
             set,
             lessons,
+            names,
+            gestures,
             recent: RecentRounds::default(),
             judged: JudgedRounds::default(),
             newest,
             credit: 0.0,
-            training,
+            training: Vec::new(),
             dirty,
             durable,
             revision: 0,
@@ -166,7 +173,10 @@ impl Learning {
             // What is held and what was told of it may have been written at different times.
             thinned,
             unsent: VecDeque::new(),
-        })
+        };
+        learning.gestures = learning.all_gestures();
+        learning.train_on_all();
+        Ok(learning)
     }
 
     /// Notes a look at the gesture of a round; says whether it was kept.
@@ -206,7 +216,7 @@ impl Learning {
     }
 
     pub fn verdict(&self, round: RoundId) -> Verdict {
-        self.lessons.verdict_by_names(self.recent.names(round), self.vocabulary.classes())
+        self.lessons.verdict_by_names(self.recent.names(round), &self.gestures)
     }
 
     /// Takes in what an instructor said, and does to all samples of that round what follows.
@@ -260,7 +270,7 @@ impl Learning {
         if space != self.space_id {
             return Err(Declined::Vector(VectorError::Space { found: space, expected: self.space_id }));
         }
-        if sample.class.index() >= self.vocabulary.classes() {
+        if !sample.class.is_named() && self.vocabulary.place(sample.class).is_none() {
             return Err(Declined::Class);
         }
         let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
@@ -289,7 +299,7 @@ impl Learning {
             match change {
                 SetChange::Added(key) => {
                     self.dirty.insert(Item::Sample(key));
-                    self.training.extend(self.set.get(key).map(inserted));
+                    self.train_on(key);
                 }
                 SetChange::Removed(sample) => {
                     self.dirty.insert(Item::Sample(sample.key));
@@ -301,13 +311,11 @@ impl Learning {
                 }
                 SetChange::Relabelled(key) => {
                     self.dirty.insert(Item::Sample(key));
-                    self.training.extend(
-                        self.set.get(key).map(|sample| TrainingChange::Relabel { key, class: sample.class }),
-                    );
+                    self.train_as_another(key);
                 }
                 SetChange::Shared(key, id) => {
                     self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);
-                    self.training.extend(self.set.get(key).map(inserted));
+                    self.train_on(key);
                 }
             }
         }
@@ -354,6 +362,7 @@ impl Learning {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
             }
+            Item::Naming(gesture) => self.names.get(gesture).map(memory::encode),
             Item::Aside(number) => self.aside.get(number).map(memory::encode_aside),
             Item::Batch(first) => self.batches.get(first).map(memory::encode_batch),
         }
@@ -380,13 +389,14 @@ impl Learning {
 
     /// What it knows, under another's key.
     pub fn digest_under(&self, key: u64) -> Digest {
-        Digest { key, samples: self.set.seen().digest(key), lessons: self.lessons.digest(key) }
+        let said = self.lessons.digest(key) ^ self.names.digest(key);
+        Digest { key, samples: self.set.seen().digest(key), lessons: said }
     }
 
     /// Draws another key if what it knows has changed since the changes were last taken. Whoever made it change did not
     /// know that key.
     pub fn refresh_digest(&mut self) {
-        if self.dirty.iter().any(|item| matches!(item, Item::Seen(_) | Item::Lessons(_))) {
+        if self.dirty.iter().any(|item| matches!(item, Item::Seen(_) | Item::Lessons(_) | Item::Naming(_))) {
             self.drawn += 1;
             let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
             sip.write(&self.drawn.to_le_bytes());
@@ -396,13 +406,12 @@ impl Learning {
 
     /// Where it stands, for the status. What the host knows of memory and training is left to it.
     pub fn status(&self) -> LearningStatus {
-        let classes = (0..self.vocabulary.classes()).map(|class| ClassId(class as u8));
-        let counts = |part: SetPart| classes.clone().map(|class| self.set.count(part, class)).collect();
+        let counts = |part: SetPart| self.vocabulary.all().map(|class| self.set.count(part, class)).collect();
         let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
         let mut fnv = Fnv1a::default();
         for (id, class) in common.collect::<BTreeMap<_, _>>() {
             let name = [id.author.0, id.life, id.number].into_iter().flat_map(u32::to_le_bytes);
-            fnv.add(name.chain([class.0]));
+            fnv.add(name.chain(class.0.to_le_bytes()));
         }
         LearningStatus {
             space: self.space_id.to_string(),
@@ -413,6 +422,7 @@ impl Learning {
             aside: self.aside.len(),
             common: format!("{:016x}", fnv.hash()),
             lessons: self.lessons.len(),
+            named: self.named_gestures(),
             memory: String::new(),
             trainings: 0,
         }

@@ -14,6 +14,9 @@ const MAX_NEIGHBOURS: usize = 64;
 /// The most rounds of which a neighbour's lessons are kept as declined; those beyond are offered again.
 const MAX_DECLINED_ROUNDS: usize = 64;
 
+/// How often a neighbour is given all names for one difference of what both know: a message may be lost, and what is refused stays refused.
+const NAMES_GIVEN: u32 = 8;
+
 /// How many messages a neighbour is told at once at most, of 16 KiB at most. A question of 40 bytes in its name brings no
 /// more upon it.
 const REPLIES_AT_ONCE: f64 = 128.0;
@@ -31,6 +34,8 @@ struct Exchange {
     declined: SeenSamples,
     /// The lessons it offered, some of which this robot cannot take: at most [`MAX_DECLINED_ROUNDS`] rounds.
     declined_lessons: LessonBook,
+    /// For which digests of names, this robot's and the neighbour's, it was given all of them, and how often.
+    names: Option<((u64, u64), u32)>,
     /// The messages it was told, less those that time has made up for, and when that was reckoned.
     told: f64,
     told_at: Duration,
@@ -95,6 +100,14 @@ impl Exchanges {
     pub fn declined_rounds(&self, robot: RobotId, key: u64) -> BTreeMap<RoundId, u64> {
         let declined = self.0.get(&robot).map(|exchange| exchange.declined_lessons.rounds(key).collect());
         declined.unwrap_or_default()
+    }
+
+    /// Whether that neighbour is to be given all names, where the digests of both are these.
+    pub fn may_give_names(&mut self, robot: RobotId, digests: (u64, u64)) -> bool {
+        let exchange = self.with(robot);
+        let given = exchange.names.filter(|(of, _)| *of == digests).map_or(0, |(_, given)| given);
+        exchange.names = Some((digests, given.saturating_add(1)));
+        given < NAMES_GIVEN
     }
 
     /// How many messages that neighbour may be told now.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Answer, Gesture, Instruction, InstructorId, Lesson, Outcome, RobotId, Word};
+use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, InstructorId, Lesson, Outcome, RobotId, Word};
 use gestalt_rounds::Input as AboutRounds;
 
 use super::answers::Waiting;
@@ -20,33 +20,44 @@ const KNOWS_NOTHING: Duration = Duration::from_secs(1);
 
 impl Mind {
     pub(super) fn on_instructed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
-        let outcome = self.learn_from(&instructed);
+        let (outcome, named) = match self.name(&instructed) {
+            Some((outcome @ (Outcome::Learned | Outcome::Known), Some(gesture))) => {
+                (self.shown_as(&instructed, gesture).unwrap_or(outcome), Some(gesture))
+            }
+            Some((outcome, gesture)) => (outcome, gesture),
+            None => (self.learn_from(&instructed, &instructed.instruction), None),
+        };
         self.share();
-        self.prepare_answer(now, instructed, outcome);
+        self.prepare_answer(now, instructed, outcome, named);
         AboutRounds::Tick
     }
 
     /// One robot says so for all, as it does of a word that is heeded.
     pub(super) fn on_disallowed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
-        self.prepare_answer(now, instructed, Outcome::NotAllowed);
+        self.prepare_answer(now, instructed, Outcome::NotAllowed, None);
         AboutRounds::Tick
     }
 
-    fn learn_from(&mut self, instructed: &Instructed) -> Outcome {
+    /// What was named was shown in a round, if the word says so.
+    fn shown_as(&mut self, instructed: &Instructed, gesture: ClassId) -> Option<Outcome> {
+        let round = instructed.instruction.round()?;
+        let was = Instruction::Was { round, class: Gesture::Class(gesture) };
+        Some(self.learn_from(instructed, &was))
+    }
+
+    fn learn_from(&mut self, instructed: &Instructed, instruction: &Instruction) -> Outcome {
         let Some(learning) = &mut self.learning else { return Outcome::NotLearning };
-        let Some(round) = instructed.instruction.round() else { return Outcome::UnknownRound };
+        let Some(round) = instruction.round() else { return Outcome::UnknownRound };
         if !learning.knows(round) {
             return Outcome::UnknownRound;
         }
-        let class = |gesture: &Gesture| {
-            let class = match gesture {
-                Gesture::Class(class) => Some(*class),
-                Gesture::Label(label) => learning.vocabulary().class(label),
-            };
-            class.filter(|class| class.index() < learning.vocabulary().classes())
-        };
-        let word = match &instructed.instruction {
-            Instruction::Open => return Outcome::UnknownRound,
+        let class = |gesture: &Gesture| learning.gesture(gesture, &instructed.by);
+        let word = match instruction {
+            Instruction::Open
+            | Instruction::New { .. }
+            | Instruction::Same { .. }
+            | Instruction::Retire { .. }
+            | Instruction::Restore { .. } => return Outcome::UnknownRound,
             Instruction::Retract { .. } => Some(Word::Retracted),
             Instruction::Was { class: gesture, .. } | Instruction::Right { of: gesture, .. } => {
                 class(gesture).map(Word::Was)
@@ -73,7 +84,13 @@ impl Mind {
         }
     }
 
-    fn prepare_answer(&mut self, now: Duration, instructed: Instructed, outcome: Outcome) {
+    fn prepare_answer(
+        &mut self,
+        now: Duration,
+        instructed: Instructed,
+        outcome: Outcome,
+        named: Option<ClassId>,
+    ) {
         let Instructed { by, at, instruction } = instructed;
         if self.answers.needs_none(&by, at) {
             return;
@@ -81,18 +98,23 @@ impl Mind {
         let wait = match outcome {
             Outcome::Learned | Outcome::Known | Outcome::NotAllowed => Duration::ZERO,
             Outcome::NothingSeen => SAW_NOTHING,
-            Outcome::UnknownRound | Outcome::UnknownGesture | Outcome::NotLearning => KNOWS_NOTHING,
+            Outcome::UnknownRound | Outcome::UnknownGesture | Outcome::NoRoom | Outcome::NotLearning => {
+                KNOWS_NOTHING
+            }
         };
-        let (mut class, mut samples, mut revision) = (None, 0, 0);
+        let (mut class, mut samples, mut revision, mut looks_like) = (named, 0, 0, None);
         if let (Some(learning), Some(round)) = (&self.learning, instruction.round()) {
             class = match learning.verdict(round) {
                 Verdict::Class(class) => Some(class),
                 _ => None,
             };
             samples = u32::try_from(learning.held_of(round)).unwrap_or(u32::MAX);
+            looks_like = named.and_then(|gesture| self.looked_like(round, Some(gesture)));
+        }
+        if let Some(learning) = &self.learning {
             revision = learning.pending_revision();
         }
-        let answer = Answer { robot: self.me(), at, to: instruction, outcome, class, samples };
+        let answer = Answer { robot: self.me(), at, to: instruction, outcome, class, samples, looks_like };
         let due = now + wait + self.rounds.turn();
         self.answers.wait(Waiting { due, revision, by, answer });
     }

@@ -116,6 +116,7 @@ impl Mind {
         let vocabulary = setup.vocabulary.clone();
         self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
         self.rounds = self.rounds.counting_from(counter).naming(vocabulary);
+        self.call_by_names();
         Ok(self)
     }
 
@@ -193,6 +194,7 @@ impl Mind {
             }
             Message::Know(know) => self.on_know(author, know, out),
             Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
+            Message::Namings(namings) => self.on_namings(namings),
             Message::Vote(_)
             | Message::Have(_)
             | Message::Give(_)

@@ -7,6 +7,7 @@ mod input;
 mod inspect;
 mod instruct;
 mod machine;
+mod naming;
 mod output;
 mod sample_repair;
 #[cfg(test)]

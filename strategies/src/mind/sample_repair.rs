@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{
     Digest, HeldBatch, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS,
-    Message, RobotId, RoundId,
+    Message, Namings, RobotId, RoundId,
 };
 use gestalt_rounds::Refusal;
 
@@ -13,6 +13,7 @@ use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Declined;
 use crate::lessons::{LessonReceipt, MAX_INSTRUCTORS};
+use crate::names::NameBook;
 use crate::sample::{MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_SERIES, SeenSamples};
 use crate::vector_codec::VectorError;
 
@@ -29,6 +30,11 @@ const MAX_TOLD: usize = 256;
 // beside its intervals, a round of lessons 25, all else 64.
 const _: () = assert!(MAX_GAPS <= MAX_INTERVALS && MAX_SERIES <= MAX_ROBOTS);
 const _: () = assert!(10 * MAX_INTERVALS_IN_ALL + 11 * MAX_SERIES + 25 * MAX_LESSONS + 64 < MAX_MESSAGE);
+
+/// All that was named, if anything was: it is little, and seldom differs.
+fn names_to_give(names: &NameBook) -> Option<Message> {
+    (!names.is_empty()).then(|| Message::Namings(Namings { namings: names.iter().cloned().collect() }))
+}
 
 impl Mind {
     /// A neighbour says what it knows in short; if that differs, this robot says what it knows at length, unless that was
@@ -59,7 +65,8 @@ impl Mind {
             rounds.append(&mut self.exchanges.declined_rounds(to, mine.key));
             rounds.into_iter().rev().take(MAX_LESSONS).collect()
         };
-        let know = Know { samples, lessons, digest: mine, answer, nothing_for: None };
+        let named = learning.names().digest(mine.key);
+        let know = Know { samples, lessons, named, digest: mine, answer, nothing_for: None };
         self.tell(to, Message::Know(know), out);
     }
 
@@ -113,6 +120,12 @@ impl Mind {
             if !lessons.is_empty() {
                 given.push(Message::Lessons(Lessons { lessons }));
             }
+            let names = learning.names();
+            if names.digest(key) != know.named {
+                lacking_here |= know.named != 0;
+                let again = self.exchanges.may_give_names(from, (names.digest(0), know.named));
+                given.extend(names_to_give(names).filter(|_| again));
+            }
         }
         let settled = given.is_empty() && !learning.withholds();
         self.exchanges.spend(from, given.len() + 1);
@@ -122,7 +135,7 @@ impl Mind {
         if settled {
             let (samples, lessons) = (Vec::new(), Vec::new());
             let nothing_for = Some(know.digest);
-            let know = Know { samples, lessons, digest: mine, answer: true, nothing_for };
+            let know = Know { samples, lessons, digest: mine, answer: true, nothing_for, named: 0 };
             self.tell(from, Message::Know(know), out);
         }
         if lacking_here && !know.answer && !self.exchanges.is_at_rest(from, mine, know.digest) {

@@ -55,7 +55,7 @@ impl Source {
         let class = self.given % CLASSES;
         self.given += 1;
         let features = raw(&self.centres[class], self.noise, &mut self.rng);
-        (ClassId(class as u8), self.space.project(&features).expect("features of the space"))
+        (ClassId(class as u32), self.space.project(&features).expect("features of the space"))
     }
 
     fn take(&mut self, count: usize) -> Vec<(ClassId, Vec<f32>)> {

@@ -87,7 +87,7 @@ impl Classifier {
     /// The support vectors with their classes.
     pub(crate) fn vectors(&self) -> impl Iterator<Item = (ClassId, &[f32])> {
         let classes = self.met().zip(&self.machine.counts);
-        let classes = classes.flat_map(|(class, &count)| std::iter::repeat_n(ClassId(class as u8), count));
+        let classes = classes.flat_map(|(class, &count)| std::iter::repeat_n(ClassId(class as u32), count));
         classes.zip(self.machine.vectors.chunks_exact(self.machine.width))
     }
 

@@ -59,7 +59,7 @@ fn learner(space: &Arc<FeatureSpace>) -> Learner {
 /// Vectors in the space, of classes in turn.
 fn samples(space: &FeatureSpace, count: usize, rng: &mut impl Rng) -> Vec<(ClassId, Vec<f32>)> {
     let sample =
-        |i: usize| (ClassId((i % CLASSES) as u8), space.project(&features(i % CLASSES, rng)).unwrap());
+        |i: usize| (ClassId((i % CLASSES) as u32), space.project(&features(i % CLASSES, rng)).unwrap());
     (0..count).map(sample).collect()
 }
 
@@ -83,7 +83,7 @@ fn gestures_never_met_are_as_likely_as_unknown_and_less_so_the_more_is_known() {
     let x = &samples[0].1;
     let raw = features(0, &mut generator(3));
     let mut by_classes = vec![learner.learn().unwrap()];
-    for class in 0..CLASSES as u8 {
+    for class in 0..CLASSES as u32 {
         for (key, (_, vector)) in samples.iter().enumerate().filter(|(_, (of, _))| of.0 == class) {
             learner.insert(key as u64, ClassId(class), vector).unwrap();
         }
@@ -188,7 +188,7 @@ fn what_came_and_went_leaves_no_trace() {
             match rng.random_range(0..6_u64) {
                 0 if at < held.len() => assert!(warm.remove(held.swap_remove(at).0)),
                 1 if at < held.len() => {
-                    held[at].1 = ClassId(rng.random_range(0..CLASSES as u64) as u8);
+                    held[at].1 = ClassId(rng.random_range(0..CLASSES as u64) as u32);
                     assert!(warm.relabel(held[at].0, held[at].1).unwrap());
                 }
                 2 if at < held.len() => {
@@ -351,7 +351,7 @@ fn wide_samples(noise: f32, count: usize, seed: u64) -> Vec<LabelledFeatures> {
     let mut rng = generator(seed);
     let sample = |i: usize| {
         let features = centres[i % 6].iter().map(|c| c + noise * normal(&mut rng)).collect();
-        LabelledFeatures { features, class: ClassId((i % 6) as u8), group: None }
+        LabelledFeatures { features, class: ClassId((i % 6) as u32), group: None }
     };
     (0..count).map(sample).collect()
 }

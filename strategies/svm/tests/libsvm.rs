@@ -24,7 +24,11 @@ fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<LabelledFeat
                 let mut features: Vec<f32> = shift.iter().map(|shift| shift + 0.4 * normal()).collect();
                 features[0] += angle.cos();
                 features[1] += angle.sin();
-                samples.push(LabelledFeatures { features, class: ClassId(class as u8), group: Some(person) });
+                samples.push(LabelledFeatures {
+                    features,
+                    class: ClassId(class as u32),
+                    group: Some(person),
+                });
             }
         }
     }

@@ -165,9 +165,9 @@ pub fn rules() -> impl Strategy<Value = (SelectionRule, ForgettingRule)> {
 /// Carries an operation out; the changes, and whether a receipt was new.
 pub fn run(set: &mut TrainingSet, operation: &Operation, rng: &mut ChaCha8Rng) -> (Vec<SetChange>, bool) {
     let changes = match operation.clone() {
-        Operation::Keep { class, round: r, vector } => set.keep(ClassId(class), round(r), vector, rng),
+        Operation::Keep { class, round: r, vector } => set.keep(ClassId(class.into()), round(r), vector, rng),
         Operation::Receive { author, number, class, round: r, vector } => {
-            match set.receive(id(author, number), ClassId(class), round(r), vector, rng) {
+            match set.receive(id(author, number), ClassId(class.into()), round(r), vector, rng) {
                 SampleReceipt::New(changes) => return (changes, true),
                 SampleReceipt::Known => Vec::new(),
                 SampleReceipt::Refused(error) => panic!("{error}"),
@@ -177,10 +177,10 @@ pub fn run(set: &mut TrainingSet, operation: &Operation, rng: &mut ChaCha8Rng) -
             let judge = Judge(Vocabulary::new(["fist", "palm", "point"]).unwrap());
             set.share(n, judged.then_some(&judge as &dyn Classify), &rounded, rng)
         }
-        Operation::Relabel { round: r, class } => set.relabel(round(r), ClassId(class)),
+        Operation::Relabel { round: r, class } => set.relabel(round(r), ClassId(class.into())),
         Operation::Retract { round: r } => set.retract(round(r)),
         Operation::TakeBack { author, number, class, round: r, vector } => {
-            set.take_back(id(author, number), ClassId(class), round(r), vector.into(), rng)
+            set.take_back(id(author, number), ClassId(class.into()), round(r), vector.into(), rng)
         }
         Operation::Restart => Vec::new(),
     };

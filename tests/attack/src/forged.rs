@@ -14,20 +14,27 @@ use crate::swarm::world::{CLASSES, instructor, space, vocabulary};
 pub const LAST: Stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
 
 /// A vote that is as sure of that class as can be said.
-pub fn vote(round: RoundId, class: u8, looks: f32) -> Vote {
+pub fn vote(round: RoundId, class: u32, looks: f32) -> Vote {
     vote_of(round, class, 6.0, looks)
 }
 
 /// A vote for that class of so many nats.
-pub fn vote_of(round: RoundId, class: u8, nats: f32, looks: f32) -> Vote {
-    let mut evidence = vec![-nats / f32::from(CLASSES - 1); usize::from(CLASSES)];
-    evidence[usize::from(class)] = nats;
-    Vote { round, vocabulary: vocabulary().id(), evidence, looks, unknown: None }
+pub fn vote_of(round: RoundId, class: u32, nats: f32, looks: f32) -> Vote {
+    let mut evidence = vec![-nats / (CLASSES - 1) as f32; CLASSES as usize];
+    evidence[class as usize] = nats;
+    Vote { round, vocabulary: vocabulary().id(), evidence, looks, unknown: None, named: vec![] }
 }
 
 /// A vote of one who has seen nothing.
 pub fn null_vote(round: RoundId) -> Vote {
-    Vote { round, vocabulary: vocabulary().id(), evidence: Vec::new(), looks: 0.0, unknown: None }
+    Vote {
+        round,
+        vocabulary: vocabulary().id(),
+        evidence: Vec::new(),
+        looks: 0.0,
+        unknown: None,
+        named: vec![],
+    }
 }
 
 /// A vote in the name of that robot, signed by nobody.
@@ -55,9 +62,9 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
         votes.into_iter().partition(|held| !held.vote.evidence.is_empty());
     let counted: Vec<CountedVote> = votes.into_iter().map(counted).collect();
     let rows = counted.iter().map(|counted| counted.vote.evidence.as_slice());
-    let fusion = fuse(MindConfig::default().rule, MindConfig::default().clip, usize::from(CLASSES), rows);
-    let (probabilities, top) = fusion
-        .map_or((vec![0.0; usize::from(CLASSES)], ClassId(0)), |fusion| (fusion.probabilities, fusion.top));
+    let fusion = fuse(MindConfig::default().rule, MindConfig::default().clip, CLASSES as usize, rows);
+    let (probabilities, top) =
+        fusion.map_or((vec![0.0; CLASSES as usize], ClassId(0)), |fusion| (fusion.probabilities, fusion.top));
     let robots = (counted.len() + others.len()) as u32;
     Decision {
         round,
@@ -76,6 +83,7 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
             robots,
             quorum: robots / 2 + 1,
             elapsed_ms: 10,
+            named: vec![],
         },
     }
 }
@@ -83,14 +91,14 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
 fn counted(held: HeldVote) -> CountedVote {
     let HeldVote { robot, stamp, vote, signature } = held;
     let top = (0..CLASSES).rev().max_by(|a, b| {
-        let of = |class: &u8| vote.evidence.get(usize::from(*class)).copied().unwrap_or(f32::MIN);
+        let of = |class: &u32| vote.evidence.get(*class as usize).copied().unwrap_or(f32::MIN);
         of(a).total_cmp(&of(b))
     });
     CountedVote { robot, stamp, class: ClassId(top.unwrap_or(0)), weight: 1.0, vote, signature }
 }
 
 /// A sample that somebody may have shared: its components in parts of their spread.
-pub fn sample(id: SampleId, class: u8, round: RoundId, at: &[f32]) -> SharedSample {
+pub fn sample(id: SampleId, class: u32, round: RoundId, at: &[f32]) -> SharedSample {
     let space = space();
     let components = space.spread().iter().zip(at.iter().cycle());
     let vector = Vector::F32(components.map(|(spread, at)| spread * at).collect());

@@ -17,7 +17,7 @@ use crate::gate::{Signer, votes};
 use crate::swarm::roster;
 
 /// How many gestures there are.
-pub const CLASSES: u8 = 3;
+pub const CLASSES: u32 = 3;
 
 /// The features of a frame.
 const FEATURES: usize = 8;
@@ -57,7 +57,7 @@ impl Classify for ByFirst {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        let shown = features[0] as u8 % CLASSES;
+        let shown = features[0] as u32 % CLASSES;
         let sure = f64::from(features[1].clamp(0.34, 0.99));
         let other = (1.0 - sure) / f64::from(CLASSES - 1);
         Ok((0..CLASSES).map(|class| if class == shown { sure } else { other }).collect())
@@ -65,9 +65,9 @@ impl Classify for ByFirst {
 }
 
 /// A frame that shows that gesture, so surely.
-pub fn frame(class: u8, sure: f32, chance: u8) -> Input {
+pub fn frame(class: u32, sure: f32, chance: u8) -> Input {
     let mut features: [f32; FEATURES] = std::array::from_fn(|place| f32::from(chance ^ place as u8) / 256.0);
-    (features[0], features[1]) = (f32::from(class % CLASSES), sure);
+    (features[0], features[1]) = ((class % CLASSES) as f32, sure);
     Input::Observed(Observation { features: features.to_vec(), quality: 1.0 })
 }
 

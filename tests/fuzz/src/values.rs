@@ -1,11 +1,11 @@
 //! Values as robots and people say them, for inputs to begin with. All of the wire that is spelt out here is in this file.
 
 use gestalt_protocol::{
-    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
+    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
     FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
     Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
-    Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Status,
-    Vector, VocabularyId, Vote, Word,
+    Naming, Namings, Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature,
+    Stamp, Status, Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -68,7 +68,12 @@ pub fn vote(rng: &mut impl Rng, round: RoundId, classes: usize) -> Vote {
     let evidence: Vec<f32> = (0..classes).map(|_| rng.random_range(-6.0..6.0)).collect();
     let looks = if evidence.is_empty() { 0.0 } else { rng.random_range(0.5..4.0) };
     let unknown = if evidence.is_empty() { None } else { maybe(rng, |rng| rng.random_range(-6.0..6.0)) };
-    Vote { round, vocabulary: VOCABULARY, evidence, looks, unknown }
+    let mut vote = Vote { round, vocabulary: VOCABULARY, evidence, looks, unknown, named: vec![] };
+    if classes >= 2 && rng.random_range(0..4) == 0 {
+        vote.evidence.push(rng.random_range(-6.0..6.0));
+        vote.named.push(ClassId::named(&instructor(rng), "circle"));
+    }
+    vote
 }
 
 fn held_vote(rng: &mut impl Rng, round: RoundId, classes: usize) -> HeldVote {
@@ -109,6 +114,7 @@ pub fn decision(rng: &mut impl Rng) -> Decision {
             robots: number(rng),
             quorum: number(rng),
             elapsed_ms: number(rng),
+            named: vec![],
         },
     }
 }
@@ -202,7 +208,7 @@ pub fn know(rng: &mut impl Rng) -> Message {
     known.dedup_by_key(|known| known.series);
     let lessons = some(rng, 3, |rng| (round(rng), rng.random()));
     let (digest, nothing_for) = (digest(rng), maybe(rng, digest));
-    Message::Know(Know { samples: known, lessons, digest, answer: rng.random(), nothing_for })
+    Message::Know(Know { samples: known, lessons, digest, answer: rng.random(), nothing_for, named: 0 })
 }
 
 /// What a robot has of the newest round.
@@ -221,7 +227,7 @@ pub fn give(decision: Option<Decision>, votes: Vec<HeldVote>, holders: Vec<Holde
 /// Any message between robots.
 pub fn message(rng: &mut impl Rng) -> Message {
     let about = round(rng);
-    match rng.random_range(0..9) {
+    match rng.random_range(0..10) {
         7 => Message::Holding(holding(rng)),
         8 => Envelope::from(announcement(rng)).message,
         0 => Message::Vote(vote(rng, about, 3)),
@@ -240,6 +246,7 @@ pub fn message(rng: &mut impl Rng) -> Message {
         }
         4 => know(rng),
         5 => batch(rng),
+        9 => Message::Namings(Namings { namings: some(rng, 3, naming) }),
         _ => lessons(some(rng, 3, |rng| lesson(rng, about))),
     }
 }
@@ -258,13 +265,28 @@ pub fn envelope(rng: &mut impl Rng) -> Envelope {
 pub fn instruction(rng: &mut impl Rng) -> Instruction {
     let round = round(rng);
     let of = if rng.random() { Gesture::Class(class(rng)) } else { Gesture::Label("thrée\n".to_owned()) };
-    match rng.random_range(0..5) {
+    match rng.random_range(0..9) {
         0 => Instruction::Open,
+        5 => Instruction::New { label: "circle".to_owned(), round: rng.random::<bool>().then_some(round) },
+        6 => Instruction::Same { class: of.clone(), of },
+        7 => Instruction::Retire { class: of },
+        8 => Instruction::Restore { class: of },
         1 => Instruction::Was { round, class: of },
         2 => Instruction::Right { round, of },
         3 => Instruction::Wrong { round, of },
         _ => Instruction::Retract { round },
     }
+}
+
+/// A word on a gesture's name.
+pub fn naming(rng: &mut impl Rng) -> Naming {
+    let fate = match rng.random_range(0..3) {
+        0 => Fate::InUse,
+        1 => Fate::Same(ClassId::named(&instructor(rng), "circle")),
+        _ => Fate::Retired,
+    };
+    let (by, said_by) = (instructor(rng), instructor(rng));
+    Naming { by, label: "circle".to_owned(), count: number(rng).into(), at: rng.random(), said_by, fate }
 }
 
 /// What the swarm answers.
@@ -276,6 +298,7 @@ pub fn answer(rng: &mut impl Rng) -> Answer {
         outcome: Outcome::Learned,
         class: maybe(rng, class),
         samples: number(rng),
+        looks_like: None,
     }
 }
 

@@ -48,7 +48,7 @@ fn set(n: usize, rng: &mut impl Rng) -> Value {
         // Small whole numbers: distances tie.
         let vector: Vec<f32> = (0..2).map(|_| rng.random_range(0..5_u8).into()).collect();
         let round = RoundId { counter: step + 1, opener: RobotId(1), life: 0 };
-        let forgotten = samples.keep(ClassId(class), round, vector.clone(), &mut chance);
+        let forgotten = samples.keep(ClassId(class.into()), round, vector.clone(), &mut chance);
         let forgotten: Vec<u64> = forgotten
             .iter()
             .filter_map(|change| match change {

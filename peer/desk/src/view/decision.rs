@@ -1,6 +1,6 @@
 //! One decision with its reasons.
 
-use gestalt_protocol::{Announcement, ClassId, CountedVote, Reason, RobotId, RoundId, RoundOutcome};
+use gestalt_protocol::{Announcement, ClassId, CountedVote, Reason, RobotId, RoundId, RoundOutcome, Vote};
 use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde::Serialize;
 
@@ -82,11 +82,11 @@ impl DecisionView {
             Some(label) if Some(class) == decision.class => clipped(label),
             _ => gesture(class, vocabulary),
         };
-        let shares = (0..=u8::MAX).map(ClassId).zip(&certificate.probabilities);
+        let shares = certificate.classes().zip(&certificate.probabilities);
         let vote = |counted: &CountedVote| VoteView {
             robot: counted.robot,
             label: name(counted.class),
-            probability: probability(&counted.vote.evidence, counted.class),
+            probability: probability(&counted.vote, counted.class),
             weight: finite(counted.weight.into()),
             looks: finite(counted.vote.looks.into()),
             agrees: decision.class == Some(counted.class),
@@ -130,8 +130,8 @@ fn why(reason: &Reason, name: &dyn Fn(ClassId) -> String) -> String {
 }
 
 /// The softmax of log-evidence at one class; zero where there is none.
-fn probability(evidence: &[f32], class: ClassId) -> f64 {
-    let Some(mine) = evidence.get(class.index()) else { return 0.0 };
-    let others: f64 = evidence.iter().map(|other| (f64::from(*other) - f64::from(*mine)).exp()).sum();
+fn probability(vote: &Vote, class: ClassId) -> f64 {
+    let Some(mine) = vote.evidence_for(class) else { return 0.0 };
+    let others: f64 = vote.evidence.iter().map(|other| (f64::from(*other) - f64::from(mine)).exp()).sum();
     finite(1.0 / others)
 }

@@ -109,7 +109,11 @@ impl Robot {
         self.heard = self.heard.max(now);
         match &mut self.told {
             Some(told) if told.status.boot > status.boot => {}
-            Some(told) if told.status.vocabulary == status.vocabulary => told.status = bounded(status),
+            Some(told)
+                if told.vocabulary.as_ref().map(|(_, it)| it) == Vocabulary::of_status(&status).as_ref() =>
+            {
+                told.status = bounded(status);
+            }
             told => *told = Some(Told::new(status)),
         }
     }
@@ -167,7 +171,7 @@ impl Robot {
 
 impl Told {
     fn new(status: Status) -> Self {
-        let vocabulary = Vocabulary::new(status.vocabulary.iter().cloned()).ok();
+        let vocabulary = Vocabulary::of_status(&status);
         let status = bounded(status);
         Self { status, vocabulary: vocabulary.map(|vocabulary| (vocabulary.id(), vocabulary)) }
     }

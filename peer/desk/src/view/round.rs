@@ -256,7 +256,11 @@ impl Word {
             Gesture::Label(label) => Self::Label(clipped(label)),
         };
         Some(match &answer.to {
-            Instruction::Open => return None,
+            Instruction::Open
+            | Instruction::Same { .. }
+            | Instruction::Retire { .. }
+            | Instruction::Restore { .. } => return None,
+            Instruction::New { .. } => Self::Class(answer.class?),
             Instruction::Was { class, .. } => is(class),
             Instruction::Right { of, .. } => is(of),
             Instruction::Wrong { of: Gesture::Class(class), .. } => Self::Not(*class),

@@ -81,11 +81,18 @@ impl SaidView {
             Instruction::Right { of, .. } => ("right", Some(of)),
             Instruction::Wrong { of, .. } => ("wrong", Some(of)),
             Instruction::Retract { .. } => ("retract", None),
+            Instruction::New { .. } => ("new", None),
+            Instruction::Same { class, .. } => ("same", Some(class)),
+            Instruction::Retire { class } => ("retire", Some(class)),
+            Instruction::Restore { class } => ("restore", Some(class)),
         };
         let (gesture, class) = match gesture {
             Some(Gesture::Label(label)) => (Some(clipped(label)), None),
             Some(Gesture::Class(class)) => (None, Some(*class)),
-            None => (None, None),
+            None => match &answer.to {
+                Instruction::New { label, .. } => (Some(clipped(label)), None),
+                _ => (None, None),
+            },
         };
         let view = Self {
             instructor: by.clone(),

@@ -15,7 +15,7 @@ pub struct Tally {
     /// Robots for which there was no room.
     pub refused: u64,
     /// Answers to instructors, by [`Tally::OUTCOMES`].
-    pub answers: [u64; 7],
+    pub answers: [u64; 8],
     /// Rounds by how long they took: one for each of [`SECONDS`] and one for all above, each counted once.
     pub seconds: [u64; SECONDS.len() + 1],
     /// The sum of these times, in seconds.
@@ -24,7 +24,7 @@ pub struct Tally {
 
 impl Tally {
     /// The outcomes in the order of `answers`, by their names in messages.
-    pub const OUTCOMES: [&'static str; 7] = [
+    pub const OUTCOMES: [&'static str; 8] = [
         "learned",
         "known",
         "nothing_seen",
@@ -32,6 +32,7 @@ impl Tally {
         "unknown_gesture",
         "not_learning",
         "not_allowed",
+        "no_room",
     ];
 
     pub(super) fn count_decision(&mut self, decision: &Decision) {
@@ -55,6 +56,7 @@ impl Tally {
             Outcome::UnknownGesture => 4,
             Outcome::NotLearning => 5,
             Outcome::NotAllowed => 6,
+            Outcome::NoRoom => 7,
         };
         self.answers[place] += 1;
     }

@@ -28,17 +28,24 @@ fn status(robot: u32) -> Status {
 }
 
 /// A decision of robots' votes for classes.
-fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
+fn decided(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
     let round = round(counter);
-    let vote = |(robot, class): (u32, &u8)| {
+    let vote = |(robot, class): (u32, &u32)| {
         let mut evidence = vec![-0.5; 3];
-        evidence[usize::from(*class)] = 1.0;
+        evidence[*class as usize] = 1.0;
         CountedVote {
             robot: RobotId(robot),
             stamp: Stamp { boot: 1, sequence: 1 },
             class: ClassId(*class),
             weight: 1.0,
-            vote: Vote { round, vocabulary: vocabulary().id(), evidence, looks: 2.0, unknown: None },
+            vote: Vote {
+                round,
+                vocabulary: vocabulary().id(),
+                evidence,
+                looks: 2.0,
+                unknown: None,
+                named: vec![],
+            },
             signature: None,
         }
     };
@@ -53,6 +60,7 @@ fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
         robots: 4,
         quorum: 3,
         elapsed_ms: 480,
+        named: vec![],
     };
     let class = class.map(ClassId);
     let decision =
@@ -64,7 +72,7 @@ fn decided(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
 
 fn was(counter: u32, label: &str, at: u64, outcome: Outcome) -> (InstructorId, Answer) {
     let to = Instruction::Was { round: round(counter), class: Gesture::Label(label.to_owned()) };
-    let answer = Answer { robot: RobotId(1), at, to, outcome, class: None, samples: 2 };
+    let answer = Answer { robot: RobotId(1), at, to, outcome, class: None, samples: 2, looks_like: None };
     ("ada".parse().unwrap(), answer)
 }
 
@@ -237,7 +245,7 @@ fn a_decision_of_a_vocabulary_that_nobody_reports_has_numbers_for_names() {
 }
 
 /// The same with a confidence of its own, for no two decisions of a round are of one rank unless they are one.
-fn ranked(counter: u32, class: Option<u8>, votes: &[u8]) -> Announcement {
+fn ranked(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
     let mut made = decided(counter, class, votes);
     let digits = votes.iter().chain(&class).fold(1_u32, |sum, class| sum * 4 + u32::from(*class));
     made.decision.confidence = 0.5 + f64::from(digits) / 10_000.0;
@@ -251,9 +259,9 @@ fn heard() -> impl Strategy<Value = Input> {
     prop_oneof![
         robot().prop_map(Input::Came),
         robot().prop_map(|robot| reported(status(robot.0))),
-        (0_u32..6, proptest::option::of(0_u8..3), proptest::collection::vec(0_u8..3, 0..4))
+        (0_u32..6, proptest::option::of(0_u32..3), proptest::collection::vec(0_u32..3, 0..4))
             .prop_map(|(counter, class, votes)| decision(ranked(counter, class, &votes))),
-        (robot(), 0_u32..6, 0_u8..3).prop_map(|(robot, counter, class)| {
+        (robot(), 0_u32..6, 0_u32..3).prop_map(|(robot, counter, class)| {
             let holding = ranked(counter, Some(class), &[class]).decision.holding(false);
             Input::Held(robot, Box::new(holding))
         }),

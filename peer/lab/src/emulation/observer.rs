@@ -156,7 +156,7 @@ mod tests {
         let mut observer = StatisticalObserver::new(view, vocabulary());
         let (mut right, mut claimed) = (0.0, 0.0);
         for n in 0..4000 {
-            let shown = ClassId((n % 6) as u8);
+            let shown = ClassId((n % 6) as u32);
             observer.show(shown, &mut rng);
             let frame = observer.frame(&mut rng).unwrap();
             let p = observer.classifier.probabilities(&frame.features).unwrap();

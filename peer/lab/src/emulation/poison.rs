@@ -80,13 +80,13 @@ impl Poison {
         (classes, showings): (usize, u32),
         rng: &mut dyn Rng,
     ) -> Option<(Vec<f32>, ClassId)> {
-        let next = |class: ClassId| ClassId(((class.index() + 1) % classes) as u8);
+        let next = |class: ClassId| ClassId(((class.index() + 1) % classes) as u32);
         let own = || truth.vector.to_vec();
         match self {
             Self::Silent => None,
             Self::RandomLabel => {
                 let step = rng.random_range(1..classes as u64) as usize;
-                Some((own(), ClassId(((truth.class.index() + step) % classes) as u8)))
+                Some((own(), ClassId(((truth.class.index() + step) % classes) as u32)))
             }
             Self::FixedLabel => Some((own(), ClassId(0))),
             Self::PairFlip | Self::Flood => Some((own(), next(truth.class))),
@@ -179,7 +179,7 @@ mod tests {
     type Lie = (Vec<f32>, ClassId);
 
     fn next(class: ClassId) -> ClassId {
-        ClassId((class.0 + 1) % CLASSES as u8)
+        ClassId((class.0 + 1) % CLASSES as u32)
     }
 
     /// Looks at what a robot of an honest swarm holds after six gestures.

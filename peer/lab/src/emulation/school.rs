@@ -46,7 +46,7 @@ impl School {
         let classes = vocabulary.classes();
         let mut rows = Vec::new();
         for n in 0..30 * classes {
-            observer.show(ClassId((n % classes) as u8), &mut rng);
+            observer.show(ClassId((n % classes) as u32), &mut rng);
             rows.extend(observer.frame(&mut rng).map(|observation| observation.features));
         }
         let rows = rows.iter().map(Vec::as_slice);

@@ -161,7 +161,8 @@ fn rendered(hands: &Hands, drift: Drift) -> (Vec<String>, Vec<Take>) {
     for (after, people) in people {
         for (person, take) in people.flat_map(|person| (0..takes).map(move |take| (person, take))) {
             for fingers in 0..6 {
-                let moment = Moment { class: ClassId(fingers), person: Some(person as u32), after };
+                let moment =
+                    Moment { class: ClassId(u32::from(fingers)), person: Some(person as u32), after };
                 let dim = after && drift == Drift::Light;
                 all.push(Take {
                     moment,

@@ -30,7 +30,7 @@ impl Fuse for First {
         let vote = votes.first()?;
         let top = (0..classes).max_by(|a, b| vote[*a].total_cmp(&vote[*b]))?;
         let probabilities = (0..classes).map(|class| f64::from(u8::from(class == top))).collect();
-        Some(Fusion { probabilities, top: ClassId(top as u8), margin: 1.0 })
+        Some(Fusion { probabilities, top: ClassId(top as u32), margin: 1.0 })
     }
 }
 

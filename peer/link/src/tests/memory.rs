@@ -14,7 +14,7 @@ fn with_memory(name: &str, path: &Path) -> RobotConfig {
 }
 
 /// Says which gesture a round showed, and waits until that is acknowledged.
-async fn teach(watched: &Watched, name: &str, round: RoundId, class: u8) {
+async fn teach(watched: &Watched, name: &str, round: RoundId, class: u32) {
     let link = LinkConfig { connect: watched.robot.locators().to_vec(), ..LinkConfig::default() };
     let client = Client::open(name, &link).await.unwrap();
     let was = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };

@@ -134,8 +134,8 @@ impl View {
     pub(super) fn say(&self, out: &Path, as_json: bool) -> Result<(), Failure> {
         let opinion = self.opinion();
         let probabilities: Vec<f64> = opinion.iter().flatten().map(|(_, probability)| *probability).collect();
-        let best = likeliest(&probabilities).and_then(|(ClassId(class), probability)| {
-            Some((opinion.as_ref().ok()?.get(usize::from(class))?.0.clone(), probability))
+        let best = likeliest(&probabilities).and_then(|(class, probability)| {
+            Some((opinion.as_ref().ok()?.get(class.index())?.0.clone(), probability))
         });
         let (width, height) = (self.frame.cols(), self.frame.rows());
         let (hand, quality) = match &self.seen {

@@ -104,7 +104,7 @@ impl<'a> Showing<'a> {
             By::Instructor => self.person.shows(decision.round).gesture,
             By::Motion => self.person.last_shown(opened(decision), &SCHEDULE),
         };
-        let truth = shown.map(ClassId).ok_or("no gesture was shown")?;
+        let truth = shown.map(|fingers| ClassId(fingers.into())).ok_or("no gesture was shown")?;
         self.tally.record(truth, decision);
         // The others hold it a moment after the first; what was not held by then is said to be so.
         tokio::time::sleep(Duration::from_millis(300)).await;

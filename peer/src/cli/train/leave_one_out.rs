@@ -115,7 +115,7 @@ mod tests {
         let samples: Vec<_> = [1, 3, 1, 2, 3].map(sample).into();
         let taught = Taught::by(&samples, &vocabulary);
         assert_eq!(taught.labels(&vocabulary), ["1", "3"]);
-        let classes: Vec<u8> = taught.samples(&samples).iter().map(|sample| sample.class.0).collect();
+        let classes: Vec<u32> = taught.samples(&samples).iter().map(|sample| sample.class.0).collect();
         assert_eq!(classes, [0, 1, 0, 1]);
 
         let rejected = |class| Rejected { image: image(class), cause: String::new() };

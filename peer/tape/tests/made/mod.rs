@@ -177,7 +177,15 @@ pub fn one_of_each() -> Vec<Passing> {
     for word in words {
         all.push(said(Topic::Feedback(ada()), json(&word), at));
         let outcome = Outcome::NothingSeen;
-        let answer = Answer { robot, at: u64::MAX, to: word, outcome, class: Some(ClassId(1)), samples: 3 };
+        let answer = Answer {
+            robot,
+            at: u64::MAX,
+            to: word,
+            outcome,
+            class: Some(ClassId(1)),
+            samples: 3,
+            looks_like: None,
+        };
         all.push(said(Topic::Answer(ada()), json(&answer), at));
     }
     // As people write it.

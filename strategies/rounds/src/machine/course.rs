@@ -74,8 +74,8 @@ impl Rounds {
     }
 
     pub(super) fn on_learned(&mut self, classifier: Arc<dyn Classify>) {
-        let before = self.classifier.as_ref().map(|old| old.vocabulary().id());
-        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary().id())) {
+        let before = self.classifier.as_ref().map(|old| old.vocabulary());
+        if let Some(round) = self.round.as_mut().filter(|_| before != Some(classifier.vocabulary())) {
             round.look_afresh();
         }
         self.classifier = Some(classifier);

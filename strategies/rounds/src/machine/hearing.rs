@@ -52,7 +52,11 @@ impl Rounds {
             // That comes as what it is, an announcement.
             Message::Announced(_) => {}
             // Whoever follows the rounds to learn from them takes these in.
-            Message::Samples(_) | Message::Batches(_) | Message::Know(_) | Message::Lessons(_) => {}
+            Message::Samples(_)
+            | Message::Batches(_)
+            | Message::Know(_)
+            | Message::Lessons(_)
+            | Message::Namings(_) => {}
         }
     }
 
@@ -205,7 +209,7 @@ impl Rounds {
             self.refusals.add(Refusal::Impossible);
             return false;
         }
-        let scale = Scale { vocabulary: vote.vocabulary, classes: vote.evidence.len() };
+        let scale = Scale { vocabulary: vote.vocabulary, classes: vote.listed() };
         if !vote.evidence.is_empty() && self.is_foreign(scale) {
             self.refusals.add(Refusal::Vocabulary);
             return false;
@@ -320,8 +324,8 @@ impl Rounds {
             let somebody = this || decision.certificate.reached() > 0;
             return if somebody { Ok(()) } else { Err(Refusal::Unfounded) };
         }
-        let Certificate { vocabulary, probabilities, votes, others, .. } = &decision.certificate;
-        if self.is_foreign(Scale { vocabulary: *vocabulary, classes: probabilities.len() }) {
+        let Certificate { vocabulary, votes, others, .. } = &decision.certificate;
+        if self.is_foreign(Scale { vocabulary: *vocabulary, classes: decision.certificate.listed() }) {
             return Err(Refusal::Vocabulary);
         }
         let counted = votes.iter().map(|counted| (counted.robot, counted.stamp, &counted.vote));

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
+use gestalt_protocol::{ClassId, Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
 use super::follow::Follow;
@@ -70,7 +70,7 @@ const BURST: u32 = 16;
 ///
 /// // Neither is sure enough alone; together they are.
 /// let saw = |p: f32| Input::Observed(Observation { features: vec![1.0 - p, p], quality: 1.0 });
-/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.85)), (1, saw(0.9))];
+/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.93)), (1, saw(0.95))];
 /// let mut decided = Vec::new();
 /// for ms in 1..1000 {
 ///     let now = Duration::from_millis(ms);
@@ -103,6 +103,8 @@ pub struct Rounds {
     pub(super) classifier: Option<Arc<dyn Classify>>,
     /// What gestures are called while there is no classifier.
     pub(super) vocabulary: Option<Vocabulary>,
+    /// What gestures are called that were named since.
+    pub(super) names: BTreeMap<ClassId, String>,
     pub(super) signer: Option<Arc<dyn Sign>>,
     /// The stamp of the last message said.
     pub(super) stamp: Stamp,
@@ -160,6 +162,7 @@ impl Rounds {
             nonce: life.nonce,
             classifier: None,
             vocabulary: None,
+            names: BTreeMap::new(),
             signer: None,
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
@@ -210,6 +213,11 @@ impl Rounds {
     pub fn naming(mut self, vocabulary: Vocabulary) -> Self {
         self.vocabulary = Some(vocabulary);
         self
+    }
+
+    /// Gestures that were named have these names from now on where this robot announces them.
+    pub fn call(&mut self, names: BTreeMap<ClassId, String>) {
+        self.names = names;
     }
 
     /// The same rounds, in which this robot signs what it stands by: votes, what it holds and announces, samples and what it passes on

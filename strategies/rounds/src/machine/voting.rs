@@ -30,7 +30,7 @@ impl Rounds {
 
     /// Says this robot's vote when it is due.
     pub(super) fn speak(&mut self, effects: &mut Effects<'_>) {
-        let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary().id());
+        let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
         let Some(round) = self.round.as_mut() else { return };
         let signer = self.signer.as_deref();
         let mut speaker =
@@ -115,7 +115,7 @@ impl Rounds {
         let known = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
         let vocabulary = known.or(self.vocabulary.as_ref())?;
         let class = decision.class.filter(|_| vocabulary.id() == decision.certificate.vocabulary)?;
-        vocabulary.label(class)
+        vocabulary.label(class).or_else(|| self.names.get(&class).map(String::as_str))
     }
 
     /// A decision in this robot's own words, which it stands by.
@@ -131,6 +131,6 @@ impl Rounds {
 
     pub(super) fn own_scale(&self) -> Option<Scale> {
         let vocabulary = self.classifier.as_ref()?.vocabulary();
-        Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.classes() })
+        Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.labels().len() })
     }
 }

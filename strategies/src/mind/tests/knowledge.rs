@@ -55,7 +55,7 @@ fn what_was_said_in_another_life_labels_nothing_whoever_forgot_what() {
     for life in 0..100 {
         // Other gestures in another order than before, and not all of them are named.
         for showing in 0..2 {
-            let class = (life * 5 + life / 6 + 3 * showing) as u8 % CLASSES;
+            let class = (life * 5 + life / 6 + 3 * showing) as u32 % CLASSES;
             let round = swarm.show(class);
             assert!(shown.insert(round), "round {round} is another showing's name");
             check_labels(&swarm, &told);
@@ -146,7 +146,7 @@ fn a_robot_that_lost_its_disk_gets_its_own_samples_back_and_goes_on_counting() {
 }
 
 /// Shows a gesture to one robot, which nobody hears, and tells it what it was.
-fn teach_alone(swarm: &mut Swarm, i: usize, class: u8) {
+fn teach_alone(swarm: &mut Swarm, i: usize, class: u32) {
     swarm.loss = 1.0;
     swarm.input(i, Input::Open);
     let round = swarm.minds[i].round().unwrap();

@@ -2,6 +2,7 @@
 
 mod feedback;
 mod knowledge;
+mod naming;
 mod refusing;
 mod rest;
 mod sharing;
@@ -29,7 +30,7 @@ use crate::sample::SetPart;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
 
-const CLASSES: u8 = 6;
+const CLASSES: u32 = 6;
 
 fn space() -> Arc<FeatureSpace> {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -53,12 +54,12 @@ impl Classify for ByFirst {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        let shown = features[0] as usize % usize::from(CLASSES);
-        Ok((0..usize::from(CLASSES)).map(|class| if class == shown { 0.95 } else { 0.01 }).collect())
+        let shown = features[0] as usize % CLASSES as usize;
+        Ok((0..CLASSES as usize).map(|class| if class == shown { 0.95 } else { 0.01 }).collect())
     }
 
     fn probabilities_in_space(&self, _: &[f32]) -> Option<Vec<f64>> {
-        let mut p = vec![0.001; usize::from(CLASSES)];
+        let mut p = vec![0.001; CLASSES as usize];
         p[2] = 0.5;
         p[4] = 0.5;
         Some(p)
@@ -247,12 +248,12 @@ impl Swarm {
     }
 
     /// Shows a gesture to the robots for long enough to keep all observations; gives the round.
-    fn show(&mut self, class: u8) -> RoundId {
+    fn show(&mut self, class: u32) -> RoundId {
         self.input(0, Input::Open);
         for _ in 0..self.config.keep {
             for i in 0..self.minds.len() {
                 let mut features: Vec<f32> = (0..8).map(|_| self.rng.random::<f32>() * 0.9).collect();
-                features[0] += f32::from(class);
+                features[0] += class as f32;
                 self.input(i, Input::Observed(Observation { features, quality: 1.0 }));
             }
             self.pass(self.config.spacing);
@@ -273,7 +274,7 @@ impl Swarm {
         at
     }
 
-    fn was(&mut self, round: RoundId, class: u8) -> u64 {
+    fn was(&mut self, round: RoundId, class: u32) -> u64 {
         self.say("ada", Instruction::Was { round, class: Gesture::Class(ClassId(class)) })
     }
 
@@ -317,6 +318,7 @@ fn kind(message: &Message) -> &'static str {
         Message::Know(_) => "know",
         Message::Samples(_) | Message::Batches(_) => "samples",
         Message::Lessons(_) => "lessons",
+        Message::Namings(_) => "names",
         _ => "other",
     }
 }

@@ -182,7 +182,8 @@ fn a_question_in_the_name_of_another_brings_no_flood_upon_it() {
         swarm.told.clear();
         let digest = gestalt_protocol::Digest { key: 1, samples: 2, lessons: 3 };
         let (samples, lessons) = (vec![], vec![]);
-        let know = gestalt_protocol::Know { samples, lessons, digest, answer: true, nothing_for: None };
+        let know =
+            gestalt_protocol::Know { samples, lessons, digest, answer: true, nothing_for: None, named: 0 };
         for _ in 0..1000 {
             let message = Message::Know(know.clone());
             let out = swarm.minds[0]

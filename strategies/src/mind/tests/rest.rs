@@ -10,7 +10,7 @@ impl Swarm {
         std::mem::take(&mut self.told)
     }
 
-    fn check_rest(&mut self) {
+    pub(super) fn check_rest(&mut self) {
         let mut told = self.told_within(Duration::from_secs(60));
         // A robot that refuses a decision or a word is reminded of it now and then.
         let reminders = self.minds.len() * (self.minds.len() - 1);
@@ -66,7 +66,7 @@ fn what_is_left_in_scattered_places_is_all_given() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 22);
     let sample = |number| SharedSample {
         id: SampleId { author: RobotId(9), life: 5, number },
-        class: ClassId((number % 6) as u8),
+        class: ClassId((number % 6) as u32),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
     };
@@ -117,7 +117,7 @@ proptest! {
                 0 => swarm.restart(who),
                 1 => swarm.restart_empty(who),
                 _ => {
-                    let class = who as u8;
+                    let class = who as u32;
                     let round = swarm.show(class);
                     swarm.was(round, class);
                 }

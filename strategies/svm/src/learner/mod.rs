@@ -1,6 +1,7 @@
 //! Learning on the spot: support vector machines that are brought up to date, not trained again.
 
 mod folds;
+mod growing;
 mod options;
 mod pair;
 mod samples;
@@ -98,7 +99,8 @@ impl Learner {
     /// # Errors
     /// A classifier of another space or vocabulary.
     pub fn build_on(&mut self, classifier: &Classifier) -> Result<(), LearnError> {
-        if classifier.vocabulary() != &self.vocabulary {
+        let vocabulary = classifier.vocabulary();
+        if vocabulary.labels() != self.vocabulary.labels() || !vocabulary.named().is_empty() {
             return Err(LearnError::Vocabulary);
         }
         if classifier.space().id() != self.space.id() {
@@ -120,7 +122,8 @@ impl Learner {
     /// key is replaced. It is of a showing of its own.
     ///
     /// # Errors
-    /// A vector of another length, with a coordinate out of range, or a class that the vocabulary does not have.
+    /// A vector of another length, with a coordinate out of range, or a class that is not on the list. A gesture that was named is met by its first
+    /// sample, while there is room.
     pub fn insert(&mut self, key: u64, class: ClassId, vector: &[f32]) -> Result<(), LearnError> {
         self.insert_shown(key, class, vector, key)
     }
@@ -136,7 +139,6 @@ impl Learner {
         vector: &[f32],
         showing: u64,
     ) -> Result<(), LearnError> {
-        self.check_class(class)?;
         if vector.len() != self.space.components() {
             return Err(LearnError::Length { found: vector.len(), expected: self.space.components() });
         }
@@ -145,15 +147,16 @@ impl Learner {
         if let Some(coordinate) = vector.iter().position(|x| !range.contains(x)) {
             return Err(LearnError::Range(coordinate));
         }
+        let class = self.place_for(class)?;
         self.showings.insert(key, showing);
         let key = Key::Inserted(key);
         if let Some(place) = self.samples.place(key) {
-            if place.class == class.index() && self.samples.at(place).vector == vector {
+            if place.class == class && self.samples.at(place).vector == vector {
                 return Ok(());
             }
             self.take(place);
         }
-        self.put(key, class.index(), vector);
+        self.put(key, class, vector);
         Ok(())
     }
 
@@ -170,13 +173,13 @@ impl Learner {
     /// Gives a sample another class; whether it was there.
     ///
     /// # Errors
-    /// A class that the vocabulary does not have.
+    /// As of [`Self::insert`].
     pub fn relabel(&mut self, key: u64, class: ClassId) -> Result<bool, LearnError> {
-        self.check_class(class)?;
+        let class = self.place_for(class)?;
         let Some(place) = self.samples.place(Key::Inserted(key)) else { return Ok(false) };
-        if place.class != class.index() {
+        if place.class != class {
             self.leave(place);
-            let place = self.samples.relabel(place, class.index());
+            let place = self.samples.relabel(place, class);
             self.join(place);
         }
         Ok(true)
@@ -220,10 +223,15 @@ impl Learner {
         let present = self.present();
         let sigmoids = self.trained().map(|pair| pair.sigmoid).collect();
         let calibration = Calibration { sigmoids, sharpness: 1.0 };
-        let learned = self.classes().map(|class| self.samples.of(class).len() as u32).collect();
+        // A gesture that was named and is no longer shown is none that this robot tells apart; those of the list always are.
+        let mut vocabulary = self.vocabulary.clone();
+        vocabulary.keep_named(|place| present.contains(&place));
+        let listed = vocabulary.labels().len();
+        let kept = self.classes().filter(|place| *place < listed || present.contains(place));
+        let learned = kept.map(|class| self.samples.of(class).len() as u32).collect();
         let machine = self.machine(&present);
         let classifier = Classifier::new(
-            self.vocabulary.clone(),
+            vocabulary,
             self.space.clone(),
             learned,
             machine,
@@ -305,10 +313,6 @@ impl Learner {
     /// The pairs of classes with samples, in the order used everywhere.
     fn trained(&self) -> impl Iterator<Item = &Pair> {
         self.pairs.iter().filter(|pair| !pair.is_empty(&self.samples))
-    }
-
-    fn check_class(&self, class: ClassId) -> Result<(), LearnError> {
-        if class.index() < self.vocabulary.classes() { Ok(()) } else { Err(LearnError::Class(class)) }
     }
 
     fn put(&mut self, key: Key, class: usize, vector: &[f32]) {

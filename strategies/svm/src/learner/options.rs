@@ -85,7 +85,7 @@ pub enum LearnError {
     /// A coordinate that is NaN, infinite, or beyond ± 1,000,000.
     #[error("coordinate {0} of the vector is not a number within ±1000000")]
     Range(usize),
-    /// A class that the vocabulary does not have.
-    #[error("class {0} is not in the vocabulary")]
+    /// A class that is not on the list, or one more that was named than can be told apart.
+    #[error("class {0} is not in the vocabulary, or there is no room for one more gesture")]
     Class(ClassId),
 }

@@ -44,6 +44,12 @@ impl KernelMatrix {
         Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places: BTreeMap::new() }
     }
 
+    /// Makes room for one more class.
+    pub fn add_class(&mut self) {
+        self.classes.iter_mut().flatten().for_each(|sample| sample.kernel.push(Vec::new()));
+        self.classes.push(Vec::new());
+    }
+
     /// The samples of a class, in its order.
     pub fn of(&self, class: usize) -> &[KernelRow] {
         &self.classes[class]

@@ -37,7 +37,7 @@ fn taught(count: usize, rng: &mut impl Rng) -> Learner {
     let mut learner = learner();
     for key in 0..count {
         let class = key % CLASSES;
-        learner.insert(key as u64, ClassId(class as u8), &vector(class, rng)).unwrap();
+        learner.insert(key as u64, ClassId(class as u32), &vector(class, rng)).unwrap();
     }
     learner.learn().unwrap();
     learner
@@ -104,7 +104,7 @@ fn stale_pairs_take_turns() {
         for class in 0..CLASSES as u64 {
             learner.remove(round * 4 + class);
             learner
-                .insert(1000 + round * 4 + class, ClassId(class as u8), &vector(class as usize, &mut rng))
+                .insert(1000 + round * 4 + class, ClassId(class as u32), &vector(class as usize, &mut rng))
                 .unwrap();
         }
         learner.learn().unwrap();

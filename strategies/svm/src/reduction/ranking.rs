@@ -82,7 +82,7 @@ mod tests {
 
     /// Ten samples, five of each of two classes; each feature is a column.
     fn samples(columns: &[[f32; 10]]) -> Vec<(Vec<f32>, ClassId)> {
-        (0..10).map(|i| (columns.iter().map(|column| column[i]).collect(), ClassId((i / 5) as u8))).collect()
+        (0..10).map(|i| (columns.iter().map(|column| column[i]).collect(), ClassId((i / 5) as u32))).collect()
     }
 
     fn of(columns: &[[f32; 10]], feature: usize) -> Score {

@@ -83,7 +83,7 @@ mod tests {
     fn samples(groups: impl Fn(usize) -> Option<u32>) -> Vec<LabelledFeatures> {
         let sample = |i: usize| LabelledFeatures {
             features: vec![0.0],
-            class: ClassId((i % 3) as u8),
+            class: ClassId((i % 3) as u32),
             group: groups(i),
         };
         (0..60).map(sample).collect()

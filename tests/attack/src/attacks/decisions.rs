@@ -17,9 +17,9 @@ use crate::swarm::{Parcel, Plan, Swarm};
 const MS: Duration = Duration::from_millis(1);
 
 /// The gesture that is shown, and the one that the adversary wants.
-const TRUE: u8 = 2;
-const FALSE: u8 = 4;
-const OTHER: u8 = 5;
+const TRUE: u32 = 2;
+const FALSE: u32 = 4;
+const OTHER: u32 = 5;
 
 pub const ALL: &[Attack] = &[
     Attack {
@@ -218,8 +218,8 @@ fn unfounded(swarm: &mut Swarm) {
             }
             decision.class = Some(ClassId(FALSE));
             decision.confidence = 1.0;
-            decision.certificate.probabilities = vec![0.0; usize::from(CLASSES)];
-            decision.certificate.probabilities[usize::from(FALSE)] = 1.0;
+            decision.certificate.probabilities = vec![0.0; CLASSES as usize];
+            decision.certificate.probabilities[FALSE as usize] = 1.0;
             swarm.put_decision(&decision);
         }
     });

@@ -54,7 +54,7 @@ pub const ALL: &[Attack] = &[
     },
 ];
 
-fn two_votes(swarm: &Swarm, sequence: u32, classes: [u8; 2]) -> [Envelope; 2] {
+fn two_votes(swarm: &Swarm, sequence: u32, classes: [u32; 2]) -> [Envelope; 2] {
     let (round, id) = (swarm.round(), swarm.id());
     classes.map(|class| {
         let said = forged::said(6, Stamp { boot: 1, sequence }, forged::vote(round, class, 2.0));

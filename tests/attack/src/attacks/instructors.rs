@@ -88,7 +88,7 @@ fn say_as(swarm: &mut Swarm, by: &str, instruction: &Instruction) {
     swarm.replay(&forged);
 }
 
-fn was(round: gestalt_protocol::RoundId, class: u8) -> Instruction {
+fn was(round: gestalt_protocol::RoundId, class: u32) -> Instruction {
     Instruction::Was { round, class: Gesture::Class(ClassId(class)) }
 }
 
@@ -103,8 +103,15 @@ fn answered_first(swarm: &mut Swarm) {
     let round = swarm.show(1);
     let at = swarm.now().as_nanos() as u64;
     let to = was(round, 1);
-    let answer =
-        Answer { robot: RobotId(9), at, to, outcome: Outcome::UnknownRound, class: None, samples: 0 };
+    let answer = Answer {
+        robot: RobotId(9),
+        at,
+        to,
+        outcome: Outcome::UnknownRound,
+        class: None,
+        samples: 0,
+        looks_like: None,
+    };
     let bytes = serde_json::to_vec(&answer).expect("an answer is JSON");
     swarm.put(&Topic::Answer(instructor("ada")), &bytes);
     swarm.teach(round, 1);

@@ -93,7 +93,7 @@ fn tell(swarm: &mut Swarm, from: u32, lessons: Vec<Lesson>) {
     }
 }
 
-fn show_and_teach(swarm: &mut Swarm, class: u8) -> RoundId {
+fn show_and_teach(swarm: &mut Swarm, class: u32) -> RoundId {
     let round = swarm.show(class);
     swarm.teach(round, class);
     round
@@ -122,9 +122,9 @@ fn near_rounds(swarm: &mut Swarm, from: u32) {
 
 /// The last word of all was learned: what was seen in the last round is labelled by it everywhere.
 fn next_word_counts(peace: &Swarm, war: &Swarm) -> Result<(), String> {
-    let of_last = |swarm: &Swarm| -> Vec<Vec<u8>> {
+    let of_last = |swarm: &Swarm| -> Vec<Vec<u32>> {
         let round = swarm.round();
-        let of = |mind: &gestalt_strategies::Mind| -> Vec<u8> {
+        let of = |mind: &gestalt_strategies::Mind| -> Vec<u32> {
             let set = mind.training_set().into_iter().flat_map(|set| set.iter());
             set.filter(|sample| sample.round == round).map(|sample| sample.class.0).collect()
         };

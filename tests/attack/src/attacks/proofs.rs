@@ -81,7 +81,7 @@ pub const ALL: &[Attack] = &[
 /// What one of five sealed robots announces.
 fn announced(seed: u64) -> Announcement {
     let mut swarm = Swarm::new(&Plan::sealed(), seed, true);
-    swarm.show((seed % 6) as u8);
+    swarm.show((seed % 6) as u32);
     let mut said = swarm.air().iter().filter(|parcel| swarm.topic(&parcel.key) == Some(Topic::Decision));
     let said = said.next_back().and_then(|parcel| decode_json(&parcel.bytes).ok());
     said.expect("five robots that see the same decide")

@@ -75,7 +75,7 @@ fn gaps(swarm: &mut Swarm) {
     teach_some(swarm);
     let of = |author: u32| {
         let id = move |n: u32| SampleId { author: RobotId(100 + author), life: 5, number: 1 + 1_000_000 * n };
-        (0..250).map(move |n| forged::sample(id(n), (n % 6) as u8, STRANGE, &[n as f32 / 30.0, 0.3]))
+        (0..250).map(move |n| forged::sample(id(n), (n % 6) as u32, STRANGE, &[n as f32 / 30.0, 0.3]))
     };
     let all: Vec<SharedSample> = (0..80).flat_map(of).collect();
     for part in all.chunks(10_000) {
@@ -100,7 +100,8 @@ fn all_is_given(_: &Swarm, war: &Swarm) -> Result<(), String> {
 fn asks(swarm: &mut Swarm, name: u32) {
     teach_some(swarm);
     let digest = Digest { key: 1, samples: 2, lessons: 3 };
-    let know = Know { samples: Vec::new(), lessons: Vec::new(), digest, answer: true, nothing_for: None };
+    let know =
+        Know { samples: Vec::new(), lessons: Vec::new(), digest, answer: true, nothing_for: None, named: 0 };
     for _ in 0..1000 {
         swarm.whisper_to(1, name, &Message::Know(know.clone()));
     }

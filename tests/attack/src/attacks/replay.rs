@@ -215,7 +215,7 @@ fn off_are_not_counted(_: &Swarm, war: &Swarm) -> Result<(), String> {
 }
 
 /// The thief has robot 6 and its key.
-fn steal(swarm: &mut Swarm, class: u8) {
+fn steal(swarm: &mut Swarm, class: u32) {
     let began = swarm.now();
     swarm.begin(class);
     swarm.pass(50 * MS);

@@ -13,8 +13,8 @@ use crate::swarm::{Plan, Swarm};
 
 const MS: Duration = Duration::from_millis(1);
 
-const TRUE: u8 = 1;
-const FALSE: u8 = 3;
+const TRUE: u32 = 1;
+const FALSE: u32 = 3;
 
 pub const ALL: &[Attack] = &[
     Attack {
@@ -101,7 +101,7 @@ fn in_its_name(swarm: &mut Swarm, by: u32) {
     swarm.pass(20 * MS);
     let (round, id) = (swarm.round(), swarm.id());
     let mut vote = forged::vote(round, FALSE, 16.0);
-    vote.evidence[usize::from(FALSE)] = 1e30;
+    vote.evidence[FALSE as usize] = 1e30;
     let unsigned = forged::said(3, forged::LAST, vote);
     let signed = forged::signed(unsigned.clone(), &key(by), &id);
     for forged in [unsigned, signed] {

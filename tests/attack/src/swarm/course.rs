@@ -22,7 +22,7 @@ const FRAME: Duration = Duration::from_millis(150);
 
 impl Swarm {
     /// Begins to show a gesture: robot 1 is told that there is one.
-    pub fn begin(&mut self, class: u8) {
+    pub fn begin(&mut self, class: u32) {
         self.gesture = Some(class % CLASSES);
         let began = self.now;
         self.shown.push(Shown { class: class % CLASSES, began, held: Vec::new(), announced: None });
@@ -33,7 +33,7 @@ impl Swarm {
     pub fn end(&mut self, began: Duration) -> RoundId {
         self.pass((began + SHOWN_FOR).saturating_sub(self.now));
         self.gesture = None;
-        let held: Vec<Option<u8>> = self.minds().map(|mind| Some(mind.held()?.class?.0)).collect();
+        let held: Vec<Option<u32>> = self.minds().map(|mind| Some(mind.held()?.class?.0)).collect();
         let of_it = self.announced.iter().filter(|(at, ..)| *at >= began);
         let mut of_held = of_it.filter(|(.., decision)| held.contains(&decision.class.map(|class| class.0)));
         let announced = of_held.next().map(|(at, ..)| *at - began);
@@ -44,7 +44,7 @@ impl Swarm {
     }
 
     /// Shows a gesture from beginning to end.
-    pub fn show(&mut self, class: u8) -> RoundId {
+    pub fn show(&mut self, class: u32) -> RoundId {
         let began = self.now;
         self.begin(class);
         self.end(began)
@@ -94,7 +94,7 @@ impl Swarm {
     }
 
     /// Ada says which gesture it was. Says when.
-    pub fn teach(&mut self, round: RoundId, class: u8) -> u64 {
+    pub fn teach(&mut self, round: RoundId, class: u32) -> u64 {
         self.say("ada", &Instruction::Was { round, class: Gesture::Class(ClassId(class)) })
     }
 

@@ -38,7 +38,7 @@ pub struct Swarm {
     /// Robots between which and the others nothing arrives.
     pub(super) cut: BTreeSet<RobotId>,
     /// Which gesture is shown.
-    pub(super) gesture: Option<u8>,
+    pub(super) gesture: Option<u32>,
     pub(super) shown: Vec<Shown>,
     pub(super) announced: Vec<(Duration, RobotId, Decision)>,
     pub(super) answers: Vec<Answer>,

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// How many gestures there are.
-pub const CLASSES: u8 = 6;
+pub const CLASSES: u32 = 6;
 
 /// How many features a frame has.
 pub const FEATURES: usize = 8;
@@ -32,7 +32,7 @@ pub fn space() -> Arc<FeatureSpace> {
     static SPACE: OnceLock<Arc<FeatureSpace>> = OnceLock::new();
     let fitted = || {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let rows: Vec<Vec<f32>> = (0..60).map(|n| features(n as u8 % CLASSES, &mut rng)).collect();
+        let rows: Vec<Vec<f32>> = (0..60).map(|n| features(n as u32 % CLASSES, &mut rng)).collect();
         let rows = rows.iter().map(Vec::as_slice);
         Arc::new(FeatureSpace::fit("test", rows, ScalingMethod::PerComponent, Components::Count(4), &mut rng))
     };
@@ -40,9 +40,9 @@ pub fn space() -> Arc<FeatureSpace> {
 }
 
 /// What a robot sees of that gesture in one frame.
-pub fn features(class: u8, rng: &mut ChaCha8Rng) -> Vec<f32> {
+pub fn features(class: u32, rng: &mut ChaCha8Rng) -> Vec<f32> {
     let mut features: Vec<f32> = (0..FEATURES).map(|_| rng.random::<f32>() * 0.9).collect();
-    features[0] += f32::from(class);
+    features[0] += class as f32;
     features
 }
 
@@ -56,9 +56,9 @@ impl Classify for ByFirst {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        let seen = features[0] as usize % usize::from(CLASSES);
+        let seen = features[0] as usize % CLASSES as usize;
         let other = (1.0 - SURE) / f64::from(CLASSES - 1);
-        Ok((0..usize::from(CLASSES)).map(|class| if class == seen { SURE } else { other }).collect())
+        Ok((0..CLASSES as usize).map(|class| if class == seen { SURE } else { other }).collect())
     }
 }
 

@@ -90,7 +90,7 @@ fn draw(decision: &mut Decision, config: &MindConfig) {
 fn names_one_gesture(decision: &Decision, follows: &impl Fn(&Decision) -> bool) {
     let Some(class) = decision.class else { return };
     for other in (0..decision.certificate.probabilities.len()).filter(|other| *other != class.index()) {
-        let other = Decision { class: u8::try_from(other).ok().map(ClassId), ..decision.clone() };
+        let other = Decision { class: u32::try_from(other).ok().map(ClassId), ..decision.clone() };
         assert!(!follows(&other), "two gestures follow from the same votes: {decision:?}");
     }
 }

@@ -54,10 +54,10 @@ impl Swarm<'_> {
     fn draw_gesture(&mut self) -> ClassId {
         let classes = self.scenario.classes;
         match self.scenario.order {
-            Order::Random => ClassId(self.course.random_range(0..classes as u64) as u8),
+            Order::Random => ClassId(self.course.random_range(0..classes as u64) as u32),
             Order::InTurn => {
                 if self.turn.is_empty() {
-                    self.turn = (0..classes).map(|class| ClassId(class as u8)).collect();
+                    self.turn = (0..classes).map(|class| ClassId(class as u32)).collect();
                     self.turn.shuffle(&mut self.course);
                 }
                 self.turn.pop().unwrap_or(ClassId(0))

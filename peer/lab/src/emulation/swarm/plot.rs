@@ -58,14 +58,21 @@ impl Plot {
         }
         let mut rivals: Vec<usize> = (0..classes).filter(|class| *class != shown.index()).collect();
         rivals.sort_by(|a, b| totals[*b].total_cmp(&totals[*a]));
-        rivals.into_iter().map(|class| ClassId(class as u8)).collect()
+        rivals.into_iter().map(|class| ClassId(class as u32)).collect()
     }
 
     /// What a liar votes who is for that gesture.
     pub fn vote(&self, class: ClassId, classes: usize, clip: f64) -> Option<Vote> {
         let mut evidence = vec![-clip as f32; classes];
         evidence[class.index()] = clip as f32;
-        Some(Vote { round: self.round?, vocabulary: self.vocabulary?, evidence, looks: LOOKS, unknown: None })
+        Some(Vote {
+            round: self.round?,
+            vocabulary: self.vocabulary?,
+            evidence,
+            looks: LOOKS,
+            unknown: None,
+            named: vec![],
+        })
     }
 
     /// The next stamp of a liar.
@@ -148,6 +155,7 @@ impl Plot {
                 robots: robots as u32,
                 quorum: config.needs(robots as u32),
                 elapsed_ms: took.as_millis() as u32,
+                named: vec![],
             },
         })
     }

@@ -61,7 +61,7 @@ impl Takes {
         let noise: u64 = rng.random();
         let camera = kind.model()?.specimen(&mut rng);
         let person = self.seed << 20 | u64::from(showing);
-        let scene = Scene { gesture: Some(shown.0), seed: person };
+        let scene = Scene { gesture: u8::try_from(shown.0).ok(), seed: person };
         let mut source =
             RenderedSource::new(camera, pose, self.plan.glove, noise ^ u64::from(showing) << 40)?;
         let mut perception = Perception::for_camera(FEATURES, HandConfig::default(), layer, &kind.model()?)?;

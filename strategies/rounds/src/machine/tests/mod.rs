@@ -95,7 +95,14 @@ const LEANING: f32 = 1.0;
 fn vote(counter: u32, class: usize, strength: f32) -> Vote {
     let mut evidence = vec![-strength / 2.0; 3];
     evidence[class] = strength;
-    Vote { round: round(counter, 1), vocabulary: vocabulary().id(), evidence, looks: 1.0, unknown: None }
+    Vote {
+        round: round(counter, 1),
+        vocabulary: vocabulary().id(),
+        evidence,
+        looks: 1.0,
+        unknown: None,
+        named: vec![],
+    }
 }
 
 fn null(counter: u32) -> Vote {
@@ -116,7 +123,7 @@ fn votes(author: u32, sequence: u32, vote: Vote) -> Input {
 }
 
 /// A decision that follows from the votes of robots 10, 11, 12 …, each sure of its class; without a class from none.
-fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decision {
+fn decision(counter: u32, class: Option<u32>, robots: u32, author: u32) -> Decision {
     let votes: Vec<CountedVote> = class.map_or(Vec::new(), |class| {
         let counted = |robot| CountedVote {
             robot: RobotId(10 + robot),
@@ -124,7 +131,7 @@ fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decisi
             stamp: Stamp { boot: 1, sequence: 1 + u32::from(class) },
             class: ClassId(class),
             weight: 1.0,
-            vote: vote(counter, usize::from(class), SURE),
+            vote: vote(counter, class as usize, SURE),
             signature: None,
         };
         (0..robots).map(counted).collect()
@@ -133,7 +140,7 @@ fn decision(counter: u32, class: Option<u8>, robots: u32, author: u32) -> Decisi
 }
 
 /// What a robot makes of these votes, by the rule of [`adding_up`].
-fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u32) -> Decision {
+fn decided(round: RoundId, class: Option<u32>, votes: Vec<CountedVote>, author: u32) -> Decision {
     let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
     let RoundsConfig { rule, clip, .. } = adding_up();
     let fused = fuse(rule, clip, 3, rows);
@@ -158,6 +165,7 @@ fn decided(round: RoundId, class: Option<u8>, votes: Vec<CountedVote>, author: u
             robots,
             quorum: robots / 2 + 1,
             elapsed_ms: 10,
+            named: vec![],
         },
     }
 }
@@ -187,7 +195,7 @@ fn broadcast(out: &[Output]) -> Vec<&Vote> {
         .collect()
 }
 
-fn holds(out: &[Output]) -> Vec<Option<u8>> {
+fn holds(out: &[Output]) -> Vec<Option<u32>> {
     out.iter()
         .filter_map(|output| match output {
             Output::Hold(decision) => Some(decision.class.map(|class| class.0)),

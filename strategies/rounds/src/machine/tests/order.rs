@@ -6,13 +6,13 @@ use super::*;
 
 /// What robot n makes of votes of robots 20 to 20 + n.
 fn concluded(counter: u32, n: u32) -> Decision {
-    let class = (n % 3) as u8;
+    let class = n % 3;
     let counted = |robot| CountedVote {
         robot: RobotId(20 + robot),
         stamp: Stamp { boot: 1, sequence: 10 * counter + n },
         class: ClassId(class),
         weight: 1.0,
-        vote: vote(counter, usize::from(class), SURE),
+        vote: vote(counter, class as usize, SURE),
         signature: None,
     };
     decided(round(counter, 1), Some(class), (0..n).map(counted).collect(), n)

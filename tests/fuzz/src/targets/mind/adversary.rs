@@ -67,11 +67,12 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         // What robots see.
         0 | 1 => {
             let (robot, class, sure) = (events.robot(), events.byte(), events.byte());
-            world.input(robot, frame(class, f32::from(sure) / 255.0, sure ^ class));
+            world.input(robot, frame(class.into(), f32::from(sure) / 255.0, sure ^ class));
         }
         2 => {
             let (class, sure) = (events.byte(), events.byte());
-            (0..ROBOTS).for_each(|robot| world.input(robot, frame(class, f32::from(sure) / 255.0, sure)));
+            (0..ROBOTS)
+                .for_each(|robot| world.input(robot, frame(class.into(), f32::from(sure) / 255.0, sure)));
         }
         3 => world.input(events.robot(), Input::Open),
         4 => {
@@ -163,6 +164,10 @@ fn about(instruction: Instruction, round: RoundId) -> Instruction {
         Instruction::Right { of, .. } => Instruction::Right { round, of },
         Instruction::Wrong { of, .. } => Instruction::Wrong { round, of },
         Instruction::Retract { .. } => Instruction::Retract { round },
+        Instruction::New { label, .. } => Instruction::New { label, round: Some(round) },
+        named @ (Instruction::Same { .. } | Instruction::Retire { .. } | Instruction::Restore { .. }) => {
+            named
+        }
     }
 }
 

@@ -1,0 +1,131 @@
+//! What becomes of samples by what instructors name, merge, retire and restore.
+
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{ClassId, MAX_CLASSES, NamedGesture, Naming};
+
+use super::changes::{TrainingChange, inserted_as};
+use super::memory::Item;
+use super::state::Learning;
+use super::unresolved;
+use crate::lessons::Candidates;
+use crate::names::{NameBook, NamingReceipt};
+
+impl Learning {
+    pub fn names(&self) -> &NameBook {
+        &self.names
+    }
+
+    /// How many gestures there may be beside those of the list.
+    pub fn room_for_names(&self) -> usize {
+        MAX_CLASSES.saturating_sub(self.vocabulary.labels().len())
+    }
+
+    /// Takes in what was said of a gesture that was named, and trains by it.
+    pub fn hear_naming(&mut self, naming: &Naming) -> NamingReceipt {
+        let before: BTreeMap<ClassId, Option<ClassId>> =
+            self.classes_of_samples().map(|class| (class, self.trained_as(class))).collect();
+        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
+        let heard = self.names.hear(naming);
+        if heard != NamingReceipt::New {
+            return heard;
+        }
+        let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
+        self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
+        self.gestures = self.all_gestures();
+        self.judged.doubt();
+        for (class, trained_as) in before {
+            if self.trained_as(class) != trained_as {
+                self.train_anew(class);
+            }
+        }
+        let rounds: Vec<_> = self.lessons.rounds(0).map(|(round, _)| round).collect();
+        rounds.into_iter().for_each(|round| self.apply_to_round(round));
+        heard
+    }
+
+    /// Puts a word into the memory that the rules would not let in.
+    #[cfg(test)]
+    pub fn remember_naming(&mut self, naming: &Naming) {
+        self.names.hear_again(naming);
+        self.dirty.insert(Item::Naming(naming.gesture()));
+    }
+
+    /// The gesture that a sample of that class is trained on as; `None` where it is on none: nobody named it that this robot heard, or it is retired.
+    pub(super) fn trained_as(&self, class: ClassId) -> Option<ClassId> {
+        if class.is_named() {
+            self.names.stands_for(class).filter(|class| self.gestures.contains(*class))
+        } else {
+            Some(class)
+        }
+    }
+
+    /// Those of the list, and those that were named and are in use.
+    pub(super) fn all_gestures(&self) -> Candidates {
+        let listed = self.vocabulary.all();
+        Candidates::of(listed.chain(self.names.in_use(self.room_for_names())))
+    }
+
+    fn classes_of_samples(&self) -> impl Iterator<Item = ClassId> + '_ {
+        let guessed = self.aside.iter().filter_map(|(_, aside)| aside.guess);
+        self.set.iter().map(|sample| sample.class).chain(guessed)
+    }
+
+    /// Trains on all that is held.
+    pub(super) fn train_on_all(&mut self) {
+        let changes = self.changes_for(|_| true);
+        self.training.extend(changes);
+    }
+
+    /// Trains on a sample of the set.
+    pub(super) fn train_on(&mut self, key: u64) {
+        if let Some(sample) = self.set.get(key) {
+            let change = inserted_as(self.trained_as(sample.class), key, &sample.vector, sample.round);
+            self.training.push(change);
+        }
+    }
+
+    /// Trains on a sample of the set as what it now shows.
+    pub(super) fn train_as_another(&mut self, key: u64) {
+        match self.set.get(key).map(|sample| sample.class) {
+            Some(class) if self.names.is_empty() => {
+                self.training.push(TrainingChange::Relabel { key, class })
+            }
+            // It may not have been trained on before.
+            _ => self.train_on(key),
+        }
+    }
+
+    /// The gestures that were named and are in use, for the status.
+    pub(super) fn named_gestures(&self) -> Vec<NamedGesture> {
+        let titles = self.names.titles(self.vocabulary.labels());
+        let samples = |gesture: ClassId| {
+            self.classes_of_samples().filter(|class| self.trained_as(*class) == Some(gesture)).count()
+        };
+        let in_use = self.names.in_use(self.room_for_names());
+        let in_use = in_use.into_iter().map(|class| NamedGesture {
+            class,
+            label: titles.get(&class).cloned().unwrap_or_default(),
+            samples: samples(class),
+        });
+        in_use.collect()
+    }
+
+    /// Trains on all samples of that class as what it now is.
+    fn train_anew(&mut self, class: ClassId) {
+        let changes = self.changes_for(|of| of == class);
+        self.training.extend(changes);
+    }
+
+    /// What makes a learner train on all samples of these classes as what they now are.
+    fn changes_for(&self, is_wanted: impl Fn(ClassId) -> bool) -> Vec<TrainingChange> {
+        let held = self.set.iter().map(|sample| (sample.class, sample.key, &sample.vector, sample.round));
+        let guessed = self.aside.iter().filter_map(|(number, aside)| {
+            Some((aside.guess?, unresolved::training_key(number), &aside.vector, aside.round))
+        });
+        held.chain(guessed)
+            .filter(|(class, ..)| is_wanted(*class))
+            .map(|(class, key, vector, round)| inserted_as(self.trained_as(class), key, vector, round))
+            .collect()
+    }
+}

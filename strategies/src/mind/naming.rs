@@ -1,0 +1,129 @@
+//! Gestures that instructors name while the swarm works: what a robot makes of such a word, and of what a neighbour heard.
+
+use gestalt_protocol::{
+    ClassId, Fate, Gesture, Instruction, InstructorId, MAX_LABEL, Naming, Namings, Outcome, RoundId,
+};
+
+use super::input::Instructed;
+use super::machine::Mind;
+use crate::learning::Learning;
+use crate::names::NamingReceipt;
+
+/// From which probability on a round is said to look like a gesture.
+const LOOKS_LIKE: f64 = 0.5;
+
+/// What came of a word on a gesture's name, and which gesture it is about.
+pub(super) type Named = (Outcome, Option<ClassId>);
+
+impl Mind {
+    /// Names a gesture, or merges, retires or restores one. `None` for any other word.
+    pub(super) fn name(&mut self, instructed: &Instructed) -> Option<Named> {
+        let Instructed { by, at, instruction } = instructed;
+        let learning = self.learning.as_mut();
+        let named = match instruction {
+            Instruction::New { label, .. } => learning.map(|learning| learning.name_anew(label, by, *at)),
+            Instruction::Same { class, of } => learning.map(|learning| match learning.gesture(of, by) {
+                Some(of) => learning.decree(class, by, *at, Fate::Same(of)),
+                None => (Outcome::UnknownGesture, None),
+            }),
+            Instruction::Retire { class } => {
+                learning.map(|learning| learning.decree(class, by, *at, Fate::Retired))
+            }
+            Instruction::Restore { class } => {
+                learning.map(|learning| learning.decree(class, by, *at, Fate::InUse))
+            }
+            Instruction::Open
+            | Instruction::Was { .. }
+            | Instruction::Right { .. }
+            | Instruction::Wrong { .. }
+            | Instruction::Retract { .. } => return None,
+        };
+        self.call_by_names();
+        Some(named.unwrap_or((Outcome::NotLearning, None)))
+    }
+
+    /// Takes in what a neighbour heard of names.
+    pub(super) fn on_namings(&mut self, namings: &Namings) {
+        let Some(learning) = &mut self.learning else { return };
+        let heard: Vec<NamingReceipt> =
+            namings.namings.iter().map(|naming| learning.hear_naming(naming)).collect();
+        if heard.contains(&NamingReceipt::New) {
+            self.call_by_names();
+            // The other neighbours may lack it too.
+            self.rounds.hurry_repair();
+        }
+    }
+
+    /// What this robot's gestures are called from now on where it announces them.
+    pub(super) fn call_by_names(&mut self) {
+        if let Some(learning) = &self.learning {
+            self.rounds.call(learning.names().titles(learning.vocabulary().labels()));
+        }
+    }
+
+    /// The gesture that the swarm took for likeliest in that round, if it was not that one.
+    pub(super) fn looked_like(&self, round: RoundId, gesture: Option<ClassId>) -> Option<ClassId> {
+        let decision = self.rounds.held().filter(|held| held.round == round)?;
+        let certificate = &decision.certificate;
+        let likely = certificate.classes().zip(&certificate.probabilities);
+        let (likeliest, p) = likely.max_by(|a, b| a.1.total_cmp(b.1))?;
+        (*p >= LOOKS_LIKE && Some(likeliest) != gesture).then_some(likeliest)
+    }
+}
+
+impl Learning {
+    /// The gesture that an instructor means.
+    pub(super) fn gesture(&self, gesture: &Gesture, by: &InstructorId) -> Option<ClassId> {
+        match gesture {
+            Gesture::Class(class) if class.is_named() => self.names().get(*class).map(Naming::gesture),
+            Gesture::Class(class) => Some(*class).filter(|class| self.vocabulary().place(*class).is_some()),
+            Gesture::Label(label) => self.vocabulary().class(label).or_else(|| self.names().find(label, by)),
+        }
+    }
+
+    fn name_anew(&mut self, label: &str, by: &InstructorId, at: u64) -> Named {
+        if let Some(listed) = self.vocabulary().class(label) {
+            return (Outcome::Known, Some(listed));
+        }
+        let gesture = ClassId::named(by, label);
+        let in_use = self.names().in_use(self.room_for_names());
+        let room = in_use.contains(&gesture) || in_use.len() < self.room_for_names();
+        if !(1..=MAX_LABEL).contains(&label.len()) || !room {
+            return (Outcome::NoRoom, None);
+        }
+        self.say_of(by.clone(), label.to_owned(), by, at, Fate::InUse)
+    }
+
+    /// Says what became of a gesture that was named, whoever named it.
+    fn decree(&mut self, gesture: &Gesture, said_by: &InstructorId, at: u64, fate: Fate) -> Named {
+        let known = self.gesture(gesture, said_by).and_then(|gesture| self.names().get(gesture));
+        let Some(Naming { by, label, .. }) = known.cloned() else { return (Outcome::UnknownGesture, None) };
+        if fate == Fate::Same(ClassId::named(&by, &label)) {
+            return (Outcome::UnknownGesture, None);
+        }
+        self.say_of(by, label, said_by, at, fate)
+    }
+
+    fn say_of(
+        &mut self,
+        by: InstructorId,
+        label: String,
+        said_by: &InstructorId,
+        at: u64,
+        fate: Fate,
+    ) -> Named {
+        let gesture = ClassId::named(&by, &label);
+        let known = self.names().get(gesture);
+        let count = match known {
+            Some(known) if known.fate == fate => return (Outcome::Known, Some(gesture)),
+            Some(known) => known.count.saturating_add(1),
+            None => 1,
+        };
+        let naming = Naming { by, label, count, at, said_by: said_by.clone(), fate };
+        match self.hear_naming(&naming) {
+            NamingReceipt::New => (Outcome::Learned, Some(gesture)),
+            NamingReceipt::Known => (Outcome::Known, Some(gesture)),
+            NamingReceipt::Full | NamingReceipt::FarAhead => (Outcome::NoRoom, None),
+        }
+    }
+}

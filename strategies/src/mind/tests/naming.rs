@@ -1,0 +1,181 @@
+//! Gestures that are named while the swarm works.
+
+use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, Naming};
+
+use super::*;
+use crate::names::NameBook;
+
+fn new(label: &str) -> Instruction {
+    Instruction::New { label: label.to_owned(), round: None }
+}
+
+fn called(label: &str) -> Gesture {
+    Gesture::Label(label.to_owned())
+}
+
+fn anas(label: &str) -> ClassId {
+    ClassId::named(&"ana".parse().unwrap(), label)
+}
+
+impl Swarm {
+    fn names(&self, i: usize) -> &NameBook {
+        self.minds[i].learning.as_ref().unwrap().names()
+    }
+
+    /// How many samples each robot trains on as that gesture.
+    fn trained_as(&self, class: ClassId) -> Vec<usize> {
+        self.trained.iter().map(|trained| trained.values().filter(|of| **of == class).count()).collect()
+    }
+
+    fn check_names(&self) {
+        for i in 1..self.minds.len() {
+            assert_eq!(self.names(i), self.names(0), "robot {} knows other names", i + 1);
+        }
+    }
+}
+
+#[test]
+fn what_is_named_and_shown_is_learned_by_all_and_can_become_another() {
+    let mut swarm = Swarm::new(3, config(4, 1.0), 61);
+    let circle = anas("circle");
+    let named = swarm.say("ana", new("circle"));
+    assert_eq!(swarm.outcome(named), Outcome::Learned);
+    assert_eq!(swarm.answers.last().unwrap().class, Some(circle));
+    let again = swarm.say("ana", new("circle"));
+    assert_eq!(swarm.outcome(again), Outcome::Known);
+    let round = swarm.show(2);
+    let word = swarm.say("ana", Instruction::Was { round, class: called("circle") });
+    assert_eq!(swarm.outcome(word), Outcome::Learned);
+    assert_eq!(swarm.trained_as(circle), [12; 3], "four looks of each of three");
+
+    // Another, named when it is shown: it looks like the third gesture of the list to all robots.
+    let round = swarm.show(2);
+    let word = swarm.say("bob", Instruction::New { label: "ring".to_owned(), round: Some(round) });
+    let answer = swarm.answers.iter().find(|answer| answer.at == word).unwrap().clone();
+    let ring = answer.class.unwrap();
+    assert_eq!((answer.outcome, answer.looks_like), (Outcome::Learned, Some(ClassId(2))));
+    assert_eq!(swarm.trained_as(ring), [12; 3]);
+
+    // They are the same, and then they are not.
+    swarm.say("cyn", Instruction::Same { class: called("ring"), of: called("circle") });
+    assert_eq!((swarm.trained_as(circle), swarm.trained_as(ring)), (vec![24; 3], vec![0; 3]));
+    swarm.restart(1);
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!(swarm.trained_as(circle), [24; 3], "also after a restart");
+    swarm.say("ana", Instruction::Restore { class: Gesture::Class(ring) });
+    assert_eq!((swarm.trained_as(circle), swarm.trained_as(ring)), (vec![12; 3], vec![12; 3]));
+    swarm.say("ana", Instruction::Retire { class: called("circle") });
+    assert_eq!((swarm.trained_as(circle), swarm.trained_as(ring)), (vec![0; 3], vec![12; 3]));
+    assert_eq!(swarm.sizes(0), [0, 8, 16], "what was seen is kept");
+    swarm.say("ana", new("circle"));
+    assert_eq!(swarm.trained_as(circle), [12; 3]);
+    swarm.check_names();
+}
+
+#[test]
+fn a_sample_of_a_gesture_that_nobody_named_here_waits_for_its_name() {
+    let mut swarm = Swarm::new(2, config(4, 1.0), 62);
+    let (circle, round) = (anas("circle"), RoundId { counter: 1, opener: RobotId(2), life: 9 });
+    let sample = SharedSample {
+        id: SampleId { author: RobotId(2), life: 5, number: 1 },
+        class: circle,
+        round,
+        vector: Vector::F32(vec![0.5; 4]),
+    };
+    let message = Message::Samples(Samples { space: space().id(), samples: vec![sample] });
+    let stamp = Stamp { boot: 1 << 20, sequence: 1 };
+    swarm.input(0, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
+    assert_eq!((swarm.sizes(0), swarm.trained_as(circle)), ([0, 0, 1], vec![0; 2]));
+    swarm.say("ana", new("circle"));
+    assert_eq!(swarm.trained_as(circle)[0], 1);
+}
+
+#[test]
+fn what_makes_no_gesture_is_answered_and_changes_nothing() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 63);
+    let room = MAX_CLASSES - CLASSES as usize;
+    for n in 0..room {
+        let named = swarm.say("ana", new(&format!("gesture {n}")));
+        assert_eq!(swarm.outcome(named), Outcome::Learned, "{n}");
+    }
+    let before = swarm.names(0).clone();
+    for (word, outcome) in [
+        (new("one more"), Outcome::NoRoom),
+        (new(""), Outcome::NoRoom),
+        (new(&"x".repeat(65)), Outcome::NoRoom),
+        (new("3"), Outcome::Known),
+        (Instruction::Retire { class: called("circle") }, Outcome::UnknownGesture),
+        (Instruction::Retire { class: Gesture::Class(ClassId(3)) }, Outcome::UnknownGesture),
+        (Instruction::Same { class: called("gesture 1"), of: called("gesture 1") }, Outcome::UnknownGesture),
+        (Instruction::Same { class: called("gesture 1"), of: called("circle") }, Outcome::UnknownGesture),
+    ] {
+        let said = swarm.say("ana", word.clone());
+        assert_eq!(swarm.outcome(said), outcome, "{word:?}");
+    }
+    assert_eq!(swarm.names(0), &before);
+    swarm.say("ana", Instruction::Retire { class: called("gesture 7") });
+    let named = swarm.say("ana", new("one more"));
+    assert_eq!(swarm.outcome(named), Outcome::Learned);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn three_instructors_at_once_end_with_equal_tables_whatever_is_lost(
+        words in prop::collection::vec((0..3_usize, 0..4_usize, 0..5_usize, any::<u8>()), 1..40),
+        seed in any::<u64>(),
+    ) {
+        let mut swarm = Swarm::new(4, config(2, 1.0), seed);
+        let labels = ["circle", "ring", "hook", "3"];
+        for (who, label, word, chance) in words {
+            let class = || called(labels[label]);
+            let of = || called(labels[usize::from(chance) % 4]);
+            let word = match word {
+                0 | 1 => new(labels[label]),
+                2 => Instruction::Same { class: class(), of: of() },
+                3 => Instruction::Retire { class: class() },
+                _ => Instruction::Restore { class: class() },
+            };
+            // Some hear it and some do not; the network loses, and robots die.
+            swarm.loss = f64::from(chance % 4) * 0.25;
+            let by: InstructorId = ["ana", "bob", "cyn"][who].parse().unwrap();
+            let at = swarm.now.as_millis() as u64;
+            for i in 0..swarm.minds.len() {
+                if chance >> i & 1 == 0 {
+                    let instruction = word.clone();
+                    swarm.input(i, Input::Instructed(Instructed { by: by.clone(), at, instruction }));
+                }
+            }
+            swarm.pass(Duration::from_millis(200));
+            match chance {
+                0..20 => swarm.restart(usize::from(chance) % 4),
+                20..25 => swarm.restart_all(),
+                _ => {}
+            }
+        }
+        swarm.loss = 0.0;
+        swarm.pass(Duration::from_secs(30));
+        swarm.check_names();
+        for i in 0..swarm.minds.len() {
+            let before = swarm.names(i).clone();
+            swarm.restart(i);
+            prop_assert_eq!(swarm.names(i), &before, "a restart forgets nothing");
+        }
+        swarm.check_rest();
+    }
+}
+
+#[test]
+fn names_that_cannot_be_taken_in_do_not_keep_robots_talking() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 64);
+    swarm.say("ana", new("circle"));
+    // Somebody has put a count there that nobody takes in.
+    let (by, said_by): (InstructorId, InstructorId) = ("ana".parse().unwrap(), "eve".parse().unwrap());
+    let label = "circle".to_owned();
+    let wild = Naming { by, label, count: 1 << 50, at: 1, said_by, fate: Fate::Retired };
+    swarm.minds[0].learning.as_mut().unwrap().remember_naming(&wild);
+    swarm.pass(Duration::from_secs(120));
+    assert_ne!(swarm.names(0), swarm.names(1));
+    swarm.check_rest();
+}

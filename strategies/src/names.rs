@@ -1,0 +1,292 @@
+//! Gestures that instructors named while the swarm works: one latest word on each, so that what is heard twice, late or in another order comes to the
+//! same.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::Hasher;
+
+use gestalt_protocol::{ClassId, Fate, InstructorId, MAX_NAMED, Naming};
+use siphasher::sip::SipHasher24;
+
+/// How far a count may lie beyond the highest known of its gesture: nobody says so much that others hear none of it.
+const COUNT_LEAP: u64 = 1 << 32;
+
+/// What came of a word on a gesture that was named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NamingReceipt {
+    /// It changed what is known.
+    New,
+    /// It, or a later word on the same gesture, was known.
+    Known,
+    /// There is no room: as many gestures of smaller numbers are kept as can be.
+    Full,
+    /// Its count lies too far ahead of all that is known.
+    FarAhead,
+}
+
+/// All gestures that were named, with what became of each: at most [`MAX_NAMED`], those of the smallest numbers, so that all robots keep the same.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NameBook {
+    namings: BTreeMap<ClassId, Naming>,
+}
+
+impl NameBook {
+    /// Takes in what was said of a gesture. Of two words of one count and time the greater counts.
+    pub fn hear(&mut self, naming: &Naming) -> NamingReceipt {
+        let gesture = naming.gesture();
+        let known = self.namings.get(&gesture);
+        if known.is_some_and(|known| order(known) >= order(naming)) {
+            return NamingReceipt::Known;
+        }
+        if naming.count > known.map_or(0, |known| known.count).saturating_add(COUNT_LEAP) {
+            return NamingReceipt::FarAhead;
+        }
+        if known.is_none() && self.namings.len() >= MAX_NAMED {
+            match self.namings.last_key_value() {
+                Some((greatest, _)) if *greatest > gesture => {
+                    self.namings.pop_last();
+                }
+                _ => return NamingReceipt::Full,
+            }
+        }
+        self.namings.insert(gesture, naming.clone());
+        NamingReceipt::New
+    }
+
+    /// Takes in what this robot knew before, whatever its count.
+    pub(crate) fn hear_again(&mut self, naming: &Naming) {
+        self.namings.insert(naming.gesture(), naming.clone());
+    }
+
+    /// What is known of a gesture.
+    #[must_use]
+    pub fn get(&self, gesture: ClassId) -> Option<&Naming> {
+        self.namings.get(&gesture)
+    }
+
+    /// All of it, by number.
+    pub fn iter(&self) -> impl Iterator<Item = &Naming> {
+        self.namings.values()
+    }
+
+    /// Whether nothing was named.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.namings.is_empty()
+    }
+
+    /// The gestures of their own, at most so many: those of the smallest numbers.
+    #[must_use]
+    pub fn in_use(&self, room: usize) -> BTreeSet<ClassId> {
+        self.namings.keys().copied().filter(|gesture| self.is_in_use(*gesture)).take(room).collect()
+    }
+
+    fn is_in_use(&self, gesture: ClassId) -> bool {
+        self.stands_for(gesture) == Some(gesture)
+    }
+
+    /// The gesture that one is by now: itself, or that which it was found to be the same as; `None` for one that is retired, or that nobody named.
+    /// Where gestures are said to be the same in a circle, it is the smallest of them.
+    #[must_use]
+    pub fn stands_for(&self, gesture: ClassId) -> Option<ClassId> {
+        let mut passed = Vec::new();
+        let mut at = gesture;
+        while at.is_named() {
+            if let Some(begin) = passed.iter().position(|known| *known == at) {
+                return passed[begin..].iter().min().copied();
+            }
+            match self.namings.get(&at)?.fate {
+                Fate::InUse => return Some(at),
+                Fate::Retired => return None,
+                Fate::Same(other) => {
+                    passed.push(at);
+                    at = other;
+                }
+            }
+        }
+        Some(at)
+    }
+
+    /// The gesture that an instructor means by a label: `circle (ana)` is the one that ana named so, `circle` the instructor's own, or else the only one of
+    /// that label that is in use.
+    #[must_use]
+    pub fn find(&self, label: &str, by: &InstructorId) -> Option<ClassId> {
+        let own = ClassId::named(by, label);
+        if self.namings.contains_key(&own) {
+            return Some(own);
+        }
+        let whose = label.strip_suffix(')').and_then(|label| label.rsplit_once(" ("));
+        if let Some((label, whose)) = whose
+            && let Ok(whose) = whose.parse()
+        {
+            let theirs = ClassId::named(&whose, label);
+            if self.namings.contains_key(&theirs) {
+                return Some(theirs);
+            }
+        }
+        let of_label = self.namings.iter().filter(|(_, naming)| naming.label == label);
+        let mut of_label = of_label.map(|(gesture, _)| *gesture).filter(|gesture| self.is_in_use(*gesture));
+        let only = of_label.next();
+        only.filter(|_| of_label.next().is_none())
+    }
+
+    /// What each gesture is called: by its label, and where another in use, or of the list, has the same, by who named it too. One that is the
+    /// same as another is called as that.
+    #[must_use]
+    pub fn titles(&self, listed: &[String]) -> BTreeMap<ClassId, String> {
+        let mut times: BTreeMap<&str, usize> = listed.iter().map(|label| (label.as_str(), 1)).collect();
+        for (_, naming) in self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture)) {
+            *times.entry(&naming.label).or_default() += 1;
+        }
+        let title = |naming: &Naming| match times.get(naming.label.as_str()) {
+            Some(2..) => format!("{} ({})", naming.label, naming.by),
+            _ => naming.label.clone(),
+        };
+        let called = |gesture: ClassId| match self.namings.get(&gesture) {
+            Some(naming) => Some(title(naming)),
+            None => listed.get(gesture.index()).cloned(),
+        };
+        let all = self.namings.keys();
+        all.filter_map(|gesture| Some((*gesture, called(self.stands_for(*gesture).unwrap_or(*gesture))?)))
+            .collect()
+    }
+
+    /// A digest of everything under a key: the same words, heard in whatever order, give the same; 0 for nothing.
+    #[must_use]
+    pub fn digest(&self, key: u64) -> u64 {
+        if self.namings.is_empty() {
+            return 0;
+        }
+        let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"names   "));
+        for (gesture, Naming { count, at, said_by, fate, .. }) in &self.namings {
+            sip.write(&gesture.0.to_le_bytes());
+            sip.write(&count.to_le_bytes());
+            sip.write(&at.to_le_bytes());
+            let name = said_by.to_string();
+            sip.write(&[name.len() as u8]);
+            sip.write(name.as_bytes());
+            let (kind, other) = match fate {
+                Fate::InUse => (0, 0),
+                Fate::Same(other) => (1, other.0),
+                Fate::Retired => (2, 0),
+            };
+            sip.write(&[kind]);
+            sip.write(&other.to_le_bytes());
+        }
+        sip.finish()
+    }
+}
+
+/// The later word is the greater. Of two names that make one number, which chance gives once in many thousand swarms, the greater is kept.
+fn order(naming: &Naming) -> (u64, u64, &InstructorId, Fate, &InstructorId, &str) {
+    let Naming { by, label, count, at, said_by, fate } = naming;
+    (*count, *at, said_by, *fate, by, label)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn who(name: &str) -> InstructorId {
+        name.parse().unwrap()
+    }
+
+    fn naming(by: &str, label: &str, count: u64, fate: Fate) -> Naming {
+        Naming { by: who(by), label: label.to_owned(), count, at: 7, said_by: who(by), fate }
+    }
+
+    fn book(said: &[Naming]) -> NameBook {
+        let mut book = NameBook::default();
+        said.iter().for_each(|naming| {
+            book.hear(naming);
+        });
+        book
+    }
+
+    #[test]
+    fn a_word_on_a_gesture_replaces_the_earlier_and_nothing_is_lost() {
+        let [circle, ring] = ["circle", "ring"].map(|label| ClassId::named(&who("ana"), label));
+        let mut book =
+            book(&[naming("ana", "circle", 1, Fate::InUse), naming("ana", "ring", 1, Fate::InUse)]);
+        assert_eq!(book.in_use(64), [circle, ring].into());
+        book.hear(&naming("ana", "ring", 2, Fate::Same(circle)));
+        assert_eq!((book.stands_for(ring), book.in_use(64)), (Some(circle), [circle].into()));
+        assert_eq!(book.titles(&[])[&ring], "circle");
+        book.hear(&naming("ana", "circle", 2, Fate::Retired));
+        assert_eq!((book.stands_for(ring), book.stands_for(circle)), (None, None));
+        book.hear(&naming("ana", "circle", 3, Fate::InUse));
+        book.hear(&naming("ana", "ring", 3, Fate::InUse));
+        assert_eq!(book.in_use(64), [circle, ring].into());
+        assert_eq!(book.hear(&naming("ana", "ring", 2, Fate::Retired)), NamingReceipt::Known);
+        assert_eq!(book.hear(&naming("ana", "ring", 1 << 40, Fate::Retired)), NamingReceipt::FarAhead);
+    }
+
+    #[test]
+    fn what_is_the_same_in_a_circle_is_the_smallest() {
+        let ids: Vec<ClassId> = ["a", "b", "c"].map(|label| ClassId::named(&who("ana"), label)).into();
+        let same = |label, other| naming("ana", label, 1, Fate::Same(ids[other]));
+        let book = book(&[same("a", 1), same("b", 2), same("c", 0)]);
+        for id in &ids {
+            assert_eq!(book.stands_for(*id), ids.iter().min().copied());
+        }
+        assert_eq!(NameBook::default().stands_for(ids[0]), None, "nobody named it");
+        assert_eq!(NameBook::default().stands_for(ClassId(3)), Some(ClassId(3)));
+    }
+
+    #[test]
+    fn two_who_choose_one_label_name_two_gestures() {
+        let [anas, bobs] = ["ana", "bob"].map(|by| ClassId::named(&who(by), "circle"));
+        let mut book = book(&[naming("ana", "circle", 1, Fate::InUse)]);
+        assert_eq!(book.find("circle", &who("cyn")), Some(anas));
+        book.hear(&naming("bob", "circle", 1, Fate::InUse));
+        assert_eq!(book.find("circle", &who("ana")), Some(anas));
+        assert_eq!(book.find("circle", &who("bob")), Some(bobs));
+        assert_eq!(book.find("circle", &who("cyn")), None, "which one?");
+        assert_eq!(book.find("circle (bob)", &who("cyn")), Some(bobs));
+        assert_eq!(book.titles(&[])[&bobs], "circle (bob)");
+    }
+
+    proptest! {
+        #[test]
+        fn in_any_order_and_however_often_robots_come_to_the_same(
+            said in prop::collection::vec((0..3_usize, 0..5_usize, 0..4_u64, 0..8_usize), 0..60),
+            order in any::<prop::sample::Index>(),
+        ) {
+            let who = ["ana", "bob", "cyn"];
+            let labels = ["a", "b", "c", "d", "e"];
+            let id = |n: usize| ClassId::named(&who[n % 3].parse().unwrap(), labels[n % 5]);
+            let said: Vec<Naming> = said.into_iter().map(|(by, label, count, fate)| {
+                let fate = match fate {
+                    0..3 => Fate::InUse,
+                    3 => Fate::Retired,
+                    4 => Fate::Same(ClassId(2)),
+                    n => Fate::Same(id(n)),
+                };
+                naming(who[by], labels[label], count, fate)
+            }).collect();
+            let forwards = book(&said);
+            let middle = order.index(said.len() + 1);
+            let turned: Vec<Naming> =
+                said[middle..].iter().chain(&said[..middle]).rev().chain(&said).cloned().collect();
+            let turned = book(&turned);
+            prop_assert_eq!(forwards.digest(7), turned.digest(7));
+            for naming in forwards.iter() {
+                let stands = forwards.stands_for(naming.gesture());
+                prop_assert!(stands.is_none_or(|stands| forwards.stands_for(stands) == Some(stands)));
+            }
+            prop_assert_eq!(forwards, turned);
+        }
+    }
+
+    #[test]
+    fn of_ever_so_many_all_robots_keep_the_same() {
+        let all: Vec<Naming> =
+            (0..3 * MAX_NAMED).map(|n| naming("ana", &n.to_string(), 1, Fate::InUse)).collect();
+        let forwards = book(&all);
+        let backwards = book(&all.iter().rev().cloned().collect::<Vec<_>>());
+        assert_eq!(forwards.iter().count(), MAX_NAMED);
+        assert_eq!(forwards, backwards);
+        assert_eq!(forwards.in_use(58).len(), 58);
+    }
+}
