@@ -11,7 +11,7 @@ use gestalt_link::{Client, Event, LinkConfig, Robot, RobotConfig};
 use gestalt_peer::center::Center;
 use gestalt_peer::config::ModelSection;
 use gestalt_peer::stream::{Sender, StreamEvent};
-use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId};
 use gestalt_strategies::MindConfig;
 use gestalt_tests::{Fixed, center_config, config, gesture, learning, look, sender_config, short_rounds};
 use rand_chacha::ChaCha8Rng;
@@ -111,8 +111,15 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
                 Some(order) if order.starts_with("was ") => {
                     let class = order["was ".len()..].parse().map(ClassId).expect("a class");
                     if let Some(round) = last {
-                        teach(swarm.to_owned(), robot.locators().to_vec(), round, class);
+                        let was = Instruction::Was { round, class: Gesture::Class(class) };
+                        teach(swarm.to_owned(), robot.locators().to_vec(), "ada", was);
                     }
+                }
+                // `says bob {"say": "new", "label": "circle"}`: a client says so in that name.
+                Some(order) if order.starts_with("says ") => {
+                    let (by, word) = order["says ".len()..].split_once(' ').expect("a name and a word");
+                    let word = serde_json::from_str(word).expect("an instruction");
+                    teach(swarm.to_owned(), robot.locators().to_vec(), by, word);
                 }
                 Some("status") => say(id, json!({"event": "status", "status": robot.status()})),
                 _ => break,
@@ -174,14 +181,14 @@ async fn stream(orders: &Value, mut stdin: mpsc::Receiver<String>) {
 }
 
 /// Attaches a client to this robot for as long as it takes to say what the gesture of a round was.
-fn teach(swarm: String, connect: Vec<String>, round: RoundId, class: ClassId) {
+fn teach(swarm: String, connect: Vec<String>, by: &str, word: Instruction) {
+    let by = by.parse().expect("a name");
     tokio::spawn(async move {
         let link = LinkConfig { connect, ..LinkConfig::default() };
         let client = Client::open(&swarm, &link).await.expect("the robot listens");
-        let was = Instruction::Was { round, class: Gesture::Class(class) };
-        let answer = client.teach(&"ada".parse().expect("a name"), &was, Duration::from_secs(3)).await;
+        let answer = client.teach(&by, &word, Duration::from_secs(3)).await;
         client.close().await;
-        eprintln!("taught {round}: {:?}", answer.map(|answer| answer.map(|answer| answer.outcome)));
+        eprintln!("{by} said {word:?}: {:?}", answer.map(|answer| answer.map(|answer| answer.outcome)));
     });
 }
 

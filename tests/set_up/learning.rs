@@ -18,12 +18,14 @@ use crate::Fixed;
 const FEATURES: usize = 12;
 const COMPONENTS: usize = 8;
 
-/// What a frame of that gesture shows: its own corner of the space, and some chance.
+/// What a frame of that gesture shows: its own corner of the space, and some chance. Those after the first six lie between two of them.
 #[must_use]
 pub fn gesture(class: ClassId, rng: &mut impl Rng) -> Observation {
+    let (class, beyond) = (class.index() % 6, class.index() / 6);
     let features = (0..FEATURES).map(|i| {
         let chance = (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
-        if i % 6 == class.index() { 2.0 + chance } else { chance }
+        let high = if i < 6 { i % 6 == class } else { i % 6 == (class + beyond) % 6 };
+        if high { 2.0 + chance } else { chance }
     });
     Observation { features: features.collect(), quality: 1.0 }
 }

@@ -81,6 +81,10 @@ pub fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge
         robots[0].order("open");
         std::thread::sleep(Duration::from_millis(2000));
         robots[0].order(&format!("was {class}"));
+        // Three instructors at different ends, while one link is cut, name gestures, merge them, and take that back.
+        for ((robot, by), word) in [(0, "ana"), (3, "bob"), (4, "cyn")].into_iter().zip(words(lesson)) {
+            robots[robot].order(&format!("says {by} {word}"));
+        }
         if lesson == 4 {
             // In the very moment in which it has shared.
             let of = |told: &[Value]| told.iter().filter(|told| told["event"] == "shared").count();
@@ -102,13 +106,15 @@ pub fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge
         // All that the living shared is known to all; what the dead one said last may have died with it.
         let due = of_the_living..=of_the_living + of_the_dead;
         let complete = |status: &Value| {
-            status["learning"]["common"] == known[0]["learning"]["common"] && due.contains(&common(status))
+            status["learning"]["common"] == known[0]["learning"]["common"]
+                && due.contains(&common(status))
+                && names(status) == names(&known[0])
         };
         if known.iter().all(complete) {
             break known;
         }
         let sizes: Vec<_> =
-            known.iter().map(|s| (&s["learning"]["common"], common(s), &s["neighbours"])).collect();
+            known.iter().map(|s| (&s["learning"]["common"], common(s), names(s), &s["neighbours"])).collect();
         assert!(calm.elapsed() < PATIENCE, "{due:?} samples are due: {sizes:#?}");
         std::thread::sleep(Duration::from_millis(100));
     };
@@ -121,12 +127,41 @@ pub fn under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge
     // half of three observations of each robot and lesson, some sixty.
     assert!(common(&known[0]) >= 36, "hardly anything was learned: {} samples", common(&known[0]));
 
+    // Nobody speaks of the hook but to name it, and of the ring ana has the last word.
+    let labels: Vec<&str> = names(&known[0]).iter().filter_map(|(_, label)| label.as_str()).collect();
+    assert!(labels.contains(&"hook") && labels.contains(&"ring"), "{labels:?}");
+
     // What was learned is decided alike, though one of them sees something else.
     robots.iter_mut().for_each(|robot| robot.order("shown 1"));
     robots[4].order("shown 3");
     robots[0].order("open");
     let decision = agreed(&robots);
     assert_eq!(decision["class"], json!(1), "{decision}");
+}
+
+/// What the three instructors say of names after that lesson.
+fn words(lesson: u32) -> [Value; 3] {
+    let new = |label: &str| json!({"say": "new", "label": label});
+    match lesson % 4 {
+        0 => [new("ring"), new("circle"), new("circle")],
+        1 => [
+            json!({"say": "same", "class": "ring", "of": 3}),
+            json!({"say": "retire", "class": "circle"}),
+            new("hook"),
+        ],
+        2 => [
+            json!({"say": "retire", "class": "ring"}),
+            json!({"say": "restore", "class": "circle"}),
+            json!({"say": "same", "class": "circle", "of": "ring (ana)"}),
+        ],
+        _ => [json!({"say": "restore", "class": "ring"}), new("circle"), new("hook")],
+    }
+}
+
+/// The gestures that it knows beside those of the list.
+fn names(status: &Value) -> Vec<(&Value, &Value)> {
+    let named = status["learning"]["named"].as_array();
+    named.into_iter().flatten().map(|named| (&named["class"], &named["label"])).collect()
 }
 
 /// The last decision they hold, once it is one and the same and names a gesture.

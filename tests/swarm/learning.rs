@@ -19,24 +19,29 @@ use crate::trouble::attach;
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Robots that learn, a client, and what is in front of all cameras.
-struct School {
+pub(crate) struct School {
     swarm: String,
-    robots: Vec<Watched>,
-    client: Client,
+    pub robots: Vec<Watched>,
+    pub client: Client,
     shown: Arc<AtomicU8>,
-    ada: InstructorId,
+    pub ada: InstructorId,
 }
 
 impl School {
     /// Robots on a ring, numbered from 0; each keeps `keep` observations of a round and shares the part `fraction`.
     async fn on_a_ring(robots: u32, keep: usize, fraction: f64) -> Self {
+        Self::linked(robots, keep, fraction, true).await
+    }
+
+    /// The same, linked in a line where the ring is not closed.
+    pub async fn linked(robots: u32, keep: usize, fraction: f64, closed: bool) -> Self {
         let swarm = unique("school");
         let shown = Arc::new(AtomicU8::new(0));
         let mut ring: Vec<Watched> = Vec::new();
         for id in 0..robots {
             let mut connect: Vec<String> = Vec::new();
             connect.extend(ring.last().map(|before| before.robot.locators()[0].clone()));
-            if id > 1 && id + 1 == robots {
+            if closed && id > 1 && id + 1 == robots {
                 connect.push(ring[0].robot.locators()[0].clone());
             }
             let config = RobotConfig {
@@ -55,7 +60,7 @@ impl School {
     }
 
     /// Shows a gesture for a round and says what it was.
-    async fn lesson(&mut self, class: u8) -> RoundId {
+    pub async fn lesson(&mut self, class: u8) -> RoundId {
         let round = self.show(class).await;
         let was = Instruction::Was { round, class: Gesture::Class(ClassId(class.into())) };
         let answer = self.client.teach(&self.ada, &was, PATIENCE).await.unwrap().expect("an answer");
@@ -64,7 +69,7 @@ impl School {
     }
 
     /// Shows a gesture for a round.
-    async fn show(&mut self, class: u8) -> RoundId {
+    pub async fn show(&mut self, class: u8) -> RoundId {
         self.shown.store(class, Ordering::Relaxed);
         let before = self.robots[0].robot.status().round.map_or(0, |round| round.counter);
         self.client.instruct(&self.ada, &Instruction::Open).await.unwrap();
@@ -80,7 +85,7 @@ impl School {
     }
 
     /// Waits until what all robots have learned is as `pick` says.
-    async fn all(&self, pick: impl Fn(&gestalt_protocol::LearningStatus) -> bool) -> bool {
+    pub async fn all(&self, pick: impl Fn(&gestalt_protocol::LearningStatus) -> bool) -> bool {
         let deadline = tokio::time::Instant::now() + PATIENCE;
         loop {
             let learned = |status: &Status| status.learning.as_ref().is_some_and(&pick);
@@ -94,7 +99,7 @@ impl School {
         }
     }
 
-    async fn end(self) {
+    pub async fn end(self) {
         self.client.close().await;
         for robot in self.robots {
             robot.stop().await;

@@ -17,6 +17,7 @@ mod line;
 mod memory;
 mod mixed;
 mod motion;
+mod naming;
 mod page;
 mod partition;
 mod pause;
@@ -64,6 +65,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Namespaces] line::the_eighth_in_a_line_decides_what_the_first_two_see,
         [Waits, Namespaces] ring::a_ring_goes_on_after_a_relay_is_killed,
         [Waits] in_process::what_the_first_two_of_a_line_see_the_last_decides.await,
+        [Waits] naming::a_gesture_that_is_named_and_shown_five_times_is_known_to_all_of_a_line.await,
         [Waits] learning::a_correction_and_an_undo_reach_every_robot.await,
         [Waits] learning::forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_them.await,
         [Works] learning::a_robot_votes_and_decides_while_it_trains.await,

@@ -278,7 +278,8 @@ function showRounds() {
     cell.title = `round ${it.round.counter}: ${it.label ?? it.outcome ?? "undecided"}, ${percent(it.confidence)}, ${verdict}`;
   });
   showCurve(curve.slice(-120));
-  const told = { was: (it) => `it was ${it.gesture}`, right: () => "right", wrong: () => "wrong", retract: () => "took it back" };
+  const told = { was: (it) => `it was ${it.gesture}`, right: () => "right", wrong: () => "wrong", retract: () => "took it back",
+    new: (it) => `this is ${it.gesture}, a new one` };
   lines("said", "no-said", said.slice(0, 6), (it) => `${it.instructor} ${it.round.counter}@${it.round.opener}-${it.round.life} ${it.word} ${it.gesture}`, (it) => [
     `${it.instructor}, round ${it.round.counter}`, `“${told[it.word](it)}” → ${it.words}`,
   ]);
@@ -321,6 +322,7 @@ function buttons() {
   $("look").disabled = !live || waiting;
   for (const id of ["right", "wrong"]) $(id).disabled = !can || !it || it.class === null;
   $("undo").disabled = !can || !it;
+  $("name-it").disabled = !live || waiting;
   $("was").classList.toggle("off", !can || !it);
   for (const button of $("gestures").children) button.disabled = !can || !it;
 }
@@ -469,6 +471,15 @@ $("look").addEventListener("click", () => say({ say: "open" }));
 for (const word of ["right", "wrong"]) {
   $(word).addEventListener("click", () => say({ say: word, round: state.decision.round, of: state.decision.class }));
 }
+$("new").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const label = $("new-label").value.trim();
+  if (!label) return;
+  $("new-label").value = "";
+  $("naming").open = false;
+  const it = state.decision;
+  say(it && settled ? { say: "new", label, round: it.round } : { say: "new", label });
+});
 $("undo").addEventListener("click", () => say({ say: "retract", round: state.decision.round }));
 $("certificate").addEventListener("click", save);
 addEventListener("hashchange", () => location.reload());

@@ -219,16 +219,19 @@ async fn said(
         client.instruct(instructor, &Instruction::Open).await?;
         return Ok("asked for a round".to_owned());
     }
-    let last = last.ok_or("no round has been decided yet: say 'open'")?.decision;
-    let Some(instruction) = word.about(last.round, last.class)? else {
-        return Err(
-            "this is a word for a keyboard: use open, was GESTURE, class NUMBER, right, wrong or undo".into(),
-        );
+    let instruction = match word.of_names(None) {
+        Some(instruction) => instruction,
+        None => {
+            let last = last.ok_or("no round has been decided yet: say 'open'")?.decision;
+            word.about(last.round, last.class)?.ok_or(
+                "this is a word for a keyboard: use open, was GESTURE, class NUMBER, right, wrong, undo or new LABEL",
+            )?
+        }
     };
     let answer = client.teach(instructor, &instruction, ANSWERED_WITHIN).await?;
     let answer =
         answer.ok_or_else(|| format!("no answer within {ANSWERED_WITHIN:?}: is a robot running?"))?;
-    Ok(show::answer(&answer))
+    Ok(show::answer(&answer, &show::Names::default()))
 }
 
 /// The time since 1970; none of a machine that lives before.

@@ -78,6 +78,11 @@ impl Names {
         self.0.iter().find(|vocabulary| vocabulary.id() == certificate.vocabulary)
     }
 
+    /// What any of the robots calls a gesture.
+    fn title(&self, class: ClassId) -> Option<&str> {
+        self.0.iter().find_map(|vocabulary| vocabulary.label(class))
+    }
+
     /// A gesture in words: `"three"`, or `class 3` where there is no name for it.
     pub(super) fn gesture(&self, class: ClassId, certificate: &Certificate) -> String {
         let label = self.of(certificate).and_then(|vocabulary| vocabulary.label(class));
@@ -172,7 +177,21 @@ pub(super) fn opened(RoundId { counter, opener, .. }: RoundId) -> String {
 }
 
 /// What the swarm says to a word of feedback: `round 5: learned; robot 1 learns from 8 samples of this round`.
-pub(super) fn answer(answer: &Answer) -> String {
+pub(super) fn answer(answer: &Answer, names: &Names) -> String {
+    let named = match &answer.to {
+        Instruction::New { label, .. } => Some(quoted(label)),
+        Instruction::Same { class, .. } | Instruction::Retire { class } | Instruction::Restore { class } => {
+            Some(clean(&class.to_string()))
+        }
+        _ => None,
+    };
+    if let Some(named) = named.filter(|_| answer.to.round().is_none()) {
+        return format!("{named}: {}", answer.outcome.describe());
+    }
+    let alike = answer.looks_like.map(|class| match names.title(class) {
+        Some(title) => format!("; it looks like {}: the two may be hard to tell apart", quoted(title)),
+        None => format!("; it looks like class {class}: the two may be hard to tell apart"),
+    });
     let samples = match (&answer.to, answer.samples) {
         (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
         (_, samples) => {
@@ -181,7 +200,7 @@ pub(super) fn answer(answer: &Answer) -> String {
         }
     };
     let round = answer.to.round().map(|round| format!("round {}: ", round.counter)).unwrap_or_default();
-    format!("{round}{}; {samples}", answer.outcome.describe())
+    format!("{round}{}; {samples}{}", answer.outcome.describe(), alike.unwrap_or_default())
 }
 
 /// `1 vote`, `8 votes`.

@@ -4,7 +4,7 @@ use std::io::BufRead;
 use std::pin::pin;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, InstructorId, RoundId};
+use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, InstructorId, RoundId};
 use serde_json::json;
 use tokio::sync::mpsc;
 
@@ -20,19 +20,25 @@ use gestalt_link::{Client, News};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt teach open -e tcp/192.168.1.5:7447
-  gestalt teach was three --round 5@2-3f9a01c7")]
+  gestalt teach was three --round 5@2-3f9a01c7
+  gestalt teach new circle --shows 5")]
 pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
     /// `open`: start a round. `was GESTURE`: it was that gesture. `right`, `wrong`: the decision was. `undo`: withdraw my
-    /// last feedback
+    /// last feedback. `new LABEL`: name a gesture that the swarm does not know yet. `same GESTURE as GESTURE`: the first is the
+    /// second. `retire GESTURE`, `restore GESTURE`: it is shown no more, or again
     #[arg(value_name = "COMMAND")]
     words: Vec<String>,
 
     /// Round the feedback is about, such as `5@2-3f9a01c7` (counter@opener-life) [default: the last one decided]
     #[arg(long)]
     round: Option<RoundId>,
+
+    /// After `new`: show it so many times now, each in a round of its own
+    #[arg(long, default_value_t = 0, value_name = "TIMES", value_parser = clap::value_parser!(u32).range(0..=100))]
+    shows: u32,
 
     /// Instructor name
     #[arg(long, default_value = "console")]
@@ -54,6 +60,9 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let words: Vec<&str> = args.words.iter().map(String::as_str).collect();
     let word = if words.is_empty() { None } else { Some(Word::read(&words)?) };
+    if args.shows > 0 && !matches!(word, Some(Word::New(_))) {
+        return Err("--shows goes with 'new LABEL'".into());
+    }
     let (swarm, link) = args.config.client()?;
     super::runtime()?.block_on(async {
         let client = Client::open(&swarm, &link).await?;
@@ -66,6 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         };
         let mut lesson = Lesson { args, client, news, last, names: Names::default() };
         let said = match word {
+            Some(Word::New(label)) => lesson.name(label).await,
             Some(word) => lesson.say(word).await,
             None => lesson.converse().await,
         };
@@ -119,19 +129,50 @@ impl Lesson<'_> {
         }
     }
 
+    /// Names a gesture, and has it shown as often as wished.
+    async fn name(&mut self, label: String) -> Result<(), Failure> {
+        let named = self.tell(&Instruction::New { label: label.clone(), round: self.args.round }).await?;
+        let Some(class) = named.class else { return Err(named.outcome.describe().into()) };
+        for show in 1..=self.args.shows {
+            if !self.args.json {
+                eprintln!(
+                    "Show {} now, {show} of {}, a little otherwise each time.",
+                    show::quoted(&label),
+                    self.args.shows
+                );
+            }
+            self.open().await?;
+            let Some((round, _)) = self.last else { continue };
+            self.tell(&Instruction::Was { round, class: Gesture::Class(class) }).await?;
+        }
+        Ok(())
+    }
+
     async fn say(&mut self, word: Word) -> Result<(), Failure> {
         if word == Word::Open {
             return self.open().await;
+        }
+        if let Some(instruction) = word.of_names(self.args.round) {
+            return self.tell(&instruction).await.map(|_| ());
         }
         let (round, decided) = self
             .last
             .ok_or("no round has been decided yet: open one with 'open', or name one with --round")?;
         let Some(instruction) = word.about(round, decided)? else { return Ok(()) };
+        self.tell(&instruction).await.map(|_| ())
+    }
+
+    /// Says it to the swarm, and prints the answer.
+    async fn tell(&mut self, instruction: &Instruction) -> Result<Answer, Failure> {
         let timeout = self.args.timeout;
-        let answer = self.client.teach(&self.args.instructor, &instruction, timeout).await?;
+        let answer = self.client.teach(&self.args.instructor, instruction, timeout).await?;
         let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
-        let words = show::answer(&answer);
-        line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)
+        if answer.looks_like.is_some() && !self.args.json {
+            self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
+        }
+        let words = show::answer(&answer, &self.names);
+        line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)?;
+        Ok(answer)
     }
 
     async fn open(&mut self) -> Result<(), Failure> {

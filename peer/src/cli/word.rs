@@ -1,4 +1,4 @@
-//! The words of an instructor: `open`, `was three`, `right`, `wrong`, `undo`.
+//! The words of an instructor: `open`, `was three`, `right`, `wrong`, `undo`, `new circle`, `same ring as circle`, `retire circle`, `restore circle`.
 
 use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
 
@@ -10,6 +10,10 @@ pub(super) enum Word {
     Right,
     Wrong,
     Undo,
+    New(String),
+    Same(Gesture, Gesture),
+    Retire(Gesture),
+    Restore(Gesture),
     Quit,
 }
 
@@ -26,15 +30,39 @@ impl Word {
             ["undo"] => Ok(Self::Undo),
             ["quit" | "exit"] => Ok(Self::Quit),
             // A bare number may be the label of a gesture, and mostly is.
-            ["was", gesture] => Ok(Self::Was(Gesture::Label((*gesture).to_owned()))),
+            ["was", gesture @ ..] if !gesture.is_empty() => Ok(Self::Was(called(gesture))),
+            ["new", label @ ..] if !label.is_empty() => Ok(Self::New(label.join(" "))),
+            ["same", gestures @ ..] => {
+                let parts = gestures.iter().position(|word| *word == "as").map(|at| gestures.split_at(at));
+                match parts {
+                    Some((class @ [_, ..], ["as", of @ ..])) if !of.is_empty() => {
+                        Ok(Self::Same(called(class), called(of)))
+                    }
+                    _ => Err("say which is the same as which: 'same ring as circle'".to_owned()),
+                }
+            }
+            ["retire", gesture @ ..] if !gesture.is_empty() => Ok(Self::Retire(called(gesture))),
+            ["restore", gesture @ ..] if !gesture.is_empty() => Ok(Self::Restore(called(gesture))),
             ["class", number] => number
                 .parse()
                 .map(|class| Self::Was(Gesture::Class(ClassId(class))))
                 .map_err(|_| format!("'{number}' is not a class number: write, for example, 'class 3'")),
             other => Err(format!(
-                "unknown command '{}': use open, was GESTURE, class NUMBER, right, wrong, undo or quit",
+                "unknown command '{}': use open, was GESTURE, class NUMBER, right, wrong, undo, new LABEL, \
+                 same GESTURE as GESTURE, retire GESTURE, restore GESTURE or quit",
                 other.join(" ")
             )),
+        }
+    }
+
+    /// The word about a gesture's name, which needs no round.
+    pub(super) fn of_names(&self, round: Option<RoundId>) -> Option<Instruction> {
+        match self.clone() {
+            Self::New(label) => Some(Instruction::New { label, round }),
+            Self::Same(class, of) => Some(Instruction::Same { class, of }),
+            Self::Retire(class) => Some(Instruction::Retire { class }),
+            Self::Restore(class) => Some(Instruction::Restore { class }),
+            Self::Open | Self::Was(_) | Self::Right | Self::Wrong | Self::Undo | Self::Quit => None,
         }
     }
 
@@ -57,9 +85,15 @@ impl Word {
             Self::Right => Some(Instruction::Right { round, of: of()? }),
             Self::Wrong => Some(Instruction::Wrong { round, of: of()? }),
             Self::Undo => Some(Instruction::Retract { round }),
-            Self::Open | Self::Quit => None,
+            Self::Open | Self::Quit | Self::New(_) | Self::Same(..) | Self::Retire(_) | Self::Restore(_) => {
+                None
+            }
         })
     }
+}
+
+fn called(words: &[&str]) -> Gesture {
+    Gesture::Label(words.join(" "))
 }
 
 #[cfg(test)]
@@ -80,7 +114,13 @@ mod tests {
         assert_eq!(read("was 3"), Ok(Word::Was(Gesture::Label("3".to_owned()))));
         assert_eq!(read("class 3"), Ok(Word::Was(Gesture::Class(ClassId(3)))));
         assert_eq!(read(" undo "), Ok(Word::Undo));
-        for wrong in ["it was 3", "class x", "was", "class 300"] {
+        let label = |label: &str| Gesture::Label(label.to_owned());
+        assert_eq!(read("was big circle (ana)"), Ok(Word::Was(label("big circle (ana)"))));
+        assert_eq!(read("new big circle"), Ok(Word::New("big circle".to_owned())));
+        assert_eq!(read("same ring as big circle"), Ok(Word::Same(label("ring"), label("big circle"))));
+        for wrong in
+            ["it was 3", "class x", "was", "new", "same ring", "same as ring", "same ring as", "retire"]
+        {
             assert!(read(wrong).is_err(), "{wrong}");
         }
     }

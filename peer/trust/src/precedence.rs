@@ -58,6 +58,8 @@ mod tests {
         let begin = Instruction::Open;
         assert!(words.permits(&ada, open, &begin) && !words.permits(&ada, Roles::NONE, &begin));
         assert!(!words.permits(&ada, open, &was(1)));
+        let new = Instruction::New { label: "circle".to_owned(), round: None };
+        assert!(!words.permits(&ada, open, &new) && words.permits(&ada, teach, &new));
         assert!(words.permits(&ada, teach, &was(1)) && words.permits(&ada, teach, &was(1)));
         assert!(!words.permits(&bob, teach, &was(1)), "ada said it first");
         assert!(words.permits(&bob, overrule, &was(1)) && words.permits(&bob, teach, &was(2)));

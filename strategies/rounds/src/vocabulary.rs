@@ -81,6 +81,12 @@ impl Vocabulary {
         self
     }
 
+    /// What all gestures are called: those of the list, then those that were named.
+    #[must_use]
+    pub fn shown(&self) -> Vec<String> {
+        self.labels.iter().chain(self.titles.values()).cloned().collect()
+    }
+
     /// Of how many gestures that were named it is known what they are called.
     #[must_use]
     pub fn titles(&self) -> usize {

@@ -121,7 +121,7 @@ impl View {
     #[must_use]
     pub fn swarm(&self, now: Duration) -> SwarmView {
         let robots = self.present().map(|(id, robot)| robot.view(*id, now)).collect();
-        let vocabulary = self.vocabulary().map(|it| it.labels().to_vec()).unwrap_or_default();
+        let vocabulary = self.vocabulary().map(Vocabulary::shown).unwrap_or_default();
         SwarmView { robots, vocabulary, trouble: self.trouble(now) }
     }
 

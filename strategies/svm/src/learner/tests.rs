@@ -115,3 +115,65 @@ fn stale_pairs_take_turns() {
     }
     assert_eq!(most, 1, "of six pairs, in one call");
 }
+
+fn named(label: &str) -> ClassId {
+    ClassId::named(&"ana".parse().unwrap(), label)
+}
+
+#[test]
+fn a_gesture_that_is_met_while_it_learns_is_told_apart_as_one_of_the_list() {
+    let mut rng = generator(5);
+    let mut learner = taught(80, &mut rng);
+    let before = learner.learn().unwrap();
+    let probe = vector(4, &mut rng);
+    for key in 0..20 {
+        learner.insert(1000 + key, named("circle"), &vector(4, &mut rng)).unwrap();
+    }
+    let grown = learner.learn().unwrap();
+    assert_eq!(grown.vocabulary().classes(), CLASSES + 1);
+    assert_eq!(grown.vocabulary().class_at(CLASSES), Some(named("circle")));
+    let p = grown.probabilities_in_space(&probe).unwrap();
+    assert!(p[CLASSES] > 0.5, "{p:?}");
+    assert!((p.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+
+    // As one that had met it from the beginning, whatever came between.
+    let mut other = self::learner();
+    let mut rng = generator(5);
+    let first: Vec<Vec<f32>> = (0..80).map(|key| vector(key % CLASSES, &mut rng)).collect();
+    let _ = vector(4, &mut rng);
+    for key in 0..20 {
+        other.insert(1000 + key, named("circle"), &vector(4, &mut rng)).unwrap();
+    }
+    for (key, vector) in first.iter().enumerate() {
+        other.insert(key as u64, ClassId((key % CLASSES) as u32), vector).unwrap();
+    }
+    let q = other.learn().unwrap().probabilities_in_space(&probe).unwrap();
+    let apart = p.iter().zip(&q).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max);
+    assert!(apart < 0.05, "{p:?} {q:?}");
+
+    // Shown no more, it leaves no trace, and its place is another's.
+    (0..20).for_each(|key| assert!(learner.remove(1000 + key)));
+    let without = learner.learn().unwrap();
+    assert_eq!(without.vocabulary(), before.vocabulary());
+    for key in 0..3 {
+        learner.insert(2000 + key, named("fist"), &vector(4, &mut rng)).unwrap();
+    }
+    assert_eq!(learner.pairs.len(), pairs(CLASSES + 1).count());
+    assert_eq!(learner.learn().unwrap().vocabulary().named(), [named("fist")]);
+}
+
+#[test]
+fn there_is_room_for_so_many_gestures_and_no_more() {
+    let mut rng = generator(6);
+    let mut learner = learner();
+    for n in 0..60_u64 {
+        learner.insert(n, named(&n.to_string()), &vector(0, &mut rng)).unwrap();
+    }
+    let full = learner.insert(60, named("60"), &vector(0, &mut rng));
+    assert_eq!(full, Err(LearnError::Class(named("60"))));
+    assert_eq!(learner.len(), 60);
+    assert!(learner.remove(7));
+    learner.insert(60, named("60"), &vector(0, &mut rng)).unwrap();
+    let unlisted = learner.insert(61, ClassId(4), &vector(0, &mut rng));
+    assert_eq!(unlisted, Err(LearnError::Class(ClassId(4))));
+}

@@ -4,6 +4,7 @@ mod agreeing;
 mod deciding;
 mod expelling;
 mod flooding;
+mod naming;
 mod opening;
 mod order;
 mod repair;
