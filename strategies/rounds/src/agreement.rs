@@ -85,15 +85,23 @@ impl Agreement {
     }
 
     /// Whether so many robots are known to hold the class held here: by their own words, and this one, `me`, and its guests, who hold
-    /// what it holds.
+    /// what it holds. Those alone count of whom that is said.
     #[must_use]
-    pub fn is_final(&self, quorum: u32, me: RobotId, guests: &BTreeSet<RobotId>) -> bool {
+    pub fn is_final(
+        &self,
+        quorum: u32,
+        me: RobotId,
+        guests: &BTreeSet<RobotId>,
+        counts: impl Fn(RobotId) -> bool,
+    ) -> bool {
         let Some(class) = self.held().and_then(|held| held.class) else { return false };
         let holds = |holder: &&Holder| {
             let Holder { robot, holding, .. } = holder;
-            holding.class == Some(class) && !holding.changed && *robot != me && !guests.contains(robot)
+            let other = *robot != me && !guests.contains(robot);
+            holding.class == Some(class) && !holding.changed && other && counts(*robot)
         };
-        let own = if self.has_changed() { 0 } else { 1 + guests.len() };
+        let through_this = guests.iter().chain([&me]).filter(|robot| counts(**robot));
+        let own = if self.has_changed() { 0 } else { through_this.count() };
         own + self.holders().filter(holds).count() >= quorum as usize
     }
 
@@ -266,7 +274,7 @@ mod tests {
     /// The most robots that it is known to be held by, of which robot 1 is this one.
     fn held_by(agreement: &Agreement, guests: &[u32]) -> Option<u32> {
         let guests = guests.iter().copied().map(RobotId).collect();
-        (1..99).rfind(|quorum| agreement.is_final(*quorum, RobotId(1), &guests))
+        (1..99).rfind(|quorum| agreement.is_final(*quorum, RobotId(1), &guests, |_| true))
     }
 
     #[test]
@@ -312,7 +320,7 @@ mod tests {
         agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(100), true);
         let due = |agreement: &Agreement| {
-            let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new());
+            let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new(), |_| true);
             agreement.announcement(at(200), is_final, at(5000))
         };
         assert_eq!(due(&agreement), Some(at(5300)));

@@ -128,6 +128,19 @@ impl Ballot {
         self.scales.get(&(scale.vocabulary.0, scale.classes)).copied().unwrap_or_default()
     }
 
+    /// How many of these robots take part, seeing or not.
+    #[must_use]
+    pub fn reached_of(&self, robots: &BTreeSet<RobotId>) -> usize {
+        robots.iter().filter(|robot| self.votes.contains_key(robot)).count()
+    }
+
+    /// How many of these robots gave evidence on that scale.
+    #[must_use]
+    pub fn contributors_of(&self, scale: Scale, robots: &BTreeSet<RobotId>) -> usize {
+        let gave = |robot: &&RobotId| self.votes.get(robot).is_some_and(|held| scale.is_of(&held.vote));
+        robots.iter().filter(gave).count()
+    }
+
     /// All evidence on that scale as one distribution, with "unknown" as a last class where any of the robots can tell; `None` when there is
     /// none, or the rule makes none of it. Of the gestures it is asked only which of those it is that any of the robots was taught.
     #[must_use]

@@ -15,6 +15,7 @@ mod agreement;
 mod alike;
 mod ballot;
 mod classify;
+mod committee;
 mod config;
 mod correlated;
 mod electorate;

@@ -32,6 +32,7 @@ pub(crate) struct Round {
     pub agreement: Agreement,
     evidence: Option<Evidence>,
     said: Option<Said>,
+    voice: Voice,
     /// Whether this robot has drawn its own conclusion.
     concluded: bool,
     /// When it ends undecided, if before its deadline.
@@ -40,6 +41,17 @@ pub(crate) struct Round {
     pub hurried: bool,
     /// Its other names, under which robots opened it at the same time.
     names: BTreeSet<RoundId>,
+}
+
+/// What a robot says in a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Voice {
+    /// What it sees.
+    Votes,
+    /// Only that there is a round, which it opened: others vote.
+    Opens,
+    /// Nothing: others vote.
+    Silent,
 }
 
 /// This robot's vote as it was last said.
@@ -61,6 +73,7 @@ impl Round {
             agreement: Agreement::default(),
             evidence: None,
             said: None,
+            voice: Voice::Votes,
             concluded: false,
             ends: None,
             hurried: false,
@@ -116,10 +129,22 @@ impl Round {
             *evidence = Evidence::new(classes);
         }
         if evidence.add(frame, config.decorrelation)
+            && self.voice == Voice::Votes
             && let Some(said) = &mut self.said
         {
             said.outdated = true;
         }
+    }
+
+    /// What this robot says in it from now on.
+    pub fn speak_as(&mut self, voice: Voice) {
+        if std::mem::replace(&mut self.voice, voice) != voice {
+            self.outdate();
+        }
+    }
+
+    pub fn voice(&self) -> Voice {
+        self.voice
     }
 
     /// This robot's vote has to be said anew, though it saw nothing new.
@@ -149,7 +174,8 @@ impl Round {
 
     /// This robot's evidence as a vote.
     fn vote(&self, vocabulary: VocabularyId, clip: f64) -> Vote {
-        let (evidence, unknown, looks) = match &self.evidence {
+        let own = self.evidence.as_ref().filter(|_| self.voice == Voice::Votes);
+        let (evidence, unknown, looks) = match own {
             Some(evidence) => {
                 let (clipped, unknown) = evidence.clipped_with_unknown(clip);
                 (clipped, unknown, evidence.looks() as f32)
@@ -186,7 +212,7 @@ impl Round {
     /// When this robot's vote is to be said (again).
     pub fn vote_due(&self, config: &RoundsConfig) -> Option<Duration> {
         match &self.said {
-            _ if !self.open => None,
+            _ if !self.open || self.voice == Voice::Silent => None,
             None => Some(self.since),
             Some(said) if said.outdated => Some(said.at + config.vote_interval),
             Some(said) => Some(said.at + config.vote_repeat),
@@ -214,7 +240,8 @@ impl Round {
     /// Whether nothing is to be waited for any more. A robot that has not seen anything yet may be about to: its camera may take a frame in half a
     /// second.
     fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
-        let mut robots = view.expected.iter().chain([&view.me]);
+        let own = Some(&view.me).filter(|_| self.voice == Voice::Votes);
+        let mut robots = view.expected.iter().chain(own);
         self.hurried
             || now >= self.since + config.patience
             || robots.all(|robot| self.ballot.has_spoken(*robot))
@@ -257,7 +284,15 @@ impl Round {
         {
             return;
         }
-        let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
+        let suffice = contributors > 0
+            && match (view.committee, scale) {
+                (Some(members), Some(scale)) => config.suffice(
+                    self.ballot.reached_of(members),
+                    self.ballot.contributors_of(scale, members),
+                    view.robots,
+                ),
+                _ => config.suffice(self.ballot.len(), contributors, view.robots),
+            };
         if !(late || suffice && self.has_heard_all(now, view, config)) {
             return;
         }
@@ -322,6 +357,8 @@ pub(crate) struct View<'a> {
     pub expected: &'a BTreeSet<RobotId>,
     /// How many robots there are.
     pub robots: u32,
+    /// Who was drawn to vote, where not all are.
+    pub committee: Option<&'a BTreeSet<RobotId>>,
     /// The scale of this robot's own classifier.
     pub scale: Option<Scale>,
 }

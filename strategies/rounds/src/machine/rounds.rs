@@ -7,6 +7,7 @@ use std::time::Duration;
 use gestalt_protocol::{Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
+use super::committee::Committee;
 use super::follow::Follow;
 use super::input::Input;
 use super::output::Output;
@@ -70,7 +71,7 @@ const BURST: u32 = 16;
 ///
 /// // Neither is sure enough alone; together they are.
 /// let saw = |p: f32| Input::Observed(Observation { features: vec![1.0 - p, p], quality: 1.0 });
-/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.85)), (1, saw(0.9))];
+/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.93)), (1, saw(0.94))];
 /// let mut decided = Vec::new();
 /// for ms in 1..1000 {
 ///     let now = Duration::from_millis(ms);
@@ -114,6 +115,8 @@ pub struct Rounds {
     /// The counter that this life began with, and when it began.
     pub(super) began: (u32, Option<Duration>),
     pub(super) electorate: Electorate,
+    /// Who votes in the newest round, where not all do.
+    pub(super) committee: Option<Committee>,
     /// The greatest decision that a robot said it holds and that is lacking here, and when it is asked for.
     pub(super) wanted: Option<Wanted>,
     /// The other robots alive, guests among them.
@@ -166,7 +169,8 @@ impl Rounds {
             round: None,
             highest: None,
             began: (0, None),
-            electorate: Electorate::default(),
+            electorate: Electorate::new(config.all_vote_up_to()),
+            committee: None,
             wanted: None,
             alive: BTreeSet::new(),
             turns: 0,
