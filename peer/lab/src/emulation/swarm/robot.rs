@@ -1,6 +1,7 @@
 //! One robot: its mind, its eyes, and what waits for it.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::rc::Rc;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
@@ -29,7 +30,7 @@ pub(super) struct Robot {
     /// None of a robot that does not learn.
     pub pupil: Option<Pupil>,
     /// Whom it believes alive, and whom it believes itself linked to.
-    pub knows: (BTreeSet<usize>, Vec<usize>),
+    pub knows: (Rc<BTreeSet<RobotId>>, Vec<usize>),
     pub lies: Option<Lies>,
     pub poison: Option<Poisoner>,
 }
