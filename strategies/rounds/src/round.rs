@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, Decision, Envelope, HeldVote, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Certificate, Decision, Envelope, HeldVote, Message, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 use crate::agreement::Agreement;
@@ -35,6 +35,8 @@ pub(crate) struct Round {
     voice: Voice,
     /// Whether this robot has drawn its own conclusion.
     concluded: bool,
+    /// What it last tried to conclude from, in vain.
+    tried: Option<Tried>,
     /// When it ends undecided, if before its deadline.
     ends: Option<Duration>,
     /// Whether others go on to the next one: then nothing more is waited for.
@@ -52,6 +54,21 @@ pub(crate) enum Voice {
     Opens,
     /// Nothing: others vote.
     Silent,
+}
+
+/// All that a conclusion depends on which may change while robots come and go no more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tried {
+    /// How often the ballot has changed.
+    votes: u64,
+    robots: u32,
+    scale: Option<Scale>,
+    pool: Option<Pool>,
+    /// Whether there is a decision for a gesture already, and of how many votes.
+    best: Option<usize>,
+    hurried: bool,
+    waits: bool,
+    late: bool,
 }
 
 /// This robot's vote as it was last said.
@@ -75,6 +92,7 @@ impl Round {
             said: None,
             voice: Voice::Votes,
             concluded: false,
+            tried: None,
             ends: None,
             hurried: false,
             names: BTreeSet::new(),
@@ -139,6 +157,7 @@ impl Round {
     /// What this robot says in it from now on.
     pub fn speak_as(&mut self, voice: Voice) {
         if std::mem::replace(&mut self.voice, voice) != voice {
+            self.tried = None;
             self.outdate();
         }
     }
@@ -263,6 +282,16 @@ impl Round {
         (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
     }
 
+    /// Whether it is still to be concluded.
+    pub fn is_unconcluded(&self) -> bool {
+        self.open && !self.concluded
+    }
+
+    /// Robots have come or gone: what was tried in vain is tried again.
+    pub fn look_again(&mut self) {
+        self.tried = None;
+    }
+
     /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline. Who holds the decision of
     /// another goes on to conclude when it knows of more evidence than that rests on.
     pub fn conclude(&mut self, now: Duration, view: &View<'_>, rule: &dyn Fuse, config: &RoundsConfig) {
@@ -276,6 +305,20 @@ impl Round {
             return;
         }
         let scale = view.scale.or_else(|| self.ballot.prevailing_scale());
+        let best = self.agreement.best().filter(|best| best.class.is_some());
+        let tried = Tried {
+            votes: self.ballot.changes(),
+            robots: view.robots,
+            scale,
+            pool: rule.pool(),
+            best: best.map(|best| best.certificate.votes.len()),
+            hurried: self.hurried,
+            waits: now < patience,
+            late,
+        };
+        if self.tried.replace(tried) == Some(tried) {
+            return;
+        }
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
         if self
             .agreement
@@ -284,16 +327,22 @@ impl Round {
         {
             return;
         }
-        let suffice = contributors > 0
-            && match (view.committee, scale) {
-                (Some(members), Some(scale)) => config.suffice(
-                    self.ballot.reached_of(members),
-                    self.ballot.contributors_of(scale, members),
-                    view.robots,
-                ),
-                _ => config.suffice(self.ballot.len(), contributors, view.robots),
-            };
-        if !(late || suffice && self.has_heard_all(now, view, config)) {
+        let suffice = || {
+            contributors > 0
+                && match (view.committee, scale) {
+                    (Some(members), Some(scale)) => config.suffice(
+                        self.ballot.reached_of(members),
+                        self.ballot.contributors_of(scale, members),
+                        view.robots,
+                    ),
+                    _ => config.suffice(self.ballot.len(), contributors, view.robots),
+                }
+        };
+        if !(late || self.has_heard_all(now, view, config)) {
+            return;
+        }
+        let suffice = suffice();
+        if !(late || suffice) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));

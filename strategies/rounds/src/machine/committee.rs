@@ -44,6 +44,7 @@ impl Rounds {
         let count = self.electorate.count();
         let before = self.committee.take();
         let Some(round) = self.round.as_mut() else { return };
+        round.look_again();
         let size = self.config.committee_of(count);
         self.committee = size.map(|size| {
             let members = self.electorate.members(&self.alive).chain([self.me]);

@@ -51,10 +51,12 @@ impl Rounds {
         let view = View { me: self.me, expected: &expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
-        let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
-        let fitted = learned.and_then(|pool| self.fusion.with(pool));
-        let rule = fitted.as_deref().unwrap_or(&*self.fusion);
-        round.conclude(self.now, &view, rule, &self.config);
+        if round.is_unconcluded() {
+            let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
+            let fitted = learned.and_then(|pool| self.fusion.with(pool));
+            let rule = fitted.as_deref().unwrap_or(&*self.fusion);
+            round.conclude(self.now, &view, rule, &self.config);
+        }
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
@@ -96,6 +98,10 @@ impl Rounds {
     pub(super) fn announcement(&self) -> Option<Duration> {
         let wait = self.config.settle.saturating_add(self.turn());
         let agreement = &self.round.as_ref()?.agreement;
+        // Asked at every input: that many hold it is counted only while there is something to announce.
+        if agreement.held().is_none() || agreement.is_announced() {
+            return None;
+        }
         agreement.announcement(wait, self.is_final(agreement), self.config.deadline)
     }
 

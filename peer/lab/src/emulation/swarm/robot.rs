@@ -36,12 +36,12 @@ pub(super) struct Robot {
 }
 
 impl Robot {
-    /// A robot that was never started.
+    /// A robot that was never started. If it learns: whether it may ever be started again.
     pub fn new(
         id: RobotId,
         observer: Box<dyn Observer>,
         seed: u64,
-        learns: bool,
+        learns: Option<bool>,
         (lies, poison): (Option<Lies>, Option<Poisoner>),
     ) -> Self {
         Self {
@@ -54,7 +54,7 @@ impl Robot {
             looking: false,
             looks: 0,
             waiting: VecDeque::new(),
-            pupil: learns.then(Pupil::default),
+            pupil: learns.map(Pupil::new),
             knows: Default::default(),
             lies,
             poison,
