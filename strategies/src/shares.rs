@@ -102,7 +102,7 @@ impl Shares {
     }
 
     /// How many robots there are; `None` for one that knows of no other.
-    fn robots(&self) -> Option<usize> {
+    pub fn robots(&self) -> Option<usize> {
         (!self.alive.is_empty()).then(|| self.alive.len() + 1)
     }
 }

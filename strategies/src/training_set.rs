@@ -122,6 +122,12 @@ impl TrainingSet {
         self.shares.meet(self.me(), alive)
     }
 
+    /// How many robots there are, this one included, as far as it was told.
+    #[must_use]
+    pub fn robots(&self) -> usize {
+        self.shares.robots().unwrap_or(1)
+    }
+
     /// Takes up a set as it was when stored, into one that is still empty: samples with their keys and parts, what
     /// was seen, and the next key. If more samples were stored than the capacity, [`trim`](Self::trim) brings them down.
     ///

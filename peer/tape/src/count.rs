@@ -29,7 +29,10 @@ pub(crate) fn count(
     let (rule, clip) = (fitted.as_deref().unwrap_or(&config.rule), config.clip);
     let Some(fusion) = ballot.fuse(rule, clip, scale) else { return Count::default() };
     let counted = ballot.counted(rule, clip, scale);
-    let decides = config.suffice(ballot.len(), counted.len(), robots)
+    let counter = counted.first().map_or(0, |counted| counted.vote.round.counter);
+    let reached = ballot.stamps().map(|(robot, _)| robot);
+    let contributors = counted.iter().map(|counted| counted.robot);
+    let decides = config.suffice_of(counter, reached, contributors, robots)
         && config.convinces(ballot.withstands(rule, config, scale, &fusion));
     let known = fusion.top.index() < scale.classes;
     let class = (decides && known).then_some(fusion.top);

@@ -11,6 +11,8 @@ use gestalt_protocol::{ClassId, Decision, Fnv1a, Holder, MAX_ROBOTS, Rank, Robot
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
     best: Option<Decision>,
+    /// Its rank, which all its votes are added up for.
+    best_rank: Option<Rank>,
     /// What each robot said last that it holds, this one among them. At most [`MAX_ROBOTS`].
     holders: BTreeMap<RobotId, Holder>,
     held: Option<Held>,
@@ -22,6 +24,7 @@ pub struct Agreement {
 #[derive(Clone, Debug, PartialEq)]
 struct Held {
     decision: Decision,
+    rank: Rank,
     since: Duration,
     /// When the class last changed, or was first contradicted by an announcement.
     unsettled: Duration,
@@ -58,6 +61,7 @@ impl Agreement {
         };
         self.holders.retain(|robot, _| !robots.contains(robot));
         let forgotten = self.best.take_if(|best| counts(best)).is_some();
+        self.best_rank.take_if(|_| forgotten);
         self.held.take_if(|held| counts(&held.decision)).is_some() || forgotten
     }
 
@@ -85,15 +89,26 @@ impl Agreement {
     }
 
     /// Whether so many robots are known to hold the class held here: by their own words, and this one, `me`, and its guests, who hold
-    /// what it holds.
+    /// what it holds. Those alone count of whom that is said.
     #[must_use]
-    pub fn is_final(&self, quorum: u32, me: RobotId, guests: &BTreeSet<RobotId>) -> bool {
+    pub fn is_final(
+        &self,
+        quorum: u32,
+        me: RobotId,
+        guests: &BTreeSet<RobotId>,
+        counts: impl Fn(RobotId) -> bool,
+    ) -> bool {
         let Some(class) = self.held().and_then(|held| held.class) else { return false };
         let holds = |holder: &&Holder| {
             let Holder { robot, holding, .. } = holder;
-            holding.class == Some(class) && !holding.changed && *robot != me && !guests.contains(robot)
+            let other = *robot != me && !guests.contains(robot);
+            holding.class == Some(class) && !holding.changed && other && counts(*robot)
         };
-        let own = if self.has_changed() { 0 } else { 1 + guests.len() };
+        let through_this = guests.iter().chain([&me]).filter(|robot| counts(**robot));
+        let own = if self.has_changed() { 0 } else { through_this.count() };
+        if own + self.holders.len() < quorum as usize {
+            return false;
+        }
         own + self.holders().filter(holds).count() >= quorum as usize
     }
 
@@ -105,9 +120,10 @@ impl Agreement {
 
     /// Takes the greater of this decision and the best known one. A robot's own conclusion needs no witnesses.
     pub fn believe(&mut self, decision: Decision) -> bool {
-        let greater = self.best.as_ref().is_none_or(|best| decision.rank() > best.rank());
+        let rank = decision.rank();
+        let greater = self.best_rank.is_none_or(|best| rank > best);
         if greater {
-            self.best = Some(decision);
+            (self.best, self.best_rank) = (Some(decision), Some(rank));
         }
         greater
     }
@@ -116,15 +132,16 @@ impl Agreement {
     /// Returns the decision when it is newly held.
     pub fn settle(&mut self, now: Duration, or_none: bool) -> Option<&Decision> {
         let best = self.best.as_ref().filter(|best| best.class.is_some() || or_none)?;
+        let rank = self.best_rank?;
         match &mut self.held {
-            Some(held) if best.rank() <= held.decision.rank() => return None,
+            Some(held) if rank <= held.rank => return None,
             Some(held) => {
                 if best.class != held.decision.class {
                     held.unsettled = now;
                 }
-                held.decision = best.clone();
+                (held.decision, held.rank) = (best.clone(), rank);
             }
-            None => self.held = Some(Held { decision: best.clone(), since: now, unsettled: now }),
+            None => self.held = Some(Held { decision: best.clone(), rank, since: now, unsettled: now }),
         }
         self.first = self.first.or(best.class);
         self.held()
@@ -151,7 +168,7 @@ impl Agreement {
     /// The rank of the decision held.
     #[must_use]
     pub fn rank(&self) -> Option<Rank> {
-        self.held().map(Decision::rank)
+        self.held.as_ref().map(|held| held.rank)
     }
 
     /// Notes that this class was announced for the swarm, by whomever.
@@ -166,6 +183,13 @@ impl Agreement {
         {
             held.unsettled = now;
         }
+    }
+
+    /// Whether the class held was announced as final: then nothing is left to be announced.
+    #[must_use]
+    pub fn is_announced(&self) -> bool {
+        let held = self.held.as_ref().map(|held| held.decision.class);
+        self.announced.is_some_and(|announced| announced.is_final && Some(announced.class) == held)
     }
 
     /// When a robot that waits that long after the last change announces the decision held; `None` while there is
@@ -268,7 +292,7 @@ mod tests {
     /// The most robots that it is known to be held by, of which robot 1 is this one.
     fn held_by(agreement: &Agreement, guests: &[u32]) -> Option<u32> {
         let guests = guests.iter().copied().map(RobotId).collect();
-        (1..99).rfind(|quorum| agreement.is_final(*quorum, RobotId(1), &guests))
+        (1..99).rfind(|quorum| agreement.is_final(*quorum, RobotId(1), &guests, |_| true))
     }
 
     #[test]
@@ -314,7 +338,7 @@ mod tests {
         agreement.believe(decision(Some(1), 3, 0.96, 5));
         agreement.settle(at(100), true);
         let due = |agreement: &Agreement| {
-            let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new());
+            let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new(), |_| true);
             agreement.announcement(at(200), is_final, at(5000))
         };
         assert_eq!(due(&agreement), Some(at(5300)));

@@ -46,11 +46,34 @@ pub struct Ballot {
     votes: BTreeMap<RobotId, HeldVote>,
     /// How many votes there are of each vocabulary and number of gestures: asked at every input, in a swarm of thousands too.
     scales: BTreeMap<(u32, usize), usize>,
+    changes: Changes,
+}
+
+/// How often a ballot has changed: no part of what it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Changes(u64);
+
+impl PartialEq for Changes {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Ballot {
     /// Puts a vote in, if it is the latest of its robot.
     pub fn cast(&mut self, held: HeldVote) -> Cast {
+        let cast = self.put(held);
+        self.changes.0 += u64::from(cast == Cast::Counted);
+        cast
+    }
+
+    /// How often it has changed so far.
+    #[must_use]
+    pub(crate) fn changes(&self) -> u64 {
+        self.changes.0
+    }
+
+    fn put(&mut self, held: HeldVote) -> Cast {
         let full = self.votes.len() >= MAX_ROBOTS;
         match self.votes.entry(held.robot) {
             Entry::Occupied(known) if known.get().stamp >= held.stamp => Cast::Known,
@@ -73,6 +96,7 @@ impl Ballot {
         for robot in robots {
             if let Some(struck) = self.votes.remove(robot) {
                 discount(&mut self.scales, &struck);
+                self.changes.0 += 1;
             }
         }
     }
@@ -133,6 +157,19 @@ impl Ballot {
     #[must_use]
     pub fn columns(&self, scale: Scale) -> Columns {
         Columns::of(scale.classes, self.on(scale).map(|held| &held.vote))
+    }
+
+    /// How many of these robots take part, seeing or not.
+    #[must_use]
+    pub fn reached_of(&self, robots: &BTreeSet<RobotId>) -> usize {
+        robots.iter().filter(|robot| self.votes.contains_key(robot)).count()
+    }
+
+    /// How many of these robots gave evidence on that scale.
+    #[must_use]
+    pub fn contributors_of(&self, scale: Scale, robots: &BTreeSet<RobotId>) -> usize {
+        let gave = |robot: &&RobotId| self.votes.get(robot).is_some_and(|held| scale.is_of(&held.vote));
+        robots.iter().filter(gave).count()
     }
 
     /// All evidence on that scale as one distribution over its [`columns`](Self::columns), with "unknown" as a last class where any of the robots can tell; `None` when there is

@@ -82,6 +82,9 @@ pub struct RoundsConfig {
     /// and neither is to take itself for the whole.
     #[serde(with = "humantime_serde")]
     pub lately: Duration,
+    /// c: how many robots vote in a round, drawn by lot, in a swarm of more than one and a half times as many; those who are not drawn
+    /// conclude from their votes. To each liar that a decision must withstand four more. 0: all vote, however many there are.
+    pub committee: u32,
     /// f: how many lying robots a decision must withstand. Whichever f votes are left out, the others must decide the same; more than 2·f robots
     /// must give evidence; and a majority is more than (n + f) / 2 of n robots, all of which gave evidence.
     pub liars: u32,
@@ -130,6 +133,7 @@ impl Default for RoundsConfig {
             alpha: None,
             quorum: Quorum::Majority,
             lately: Duration::from_secs(120),
+            committee: 72,
             liars: 0,
             clip: 6.0,
             decorrelation: Duration::from_millis(500),
@@ -151,10 +155,12 @@ impl RoundsConfig {
     /// q: how many robots a decision needs, of so many.
     #[must_use]
     pub fn needs(&self, robots: u32) -> u32 {
-        match self.quorum {
+        match (self.quorum, self.committee_of(robots)) {
+            // Of a committee all liars may be members, or none, and speak all the same.
+            (Quorum::Majority, Some(size)) => (size / 2 + 1).saturating_add(self.liars),
             // Two majorities have an honest robot in common, whatever liars say to each (Malkhi & Reiter 1998).
-            Quorum::Majority => robots.saturating_add(self.liars) / 2 + 1,
-            Quorum::Evidence(quorum) => quorum,
+            (Quorum::Majority, None) => robots.saturating_add(self.liars) / 2 + 1,
+            (Quorum::Evidence(quorum), _) => quorum,
         }
     }
 
@@ -167,7 +173,8 @@ impl RoundsConfig {
         }
     }
 
-    /// Whether these are enough to decide: the robots that take part, those of them that gave evidence, and all there are.
+    /// Whether these are enough to decide: the robots that take part, those of them that gave evidence, and all there are. Of a large swarm
+    /// only those count who were drawn, see [`suffice_of`](Self::suffice_of).
     #[must_use]
     pub fn suffice(&self, reached: usize, contributors: usize, robots: u32) -> bool {
         let counted = match self.quorum {

@@ -19,9 +19,23 @@ pub(crate) struct Electorate {
     unheard: BTreeMap<RobotId, Duration>,
     /// Alive through a whole round, and never heard.
     silent: BTreeSet<RobotId>,
+    /// Heard, or alive, and not alive now: since when. At most [`MAX_ROBOTS`].
+    gone: BTreeMap<RobotId, Duration>,
+    /// How many other robots are alive.
+    alive: usize,
+    /// Of more robots than this only some are asked to vote in a round: then silence says nothing of most, and whoever is alive counts, or was
+    /// lately. `None`: all are asked, however many.
+    most_asked: Option<u32>,
+    /// Whether there were more at last.
+    large: bool,
 }
 
 impl Electorate {
+    /// Of which all are asked to vote where there are no more than so many.
+    pub fn new(most_asked: Option<u32>) -> Self {
+        Self { most_asked, ..Self::default() }
+    }
+
     /// A robot voted.
     pub fn hear(&mut self, robot: RobotId, now: Duration) {
         self.unheard.remove(&robot);
@@ -31,10 +45,34 @@ impl Electorate {
         }
     }
 
+    /// A robot voted that is not said to be alive.
+    pub fn hear_absent(&mut self, robot: RobotId, now: Duration) {
+        if self.gone.len() < MAX_ROBOTS || self.gone.contains_key(&robot) {
+            self.gone.insert(robot, now);
+        }
+    }
+
+    /// Those were alive, and these are now.
+    pub fn change(&mut self, before: &BTreeSet<RobotId>, robots: &BTreeSet<RobotId>, now: Duration) {
+        for robot in before.difference(robots).filter(|robot| !self.silent.contains(robot)) {
+            if self.gone.len() < MAX_ROBOTS {
+                self.gone.insert(*robot, now);
+            }
+        }
+        self.gone.retain(|robot, _| !robots.contains(robot));
+        self.alive(robots, now);
+    }
+
     /// These are alive now.
     pub fn alive(&mut self, robots: &BTreeSet<RobotId>, now: Duration) {
+        self.alive = robots.len();
         self.unheard.retain(|robot, _| robots.contains(robot));
         self.silent.retain(|robot| robots.contains(robot));
+        self.large = self.counted_large().is_some();
+        if self.large {
+            self.unheard.clear();
+            return;
+        }
         for robot in robots.iter().take(MAX_ROBOTS) {
             if !self.heard.contains_key(robot) && !self.silent.contains(robot) {
                 self.unheard.entry(*robot).or_insert(now);
@@ -47,6 +85,7 @@ impl Electorate {
         self.heard.retain(|robot, _| !robots.contains(robot));
         self.unheard.retain(|robot, _| !robots.contains(robot));
         self.silent.retain(|robot| !robots.contains(robot));
+        self.gone.retain(|robot, _| !robots.contains(robot));
     }
 
     /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
@@ -60,6 +99,11 @@ impl Electorate {
         }
     }
 
+    /// The same of a round in which only these robots were asked, and these alive all the while: none of whom said anything.
+    pub fn asked_in_vain(&mut self, robots: impl Iterator<Item = RobotId>) {
+        self.silent.extend(robots.filter(|robot| !self.heard.contains_key(robot)));
+    }
+
     /// Those of the living of whom anything is to be expected.
     pub fn expected<'a>(&self, alive: &'a BTreeSet<RobotId>) -> Cow<'a, BTreeSet<RobotId>> {
         match self.silent.is_empty() {
@@ -68,14 +112,39 @@ impl Electorate {
         }
     }
 
-    /// Forgets who was not heard for that long.
-    pub fn forget(&mut self, now: Duration, lately: Duration) {
+    /// Forgets who was not heard for that long; these are alive.
+    pub fn forget(&mut self, now: Duration, lately: Duration, alive: &BTreeSet<RobotId>) {
         self.heard.retain(|_, at| now.saturating_sub(*at) <= lately);
+        self.gone.retain(|_, at| now.saturating_sub(*at) <= lately);
+        if self.large && self.counted_large().is_none() {
+            // From now on all are asked again.
+            self.alive(alive, now);
+        }
     }
 
     /// How many robots there are, this one included.
     pub fn count(&self) -> u32 {
-        u32::try_from(1 + self.heard.len() + self.unheard.len()).unwrap_or(u32::MAX)
+        let small = || u32::try_from(1 + self.heard.len() + self.unheard.len()).unwrap_or(u32::MAX);
+        self.counted_large().unwrap_or_else(small)
+    }
+
+    /// How many there are, where only some of them are asked: those alive of whom anything is to be expected, and those who were lately.
+    fn counted_large(&self) -> Option<u32> {
+        let robots = (1 + self.alive + self.gone.len()).saturating_sub(self.silent.len());
+        let robots = u32::try_from(robots).unwrap_or(u32::MAX);
+        self.most_asked.filter(|most| robots > *most).map(|_| robots)
+    }
+
+    /// Whether more than half of the robots are alive, this one included.
+    pub fn sees_most(&self) -> bool {
+        2 * (1 + self.alive).saturating_sub(self.silent.len()) > self.count() as usize
+    }
+
+    /// The other robots, where only some of them are asked.
+    pub fn members<'a>(&'a self, alive: &'a BTreeSet<RobotId>) -> impl Iterator<Item = RobotId> + Clone + 'a {
+        let some_silent = !self.silent.is_empty();
+        let speaks = move |robot: &&RobotId| !(some_silent && self.silent.contains(*robot));
+        alive.iter().filter(speaks).chain(self.gone.keys()).copied()
     }
 }
 
@@ -103,9 +172,9 @@ mod tests {
         }
         electorate.alive(&robots(1..=3), at(2));
         electorate.round_over(at(2));
-        electorate.forget(at(61), LATELY);
+        electorate.forget(at(61), LATELY, &robots(1..=3));
         assert_eq!(electorate.count(), 9);
-        electorate.forget(at(62), LATELY);
+        electorate.forget(at(62), LATELY, &robots(1..=3));
         assert_eq!(electorate.count(), 1);
     }
 

@@ -16,7 +16,9 @@ pub fn outcome(decision: &Decision, config: &RoundsConfig) -> (RoundOutcome, Rea
     let certificate = &decision.certificate;
     let Certificate { probabilities, votes, robots, .. } = certificate;
     let needed = certificate.quorum;
-    let counted = match config.suffice(certificate.reached(), votes.len(), *robots) {
+    let contributors = votes.iter().map(|counted| counted.robot);
+    let reached = contributors.clone().chain(certificate.others.iter().map(|held| held.robot));
+    let counted = match config.suffice_of(decision.round.counter, reached, contributors, *robots) {
         true => None,
         false if config.liars > 0 => Some(votes.len()),
         false => Some(certificate.reached()),

@@ -34,7 +34,9 @@ pub fn follows(decision: &Decision, rule: &dyn Fuse, config: &RoundsConfig, robo
         && columns == Columns::of_certificate(certificate)
         && votes.iter().all(|counted| scale.is_of(&counted.vote) && of_the_round(counted.vote.round.counter))
         && others.iter().all(|held| of_the_round(held.vote.round.counter));
-    let suffice = config.suffice(certificate.reached(), votes.len(), robots);
+    let contributors = votes.iter().map(|counted| counted.robot);
+    let reached = contributors.clone().chain(others.iter().map(|held| held.robot));
+    let suffice = config.suffice_of(decision.round.counter, reached, contributors, robots);
     let said;
     let rule = match (rule.pool(), certificate.pool) {
         (None, None) => rule,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, ClassId, Decision, Envelope, HeldVote, Message, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Certificate, ClassId, Decision, Envelope, HeldVote, Message, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
 use crate::agreement::Agreement;
@@ -34,14 +34,43 @@ pub(crate) struct Round {
     pub agreement: Agreement,
     evidence: Option<Evidence>,
     said: Option<Said>,
+    voice: Voice,
     /// Whether this robot has drawn its own conclusion.
     concluded: bool,
+    /// What it last tried to conclude from, in vain.
+    tried: Option<Tried>,
     /// When it ends undecided, if before its deadline.
     ends: Option<Duration>,
     /// Whether others go on to the next one: then nothing more is waited for.
     pub hurried: bool,
     /// Its other names, under which robots opened it at the same time.
     names: BTreeSet<RoundId>,
+}
+
+/// What a robot says in a round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Voice {
+    /// What it sees.
+    Votes,
+    /// Only that there is a round, which it opened: others vote.
+    Opens,
+    /// Nothing: others vote.
+    Silent,
+}
+
+/// All that a conclusion depends on which may change while robots come and go no more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Tried {
+    /// How often the ballot has changed.
+    votes: u64,
+    robots: u32,
+    scale: Option<Scale>,
+    pool: Option<Pool>,
+    /// Whether there is a decision for a gesture already, and of how many votes.
+    best: Option<usize>,
+    hurried: bool,
+    waits: bool,
+    late: bool,
 }
 
 /// This robot's vote as it was last said.
@@ -63,7 +92,9 @@ impl Round {
             agreement: Agreement::default(),
             evidence: None,
             said: None,
+            voice: Voice::Votes,
             concluded: false,
+            tried: None,
             ends: None,
             hurried: false,
             names: BTreeSet::new(),
@@ -118,10 +149,23 @@ impl Round {
             *evidence = Evidence::new(classes);
         }
         if evidence.add(frame, config.decorrelation)
+            && self.voice == Voice::Votes
             && let Some(said) = &mut self.said
         {
             said.outdated = true;
         }
+    }
+
+    /// What this robot says in it from now on.
+    pub fn speak_as(&mut self, voice: Voice) {
+        if std::mem::replace(&mut self.voice, voice) != voice {
+            self.tried = None;
+            self.outdate();
+        }
+    }
+
+    pub fn voice(&self) -> Voice {
+        self.voice
     }
 
     /// This robot's vote has to be said anew, though it saw nothing new.
@@ -151,7 +195,8 @@ impl Round {
 
     /// This robot's evidence as a vote.
     fn vote(&self, vocabulary: Option<&Vocabulary>, clip: f64) -> Vote {
-        let (mut evidence, unknown, looks) = match &self.evidence {
+        let own = self.evidence.as_ref().filter(|_| self.voice == Voice::Votes);
+        let (mut evidence, unknown, looks) = match own {
             Some(evidence) => {
                 let (clipped, unknown) = evidence.clipped_with_unknown(clip);
                 (clipped, unknown, evidence.looks() as f32)
@@ -196,7 +241,7 @@ impl Round {
     /// When this robot's vote is to be said (again).
     pub fn vote_due(&self, config: &RoundsConfig) -> Option<Duration> {
         match &self.said {
-            _ if !self.open => None,
+            _ if !self.open || self.voice == Voice::Silent => None,
             None => Some(self.since),
             Some(said) if said.outdated => Some(said.at + config.vote_interval),
             Some(said) => Some(said.at + config.vote_repeat),
@@ -224,7 +269,8 @@ impl Round {
     /// Whether nothing is to be waited for any more. A robot that has not seen anything yet may be about to: its camera may take a frame in half a
     /// second.
     fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
-        let mut robots = view.expected.iter().chain([&view.me]);
+        let own = Some(&view.me).filter(|_| self.voice == Voice::Votes);
+        let mut robots = view.expected.iter().chain(own);
         self.hurried
             || now >= self.since + config.patience
             || robots.all(|robot| self.ballot.has_spoken(*robot))
@@ -249,6 +295,16 @@ impl Round {
         (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
     }
 
+    /// Whether it is still to be concluded.
+    pub fn is_unconcluded(&self) -> bool {
+        self.open && !self.concluded
+    }
+
+    /// Robots have come or gone: what was tried in vain is tried again.
+    pub fn look_again(&mut self) {
+        self.tried = None;
+    }
+
     /// Draws this robot's own conclusion, once: a class when the votes suffice, none at the deadline. Who holds the decision of
     /// another goes on to conclude when it knows of more evidence than that rests on.
     pub fn conclude(&mut self, now: Duration, view: &View<'_>, rule: &dyn Fuse, config: &RoundsConfig) {
@@ -262,6 +318,20 @@ impl Round {
             return;
         }
         let scale = view.scale.or_else(|| self.ballot.prevailing_scale());
+        let best = self.agreement.best().filter(|best| best.class.is_some());
+        let tried = Tried {
+            votes: self.ballot.changes(),
+            robots: view.robots,
+            scale,
+            pool: rule.pool(),
+            best: best.map(|best| best.certificate.votes.len()),
+            hurried: self.hurried,
+            waits: now < patience,
+            late,
+        };
+        if self.tried.replace(tried) == Some(tried) {
+            return;
+        }
         let contributors = scale.map_or(0, |scale| self.ballot.contributors(scale));
         if self
             .agreement
@@ -270,8 +340,22 @@ impl Round {
         {
             return;
         }
-        let suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
-        if !(late || suffice && self.has_heard_all(now, view, config)) {
+        let suffice = || {
+            contributors > 0
+                && match (view.committee, scale) {
+                    (Some(members), Some(scale)) => config.suffice(
+                        self.ballot.reached_of(members),
+                        self.ballot.contributors_of(scale, members),
+                        view.robots,
+                    ),
+                    _ => config.suffice(self.ballot.len(), contributors, view.robots),
+                }
+        };
+        if !(late || self.has_heard_all(now, view, config)) {
+            return;
+        }
+        let suffice = suffice();
+        if !(late || suffice) {
             return;
         }
         let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
@@ -340,6 +424,8 @@ pub(crate) struct View<'a> {
     pub expected: &'a BTreeSet<RobotId>,
     /// How many robots there are.
     pub robots: u32,
+    /// Who was drawn to vote, where not all are.
+    pub committee: Option<&'a BTreeSet<RobotId>>,
     /// The scale of this robot's own classifier.
     pub scale: Option<Scale>,
 }

@@ -56,6 +56,7 @@ pub enum LearningConfigError {
 /// | `spacing` | 400ms | least time between two of them | ≤ 1 min |
 /// | `share_samples` | none | n: the most samples shared per round | ≥ 0 |
 /// | `share_fraction` | 1.0 | B: the most samples shared, as a part of those newly acquired | 0–1 |
+/// | `share_per_round` | 100 | the most samples that the whole swarm shares per round | ≥ 0 |
 /// | `share_bytes` | 512 | the most bytes of samples per round, with their envelope | ≥ 128 |
 /// | `precision` | i8 | how shared vectors travel | |
 /// | `selection` | k_center | which samples are shared | |
@@ -77,6 +78,13 @@ pub struct LearningConfig {
     pub share_samples: Option<u32>,
     /// B: the most samples shared, as a part of those newly acquired. What a round leaves of it counts for the next.
     pub share_fraction: f64,
+    /// The most samples that all robots alive share per round, about: divided by their number, and what that leaves over falls by lot. All
+    /// robots of a swarm should have the same; each keeps to it by itself. What it withholds stays personal.
+    ///
+    /// Every robot takes in what all share, so without it their work grows with the square of their number, and no sample lasts: a
+    /// thousand robots that share three each replace all of 1000 samples three times a round. By default it is a tenth of the default
+    /// `capacity`: what a round brings stays for ten, and at most 33 robots that look three times share all they would.
+    pub share_per_round: Option<u32>,
     /// The most bytes of samples per round, with their envelope.
     pub share_bytes: Option<u32>,
     /// How shared vectors travel.
@@ -101,6 +109,7 @@ impl Default for LearningConfig {
             spacing: Duration::from_millis(400),
             share_samples: None,
             share_fraction: 1.0,
+            share_per_round: Some(100),
             share_bytes: Some(512),
             precision: Precision::default(),
             selection: SelectionRule::default(),

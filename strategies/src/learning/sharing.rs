@@ -28,7 +28,10 @@ impl Learning {
         // A hair more than a whole: tenths do not add up to one exactly.
         let by_fraction = (self.credit + 1e-9).floor() as usize;
         let by_number = self.config.share_samples.map_or(usize::MAX, |n| n as usize);
-        let n = by_fraction.min(by_number).min(self.most_by_bytes());
+        let round = self.newest.unwrap_or_default();
+        let of_swarm = |budget| self.shared.left(budget, self.set.robots(), round, self.me);
+        let by_budget = self.config.share_per_round.map_or(usize::MAX, of_swarm);
+        let n = by_fraction.min(by_number).min(self.most_by_bytes()).min(by_budget);
         // What the other bounds withhold is not owed.
         self.credit = (self.credit - by_fraction as f64).max(0.0);
         if n == 0 {
@@ -45,6 +48,7 @@ impl Learning {
             _ => None,
         });
         let shared: Vec<SharedSample> = ids.filter_map(|id| self.as_shared(id)).collect();
+        self.shared.add(round, shared.len());
         self.absorb(changes);
         let each = self.config.precision.bytes() * self.space.components();
         let fit = (BATCH_BYTES / each.max(1)).clamp(1, MAX_SAMPLES);

@@ -16,6 +16,7 @@ use gestalt_svm::FeatureSpace;
 use rand::Rng;
 use siphasher::sip::SipHasher24;
 
+use super::budget::SharedSoFar;
 use super::changes::TrainingChange;
 use super::config::LearningConfig;
 use super::judged::JudgedRounds;
@@ -82,7 +83,7 @@ pub(crate) struct Learning {
     pub(super) judged: JudgedRounds,
     pub(super) aside: Unresolved,
     /// The highest counter of a round that this robot knows of.
-    newest: Option<u32>,
+    pub(super) newest: Option<u32>,
     /// The key of the digest, and that itself once somebody asked for it: most change again before.
     key: u64,
     digest: OnceCell<Digest>,
@@ -91,6 +92,8 @@ pub(crate) struct Learning {
     drawn: u64,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
+    /// What was shared in the newest round, of the swarm's budget.
+    pub(super) shared: SharedSoFar,
     /// What is to be trained and remembered, and was not yet said.
     pub(super) training: Vec<TrainingChange>,
     pub(super) dirty: BTreeSet<Item>,
@@ -164,6 +167,7 @@ impl Learning {
             judged: JudgedRounds::default(),
             newest,
             credit: 0.0,
+            shared: SharedSoFar::default(),
             training: Vec::new(),
             dirty,
             durable,

@@ -32,6 +32,12 @@ impl Mind {
         self.rounds.is_open()
     }
 
+    /// Whether its own evidence is asked for in that round, see [`Rounds::votes`](gestalt_rounds::Rounds::votes).
+    #[must_use]
+    pub fn votes(&self) -> bool {
+        self.rounds.votes()
+    }
+
     /// The decision held for that round.
     #[must_use]
     pub fn held(&self) -> Option<&Decision> {

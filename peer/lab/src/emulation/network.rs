@@ -5,6 +5,7 @@ use std::iter::Sum;
 use std::rc::Rc;
 use std::time::Duration;
 
+use gestalt_protocol::RobotId;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -83,6 +84,21 @@ pub(super) enum Kind {
     Samples,
 }
 
+/// From whom to whom a broadcast goes on, by their index: half as large as a [`Link`], for each robot may have as many as there are robots.
+type Hop = (u32, u32);
+
+/// Robots that can reach each other.
+struct Parts {
+    /// Which part each robot belongs to, of those that are believed alive.
+    of: Vec<Option<u32>>,
+    members: Vec<Rc<BTreeSet<RobotId>>>,
+}
+
+/// The name of the robot of that index.
+fn name(robot: usize) -> RobotId {
+    RobotId(robot as u32 + 1)
+}
+
 /// Links, what robots believe of them, and the routes that follow.
 pub(super) struct Network {
     model: LinkModel,
@@ -95,7 +111,9 @@ pub(super) struct Network {
     /// Links and robots that are believed to work: what routing goes by.
     believed_links: BTreeSet<Link>,
     believed_robots: Vec<bool>,
-    routes: Vec<Option<Rc<Vec<Link>>>>,
+    routes: Vec<Option<Rc<[Hop]>>>,
+    /// Who is alive to whom; worked out when somebody asks.
+    parts: Option<Parts>,
     pub traffic: Vec<Traffic>,
 }
 
@@ -116,6 +134,7 @@ impl Network {
             believed_links: links.into_iter().collect(),
             believed_robots: vec![true; size],
             routes: vec![None; size],
+            parts: None,
             traffic: vec![Traffic::default(); size],
         }
     }
@@ -167,6 +186,7 @@ impl Network {
             Change::Robot(robot, up) => self.believed_robots[robot] = up,
         }
         self.routes.iter_mut().for_each(|route| *route = None);
+        self.parts = None;
     }
 
     /// The robots that this one believes itself linked to.
@@ -177,16 +197,53 @@ impl Network {
         self.adjacent[robot].iter().copied().filter(believed).collect()
     }
 
-    /// The robots that this one believes alive: those it can reach, itself included.
-    pub fn reachable(&mut self, robot: usize) -> BTreeSet<usize> {
-        self.route(robot).iter().map(|hop| hop.1).chain([robot]).collect()
+    /// The robots that this one believes alive: those it can reach, itself included. All of one part share the list.
+    pub fn reachable(&mut self, robot: usize) -> Rc<BTreeSet<RobotId>> {
+        let parts = self.parts.take().unwrap_or_else(|| self.find_parts());
+        let reachable = match parts.of[robot] {
+            Some(part) => parts.members[part as usize].clone(),
+            // It is up, and not believed to be: it hears, and nobody counts on it yet.
+            None => {
+                let near: BTreeSet<u32> =
+                    self.neighbours(robot).into_iter().filter_map(|other| parts.of[other]).collect();
+                let all = near.iter().flat_map(|part| parts.members[*part as usize].iter().copied());
+                Rc::new(all.chain([name(robot)]).collect())
+            }
+        };
+        self.parts = Some(parts);
+        reachable
     }
 
-    fn route(&mut self, origin: usize) -> Rc<Vec<Link>> {
+    /// The robots believed alive, in parts that are linked.
+    fn find_parts(&self) -> Parts {
+        let mut parts = Parts { of: vec![None; self.size()], members: Vec::new() };
+        for first in 0..self.size() {
+            if parts.of[first].is_some() || !self.believed_robots[first] {
+                continue;
+            }
+            let part = parts.members.len() as u32;
+            parts.of[first] = Some(part);
+            let (mut members, mut next) = (vec![name(first)], vec![first]);
+            while let Some(robot) = next.pop() {
+                for other in self.neighbours(robot) {
+                    if parts.of[other].is_none() {
+                        parts.of[other] = Some(part);
+                        members.push(name(other));
+                        next.push(other);
+                    }
+                }
+            }
+            parts.members.push(Rc::new(members.into_iter().collect()));
+        }
+        parts
+    }
+
+    fn route(&mut self, origin: usize) -> Rc<[Hop]> {
         if let Some(route) = &self.routes[origin] {
             return route.clone();
         }
-        let route = Rc::new(shortest_ways(origin, self.size(), |robot| self.neighbours(robot)));
+        let ways = shortest_ways(origin, self.size(), |robot| self.neighbours(robot));
+        let route: Rc<[Hop]> = ways.into_iter().map(|(from, to)| (from as u32, to as u32)).collect();
         self.routes[origin] = Some(route.clone());
         route
     }
@@ -201,6 +258,7 @@ impl Network {
             self.traffic[origin].published_samples += bytes as u64;
         }
         for &(from, to) in self.route(origin).iter() {
+            let (from, to) = (from as usize, to as usize);
             let Some(so_far) = taken[from] else { continue };
             let traffic = &mut self.traffic[from];
             let account = match kind {

@@ -16,6 +16,8 @@ use super::school::School;
 #[derive(Debug, Default)]
 pub(super) struct Pupil {
     disk: BTreeMap<Vec<u8>, Vec<u8>>,
+    /// Whether anybody ever reads what is on it.
+    is_read: bool,
     /// The revision on the disk.
     pub remembered: u64,
     learner: Option<Learner>,
@@ -25,6 +27,11 @@ pub(super) struct Pupil {
 }
 
 impl Pupil {
+    /// A robot that was never started, and may be started again or not.
+    pub fn new(starts_again: bool) -> Self {
+        Self { is_read: starts_again, ..Self::default() }
+    }
+
     /// The mind of this robot, with what its disk holds.
     pub fn start(
         &mut self,
@@ -60,6 +67,7 @@ impl Pupil {
     }
 
     pub fn remember(&mut self, revision: u64, changes: Vec<RecordChange>) {
+        let changes = changes.into_iter().filter(|_| self.is_read);
         for RecordChange { key, value } in changes {
             match value {
                 Some(value) => self.disk.insert(key, value),

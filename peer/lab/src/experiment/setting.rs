@@ -30,7 +30,7 @@ use crate::shape::NetworkShape;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Setting {
-    /// How many robots, `1..=1000`.
+    /// How many robots, at least 1.
     pub robots: usize,
     /// How many of them, the last ones, share what poisons others. What is measured is how well the honest ones judge.
     pub liars: usize,

@@ -8,6 +8,7 @@ use super::plan::{Cell, Experiment};
 use super::pool::Pool;
 use super::results::Run;
 use super::standing::Standing;
+use super::trial::{ALL_EXAMINED, EXAMINED};
 use crate::emulation::Mean;
 
 /// Accuracies that a single robot is to reach.
@@ -156,6 +157,13 @@ impl Summary {
              after which the mean of single robots is that high, and stays so. `published`: samples as their author says \
              them, once; `on links`: with what robots relay and tell for repair.\n",
         );
+        if self.cells.iter().any(|(cell, _)| cell.setting.robots > ALL_EXAMINED) {
+            let _ = writeln!(
+                text,
+                "\nOf more than {ALL_EXAMINED} robots, {EXAMINED} drawn by the seed are examined, the same after each round; bytes and samples are \
+                 those of all."
+            );
+        }
         text
     }
 }

@@ -18,6 +18,10 @@ use super::setting::{Drift, Setting};
 use super::standing::Standing;
 use crate::emulation::{Emulation, Observer, Rules, School, Trace, likeliest};
 
+/// The most robots of which all are examined after each round, and how many are of more: all who are train for it.
+pub(super) const ALL_EXAMINED: usize = 100;
+pub(super) const EXAMINED: usize = 32;
+
 /// The most held-out moments that are judged after each round.
 const JUDGED: usize = 60;
 
@@ -58,7 +62,9 @@ pub fn run(
     let mut emulation =
         Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
     let honest = &places[..setting.robots - setting.liars];
-    let exams = [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], honest, rules));
+    let examined = examined(honest.len(), seed);
+    let exams =
+        [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], (honest, &examined), rules));
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
         if stop.load(Ordering::Relaxed) {
@@ -80,6 +86,19 @@ fn places(places: usize, robots: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
         drawn.extend(all.into_iter().take(robots - drawn.len()));
     }
     drawn
+}
+
+/// Draws who is examined, of so many robots: of more than [`ALL_EXAMINED`] some.
+fn examined(robots: usize, seed: u64) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..robots).collect();
+    if robots > ALL_EXAMINED {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(u64::MAX);
+        all.shuffle(&mut rng);
+        all.truncate(EXAMINED);
+        all.sort_unstable();
+    }
+    all
 }
 
 /// Draws half of the people to be held out; of a gesture that fewer than four show, half of the moments.
@@ -129,7 +148,10 @@ fn split(pool: &Pool, rng: &mut ChaCha8Rng) -> Result<Split, ExperimentError> {
 /// Held-out moments as all robots see them, in the space they learn in. Robots at one place see the same.
 struct Exam {
     classes: usize,
+    /// All that are honest.
     robots: usize,
+    /// Those that are examined.
+    examined: Vec<usize>,
     /// What is right, and the coordinates from each place.
     questions: Vec<(ClassId, BTreeMap<usize, Vec<f32>>)>,
     places: Vec<usize>,
@@ -138,7 +160,15 @@ struct Exam {
 }
 
 impl Exam {
-    fn new(pool: &Pool, school: &School, moments: &[usize], places: &[usize], rules: &Rules) -> Self {
+    fn new(
+        pool: &Pool,
+        school: &School,
+        moments: &[usize],
+        (places, examined): (&[usize], &[usize]),
+        rules: &Rules,
+    ) -> Self {
+        let (robots, places) =
+            (places.len(), examined.iter().map(|robot| places[*robot]).collect::<Vec<_>>());
         let question = |moment: &usize| {
             let seen = places.iter().filter_map(|place| {
                 let (features, _) = pool.features(*moment, *place)?;
@@ -148,18 +178,12 @@ impl Exam {
         };
         let questions = moments.iter().map(question).collect();
         let fusion = rules.fusion.clone().unwrap_or(Arc::new(FusionRule::default()));
-        Self {
-            classes: pool.gestures.len(),
-            robots: places.len(),
-            questions,
-            places: places.to_vec(),
-            fusion,
-        }
+        Self { classes: pool.gestures.len(), robots, examined: examined.to_vec(), questions, places, fusion }
     }
 
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
         let classifiers: Vec<Option<Arc<Classifier>>> =
-            (0..self.robots).map(|robot| emulation.classifier(robot)).collect();
+            self.examined.iter().map(|robot| emulation.classifier(*robot)).collect();
         let chance = 1.0 / self.classes as f64;
         let (mut single, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0);
         for (class, views) in &self.questions {

@@ -1,5 +1,6 @@
 //! The course of a round: when it opens, how long a robot looks, when it closes.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -60,6 +61,9 @@ impl Rounds {
     }
 
     pub(super) fn on_observed(&mut self, observation: &Observation, learns: bool) {
+        if !self.votes() {
+            return;
+        }
         let Some(round) = self.round.as_mut().filter(|round| round.open) else { return };
         let Some(classifier) = &self.classifier else {
             // Who learns has none until it was taught.
@@ -91,7 +95,9 @@ impl Rounds {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.open = false;
             if self.now >= round.since + self.config.patience {
-                self.electorate.round_over(round.since);
+                let since = round.since;
+                self.electorate.round_over(since);
+                self.note_silence();
             }
         }
         if self.looking_until(effects.follower).is_none() {
@@ -132,8 +138,10 @@ impl Rounds {
         self.close(effects);
         self.stop_looking(effects);
         self.highest = self.highest.max(Some(id.counter));
-        self.electorate.forget(self.now, self.config.lately);
+        self.electorate.forget(self.now, self.config.lately, &self.alive);
         self.round = Some(Round::new(id, self.now, open));
+        self.committee = None;
+        self.draw(&BTreeSet::new());
         self.looking = open.then_some(id);
         effects.follower.entered(id);
     }

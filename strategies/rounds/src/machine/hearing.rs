@@ -9,6 +9,7 @@ use gestalt_protocol::{
     Stamp,
 };
 
+use super::committee::{Committee, expected};
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
@@ -235,6 +236,10 @@ impl Rounds {
         let is_news = match round.ballot.cast(held) {
             Cast::Counted => {
                 self.electorate.hear(robot, self.now);
+                if !self.alive.contains(&robot) {
+                    self.electorate.hear_absent(robot, self.now);
+                }
+                self.draw_if_the_size_calls_for_it();
                 true
             }
             Cast::Known => false,
@@ -292,7 +297,8 @@ impl Rounds {
             Ok(Ordering::Greater) => self.enter(decision.round, false, effects),
             Ok(Ordering::Equal) => {}
         }
-        let expected = self.electorate.expected(&self.alive);
+        let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
+        let committee = self.committee.as_ref().map(Committee::members);
         let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
         for counted in &decision.certificate.votes {
@@ -300,7 +306,7 @@ impl Rounds {
                 round.ballot.cast(counted.held());
             }
         }
-        let view = View { me: self.me, expected: &expected, robots, scale };
+        let view = View { me: self.me, expected: &expected, robots, committee, scale };
         if self.config.liars > 0
             && decision.class.is_some()
             && !round.bears_out(self.now, &decision, &view, &*self.fusion, &self.config)

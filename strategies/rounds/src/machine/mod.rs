@@ -8,6 +8,7 @@
 //! ```
 
 mod allowance;
+mod committee;
 mod course;
 mod expulsion;
 mod follow;

@@ -7,6 +7,7 @@ use std::time::Duration;
 use gestalt_protocol::{ClassId, Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
+use super::committee::Committee;
 use super::follow::Follow;
 use super::input::Input;
 use super::output::Output;
@@ -116,6 +117,8 @@ pub struct Rounds {
     /// The counter that this life began with, and when it began.
     pub(super) began: (u32, Option<Duration>),
     pub(super) electorate: Electorate,
+    /// Who votes in the newest round, where not all do.
+    pub(super) committee: Option<Committee>,
     /// The greatest decision that a robot said it holds and that is lacking here, and when it is asked for.
     pub(super) wanted: Option<Wanted>,
     /// The other robots alive, guests among them.
@@ -169,7 +172,8 @@ impl Rounds {
             round: None,
             highest: None,
             began: (0, None),
-            electorate: Electorate::default(),
+            electorate: Electorate::new(config.all_vote_up_to()),
+            committee: None,
             wanted: None,
             alive: BTreeSet::new(),
             turns: 0,

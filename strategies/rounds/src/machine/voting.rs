@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Announced, Announcement, Decision, Envelope, Holder, Message, RobotId};
 
+use super::committee::{Committee, expected};
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
 use crate::agreement::Agreement;
@@ -13,9 +14,11 @@ use crate::round::{Speaker, View};
 
 impl Rounds {
     pub(super) fn on_alive(&mut self, robots: BTreeSet<RobotId>) {
-        self.alive = &robots | &self.guests;
-        self.alive.remove(&self.me);
-        self.electorate.alive(&self.alive, self.now);
+        let mut alive = &robots | &self.guests;
+        alive.remove(&self.me);
+        let before = std::mem::replace(&mut self.alive, alive);
+        self.electorate.change(&before, &self.alive, self.now);
+        self.draw(&(&self.alive - &before));
         self.forget_accounts();
         // This robot speaks for its guests too: its turn is that of the smallest of them all.
         let first = self.guests.first().map_or(self.me, |guest| self.me.min(*guest));
@@ -42,14 +45,18 @@ impl Rounds {
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
     pub(super) fn decide(&mut self, effects: &mut Effects<'_>) {
         let scale = self.own_scale();
-        let expected = self.electorate.expected(&self.alive);
-        let view = View { me: self.me, expected: &expected, robots: self.electorate.count(), scale };
+        let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
+        let committee = self.committee.as_ref().map(Committee::members);
+        let robots = self.electorate.count();
+        let view = View { me: self.me, expected: &expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
-        let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
-        let fitted = learned.and_then(|pool| self.fusion.with(pool));
-        let rule = fitted.as_deref().unwrap_or(&*self.fusion);
-        round.conclude(self.now, &view, rule, &self.config);
+        if round.is_unconcluded() {
+            let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
+            let fitted = learned.and_then(|pool| self.fusion.with(pool));
+            let rule = fitted.as_deref().unwrap_or(&*self.fusion);
+            round.conclude(self.now, &view, rule, &self.config);
+        }
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
@@ -61,7 +68,10 @@ impl Rounds {
 
     /// Says which gesture this robot holds, unless that is what it said last: a greater decision for the same is news to nobody.
     fn say_holding(&mut self, effects: &mut Effects<'_>) {
-        let Some(agreement) = self.round.as_ref().map(|round| &round.agreement) else { return };
+        // Of those who were drawn that is counted; what all others hold they can tell by that.
+        let counts = self.counts(self.me) || self.guests.iter().any(|guest| self.counts(*guest));
+        let round = self.round.as_ref().filter(|_| counts);
+        let Some(agreement) = round.map(|round| &round.agreement) else { return };
         let Some(holding) = agreement.held().map(|held| held.holding(agreement.has_changed())) else {
             return;
         };
@@ -88,6 +98,10 @@ impl Rounds {
     pub(super) fn announcement(&self) -> Option<Duration> {
         let wait = self.config.settle.saturating_add(self.turn());
         let agreement = &self.round.as_ref()?.agreement;
+        // Asked at every input: that many hold it is counted only while there is something to announce.
+        if agreement.held().is_none() || agreement.is_announced() {
+            return None;
+        }
         agreement.announcement(wait, self.is_final(agreement), self.config.deadline)
     }
 
@@ -126,7 +140,7 @@ impl Rounds {
 
     pub(super) fn is_final(&self, agreement: &Agreement) -> bool {
         let holders = self.config.holders(self.electorate.count());
-        agreement.is_final(holders, self.me, &self.guests)
+        agreement.is_final(holders, self.me, &self.guests, |robot| self.counts(robot))
     }
 
     pub(super) fn own_scale(&self) -> Option<Scale> {

@@ -50,6 +50,30 @@ fn bytes_bound_what_a_round_shares() {
     }
 }
 
+#[test]
+fn a_swarm_keeps_to_its_budget_of_a_round_and_a_small_one_notices_nothing_of_it() {
+    let shared = |budget| {
+        let mut swarm = Swarm::new(10, LearningConfig { share_per_round: budget, ..config(5, 1.0) }, 3);
+        let mut of_rounds = Vec::new();
+        for class in 0..CLASSES {
+            let before: usize = (0..10).map(|i| swarm.sizes(i)[1]).sum();
+            let round = swarm.show(class);
+            swarm.was(round, class);
+            of_rounds.push((0..10).map(|i| swarm.sizes(i)[1]).sum::<usize>() - before);
+        }
+        swarm.check();
+        of_rounds
+    };
+    assert_eq!(shared(None), [50; 6]);
+    assert_eq!(shared(Some(50)), [50; 6]);
+    assert_eq!(shared(Some(20)), [20; 6], "two of each");
+    assert_eq!(shared(Some(0)), [0; 6]);
+    // Four of the robots have their turn, about; and not always the same number of them.
+    let by_lot = shared(Some(4));
+    assert!((10..=40).contains(&by_lot.iter().sum::<usize>()), "{by_lot:?}");
+    assert!(by_lot.iter().any(|of_round| *of_round != by_lot[0]), "{by_lot:?}");
+}
+
 /// Shares what was seen last, and nothing of class 3.
 #[derive(Debug)]
 struct Newest;

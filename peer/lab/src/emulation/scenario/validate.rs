@@ -6,6 +6,9 @@ use super::Scenario;
 use super::error::ScenarioError;
 use super::fault::Event;
 
+/// The most robots: more do not fit into the memory of any machine that this runs on.
+const MOST: usize = 1_000_000;
+
 impl Scenario {
     /// Whether the scenario can be run.
     ///
@@ -14,8 +17,8 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         let wrong = |key, mend: String| Err(ScenarioError::Value { key, mend });
         let size = self.swarm_size();
-        if !(1..=1000).contains(&size) {
-            return wrong("robots", format!("{size} robots in all: choose 1 to 1000"));
+        if !(1..=MOST).contains(&size) {
+            return wrong("robots", format!("{size} robots in all: choose 1 to {MOST}"));
         }
         if !(2..=MAX_CLASSES).contains(&self.classes) {
             return wrong("classes", format!("is {}: choose 2 to {MAX_CLASSES}", self.classes));

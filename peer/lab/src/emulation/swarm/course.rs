@@ -70,8 +70,11 @@ impl Swarm<'_> {
         if !looks_still(&self.robots[i]) {
             return;
         }
-        // A robot that learns does so before it looks again, not sooner: nobody asks before.
-        self.train(i);
+        // A robot that learns does so before it looks again, not sooner, and only if its judgement is asked for: nobody asks before.
+        let judges = self.robots[i].mind.as_ref().is_some_and(Mind::votes);
+        if judges {
+            self.train(i);
+        }
         let robot = &mut self.robots[i];
         let next = self.now + Duration::from_secs_f64(robot.observer.period());
         if self.network.presence(i) == Presence::Up
@@ -81,6 +84,7 @@ impl Swarm<'_> {
                 Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
                 None => robot.observer.classifier(),
             };
+            let classifier = classifier.filter(|_| judges);
             if let Some(p) = classifier.and_then(|c| c.probabilities(&observation.features).ok()) {
                 self.record.frame(&p, self.shown);
             }

@@ -64,13 +64,12 @@ impl Swarm<'_> {
             }
             let now = (self.network.reachable(i), self.network.neighbours(i));
             let before = std::mem::replace(&mut self.robots[i].knows, now.clone());
-            let ids =
-                |robots: &mut dyn Iterator<Item = usize>| robots.map(|i| RobotId(i as u32 + 1)).collect();
             if before.0 != now.0 {
-                self.tell_mind(i, Input::Alive(ids(&mut now.0.into_iter())));
+                self.tell_mind(i, Input::Alive((*now.0).clone()));
             }
             if before.1 != now.1 {
-                self.tell_mind(i, Input::Neighbours(ids(&mut now.1.into_iter())));
+                let neighbours = now.1.into_iter().map(|i| RobotId(i as u32 + 1)).collect();
+                self.tell_mind(i, Input::Neighbours(neighbours));
             }
         }
     }

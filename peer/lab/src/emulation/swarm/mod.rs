@@ -35,7 +35,7 @@ use super::observer::Observer;
 use super::record::Record;
 use super::report::Learned;
 use super::rules::Rules;
-use super::scenario::Scenario;
+use super::scenario::{Event, Fault, Scenario};
 use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
@@ -75,7 +75,8 @@ impl<'a> Swarm<'a> {
         let mut rng = stream(seed, NETWORK);
         let links = scenario.topology.links(observers.len(), &mut rng);
         let network = Network::new(observers.len(), links, scenario.link, rng);
-        let learns = school.is_some();
+        let starts_again = |fault: &Fault| matches!(fault.event, Event::Restart(_));
+        let learns = school.as_ref().map(|_| scenario.faults.iter().any(starts_again));
         let robots: Vec<_> = (1..)
             .zip(observers.into_iter().zip(scenario.members()))
             .map(|(id, (observer, group))| {

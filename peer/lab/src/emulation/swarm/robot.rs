@@ -1,6 +1,7 @@
 //! One robot: its mind, its eyes, and what waits for it.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::rc::Rc;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
@@ -29,18 +30,18 @@ pub(super) struct Robot {
     /// None of a robot that does not learn.
     pub pupil: Option<Pupil>,
     /// Whom it believes alive, and whom it believes itself linked to.
-    pub knows: (BTreeSet<usize>, Vec<usize>),
+    pub knows: (Rc<BTreeSet<RobotId>>, Vec<usize>),
     pub lies: Option<Lies>,
     pub poison: Option<Poisoner>,
 }
 
 impl Robot {
-    /// A robot that was never started.
+    /// A robot that was never started. If it learns: whether it may ever be started again.
     pub fn new(
         id: RobotId,
         observer: Box<dyn Observer>,
         seed: u64,
-        learns: bool,
+        learns: Option<bool>,
         (lies, poison): (Option<Lies>, Option<Poisoner>),
     ) -> Self {
         Self {
@@ -53,7 +54,7 @@ impl Robot {
             looking: false,
             looks: 0,
             waiting: VecDeque::new(),
-            pupil: learns.then(Pupil::default),
+            pupil: learns.map(Pupil::new),
             knows: Default::default(),
             lies,
             poison,

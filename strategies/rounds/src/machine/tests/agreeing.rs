@@ -138,7 +138,7 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
     }
 }
 
-fn outputs(all: Vec<(Duration, Output)>) -> Vec<Output> {
+pub(super) fn outputs(all: Vec<(Duration, Output)>) -> Vec<Output> {
     all.into_iter().map(|(_, output)| output).collect()
 }
 
