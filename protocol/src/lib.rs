@@ -1,7 +1,7 @@
 //! What the robots of a Gestalt swarm say to each other, and where.
 //!
 //! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Announcement`],
-//! [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
+//! [`Question`], [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
 //! of it travels.
 //!
 //! This crate holds no behaviour: when to speak, and what to make of what is heard, is `gestalt-strategies`;
@@ -28,6 +28,7 @@ mod lesson;
 mod limits;
 mod message;
 mod pool;
+mod question;
 mod round_outcome;
 mod sample;
 mod signature;
@@ -52,6 +53,7 @@ pub use lesson::{Lesson, MAX_LESSONS, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
 pub use message::{Give, Have, Message};
 pub use pool::Pool;
+pub use question::{Ask, Asked, Question};
 pub use round_outcome::{Reason, RoundOutcome};
 pub use sample::{
     Batches, Digest, HeldBatch, Know, Known, Lessons, MAX_BATCH_BYTES, MAX_BATCHES, MAX_COMPONENTS,

@@ -8,6 +8,7 @@ use crate::decision::{Decision, Rank};
 use crate::holding::{Holder, Holding};
 use crate::id::{RobotId, RoundId, Stamp};
 use crate::limits::MAX_ROBOTS;
+use crate::question::Asked;
 use crate::sample::{Batches, Digest, Know, Lessons, Samples};
 use crate::vote::{HeldVote, Vote};
 
@@ -32,6 +33,8 @@ pub enum Message {
     Holding(Holding),
     /// To the swarm and its clients: a decision, in JSON. This is what its announcer signs of it.
     Announced(Announced),
+    /// To the swarm and its clients: a question, in JSON. This is what its asker signs of it.
+    Asked(Asked),
 }
 
 /// What a robot holds of the newest round it knows, in short.

@@ -11,8 +11,9 @@
 //! and written again has the same bytes.
 
 use gestalt_protocol::{
-    Announced, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons,
-    MAX_JSON, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector, Vote,
+    Announced, Asked, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know,
+    Lessons, MAX_JSON, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
+    Vote,
 };
 use half::f16;
 use serde::{Deserialize, Serialize};
@@ -69,6 +70,7 @@ enum SpeltMessage {
     Batches(SpeltBatches),
     Holding(Holding),
     Announced(Announced),
+    Asked(Asked),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -146,6 +148,7 @@ impl From<Message> for SpeltMessage {
             }
             Message::Holding(holding) => Self::Holding(holding),
             Message::Announced(announced) => Self::Announced(announced),
+            Message::Asked(asked) => Self::Asked(asked),
         }
     }
 }
@@ -167,6 +170,7 @@ impl From<SpeltMessage> for Message {
             }
             SpeltMessage::Holding(holding) => Self::Holding(holding),
             SpeltMessage::Announced(announced) => Self::Announced(announced),
+            SpeltMessage::Asked(asked) => Self::Asked(asked),
         }
     }
 }

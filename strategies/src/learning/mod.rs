@@ -3,6 +3,7 @@
 mod changes;
 mod config;
 mod following;
+mod inspect;
 mod judged;
 mod labelling;
 mod memory;
