@@ -198,6 +198,7 @@ fn described(event: &Event) -> Value {
         Event::Closed(round) => json!({"event": "closed", "round": round.counter}),
         Event::Held(decision) => outcome("held", decision),
         Event::Announced(announcement) => outcome("announced", &announcement.decision),
+        Event::Asked(question) => json!({"event": "asked", "question": question}),
         Event::Neighbours(robots) => json!({"event": "neighbours", "robots": ids(robots)}),
         Event::Shared(samples) => json!({"event": "shared", "samples": samples}),
         Event::Answered(_, answer) => json!({"event": "answered", "answer": answer}),

@@ -234,6 +234,7 @@ impl Listener {
                     it.decision.round, it.decision.confidence
                 )
             }
+            Heard::Asked(it) => format!("round {}: robot {} asks: {it}", it.round, it.robot),
             Heard::Held(..) => return,
         };
         self.intake.say(self.clock.now(), Level::Info, words);

@@ -9,6 +9,7 @@ use crate::holding::Holder;
 use crate::id::{ClassId, RobotId, Stamp};
 use crate::limits::MAX_MESSAGE;
 use crate::message::Message;
+use crate::question::{Asked, Question};
 use crate::sample::HeldBatch;
 use crate::signature::Signature;
 use crate::vote::{HeldVote, Vote};
@@ -105,6 +106,27 @@ impl From<Announcement> for Envelope {
     }
 }
 
+impl Question {
+    /// What was asked, by the robot that asked it; `None` for another message.
+    #[must_use]
+    pub fn of(said: Envelope) -> Option<Self> {
+        let Envelope { author: robot, stamp, message: Message::Asked(asked), signature } = said else {
+            return None;
+        };
+        let Asked { round, ask, labels, entropy, disagreement } = asked;
+        Some(Self { round, ask, labels, entropy, disagreement, robot, stamp, signature })
+    }
+}
+
+impl From<Question> for Envelope {
+    /// The question as its asker signed it.
+    fn from(question: Question) -> Self {
+        let Question { round, ask, labels, entropy, disagreement, robot, stamp, signature } = question;
+        let message = Message::Asked(Asked { round, ask, labels, entropy, disagreement });
+        Self { author: robot, stamp, message, signature }
+    }
+}
+
 impl Message {
     fn check(&self) -> Result<(), DecodeError> {
         match self {
@@ -122,6 +144,7 @@ impl Message {
             Self::Holding(holding) => holding.check(),
             Self::Announced(announced) => announced.decision.check(),
             Self::Namings(namings) => namings.check(),
+            Self::Asked(asked) => asked.check(),
         }
     }
 }

@@ -36,6 +36,8 @@ pub enum Topic {
     Taken(RobotId),
     /// `decision`: the swarm's decision, one message each, JSON; also a queryable for the last one.
     Decision,
+    /// `question`: what the swarm asks its instructor, a [`Question`](crate::Question), JSON.
+    Question,
     /// `evidence`: in a sealed swarm, proof that a member said two things; see `gestalt-trust`.
     Evidence,
     /// `roster`: in a sealed swarm, its newest members, for all who hear it; see `gestalt-trust`.
@@ -86,6 +88,7 @@ impl Keys {
             Topic::Frame(id) => format!("{prefix}robot/{id}/frame"),
             Topic::Taken(id) => format!("{prefix}robot/{id}/taken"),
             Topic::Decision => format!("{prefix}decision"),
+            Topic::Question => format!("{prefix}question"),
             Topic::Evidence => format!("{prefix}evidence"),
             Topic::Roster => format!("{prefix}roster"),
             Topic::RosterFor(id) => format!("{prefix}robot/{id}/roster"),
@@ -113,6 +116,7 @@ impl Keys {
         let mut chunks = key.strip_prefix(&self.prefix)?.split('/');
         let topic = match (chunks.next()?, chunks.next(), chunks.next()) {
             ("decision", None, None) => Topic::Decision,
+            ("question", None, None) => Topic::Question,
             ("evidence", None, None) => Topic::Evidence,
             ("roster", None, None) => Topic::Roster,
             ("robot", Some(id), Some(what)) => {
@@ -163,6 +167,7 @@ mod tests {
             Topic::Frame(RobotId(5)),
             Topic::Taken(RobotId(6)),
             Topic::Decision,
+            Topic::Question,
             Topic::Evidence,
             Topic::Roster,
             Topic::RosterFor(RobotId(7)),

@@ -1,7 +1,7 @@
 //! What the robots of a Gestalt swarm say to each other, and where.
 //!
 //! Robots speak [`Message`]s in postcard inside a versioned [`Envelope`]; clients read JSON ([`Announcement`],
-//! [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
+//! [`Question`], [`Status`], [`Answer`]) and write JSON ([`Instruction`]). [`Keys`] builds and parses the key expressions under which all
 //! of it travels.
 //!
 //! This crate holds no behaviour: when to speak, and what to make of what is heard, is `gestalt-strategies`;
@@ -29,6 +29,7 @@ mod limits;
 mod message;
 mod naming;
 mod pool;
+mod question;
 mod round_outcome;
 mod sample;
 mod signature;
@@ -54,6 +55,7 @@ pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
 pub use message::{Give, Have, Message};
 pub use naming::{Fate, MAX_LABEL, MAX_NAMED, Naming, Namings};
 pub use pool::Pool;
+pub use question::{Ask, Asked, Question};
 pub use round_outcome::{Reason, RoundOutcome};
 pub use sample::{
     Batches, Digest, HeldBatch, Know, Known, Lessons, MAX_BATCH_BYTES, MAX_BATCHES, MAX_COMPONENTS,

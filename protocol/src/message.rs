@@ -9,6 +9,7 @@ use crate::holding::{Holder, Holding};
 use crate::id::{RobotId, RoundId, Stamp};
 use crate::limits::MAX_ROBOTS;
 use crate::naming::Namings;
+use crate::question::Asked;
 use crate::sample::{Batches, Digest, Know, Lessons, Samples};
 use crate::vote::{HeldVote, Vote};
 
@@ -35,6 +36,8 @@ pub enum Message {
     Announced(Announced),
     /// To one neighbour: what instructors named and it may not have heard.
     Namings(Namings),
+    /// To the swarm and its clients: a question, in JSON. This is what its asker signs of it.
+    Asked(Asked),
 }
 
 /// What a robot holds of the newest round it knows, in short.

@@ -2,10 +2,7 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
-    FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known,
-    Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, RobotId, RoundId, SampleId, SampleSeries,
-    Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    Announcement, Answer, Ask, Asked, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate, FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known, Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -176,6 +173,61 @@ fn what_an_announcer_signs() {
     assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));
     assert_eq!(Announcement::of(envelope), Some(announcement));
     assert_eq!(Announcement::of(self::envelope(Message::Vote(vote()))), None);
+}
+
+fn question() -> Question {
+    Question {
+        round: ROUND,
+        ask: Ask::Between { classes: [ClassId(2), ClassId(3)] },
+        labels: vec!["two".to_owned(), "three".to_owned()],
+        entropy: 0.75,
+        disagreement: 0.25,
+        robot: RobotId(7),
+        stamp: Stamp { boot: 1, sequence: 130 },
+        signature: None,
+    }
+}
+
+#[test]
+fn what_an_asker_signs() {
+    // The round, what is asked, two labels, the two numbers.
+    let nats = "000000000000e83f 000000000000d03f";
+    let labels = "02 03 74776f 05 7468726565";
+    let Question { entropy, disagreement, labels: named, .. } = question();
+    let asked = |ask, labels| Asked { round: ROUND, ask, labels, entropy, disagreement };
+    for (ask, said) in [
+        (question().ask, "00 02 03"),
+        (Ask::Again { nearest: ClassId(2) }, "01 02"),
+        (Ask::Name { nearest: Some(ClassId(2)) }, "02 01 02"),
+        (Ask::Name { nearest: None }, "02 00"),
+    ] {
+        travels_as(Message::Asked(asked(ask, vec![])), &format!("{HEAD} 09 ac0202a101 {said} 00 {nats}"));
+    }
+    let envelope = Envelope::from(question());
+    assert_eq!(envelope, self::envelope(Message::Asked(asked(question().ask, named))));
+    assert_eq!(
+        hex(&envelope.statement()),
+        format!("{HEAD} 09 ac0202a101 00 02 03 {labels} {nats}").replace(' ', "")
+    );
+    assert_eq!(Question::of(envelope), Some(question()));
+}
+
+#[test]
+fn a_question_as_clients_read_it() {
+    let json = concat!(
+        r#"{"round":{"counter":300,"opener":2,"life":161},"ask":{"kind":"between","classes":[2,3]},"#,
+        r#""labels":["two","three"],"entropy":0.75,"disagreement":0.25,"#,
+        r#""robot":7,"stamp":{"boot":1,"sequence":130},"signature":null}"#
+    );
+    assert_eq!(serde_json::to_string(&question()).unwrap(), json);
+    assert_eq!(decode_json::<Question>(json.as_bytes()), Ok(question()));
+    for (ask, said) in [
+        (Ask::Again { nearest: ClassId(2) }, r#"{"kind":"again","nearest":2}"#),
+        (Ask::Name { nearest: None }, r#"{"kind":"name","nearest":null}"#),
+    ] {
+        assert_eq!(serde_json::to_string(&ask).unwrap(), said);
+        assert_eq!(decode_json::<Ask>(said.as_bytes()), Ok(ask));
+    }
 }
 
 fn sample(vector: Vector) -> SharedSample {

@@ -15,6 +15,7 @@
 //! Who wants decisions and no learning takes `gestalt-rounds` alone; who wants classifiers, `gestalt-svm`. What a host
 //! needs of both is re-exported here.
 
+mod asking;
 pub mod forgetting;
 pub mod geometry;
 mod learning;
@@ -27,9 +28,10 @@ mod shares;
 mod training_set;
 mod vector_codec;
 
+pub use asking::{Occasion, QuestionBudget, QuestionsConfig, QuestionsConfigError, worth_asking};
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
-    Ballot, Classify, ClassifyError, Evidence, Fuse, JudgedFrame, Life, Observation, Quorum, Refusal,
+    Ballot, Classify, ClassifyError, Doubt, Evidence, Fuse, JudgedFrame, Life, Observation, Quorum, Refusal,
     Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
 };
 pub use gestalt_svm::{

@@ -11,8 +11,7 @@
 //! and written again has the same bytes.
 
 use gestalt_protocol::{
-    Announced, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons,
-    MAX_JSON, Message, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
+    Announced, Asked, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons, MAX_JSON, Message, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
     Vote,
 };
 use half::f16;
@@ -71,6 +70,7 @@ enum SpeltMessage {
     Holding(Holding),
     Announced(Announced),
     Namings(Namings),
+    Asked(Asked),
 }
 
 #[derive(Serialize, Deserialize)]
@@ -149,6 +149,7 @@ impl From<Message> for SpeltMessage {
             Message::Holding(holding) => Self::Holding(holding),
             Message::Announced(announced) => Self::Announced(announced),
             Message::Namings(namings) => Self::Namings(namings),
+            Message::Asked(asked) => Self::Asked(asked),
         }
     }
 }
@@ -171,6 +172,7 @@ impl From<SpeltMessage> for Message {
             SpeltMessage::Holding(holding) => Self::Holding(holding),
             SpeltMessage::Announced(announced) => Self::Announced(announced),
             SpeltMessage::Namings(namings) => Self::Namings(namings),
+            SpeltMessage::Asked(asked) => Self::Asked(asked),
         }
     }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_ROBOTS, Message, RobotId,
-    Topic, decode_json,
+    Announcement, Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_ROBOTS, Message, Question,
+    RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{
     Classifier, Classify, ClassifyError, Input, Instructed, LearnError, Learner, LearningSetup, Mind,
@@ -188,6 +188,11 @@ impl PortableMind {
                 announcement.decision.check().map_err(refused)?;
                 Input::Announced(announcement)
             }
+            Topic::Question => {
+                let question: Question = decode_json(payload).map_err(refused)?;
+                question.check().map_err(refused)?;
+                Input::Asked(question)
+            }
             Topic::Answer(instructor) => {
                 let answer: Answer = decode_json(payload).map_err(refused)?;
                 Input::Answered(instructor, answer.at, answer.robot)
@@ -218,7 +223,11 @@ impl PortableMind {
             }
             (
                 Topic::Repair(_),
-                Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_),
+                Message::Vote(_)
+                | Message::Samples(_)
+                | Message::Holding(_)
+                | Message::Announced(_)
+                | Message::Asked(_),
             ) => false,
             (Topic::Repair(to), _) => *to == self.settings.robot && author != self.settings.robot,
             _ => false,
@@ -320,6 +329,7 @@ impl PortableMind {
             }
             Output::Tell(to, envelope) => self.say(&Topic::Repair(to), Some(to), false, envelope.encode()),
             Output::Announce(announcement) => self.say_json(&Topic::Decision, &announcement),
+            Output::Ask(question) => self.say_json(&Topic::Question, &question),
             Output::Answer(instructor, answer) => self.say_json(&Topic::Answer(instructor), &answer),
             // The host asks what it holds, and whether a round is open.
             Output::Hold(_) | Output::Opened(_) | Output::Closed(_) => {}

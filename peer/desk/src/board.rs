@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use crate::view::View;
 
 /// The parts of the page, by the names of their events.
-const NAMES: [&str; 4] = ["swarm", "decision", "rounds", "beat"];
+const NAMES: [&str; 5] = ["swarm", "decision", "rounds", "question", "beat"];
 
 /// One part as it was last written.
 #[derive(Clone, Debug, Default)]
@@ -55,6 +55,7 @@ impl Board {
             event(NAMES[0], &view.swarm(now)),
             event(NAMES[1], &view.decision()),
             event(NAMES[2], &json!({"rounds": view.rounds(), "curve": view.curve(), "said": view.said()})),
+            event(NAMES[3], &view.question(now)),
         ];
         let announced = view.latest().map(|latest| serde_json::to_vec(latest).expect(IN_JSON).into());
         *self.announced.lock().unwrap_or_else(PoisonError::into_inner) = announced;
@@ -68,8 +69,8 @@ impl Board {
     /// Says that the page is live: readers that hear this no more have lost it.
     pub fn beat(&self, now: Duration) {
         let at_ms = u64::try_from(now.as_millis()).unwrap_or(u64::MAX);
-        let event = event(NAMES[3], &json!({"swarm": self.swarm, "at_ms": at_ms}));
-        self.parts.send_modify(|parts| parts.0[3].write(event));
+        let event = event(NAMES[4], &json!({"swarm": self.swarm, "at_ms": at_ms}));
+        self.parts.send_modify(|parts| parts.0[4].write(event));
     }
 
     pub fn reader(&self) -> Reader {

@@ -22,4 +22,4 @@ pub mod view;
 pub use desk::Desk;
 pub use error::DeskError;
 pub use page::{Address, Door, Limits, Token};
-pub use view::{Event, Input, View};
+pub use view::{Event, Input, SHOWN, View};

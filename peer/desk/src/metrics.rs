@@ -107,12 +107,15 @@ impl Collector for Moment {
 
 impl Moment {
     fn encode_swarm(&self, to: &mut DescriptorEncoder) -> fmt::Result {
-        let Tally { decided, undecided, refused, answers, seconds, total_seconds } = &self.tally;
+        let Tally { decided, undecided, refused, answers, questions, seconds, total_seconds } = &self.tally;
         let rounds = [([("outcome", "decided")], *decided), ([("outcome", "undecided")], *undecided)];
         counter(to, "rounds", "Rounds that ended, as first heard", rounds)?;
         let answers = Tally::OUTCOMES.into_iter().zip(answers);
         let answers = answers.map(|(outcome, count)| ([("outcome", outcome)], *count));
         counter(to, "answers", "Answers of the swarm to instructors", answers)?;
+        let questions =
+            Tally::KINDS.into_iter().zip(questions).map(|(kind, count)| ([("kind", kind)], *count));
+        counter(to, "questions", "Questions of the swarm to its instructor, as first heard", questions)?;
         counter(
             to,
             "robots_refused",

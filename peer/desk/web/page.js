@@ -7,7 +7,7 @@ const counted = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
 const token = decodeURIComponent(location.hash.slice(1));
 const authority = token ? { Authorization: `Bearer ${token}` } : {};
 
-const state = { swarm: null, decision: null, rounds: null };
+const state = { swarm: null, decision: null, rounds: null, question: null };
 // Without a word for this long, the page is not live. The server says one each second.
 const SILENCE = 2500;
 // A round that has just appeared is not yet what the person meant to speak of.
@@ -325,6 +325,7 @@ function buttons() {
   $("name-it").disabled = !live || waiting;
   $("was").classList.toggle("off", !can || !it);
   for (const button of $("gestures").children) button.disabled = !can || !it;
+  for (const button of $("replies").children) button.disabled = !live || waiting;
 }
 
 function showGestures() {
@@ -337,6 +338,39 @@ function showGestures() {
     });
     return button;
   }, () => {});
+}
+
+// A question is answered with a word on its round, whatever was decided since. "Neither" leaves it to "That was…" to say which.
+function showQuestion() {
+  const it = state.question;
+  $("question").hidden = !it;
+  if (!it) return;
+  text("asks", `Round ${it.round.counter}, robot ${it.robot} asks: ${it.words}`);
+  const known = state.swarm ? state.swarm.vocabulary : [];
+  const asked = it.kind === "again" ? [] : it.kind === "between" ? it.gestures : known;
+  const gestures = asked.map((label) => ({ label, word: { say: "was", round: it.round, class: label } }));
+  const neither = it.kind === "between" ? known.filter((label) => !it.gestures.includes(label)) : [];
+  const replies = [...gestures, ...(it.kind === "between" ? [{ label: "Neither", of: neither }] : [])];
+  const of = `${it.round.counter}@${it.round.opener}-${it.round.life}`;
+  sync($("replies"), replies, (reply) => `${of} ${reply.label}`, (reply) => {
+    const button = make("button", "", reply.label);
+    button.type = "button";
+    button.addEventListener("click", () => (reply.word ? say(reply.word) : chooseOther(it, reply.of)));
+    return button;
+  }, () => {});
+  buttons();
+}
+
+// Neither of the two: then which of the others.
+function chooseOther(it, others) {
+  const replies = others.map((label) => {
+    const button = make("button", "", label);
+    button.type = "button";
+    button.addEventListener("click", () => say({ say: "was", round: it.round, class: label }));
+    return button;
+  });
+  $("replies").replaceChildren(...replies);
+  buttons();
 }
 
 async function say(word) {
@@ -408,6 +442,11 @@ const PARTS = {
     state.rounds = it;
     showRounds();
     showVerdict();
+  },
+  question(it) {
+    const changed = JSON.stringify(it) !== JSON.stringify(state.question);
+    state.question = it;
+    if (changed) showQuestion();
   },
   beat(it) {
     text("swarm", it.swarm);

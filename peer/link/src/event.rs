@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use gestalt_protocol::{Announcement, Answer, Decision, InstructorId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{Announcement, Answer, Decision, InstructorId, Question, RobotId, RoundId, SampleId};
 
 use crate::failure::Part;
 
@@ -24,6 +24,8 @@ pub enum Event {
     Held(Decision),
     /// That decision was announced for the swarm, by this robot or another.
     Announced(Announcement),
+    /// That was asked in the name of the swarm, by this robot or another.
+    Asked(Question),
     /// The robots it is linked to now.
     Neighbours(BTreeSet<RobotId>),
     /// The robots alive now, itself aside.

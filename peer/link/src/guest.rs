@@ -214,7 +214,7 @@ impl Guest {
                 let host = self.host_account.lock().robot;
                 self.note_alive(robots.iter().copied().chain([host]));
             }
-            Event::Announced(_) => {}
+            Event::Announced(_) | Event::Asked(_) => {}
             // What the host alone lives through.
             Event::Held(_)
             | Event::Neighbours(_)

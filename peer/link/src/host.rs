@@ -112,6 +112,7 @@ impl Host {
                 self.tell(Event::Neighbours(neighbours.clone()));
             }
             Input::Announced(announcement) => self.tell(Event::Announced(announcement.clone())),
+            Input::Asked(question) => self.tell(Event::Asked(question.clone())),
             Input::Learned(classifier) => {
                 let guarded = self.sight.guard(classifier.clone())?;
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier.clone());
@@ -215,6 +216,10 @@ impl Host {
             Output::Announce(announcement) => {
                 self.voice.announce(&announcement);
                 self.tell(Event::Announced(announcement));
+            }
+            Output::Ask(question) => {
+                self.voice.ask(&question);
+                self.tell(Event::Asked(question));
             }
             Output::Opened(round) => {
                 let mut status = self.account.lock();

@@ -114,7 +114,7 @@ impl Inbox {
     }
 
     /// Whether a member said that; in an open swarm everybody is believed.
-    fn believe(&self, envelope: &Envelope) -> Result<(), Distrust> {
+    pub(super) fn believe(&self, envelope: &Envelope) -> Result<(), Distrust> {
         self.judged(|judge, now| judge.envelope(now, envelope)).unwrap_or(Ok(()))
     }
 
@@ -170,6 +170,7 @@ impl Inbox {
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
             Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(id, sample)),
             Some(Topic::Decision) => ("decision", self.on_decision(sample)),
+            Some(Topic::Question) => ("question", self.on_question(sample)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(sample)),
             Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
             Some(Topic::Word(by)) => ("word", self.on_word(by, sample)),
@@ -251,7 +252,11 @@ impl Inbox {
         // What is said to all comes under a key of its own.
         let to_all = matches!(
             envelope.message,
-            Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_)
+            Message::Vote(_)
+                | Message::Samples(_)
+                | Message::Holding(_)
+                | Message::Announced(_)
+                | Message::Asked(_)
         );
         if to_all {
             return Err(Refusal::Kind);

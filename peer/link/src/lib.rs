@@ -27,6 +27,7 @@ mod hearing;
 mod host;
 mod identity;
 mod inbox;
+mod inbox_question;
 mod inbox_sealed;
 mod keeper;
 mod memory;

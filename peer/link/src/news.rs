@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use gestalt_protocol::{
-    Announcement, DecodeError, Envelope, Holding, Keys, Message, RobotId, RoundId, Topic, decode_json,
+    Announcement, DecodeError, Envelope, Holding, Keys, Message, Question, RobotId, RoundId, Topic,
+    decode_json,
 };
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
@@ -22,6 +23,8 @@ pub enum Heard {
     Decided(Announcement),
     /// That robot now holds another decision.
     Held(RobotId, Holding),
+    /// The swarm asks whoever instructs it.
+    Asked(Question),
     /// A robot came.
     Came(RobotId),
     /// A robot left, or was lost.
@@ -101,11 +104,12 @@ struct Listener {
 
 impl Listener {
     async fn listen(&self, session: &Session) -> zenoh::Result<()> {
-        for key in [self.keys.key(&Topic::Decision), self.keys.every_robot("decision")] {
+        let keys = &self.keys;
+        for key in [keys.key(&Topic::Decision), keys.every_robot("decision"), keys.key(&Topic::Question)] {
             let listener = self.clone();
             session
                 .declare_subscriber(key)
-                .callback(move |sample| listener.on_decision(&sample))
+                .callback(move |sample| listener.on_sample(&sample))
                 .background()
                 .await?;
         }
@@ -119,10 +123,11 @@ impl Listener {
             .await
     }
 
-    fn on_decision(&self, sample: &Sample) {
+    fn on_sample(&self, sample: &Sample) {
         let bytes = sample.payload().to_bytes();
         let heard = match self.keys.parse(sample.key_expr()) {
             Some(Topic::Decision) => decode_json(&bytes).map(Heard::Decided),
+            Some(Topic::Question) => question(&bytes).map(Heard::Asked),
             Some(Topic::RobotDecision(robot)) => {
                 held(robot, &bytes).map(|holding| Heard::Held(robot, holding))
             }
@@ -139,7 +144,7 @@ impl Listener {
                 known.held.insert(*robot, holding.clone());
                 Some(holding.round.counter)
             }
-            Heard::Came(_) | Heard::Left(_) => None,
+            Heard::Asked(_) | Heard::Came(_) | Heard::Left(_) => None,
         };
         known.newest = known.newest.max(round);
         drop(known);
@@ -159,6 +164,13 @@ impl Listener {
             let _ = self.news.send(heard);
         }
     }
+}
+
+/// What is asked, as it is claimed.
+fn question(bytes: &[u8]) -> Result<Question, DecodeError> {
+    let question: Question = decode_json(bytes)?;
+    question.check()?;
+    Ok(question)
 }
 
 /// What a robot says under its own key that it holds.

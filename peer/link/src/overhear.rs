@@ -26,7 +26,7 @@ pub enum Overheard {
 }
 
 impl Client {
-    /// Hears all that is said to all from now on: votes, samples, decisions, feedback, answers and evidence, and robots that come and
+    /// Hears all that is said to all from now on: votes, samples, decisions, questions, feedback, answers and evidence, and robots that come and
     /// go; with `frames` also what cameras stream, which then travels to this client as well. What one neighbour tells another is not
     /// heard. `take` is called on Zenoh's threads, which must not wait.
     ///
@@ -42,6 +42,7 @@ impl Client {
             self.keys.every_robot("sample"),
             self.keys.every_robot("decision"),
             self.keys.key(&Topic::Decision),
+            self.keys.key(&Topic::Question),
             self.keys.key(&Topic::Evidence),
             self.keys.every_instructor("feedback"),
             self.keys.every_instructor("word"),

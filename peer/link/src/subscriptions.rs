@@ -21,6 +21,7 @@ pub(crate) async fn listen(
         keys.key(&Topic::Repair(me)),
         keys.every_robot("decision"),
         keys.key(&Topic::Decision),
+        keys.key(&Topic::Question),
         keys.key(&Topic::Evidence),
         keys.every_instructor("feedback"),
         keys.every_instructor("word"),

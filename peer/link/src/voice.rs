@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{
-    Announcement, Answer, Envelope, InstructorId, Keys, Message, RobotId, RoundId, Topic,
+    Announcement, Answer, Envelope, InstructorId, Keys, Message, Question, RobotId, RoundId, Topic,
 };
 use gestalt_strategies::Mind;
 use serde::Serialize;
@@ -110,7 +110,8 @@ impl Voice {
             | Message::Lessons(_)
             | Message::Namings(_)
             | Message::Holding(_)
-            | Message::Announced(_) => "give",
+            | Message::Announced(_)
+            | Message::Asked(_) => "give",
         };
         let key = self.keys.key(&Topic::Repair(neighbour));
         self.outbox.send(Parcel { kind, key, bytes: envelope.encode(), express: true });
@@ -123,6 +124,20 @@ impl Voice {
         let put = self
             .session
             .put(self.keys.key(&Topic::Answer(instructor.clone())), json)
+            .encoding(Encoding::APPLICATION_JSON)
+            .priority(Priority::InteractiveHigh)
+            .congestion_control(CongestionControl::Drop)
+            .wait();
+        self.account.check(put);
+    }
+
+    /// Asks whoever instructs the swarm.
+    pub fn ask(&self, question: &Question) {
+        let json = as_json(question);
+        self.account.sent("question", json.len());
+        let put = self
+            .session
+            .put(self.keys.key(&Topic::Question), json)
             .encoding(Encoding::APPLICATION_JSON)
             .priority(Priority::InteractiveHigh)
             .congestion_control(CongestionControl::Drop)

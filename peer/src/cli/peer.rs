@@ -174,6 +174,9 @@ pub(super) fn report(as_json: bool, event: &Event, names: &Names) -> Result<(), 
             json!({"event": "announced", "decision": announcement}),
             format!("decided: {}", show::announced(announcement, names)),
         ),
+        Event::Asked(question) => {
+            (json!({"event": "asked", "question": question}), format!("asks: {}", show::question(question)))
+        }
         Event::Neighbours(robots) => (
             json!({"event": "neighbours", "robots": robots}),
             match robots.len() {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use gestalt_protocol::{
-    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, Reason, RobotId, RoundId,
-    RoundOutcome, Status,
+    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, Question, Reason, RobotId,
+    RoundId, RoundOutcome, Status,
 };
 use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde_json::Value;
@@ -201,6 +201,14 @@ pub(super) fn answer(answer: &Answer, names: &Names) -> String {
     };
     let round = answer.to.round().map(|round| format!("round {}: ", round.counter)).unwrap_or_default();
     format!("{round}{}; {samples}{}", answer.outcome.describe(), alike.unwrap_or_default())
+}
+
+/// A question of the swarm, and what it rests on.
+pub(super) fn question(question: &Question) -> String {
+    clean(&format!(
+        "round {}: robot {} asks: {question} (unsure by {:.2} nats, {:.2} of them disagreement)",
+        question.round.counter, question.robot, question.entropy, question.disagreement
+    ))
 }
 
 /// `1 vote`, `8 votes`.

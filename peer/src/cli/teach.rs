@@ -2,9 +2,9 @@
 
 use std::io::BufRead;
 use std::pin::pin;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, InstructorId, RoundId};
+use gestalt_protocol::{Answer, Ask, ClassId, Gesture, Instruction, InstructorId, Question, RoundId};
 use serde_json::json;
 use tokio::sync::mpsc;
 
@@ -12,11 +12,13 @@ use super::config_args::ConfigArgs;
 use super::show::{self, Names, line};
 use super::word::Word;
 use super::{Failure, interrupted};
-use gestalt_link::{Client, News};
+use gestalt_desk::SHOWN;
+use gestalt_link::{Client, Heard, News};
 
 /// Give a swarm feedback on its decisions
 ///
-/// With a command, sends it and exits. Without one, reads commands from the keyboard, one per line, until `quit`.
+/// With a command, sends it and exits. Without one, reads commands from the keyboard, one per line, until `quit`, and shows what the swarm asks: a line that
+/// is no command, but a gesture's name, answers it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt teach open -e tcp/192.168.1.5:7447
@@ -73,7 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             Some(round) => Some((round, last.filter(|last| last.0 == round).and_then(|last| last.1))),
             None => last,
         };
-        let mut lesson = Lesson { args, client, news, last, names: Names::default() };
+        let mut lesson = Lesson { args, client, news, last, asked: None, names: Names::default() };
         let said = match word {
             Some(Word::New(label)) => lesson.name(label).await,
             Some(word) => lesson.say(word).await,
@@ -90,6 +92,8 @@ struct Lesson<'a> {
     news: News,
     /// The round that words are about, and what was decided of it.
     last: Option<(RoundId, Option<ClassId>)>,
+    /// What the swarm asked last, and when.
+    asked: Option<(Question, Instant)>,
     names: Names,
 }
 
@@ -109,6 +113,14 @@ impl Lesson<'_> {
         loop {
             let typed = tokio::select! {
                 () = &mut interrupted => return Ok(()),
+                heard = self.news.next() => match heard {
+                    Some(Heard::Asked(question)) => {
+                        self.hear_question(question)?;
+                        continue;
+                    }
+                    Some(_) => continue,
+                    None => return Err("the session with the swarm has ended".into()),
+                },
                 typed = keyboard.recv() => match typed {
                     Some(typed) => typed,
                     None => return Ok(()),
@@ -121,7 +133,10 @@ impl Lesson<'_> {
             let said = match Word::read(&words) {
                 Ok(Word::Quit) => return Ok(()),
                 Ok(word) => self.say(word).await,
-                Err(error) => Err(error.into()),
+                Err(error) => match self.question() {
+                    Some(question) => self.reply(&question, &words.join(" ")).await,
+                    None => Err(error.into()),
+                },
             };
             if let Err(error) = said {
                 eprintln!("{}", show::clean(&error.to_string()));
@@ -148,6 +163,34 @@ impl Lesson<'_> {
         Ok(())
     }
 
+    fn hear_question(&mut self, question: Question) -> Result<(), Failure> {
+        // Where a robot dies while it asks, the next may ask the same.
+        if self.question().is_some_and(|known| known.round == question.round) {
+            return Ok(());
+        }
+        let words = format!("{}\n{}", show::question(&question), how_to_answer(&question.ask));
+        let shown = line(self.args.json, &json!({"event": "question", "question": question}), &words);
+        self.asked = Some((question, Instant::now()));
+        shown
+    }
+
+    /// The question that waits for its answer.
+    fn question(&self) -> Option<Question> {
+        let (question, asked) = self.asked.as_ref()?;
+        (asked.elapsed() < SHOWN).then(|| question.clone())
+    }
+
+    /// Answers a question with what was typed: a gesture's name, or `neither`, which leaves it to the next line to say which.
+    async fn reply(&mut self, question: &Question, typed: &str) -> Result<(), Failure> {
+        if typed == "neither" {
+            self.asked = Some((question.clone(), Instant::now()));
+            return line(self.args.json, &json!({"event": "neither"}), "which one, then? Or nothing.");
+        }
+        self.asked = None;
+        let word = Word::Was(Gesture::Label(typed.to_owned()));
+        self.say_of(question.round, None, word).await
+    }
+
     async fn say(&mut self, word: Word) -> Result<(), Failure> {
         if word == Word::Open {
             return self.open().await;
@@ -158,6 +201,10 @@ impl Lesson<'_> {
         let (round, decided) = self
             .last
             .ok_or("no round has been decided yet: open one with 'open', or name one with --round")?;
+        self.say_of(round, decided, word).await
+    }
+
+    async fn say_of(&mut self, round: RoundId, decided: Option<ClassId>, word: Word) -> Result<(), Failure> {
         let Some(instruction) = word.about(round, decided)? else { return Ok(()) };
         self.tell(&instruction).await.map(|_| ())
     }
@@ -191,5 +238,14 @@ impl Lesson<'_> {
             &json!({"event": "decision", "decision": decided}),
             &show::announced(&decided, &self.names),
         )
+    }
+}
+
+/// What to type.
+fn how_to_answer(ask: &Ask) -> &'static str {
+    match ask {
+        Ask::Between { .. } => "type the gesture, or neither; or nothing",
+        Ask::Again { .. } => "type open and show it again, or its name; or nothing",
+        Ask::Name { .. } => "type its name, or nothing",
     }
 }

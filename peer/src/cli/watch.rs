@@ -97,6 +97,10 @@ async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Fail
             Some(Event::Left(robot)) => {
                 line(args.json, &json!({"event": "left", "robot": robot}), &format!("robot {robot} left"))?;
             }
+            Some(Event::Question(question)) => {
+                let words = show::question(&question);
+                line(args.json, &json!({"event": "question", "question": question}), &words)?;
+            }
             // What each robot holds is in the decision's own message already.
             Some(Event::Answered(_)) | None => {}
         }

@@ -15,6 +15,8 @@ pub enum Kind {
     Holding,
     /// A decision, announced for the swarm.
     Decision,
+    /// A question of the swarm to its instructor.
+    Question,
     /// A robot's account of itself.
     Status,
     /// A robot came or left.
@@ -40,11 +42,12 @@ const OWN: &str = "gestalt.";
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Vote,
         Self::Sample,
         Self::Holding,
         Self::Decision,
+        Self::Question,
         Self::Status,
         Self::Alive,
         Self::Feedback,
@@ -64,6 +67,7 @@ impl Kind {
             Topic::Sample(_) => Self::Sample,
             Topic::RobotDecision(_) => Self::Holding,
             Topic::Decision => Self::Decision,
+            Topic::Question => Self::Question,
             Topic::Status(_) => Self::Status,
             Topic::Alive(_) => Self::Alive,
             Topic::Feedback(_) => Self::Feedback,
@@ -90,6 +94,7 @@ impl Kind {
             Self::Sample => "gestalt.Samples",
             Self::Holding => "gestalt.Holding",
             Self::Decision => "gestalt.Decision",
+            Self::Question => "gestalt.Question",
             Self::Status => "gestalt.Status",
             Self::Alive => "gestalt.Alive",
             Self::Feedback => "gestalt.Feedback",
@@ -116,6 +121,7 @@ impl Kind {
             Self::Sample => "sample",
             Self::Holding => "holding",
             Self::Decision => "decision",
+            Self::Question => "question",
             Self::Status => "status",
             Self::Alive => "alive",
             Self::Feedback => "feedback",

@@ -20,6 +20,7 @@ pub fn schema(kind: Kind) -> Option<Value> {
         Kind::Sample => ("Samples that a robot shares with all.", samples()),
         Kind::Holding => ("Which decision a robot holds, in short.", holding()),
         Kind::Decision => ("The swarm's decision, with the votes it rests on.", decision()),
+        Kind::Question => ("A question of the swarm to its instructor.", question()),
         Kind::Status => ("A robot's account of itself, asked for every few seconds.", status()),
         Kind::Alive => (
             "A robot came or left.",
@@ -210,6 +211,24 @@ fn decision() -> Vec<Field> {
         must("announcer", robot()),
         must("stamp", stamp()),
         may("signature", text("The announcer's signature, in hexadecimal; only in a sealed swarm.")),
+    ]
+}
+
+fn question() -> Vec<Field> {
+    let ask = vec![
+        must("kind", one_of("What is asked.", &["between", "again", "name"])),
+        may("classes", list("between: the two gestures.", class("One of them."))),
+        may("nearest", class("again, name: the gesture that it is likest.")),
+    ];
+    vec![
+        must("round", round()),
+        must("ask", object("What is asked.", ask)),
+        must("labels", list("What the gestures in question are called.", text("One of them."))),
+        must("entropy", number("The entropy of the pooled opinion, in nats.")),
+        must("disagreement", number("The Jensen-Shannon divergence of the votes, in nats.")),
+        must("robot", robot()),
+        must("stamp", stamp()),
+        may("signature", signature()),
     ]
 }
 

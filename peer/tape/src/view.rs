@@ -4,7 +4,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Envelope, Gesture, HeldVote, Holder, Instruction, MAX_MESSAGE,
-    Message, RobotId, Samples, Stamp, Status, Topic, Vector, decode_json,
+    Message, Question, RobotId, Samples, Stamp, Status, Topic, Vector, decode_json,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -38,6 +38,11 @@ pub fn view(topic: &Topic, payload: &[u8]) -> Result<Value, DecodeError> {
             // A rule of somebody's own is an object in JSON; a viewer wants one type.
             view["certificate"]["rule"] = json!(announced.decision.certificate.rule.name());
             view
+        }
+        Topic::Question => {
+            let question: Question = decode_json(payload)?;
+            question.check()?;
+            plain(&question)?
         }
         Topic::Status(_) => plain(&decode_json::<Status>(payload)?)?,
         Topic::Alive(_) => plain(&decode_json::<Alive>(payload)?)?,
@@ -86,6 +91,7 @@ pub fn wire(topic: &Topic, view: &Value) -> Option<Vec<u8>> {
         Topic::Vote(_) => Some(Envelope::from(HeldVote::deserialize(view).ok()?).encode()),
         Topic::RobotDecision(_) => Some(Envelope::from(Holder::deserialize(view).ok()?).encode()),
         Topic::Decision => spoken::<Announcement>(view),
+        Topic::Question => spoken::<Question>(view),
         Topic::Status(_) => spoken::<Status>(view),
         Topic::Alive(_) => spoken::<Alive>(view),
         Topic::Feedback(_) => spoken::<Instruction>(view),

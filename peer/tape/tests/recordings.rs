@@ -214,7 +214,7 @@ proptest! {
     #[test]
     fn no_bytes_under_any_key_panic_and_none_are_lost(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let topics = [
-            Topic::Vote(RobotId(1)), Topic::Sample(RobotId(1)), Topic::RobotDecision(RobotId(1)), Topic::Decision,
+            Topic::Vote(RobotId(1)), Topic::Sample(RobotId(1)), Topic::RobotDecision(RobotId(1)), Topic::Decision, Topic::Question,
             Topic::Status(RobotId(1)), Topic::Evidence, Topic::Feedback("ada".parse().unwrap()),
             Topic::Answer("ada".parse().unwrap()), Topic::Frame(RobotId(1)), Topic::Alive(RobotId(1)),
         ];

@@ -6,6 +6,7 @@ use gestalt_svm::LearnerOptions;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::asking::{QuestionsConfig, QuestionsConfigError};
 use crate::forgetting::ForgettingRule;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
@@ -44,6 +45,9 @@ pub enum LearningConfigError {
     /// An unlikely time between looks.
     #[error("spacing is longer than a minute: choose a shorter duration, for example 400ms")]
     Spacing,
+    /// Questions that nobody can ask.
+    #[error(transparent)]
+    Questions(#[from] QuestionsConfigError),
 }
 
 /// How a robot learns: what it keeps, what it shares, what it forgets. In a configuration file what is left out is the
@@ -64,6 +68,7 @@ pub enum LearningConfigError {
 /// | `sure` | 0.95 | probability from which a sample of several possible gestures is labelled by the robot itself | 0.5–1 |
 /// | `aside` | 256 | the most samples kept aside until it is known what they show | 0–100,000 |
 /// | `learner` | | how the support vector machines are trained | |
+/// | `questions` | | when the swarm asks its instructor, see [`QuestionsConfig`] | |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearningConfig {
@@ -99,6 +104,8 @@ pub struct LearningConfig {
     pub aside: usize,
     /// How the support vector machines are trained.
     pub learner: LearnerOptions,
+    /// When the swarm asks its instructor, and what.
+    pub questions: QuestionsConfig,
 }
 
 impl Default for LearningConfig {
@@ -117,6 +124,7 @@ impl Default for LearningConfig {
             sure: 0.95,
             aside: 256,
             learner: LearnerOptions::default(),
+            questions: QuestionsConfig::default(),
         }
     }
 }
@@ -148,7 +156,7 @@ impl LearningConfig {
         if self.spacing > Duration::from_secs(60) {
             return Err(LearningConfigError::Spacing);
         }
-        Ok(())
+        Ok(self.questions.validate()?)
     }
 }
 

@@ -4,6 +4,7 @@ mod budget;
 mod changes;
 mod config;
 mod following;
+mod inspect;
 mod judged;
 mod labelling;
 mod memory;

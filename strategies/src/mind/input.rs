@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, RobotId};
+use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, Question, RobotId};
 use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
 
 /// What the world tells the mind.
@@ -35,6 +35,8 @@ pub enum Input {
     Received(Envelope),
     /// This decision was announced for the swarm (`decision`).
     Announced(Announcement),
+    /// Another robot asked that in the name of the swarm (`question`).
+    Asked(Question),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
     Alive(BTreeSet<RobotId>),
     /// The robots that see and vote through this robot's host, and leave deciding and announcing to this mind.
@@ -61,13 +63,13 @@ pub struct Instructed {
 }
 
 /// What an input is about.
-#[expect(clippy::large_enum_variant, reason = "it is taken apart at once, and never kept")]
 pub(super) enum Concern {
     Rounds(AboutRounds),
     Word(Instructed),
     Disallowed(Instructed),
     Answered(InstructorId, u64, RobotId),
     Remembered(u64),
+    Asked(Question),
 }
 
 impl Input {
@@ -79,6 +81,7 @@ impl Input {
             Self::Instructed(word) => return Concern::Word(word),
             Self::Disallowed(word) => return Concern::Disallowed(word),
             Self::Answered(by, at, robot) => return Concern::Answered(by, at, robot),
+            Self::Asked(question) => return Concern::Asked(question),
             Self::Remembered(revision) => return Concern::Remembered(revision),
             Self::Tick => AboutRounds::Tick,
             Self::Shown(began) => AboutRounds::Shown(began),

@@ -10,6 +10,7 @@ use gestalt_rounds::{
 };
 
 use super::answers::Answers;
+use super::asks::Asks;
 use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
@@ -60,6 +61,7 @@ pub struct Mind {
     pub(super) learning: Option<Learning>,
     pub(super) answers: Answers,
     pub(super) exchanges: Exchanges,
+    pub(super) asks: Asks,
     /// Of this life, in the names of its rounds and samples.
     nonce: u32,
 }
@@ -76,6 +78,7 @@ impl Mind {
             learning: None,
             answers: Answers::default(),
             exchanges: Exchanges::default(),
+            asks: Asks::default(),
             nonce: life.nonce,
         })
     }
@@ -129,6 +132,7 @@ impl Mind {
             Concern::Word(word) => self.on_instructed(now, word),
             Concern::Disallowed(word) => self.on_disallowed(now, word),
             Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
+            Concern::Asked(question) => self.on_asked(now, question),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };
         let round = self.rounds.round();
@@ -145,6 +149,7 @@ impl Mind {
         out.extend(done.into_iter().map(Output::from));
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);
+        self.carry_on_asking(now, &mut out);
         out
     }
 
@@ -155,7 +160,10 @@ impl Mind {
             Some(learning) => learning,
             None => &(),
         };
-        [self.rounds.next_wake_with(follower), self.answer_due()].into_iter().flatten().min()
+        [self.rounds.next_wake_with(follower), self.answer_due(), self.questions_due()]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     /// Learns from what concerns the rounds, before they take it in.
@@ -199,7 +207,8 @@ impl Mind {
             | Message::Have(_)
             | Message::Give(_)
             | Message::Holding(_)
-            | Message::Announced(_) => {}
+            | Message::Announced(_)
+            | Message::Asked(_) => {}
         }
     }
 

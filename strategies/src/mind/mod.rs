@@ -2,6 +2,7 @@
 //! from.
 
 mod answers;
+mod asks;
 mod exchanges;
 mod input;
 mod inspect;

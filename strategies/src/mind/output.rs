@@ -1,6 +1,6 @@
 //! What the mind wants done.
 
-use gestalt_protocol::{Announcement, Answer, Decision, Envelope, InstructorId, RobotId, RoundId};
+use gestalt_protocol::{Announcement, Answer, Decision, Envelope, InstructorId, Question, RobotId, RoundId};
 use gestalt_rounds::Output as OfRounds;
 
 use crate::learning::{RecordChange, TrainingChange};
@@ -21,6 +21,8 @@ pub enum Output {
     Opened(RoundId),
     /// That round is over for this robot: no further looking.
     Closed(RoundId),
+    /// As the spokesrobot: ask whoever instructs the swarm (`question`).
+    Ask(Question),
     /// Answer that instructor (`instructor/<id>/answer`).
     Answer(InstructorId, Answer),
     /// Make the classifier follow these changes of its samples, beside the loop; then say

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use gestalt_protocol::{Announcement, Decision, Envelope, HeldVote, Holder, RobotId, Signature};
+use gestalt_protocol::{Announcement, Decision, Envelope, HeldVote, Holder, Question, RobotId, Signature};
 use gestalt_trust::{Fake, Identity, Instructor, Membership, Role, Roles, Roster, SwarmId, statement};
 
 /// Robots 1 to so many are on the roster.
@@ -73,6 +73,12 @@ pub fn seal_holder(holder: &mut Holder) {
 pub fn seal_announcement(announcement: &mut Announcement) {
     let said = Envelope::from(announcement.clone());
     announcement.signature = Some(sign(announcement.announcer, &said.statement()));
+}
+
+/// The same of a question.
+pub fn seal_question(question: &mut Question) {
+    let said = Envelope::from(question.clone());
+    question.signature = Some(sign(question.robot, &said.statement()));
 }
 
 /// Puts their own signatures under those votes that a decision rests on whose bit is set.

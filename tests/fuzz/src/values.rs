@@ -1,11 +1,7 @@
 //! Values as robots and people say them, for inputs to begin with. All of the wire that is spelt out here is in this file.
 
 use gestalt_protocol::{
-    Announcement, Answer, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
-    FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
-    Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
-    Naming, Namings, Outcome, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature,
-    Stamp, Status, Vector, VocabularyId, Vote, Word,
+    Announcement, Answer, Ask, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate, FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message, Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Status, Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -137,6 +133,26 @@ pub fn announcement(rng: &mut impl Rng) -> Announcement {
     Announcement { decision, label, announcer, stamp, signature: maybe(rng, signature) }
 }
 
+/// What a swarm asks.
+pub fn question(rng: &mut impl Rng) -> Question {
+    let ask = match rng.random_range(0..3) {
+        0 => Ask::Between { classes: [class(rng), class(rng)] },
+        1 => Ask::Again { nearest: class(rng) },
+        _ => Ask::Name { nearest: maybe(rng, class) },
+    };
+    let labels = ask.classes().iter().map(|_| "thrée\n".to_owned()).collect();
+    Question {
+        round: round(rng),
+        ask,
+        labels,
+        entropy: rng.random(),
+        disagreement: rng.random(),
+        robot: robot(rng),
+        stamp: stamp(rng),
+        signature: maybe(rng, signature),
+    }
+}
+
 /// A digest.
 pub fn digest(rng: &mut impl Rng) -> Digest {
     Digest { key: rng.random(), samples: rng.random(), lessons: rng.random() }
@@ -227,7 +243,8 @@ pub fn give(decision: Option<Decision>, votes: Vec<HeldVote>, holders: Vec<Holde
 /// Any message between robots.
 pub fn message(rng: &mut impl Rng) -> Message {
     let about = round(rng);
-    match rng.random_range(0..10) {
+    match rng.random_range(0..11) {
+        10 => Envelope::from(question(rng)).message,
         7 => Message::Holding(holding(rng)),
         8 => Envelope::from(announcement(rng)).message,
         0 => Message::Vote(vote(rng, about, 3)),

@@ -4,6 +4,7 @@
 //! whoever speaks, nothing here grows beyond [`MAX_ROBOTS`], [`MAX_ROUNDS`] and the lengths below.
 
 mod decision;
+mod question;
 mod robot;
 mod round;
 mod said;
@@ -17,18 +18,20 @@ use std::time::Duration;
 
 use gestalt_link::Heard;
 use gestalt_protocol::{
-    Announcement, Answer, Holding, InstructorId, MAX_ROBOTS, RobotId, RoundId, Status, VocabularyId,
+    Announcement, Answer, Holding, InstructorId, MAX_ROBOTS, Question, RobotId, RoundId, Status, VocabularyId,
 };
 use gestalt_strategies::Vocabulary;
 use serde::Serialize;
 
 pub use decision::{DecisionView, Share, VoteView};
+pub use question::{QuestionView, SHOWN};
 pub use robot::{LearningView, RobotView};
 pub use round::{CurvePoint, MAX_ROUNDS, RoundView, Verdict};
 pub use said::{MAX_SAID, SaidView};
 pub use tally::{SECONDS, Tally};
 pub use text::clipped;
 
+use question::Asked;
 use robot::Robot;
 use round::Rounds;
 use said::Said;
@@ -51,6 +54,8 @@ pub enum Input {
     Decided(Box<Announcement>),
     /// Which decision a robot holds.
     Held(RobotId, Box<Holding>),
+    /// The swarm's question to its instructor.
+    Question(Box<Question>),
     /// The swarm's answer to an instructor.
     Answered(InstructorId, Box<Answer>),
 }
@@ -61,6 +66,7 @@ impl From<Heard> for Input {
             Heard::Came(robot) => Self::Came(robot),
             Heard::Left(robot) => Self::Left(robot),
             Heard::Decided(announcement) => Self::Decided(Box::new(announcement)),
+            Heard::Asked(question) => Self::Question(Box::new(question)),
             Heard::Held(robot, holding) => Self::Held(robot, Box::new(holding)),
         }
     }
@@ -75,6 +81,8 @@ pub enum Event {
     Left(RobotId),
     /// A round was decided, or decided otherwise than was heard before.
     Decided(Box<Announcement>),
+    /// The swarm asks.
+    Question(Box<Question>),
     /// An instructor was answered.
     Answered(RoundId),
 }
@@ -98,6 +106,7 @@ pub struct View {
     latest: Option<Announcement>,
     rounds: Rounds,
     said: Said,
+    asked: Asked,
     tally: Tally,
     /// Since when no robot has answered, though asked.
     unanswered: Option<Duration>,
@@ -113,6 +122,7 @@ impl View {
             Input::Asked(answers) => self.on_asked(now, answers),
             Input::Decided(announcement) => self.on_decided(*announcement),
             Input::Held(id, holding) => self.on_held(now, id, *holding),
+            Input::Question(question) => self.on_question(now, *question),
             Input::Answered(by, answer) => self.on_answered(by, *answer),
         }
     }
@@ -160,6 +170,12 @@ impl View {
             let vocabulary = self.rounds.vocabulary(round).and_then(|id| self.known_vocabulary(id));
             text::gesture(class, vocabulary.or_else(|| self.vocabulary()))
         })
+    }
+
+    /// The question that waits for its answer.
+    #[must_use]
+    pub fn question(&self, now: Duration) -> Option<QuestionView> {
+        self.asked.at(now).map(QuestionView::from)
     }
 
     /// What was heard since the view began, counted.
@@ -279,8 +295,17 @@ impl View {
         None
     }
 
+    fn on_question(&mut self, now: Duration, question: Question) -> Option<Event> {
+        if !self.asked.ask(now, question.clone()) {
+            return None;
+        }
+        self.tally.count_question(&question.ask);
+        Some(Event::Question(Box::new(question)))
+    }
+
     fn on_answered(&mut self, by: InstructorId, answer: Answer) -> Option<Event> {
         let round = answer.to.round()?;
+        self.asked.answer(round, answer.outcome);
         if !self.said.note(&by, round, &answer) {
             return None;
         }

@@ -1,6 +1,6 @@
 //! What was heard, counted: for metrics.
 
-use gestalt_protocol::{Decision, Outcome};
+use gestalt_protocol::{Ask, Decision, Outcome};
 
 /// Upper bounds of the histogram of decision times, in seconds; the last bucket is everything above.
 pub const SECONDS: [f64; 8] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
@@ -16,6 +16,8 @@ pub struct Tally {
     pub refused: u64,
     /// Answers to instructors, by [`Tally::OUTCOMES`].
     pub answers: [u64; 8],
+    /// Questions of the swarm, by [`Tally::KINDS`].
+    pub questions: [u64; 3],
     /// Rounds by how long they took: one for each of [`SECONDS`] and one for all above, each counted once.
     pub seconds: [u64; SECONDS.len() + 1],
     /// The sum of these times, in seconds.
@@ -45,6 +47,18 @@ impl Tally {
         let bucket = SECONDS.iter().position(|most| seconds <= *most).unwrap_or(SECONDS.len());
         self.seconds[bucket] += 1;
         self.total_seconds += seconds;
+    }
+
+    /// The kinds of questions in the order of `questions`, by their names in messages.
+    pub const KINDS: [&'static str; 3] = ["between", "again", "name"];
+
+    pub(super) fn count_question(&mut self, ask: &Ask) {
+        let place = match ask {
+            Ask::Between { .. } => 0,
+            Ask::Again { .. } => 1,
+            Ask::Name { .. } => 2,
+        };
+        self.questions[place] += 1;
     }
 
     pub(super) fn count_answer(&mut self, outcome: Outcome) {

@@ -4,6 +4,7 @@
 //! every machine, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
 //! shortest ways of what the robots believe to be connected, and are lost hop by hop.
 
+mod answering;
 mod calibration;
 mod network;
 mod observer;
@@ -23,6 +24,7 @@ mod trace;
 use std::io;
 use std::sync::Arc;
 
+pub use answering::{Answering, AskedBy};
 pub use calibration::Calibration;
 pub use network::Traffic;
 pub use observer::{BlindObserver, Observer, ScoreClassifier, StatisticalObserver};
@@ -180,6 +182,12 @@ impl<'a> Emulation<'a> {
     #[must_use]
     pub fn traffic(&self, robot: usize) -> Traffic {
         self.swarm.traffic(robot)
+    }
+
+    /// How many questions were asked so far, and how often the instructor said what was shown.
+    #[must_use]
+    pub fn asked(&self) -> (u32, u32) {
+        self.swarm.asked()
     }
 
     /// Runs to the end; the second value says whether the trace could be written.

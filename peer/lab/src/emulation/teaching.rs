@@ -5,6 +5,8 @@ use std::time::Duration;
 use gestalt_strategies::LearningConfig;
 use serde::{Deserialize, Serialize};
 
+use super::answering::{Answering, AskedBy};
+
 /// How robots are taught, and how they learn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -16,6 +18,8 @@ pub struct Teaching {
     pub after: Duration,
     /// How every robot learns.
     pub robots: LearningConfig,
+    /// Who asks, and how the instructor answers.
+    pub answering: Answering,
 }
 
 impl Default for Teaching {
@@ -24,7 +28,18 @@ impl Default for Teaching {
             feedback: Feedback::default(),
             after: Duration::from_secs(5),
             robots: LearningConfig::default(),
+            answering: Answering::default(),
         }
+    }
+}
+
+impl Teaching {
+    /// How every robot learns: where nobody answers, nobody asks.
+    #[must_use]
+    pub fn of_robots(&self) -> LearningConfig {
+        let mut robots = self.robots.clone();
+        robots.questions.ask &= self.feedback == Feedback::Asked && self.answering.asked_by == AskedBy::Swarm;
+        robots
     }
 }
 
@@ -37,6 +52,8 @@ pub enum Feedback {
     Full,
     /// Whether the decision was right; nothing where there is none.
     Partial,
+    /// Which gesture it was, where that is asked.
+    Asked,
     /// Nothing: robots stay with what they know.
     None,
 }

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, Instruction, Outcome, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Decision, Instruction, Outcome, Question, RobotId, RoundId};
 use serde::Serialize;
 
 use super::scenario::Event;
@@ -71,6 +71,13 @@ pub enum Happening<'a> {
         robot: RobotId,
         /// What.
         instruction: &'a Instruction,
+    },
+    /// A robot asks.
+    Ask {
+        /// Who.
+        robot: RobotId,
+        /// What.
+        question: &'a Question,
     },
     /// A robot answers.
     Answer {

@@ -6,6 +6,7 @@
 //! hands ─► school: space, classifier ───┘                                        table, plots ◄─┘
 //! ```
 
+mod asking;
 mod chart;
 mod error;
 mod eyes;

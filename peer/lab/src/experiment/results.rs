@@ -25,6 +25,8 @@ struct Row {
     published_bytes: f64,
     link_bytes: f64,
     samples: f64,
+    questions: f64,
+    labels: f64,
 }
 
 /// `results.csv`: all rounds of each run that ended.
@@ -87,7 +89,8 @@ fn rows(runs: &BTreeMap<Run, Vec<Standing>>) -> Vec<Row> {
 }
 
 fn row((line, value, seed): &Run, standing: &Standing) -> Row {
-    let Standing { round, single, swarm, majority, published, on_links, samples } = *standing;
+    let Standing { round, single, swarm, majority, published, on_links, samples, questions, labels } =
+        *standing;
     Row {
         line: line.clone(),
         value: value.clone(),
@@ -99,11 +102,16 @@ fn row((line, value, seed): &Run, standing: &Standing) -> Row {
         published_bytes: published,
         link_bytes: on_links,
         samples,
+        questions,
+        labels,
     }
 }
 
 fn taken_apart(row: Row) -> (Run, Standing) {
-    let Row { line, value, seed, round, single, swarm, majority, published_bytes, link_bytes, samples } = row;
+    let Row {
+        line, value, seed, round, single, swarm, majority, published_bytes, link_bytes, samples, ..
+    } = row;
+    let Row { questions, labels, .. } = row;
     let standing = Standing {
         round,
         single,
@@ -112,6 +120,8 @@ fn taken_apart(row: Row) -> (Run, Standing) {
         published: published_bytes,
         on_links: link_bytes,
         samples,
+        questions,
+        labels,
     };
     ((line, value, seed), standing)
 }
@@ -129,6 +139,8 @@ mod tests {
             published: 10.5,
             on_links: 20.0,
             samples: 3.0,
+            questions: 1.0,
+            labels: 1.0,
         };
         (0..=rounds).map(standing).collect()
     }

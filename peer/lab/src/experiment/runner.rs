@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::asking::asking;
 use super::error::ExperimentError;
 use super::figures::figures;
 use super::fingerprint::this_program;
@@ -80,7 +81,8 @@ pub fn conduct_by(
     let runs = run_what_is_left(&taught, &pool, results, seeds, &progress)?.finish()?;
 
     let summary = Summary::of(&experiment, &cells, &runs, seeds);
-    let table = summary.markdown(&pool, materials);
+    let table =
+        summary.markdown(&pool, materials) + &asking(&experiment, &cells, &runs, seeds).unwrap_or_default();
     let path = folder.join("results.md");
     replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &figures(&summary))?;

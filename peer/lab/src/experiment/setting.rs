@@ -7,7 +7,7 @@ use gestalt_strategies::{LearningConfig, MindConfig, Ranking};
 use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
-use crate::emulation::{Feedback, Group, Order, Poison, Scenario, Teaching};
+use crate::emulation::{Answering, Feedback, Group, Order, Poison, Scenario, Teaching};
 use crate::shape::NetworkShape;
 
 /// A swarm that learns, and everything that an experiment may vary. What is left out is the default.
@@ -25,6 +25,7 @@ use crate::shape::NetworkShape;
 /// | `moments` | own | whether robots look at the hand at the same moments |
 /// | `drift` | none | what changes half-way |
 /// | `feedback` | full | what the instructor says |
+/// | `answering` | the swarm asks, no answer is wrong | who asks where the instructor speaks when asked, and which part of what they say is wrong |
 /// | `learning` | | how robots keep, share, forget and train |
 /// | `own_rules` | none | the name of rules of your own, as handed to [`conduct_by`](super::conduct_by) |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +53,8 @@ pub struct Setting {
     pub drift: Drift,
     /// What the instructor says.
     pub feedback: Feedback,
+    /// Who asks where the instructor speaks when asked, and how they answer.
+    pub answering: Answering,
     /// How robots keep, share, forget and train.
     pub learning: LearningConfig,
     /// The name of rules of your own, in place of those that `learning` names and of the logarithmic pool.
@@ -132,6 +135,7 @@ impl Default for Setting {
             moments: Moments::default(),
             drift: Drift::default(),
             feedback: Feedback::default(),
+            answering: Answering::default(),
             learning: LearningConfig::default(),
             own_rules: None,
         }
@@ -187,6 +191,7 @@ impl Setting {
                 feedback: self.feedback,
                 after: seconds(6),
                 robots: self.learning.clone(),
+                answering: self.answering,
             }),
             faults: Vec::new(),
             churn: None,

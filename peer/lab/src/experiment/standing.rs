@@ -18,4 +18,8 @@ pub struct Standing {
     pub on_links: f64,
     /// Samples that a robot holds, on average.
     pub samples: f64,
+    /// How many questions were asked so far.
+    pub questions: f64,
+    /// How often the instructor said what was shown.
+    pub labels: f64,
 }

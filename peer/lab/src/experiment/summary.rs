@@ -207,6 +207,8 @@ mod tests {
             published: 0.0,
             on_links: 0.0,
             samples: 0.0,
+            questions: 0.0,
+            labels: 0.0,
         };
         let mut runs = BTreeMap::new();
         for (seed, ease) in [(0, 0.2), (1, 0.6)] {

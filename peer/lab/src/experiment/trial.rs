@@ -214,6 +214,7 @@ impl Exam {
         let traffic = (0..self.robots).map(|robot| emulation.traffic(robot));
         let traffic: crate::emulation::Traffic = traffic.sum();
         let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
+        let (asked, labels) = emulation.asked();
         Standing {
             round,
             single: single / f64::max(seen, 1.0),
@@ -222,6 +223,8 @@ impl Exam {
             published: traffic.published_samples as f64 / robots,
             on_links: traffic.samples_on_links() as f64 / robots,
             samples: samples.sum::<usize>() as f64 / robots,
+            questions: f64::from(asked),
+            labels: f64::from(labels),
         }
     }
 }

@@ -55,9 +55,10 @@ fn merge(config: &mut Value, extra: Value) {
 fn planes(keys: &Keys) -> Value {
     let all = format!("gestalt/{}/**", keys.swarm());
     let robots = format!("gestalt/{}/robot/**", keys.swarm());
-    let swarm = [robots, keys.key(&Topic::Decision), keys.key(&Topic::Evidence), keys.key(&Topic::Roster)];
+    let of_swarm = [Topic::Decision, Topic::Question, Topic::Evidence, Topic::Roster];
+    let swarm = [robots].into_iter().chain(of_swarm.iter().map(|topic| keys.key(topic)));
     let of_members: Vec<String> =
-        swarm.into_iter().chain([keys.every_instructor("word"), keys.every_instructor("answer")]).collect();
+        swarm.chain([keys.every_instructor("word"), keys.every_instructor("answer")]).collect();
     json!({
         "enabled": true,
         "default_permission": "deny",

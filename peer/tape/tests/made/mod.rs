@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, ClassId, Decision, Envelope, FeatureSpaceId, FrameHeader, FusionRule, Gesture,
-    ImageEncoding, Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Reported, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
+    Announcement, Answer, Ask, ClassId, Decision, Envelope, FeatureSpaceId, FrameHeader, FusionRule, Gesture,
+    ImageEncoding, Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Question, Reported,
+    RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
 };
 use gestalt_rounds::{
     Classify, ClassifyError, Input, Life, Observation, Output, Rounds, RoundsConfig, Vocabulary,
@@ -164,6 +164,17 @@ pub fn one_of_each() -> Vec<Passing> {
     let signature = Some(Signature::from_bytes([9; 64]));
     let own = Announcement { decision: own, label: None, announcer: robot, stamp, signature };
     all.push(said(Topic::Decision, json(&own), at));
+    for ask in [
+        Ask::Between { classes: [ClassId(2), ClassId(0)] },
+        Ask::Again { nearest: ClassId(1) },
+        Ask::Name { nearest: Some(ClassId(1)) },
+        Ask::Name { nearest: None },
+    ] {
+        let labels = ask.classes().iter().map(ToString::to_string).collect();
+        let question =
+            Question { round, ask, labels, entropy: 0.5, disagreement: 0.0, robot, stamp, signature };
+        all.push(said(Topic::Question, json(&question), at));
+    }
     let ada = || "ada".parse().unwrap();
     let (label, class) = (Gesture::Label("fist".to_owned()), Gesture::Class(ClassId(2)));
     let words = [
@@ -209,6 +220,7 @@ pub fn one_of_each() -> Vec<Passing> {
         Topic::Vote(robot),
         Topic::Sample(robot),
         Topic::Decision,
+        Topic::Question,
         Topic::Feedback(ada()),
         Topic::Answer(ada()),
     ] {

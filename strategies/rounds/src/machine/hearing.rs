@@ -52,6 +52,8 @@ impl Rounds {
             }
             // That comes as what it is, an announcement.
             Message::Announced(_) => {}
+            // And that as a question, to whoever follows the rounds.
+            Message::Asked(_) => {}
             // Whoever follows the rounds to learn from them takes these in.
             Message::Samples(_)
             | Message::Batches(_)

@@ -1,5 +1,6 @@
 //! Whole minds that learn, joined by a network of a few lines.
 
+mod asking;
 mod feedback;
 mod knowledge;
 mod naming;
@@ -76,6 +77,7 @@ struct Swarm {
     loss: f64,
     rng: ChaCha8Rng,
     answers: Vec<gestalt_protocol::Answer>,
+    asked: Vec<(Duration, gestalt_protocol::Question)>,
     said: Vec<SharedSample>,
     trained: Vec<BTreeMap<u64, ClassId>>,
     spaces: Vec<Arc<FeatureSpace>>,
@@ -104,6 +106,7 @@ impl Swarm {
             loss: 0.0,
             rng: ChaCha8Rng::seed_from_u64(seed),
             answers: Vec::new(),
+            asked: Vec::new(),
             said: Vec::new(),
             trained: vec![BTreeMap::new(); n],
             spaces: vec![space(); n],
@@ -226,6 +229,13 @@ impl Swarm {
                                 }
                             }
                         }
+                    }
+                    Output::Ask(question) => {
+                        for j in (0..self.minds.len()).filter(|j| *j != i) {
+                            due.push_back((j, Input::Asked(question.clone())));
+                        }
+                        assert!(self.minds.iter().all(|mind| !mind.is_open()), "never while a round is open");
+                        self.asked.push((self.now, question));
                     }
                     Output::Hold(_) | Output::Announce(_) | Output::Opened(_) | Output::Closed(_) => {}
                 }

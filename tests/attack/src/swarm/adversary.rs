@@ -176,7 +176,7 @@ impl Swarm {
             }
         }
         match envelope.message {
-            Message::Lessons(_) | Message::Holding(_) | Message::Announced(_) => {
+            Message::Lessons(_) | Message::Holding(_) | Message::Announced(_) | Message::Asked(_) => {
                 forged::signed(envelope, &key(by.0), &self.id())
             }
             _ => envelope,

@@ -188,6 +188,7 @@ impl Swarm {
                 self.broadcast(i, &Topic::Decision, json(&announcement));
                 self.announced.push((self.now, me, announcement.decision));
             }
+            Output::Ask(question) => self.broadcast(i, &Topic::Question, json(&question)),
             Output::Answer(by, answer) => {
                 self.broadcast(i, &Topic::Answer(by), json(&answer));
                 self.answers.push(answer);

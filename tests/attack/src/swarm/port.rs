@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
-    Message, RobotId, Topic, decode_json,
+    Message, Question, RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge, RosterError};
@@ -119,6 +119,7 @@ impl Port {
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(now, &parcel.bytes)),
             Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(now, id, &parcel.bytes)),
             Some(Topic::Decision) => ("decision", self.on_decision(now, &parcel.bytes)),
+            Some(Topic::Question) => ("question", self.on_question(now, &parcel.bytes)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(now, &parcel.bytes)),
             Some(Topic::Roster) => ("roster", self.on_roster(&parcel.bytes)),
             // Links between members carry none without a signature.
@@ -185,7 +186,11 @@ impl Port {
             return Err(Refusal::Twin);
         }
         match envelope.message {
-            Message::Vote(_) | Message::Samples(_) | Message::Holding(_) | Message::Announced(_) => {
+            Message::Vote(_)
+            | Message::Samples(_)
+            | Message::Holding(_)
+            | Message::Announced(_)
+            | Message::Asked(_) => {
                 return Err(Refusal::Kind);
             }
             Message::Lessons(_) => self.judge(now, &envelope)?,
@@ -210,6 +215,13 @@ impl Port {
             judge.announcement(now, &announcement)?;
         }
         Ok(Some(Input::Announced(announcement)))
+    }
+
+    fn on_question(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
+        let question: Question = json(bytes)?;
+        question.check()?;
+        self.judge(now, &question.clone().into())?;
+        Ok(Some(Input::Asked(question)))
     }
 
     fn on_holding(&mut self, now: Duration, id: RobotId, bytes: &[u8]) -> Result<Option<Input>, Refusal> {

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, Envelope, Instruction, Keys, MAX_ROBOTS, Message, RobotId, Topic, decode_json,
+    Announcement, Answer, Envelope, Instruction, Keys, MAX_ROBOTS, Message, Question, RobotId, Topic,
+    decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::Witness;
@@ -106,7 +107,7 @@ impl Inbox {
                 if envelope.author == ME
                     || matches!(
                         envelope.message,
-                        Message::Vote(_) | Message::Holding(_) | Message::Announced(_)
+                        Message::Vote(_) | Message::Holding(_) | Message::Announced(_) | Message::Asked(_)
                     )
                 {
                     return None;
@@ -129,6 +130,15 @@ impl Inbox {
                 }
                 self.gate.announcement(self.now, &announcement).ok()?;
                 Input::Announced(announcement)
+            }
+            Topic::Question => {
+                let mut question: Question = bounded(payload, || decode_json(payload)).ok()?;
+                question.check().ok()?;
+                if seal {
+                    swarm::seal_question(&mut question);
+                }
+                self.gate.message(self.now, question.clone().into()).ok()?;
+                Input::Asked(question)
             }
             Topic::Feedback(by) => {
                 let instruction: Instruction = bounded(payload, || decode_json(payload)).ok()?;
@@ -172,7 +182,7 @@ pub fn seed(rng: &mut impl rand::Rng) -> Vec<u8> {
         let mut envelope = values::envelope(rng);
         let author = envelope.author;
         let json = |value: serde_json::Result<Vec<u8>>| value.expect("it is JSON");
-        let (topic, payload) = match rng.random_range(0..7) {
+        let (topic, payload) = match rng.random_range(0..8) {
             0 => {
                 let round = values::round(rng);
                 envelope.message = Message::Vote(values::vote(rng, round, 3));
@@ -184,6 +194,7 @@ pub fn seed(rng: &mut impl rand::Rng) -> Vec<u8> {
                 envelope.message = Message::Holding(values::holding(rng));
                 (Topic::RobotDecision(author), envelope.encode())
             }
+            6 => (Topic::Question, json(serde_json::to_vec(&values::question(rng)))),
             5 => (Topic::Decision, json(serde_json::to_vec(&values::announcement(rng)))),
             _ => (
                 Topic::Feedback(values::instructor(rng)),

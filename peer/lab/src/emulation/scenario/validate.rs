@@ -61,6 +61,9 @@ impl Scenario {
         self.mind.validate()?;
         if let Some(teaching) = &self.learning {
             teaching.robots.validate()?;
+            if !(0.0..=1.0).contains(&teaching.answering.wrong) {
+                return wrong("learning.answering.wrong", "choose from 0 to 1, for example 0.1".to_owned());
+            }
             if teaching.after >= self.interval {
                 return wrong("learning.after", "speak before the next gesture is shown".to_owned());
             }

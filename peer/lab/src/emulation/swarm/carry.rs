@@ -73,6 +73,12 @@ impl Swarm<'_> {
                 let (announcement, bytes) = as_json(&announcement);
                 self.broadcast(i, bytes, Kind::Decision, &Parcel::Announced(announcement));
             }
+            Output::Ask(question) => {
+                self.note(&Happening::Ask { robot, question: &question });
+                self.hear_question(i, &question);
+                let (question, bytes) = as_json(&question);
+                self.broadcast(i, bytes, Kind::Words, &Parcel::Asked(question));
+            }
             Output::Opened(round) => {
                 self.note(&Happening::Opened { robot, round });
                 self.record.open(self.now, i);

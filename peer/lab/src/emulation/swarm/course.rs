@@ -4,7 +4,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId};
+use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId, RoundId};
 use gestalt_strategies::{Classify, Input, Instructed, Mind};
 use rand::RngExt;
 use rand::seq::SliceRandom;
@@ -14,6 +14,7 @@ use super::parcel::{Parcel, json_bytes};
 use super::queue::Due;
 use super::robot::Robot;
 use super::seed::{frames, stream};
+use crate::emulation::answering::AskedBy;
 use crate::emulation::network::{Kind, Presence};
 use crate::emulation::scenario::Order;
 use crate::emulation::teaching::Feedback;
@@ -98,8 +99,20 @@ impl Swarm<'_> {
         let Some(teaching) = &self.scenario.learning else { return };
         let mind = self.robots[i].mind.as_ref().filter(|_| self.network.presence(i) == Presence::Up);
         let Some((mind, round)) = mind.and_then(|mind| Some((mind, mind.round()?))) else { return };
-        let instruction = match (teaching.feedback, mind.held().and_then(|held| held.class)) {
-            (Feedback::Full, _) => Instruction::Was { round, class: Gesture::Class(self.shown) },
+        let held = mind.held().and_then(|held| held.class);
+        let by_others = teaching.answering.asked_by != AskedBy::Swarm;
+        let instruction = match (teaching.feedback, held) {
+            (Feedback::Full, _) => {
+                let class = self.names(None);
+                return self.tell_class(i, round, class);
+            }
+            (Feedback::Asked, _) => {
+                if by_others && self.is_asked(i) {
+                    let class = self.names(None);
+                    self.tell_class(i, round, class);
+                }
+                return;
+            }
             (Feedback::Partial, Some(decided)) => {
                 let of = Gesture::Class(decided);
                 if decided == self.shown {
@@ -110,12 +123,26 @@ impl Swarm<'_> {
             }
             (Feedback::Partial, None) | (Feedback::None, _) => return,
         };
+        self.say(i, instruction, u64::from(n));
+    }
+
+    /// The instructor, who stands at that robot, says that it was that gesture.
+    pub(super) fn tell_class(&mut self, i: usize, round: RoundId, class: ClassId) {
+        let n = self.record.showings.len().saturating_sub(1) as u64;
+        self.say(i, Instruction::Was { round, class: Gesture::Class(class) }, n);
+    }
+
+    fn say(&mut self, i: usize, instruction: Instruction, at: u64) {
+        if self.network.presence(i) != Presence::Up {
+            return;
+        }
         let robot = self.robots[i].id;
+        self.asking.labels += 1;
         self.record.tell();
         self.note(&Happening::Instruct { robot, instruction: &instruction });
         let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
         let bytes = json_bytes(&instruction);
-        let instructed = Rc::new(Instructed { by, at: u64::from(n), instruction });
+        let instructed = Rc::new(Instructed { by, at, instruction });
         self.broadcast(i, bytes, Kind::Words, &Parcel::Instructed(instructed.clone()));
         self.arrive(i, Parcel::Instructed(instructed));
     }

@@ -28,7 +28,7 @@ impl Swarm<'_> {
             Parcel::Announced(said) => {
                 said.decision.certificate.votes.iter().map(|counted| counted.held()).collect()
             }
-            Parcel::Instructed(_) | Parcel::Answered(..) => Vec::new(),
+            Parcel::Asked(_) | Parcel::Instructed(_) | Parcel::Answered(..) => Vec::new(),
         };
         let honest = |robot: RobotId| self.robots[robot.0 as usize - 1].lies.is_none();
         let of_others: Vec<HeldVote> = heard.into_iter().filter(|held| honest(held.robot)).collect();

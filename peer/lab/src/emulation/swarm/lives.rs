@@ -25,9 +25,8 @@ impl Swarm<'_> {
             match (&mut robot.pupil, &self.school, &self.scenario.learning) {
                 (Some(pupil), Some(school), Some(teaching)) => {
                     let rng = stream(self.seed, learning(i, robot.boot));
-                    let me = (robot.id, life);
-                    robot.mind =
-                        Some(pupil.start(me, config, school, (&teaching.robots, &self.rules.learning), rng));
+                    let (me, robots) = ((robot.id, life), teaching.of_robots());
+                    robot.mind = Some(pupil.start(me, config, school, (&robots, &self.rules.learning), rng));
                     pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>)
                 }
                 _ => {

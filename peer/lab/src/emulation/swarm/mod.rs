@@ -4,12 +4,14 @@
 //! |---|---|
 //! | `queue` | what is to happen next? |
 //! | `course` | what is shown, seen and taught? |
+//! | `answering` | what is asked, and what is answered? |
 //! | `faults` | what goes wrong? |
 //! | `lives` | who starts, goes on, and knows of whom? |
 //! | `carry` | what does a mind want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
 //! | `poisoning` | what do poisoners share? |
 
+mod answering;
 mod carry;
 mod course;
 mod deceive;
@@ -39,11 +41,12 @@ use super::scenario::{Event, Fault, Scenario};
 use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
+use answering::Asking;
 use plot::Plot;
 use poisoning::Poisoner;
 use queue::{Due, Queue};
 use robot::Robot;
-use seed::{COURSE, NETWORK, stream};
+use seed::{ANSWERS, COURSE, NETWORK, stream};
 
 /// A run of a scenario.
 pub(super) struct Swarm<'a> {
@@ -59,6 +62,7 @@ pub(super) struct Swarm<'a> {
     shown: ClassId,
     /// The gestures still to be shown before all have been.
     turn: Vec<ClassId>,
+    asking: Asking,
     plot: Plot,
     record: Record,
     trace: Trace<'a>,
@@ -97,6 +101,7 @@ impl<'a> Swarm<'a> {
             course: stream(seed, COURSE),
             shown: ClassId(0),
             turn: Vec::new(),
+            asking: Asking::new(stream(seed, ANSWERS)),
             plot: Plot::default(),
             record,
             trace,
@@ -137,6 +142,10 @@ impl<'a> Swarm<'a> {
         self.network.traffic[i]
     }
 
+    pub fn asked(&self) -> (u32, u32) {
+        (self.asking.questions, self.asking.labels)
+    }
+
     /// What that robot judges by after learning from all it holds.
     pub fn learned(&mut self, i: usize) -> Option<Arc<Classifier>> {
         self.train(i);
@@ -171,6 +180,7 @@ impl<'a> Swarm<'a> {
             Due::Arrive(robot, parcel) => self.arrive(robot, parcel),
             Due::Spread(arrivals, parcel) => self.spread(arrivals, parcel),
             Due::Teach(n, robot) => self.teach(n, robot),
+            Due::Reply(robot, round, ask) => self.reply(robot, round, ask),
             Due::Remembered(robot, boot, revision) => {
                 if self.robots[robot].boot == boot {
                     self.tell_mind(robot, Input::Remembered(revision));

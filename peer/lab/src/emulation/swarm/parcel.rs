@@ -2,7 +2,7 @@
 
 use std::rc::Rc;
 
-use gestalt_protocol::{Announcement, Envelope, InstructorId, RobotId};
+use gestalt_protocol::{Announcement, Envelope, InstructorId, Question, RobotId};
 use gestalt_strategies::{Input, Instructed};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -12,6 +12,7 @@ use serde::de::DeserializeOwned;
 pub(super) enum Parcel {
     Said(Rc<Envelope>),
     Announced(Rc<Announcement>),
+    Asked(Rc<Question>),
     Instructed(Rc<Instructed>),
     Answered(InstructorId, u64, RobotId),
 }
@@ -22,6 +23,7 @@ impl Parcel {
         match self {
             Self::Said(envelope) => Input::Received((*envelope).clone()),
             Self::Announced(announcement) => Input::Announced((*announcement).clone()),
+            Self::Asked(question) => Input::Asked((*question).clone()),
             Self::Instructed(instructed) => Input::Instructed((*instructed).clone()),
             Self::Answered(by, at, robot) => Input::Answered(by, at, robot),
         }

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
+use gestalt_protocol::{Ask, RoundId};
+
 use super::parcel::Parcel;
 use crate::emulation::network::Change;
 use crate::emulation::scenario::Event;
@@ -21,6 +23,8 @@ pub(super) enum Due {
     Spread(VecDeque<(Duration, usize)>, Parcel),
     /// The instructor speaks of that showing, through that robot if it is up.
     Teach(u32, usize),
+    /// The instructor answers that question about that round, through that robot.
+    Reply(usize, RoundId, Ask),
     /// What that robot was to remember in that life, up to that revision, is on its disk.
     Remembered(usize, u32, u64),
 }

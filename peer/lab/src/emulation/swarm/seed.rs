@@ -8,6 +8,8 @@ use rand_chacha::ChaCha8Rng;
 pub(super) const NETWORK: u64 = u64::MAX;
 /// The course of events.
 pub(super) const COURSE: u64 = u64::MAX - 1;
+/// What is asked by chance, and which answers are wrong.
+pub(super) const ANSWERS: u64 = u64::MAX - 2;
 /// The first of those by which robots share and forget, one for each life of each robot.
 const LEARNING: u64 = 1 << 63;
 /// The first of those that lives draw their numbers from.

@@ -278,6 +278,12 @@ fn altered(world: &mut World, events: &mut Events<'_>) {
             2 => envelope.message = values::message(&mut chance),
             _ => envelope.signature = None,
         },
+        Said::Asked(question) => match what % 4 {
+            0 => question.robot = RobotId(number),
+            1 => question.round = values::round(&mut chance),
+            2 => question.signature = None,
+            _ => *question = values::question(&mut chance),
+        },
         Said::Answered(_, at, _) => *at = number.into(),
     }
     world.hear(to, said);

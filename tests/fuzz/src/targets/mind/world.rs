@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, InstructorId, RobotId, RoundId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, InstructorId, Question, RobotId, RoundId};
 use gestalt_strategies::{Input, Output};
 
 use crate::gate::Gate;
@@ -22,6 +22,8 @@ pub enum Said {
     Message(Envelope),
     /// For the swarm.
     Announced(Announcement),
+    /// By the swarm.
+    Asked(Question),
     /// That a robot answered an instructor.
     Answered(InstructorId, u64, RobotId),
 }
@@ -108,6 +110,7 @@ impl World {
                     self.announced(&announcement.decision);
                     self.tell_all(robot, Said::Announced(announcement));
                 }
+                Output::Ask(question) => self.tell_all(robot, Said::Asked(question)),
                 Output::Answer(by, answer) => self.tell_all(robot, Said::Answered(by, answer.at, me)),
                 Output::Opened(_) | Output::Closed(_) | Output::Train(_) | Output::Remember { .. } => {}
             }
@@ -180,6 +183,13 @@ impl World {
                     return;
                 }
                 Input::Announced(announcement)
+            }
+            Said::Asked(question) => {
+                let sound = question.check().is_ok();
+                if !sound || gate.message(self.now, question.clone().into()).is_err() {
+                    return;
+                }
+                Input::Asked(question)
             }
             Said::Answered(by, at, robot) => Input::Answered(by, at, robot),
         };

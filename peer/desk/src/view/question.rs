@@ -1,0 +1,107 @@
+//! The question that the swarm asks now.
+
+use std::time::Duration;
+
+use gestalt_protocol::{Outcome, Question, RobotId, RoundId};
+use serde::Serialize;
+
+use super::text::{clipped, finite};
+
+/// How long it is shown: as long as robots wait for its answer, unless they are told otherwise.
+pub const SHOWN: Duration = Duration::from_secs(15);
+
+/// A question as a reader of the page is shown it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct QuestionView {
+    /// The round that it is about, and that an answer names.
+    pub round: RoundId,
+    /// `between`, `again` or `name`.
+    pub kind: &'static str,
+    /// The question in words.
+    pub words: String,
+    /// What the gestures are called that it names.
+    pub gestures: Vec<String>,
+    /// Who asks.
+    pub robot: RobotId,
+    /// See [`Question::entropy`].
+    pub entropy: f64,
+    /// See [`Question::disagreement`].
+    pub disagreement: f64,
+}
+
+/// The latest question, until it is answered or nobody did in time.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Asked(Option<(Question, Duration)>);
+
+impl Asked {
+    /// Takes in a question. Says whether it is new: where a robot dies while it asks, the next may ask the same.
+    pub fn ask(&mut self, now: Duration, question: Question) -> bool {
+        if self.at(now).is_some_and(|known| known.round == question.round) {
+            return false;
+        }
+        self.0 = Some((question, now));
+        true
+    }
+
+    /// A word on that round was answered: where it was heeded, the question is settled.
+    pub fn answer(&mut self, round: RoundId, outcome: Outcome) {
+        let heeded = matches!(outcome, Outcome::Learned | Outcome::Known | Outcome::NothingSeen);
+        self.0.take_if(|(question, _)| heeded && question.round == round);
+    }
+
+    /// The one that waits for its answer.
+    pub fn at(&self, now: Duration) -> Option<&Question> {
+        let (question, heard) = self.0.as_ref()?;
+        (now < heard.saturating_add(SHOWN)).then_some(question)
+    }
+}
+
+impl From<&Question> for QuestionView {
+    fn from(question: &Question) -> Self {
+        Self {
+            round: question.round,
+            kind: question.ask.kind(),
+            words: clipped(&question.to_string()),
+            gestures: question.names().iter().map(|name| clipped(name)).collect(),
+            robot: question.robot,
+            entropy: finite(question.entropy),
+            disagreement: finite(question.disagreement),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{Ask, ClassId, Stamp};
+
+    use super::*;
+
+    fn question(counter: u32) -> Question {
+        Question {
+            round: RoundId { counter, opener: RobotId(1), life: 0 },
+            ask: Ask::Between { classes: [ClassId(2), ClassId(3)] },
+            labels: vec!["two".to_owned(), "three".to_owned()],
+            entropy: 0.5,
+            disagreement: 0.25,
+            robot: RobotId(1),
+            stamp: Stamp::default(),
+            signature: None,
+        }
+    }
+
+    #[test]
+    fn it_stands_until_it_is_answered_or_for_a_while() {
+        let second = Duration::from_secs;
+        let mut asked = Asked::default();
+        assert!(asked.ask(second(1), question(5)));
+        assert!(!asked.ask(second(2), question(5)), "who takes over may ask it again");
+        let view = QuestionView::from(asked.at(second(2)).unwrap());
+        assert_eq!((view.kind, view.words.as_str()), ("between", "\"two\" or \"three\"?"));
+        asked.answer(question(4).round, Outcome::Learned);
+        asked.answer(question(5).round, Outcome::NotAllowed);
+        assert!(asked.at(second(15)).is_some() && asked.at(second(16)).is_none());
+        assert!(asked.ask(second(20), question(8)));
+        asked.answer(question(8).round, Outcome::Learned);
+        assert_eq!(asked.at(second(20)), None);
+    }
+}

@@ -1,0 +1,34 @@
+//! An instructor who speaks when asked.
+
+use serde::{Deserialize, Serialize};
+
+/// By whom, or by what, an instructor who says nothing unasked is asked. All keep to the same budget, that of the robots' configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AskedBy {
+    /// The swarm's own questions.
+    #[default]
+    Swarm,
+    /// Chance: every second round about which a question may be asked.
+    Random,
+    /// Whatever leaves at least as much entropy as the swarm's own threshold, of whatever was said before.
+    Entropy,
+    /// Whatever the two likeliest outcomes of which lie less than a half apart.
+    Margin,
+}
+
+/// How an instructor answers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Answering {
+    /// Who asks; of no consequence where the instructor speaks unasked.
+    pub asked_by: AskedBy,
+    /// Which part of what the instructor says names another gesture than the one shown, `0.0..=1.0`.
+    pub wrong: f64,
+}
+
+impl Default for Answering {
+    fn default() -> Self {
+        Self { asked_by: AskedBy::default(), wrong: 0.0 }
+    }
+}

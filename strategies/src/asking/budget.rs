@@ -1,0 +1,96 @@
+//! How often a swarm may ask.
+
+use std::time::Duration;
+
+use super::config::QuestionsConfig;
+
+/// Counts rounds and time since the last question, whoever asked it.
+///
+/// It begins as if one had just been asked: a robot that starts anew does not know of what was asked before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct QuestionBudget {
+    /// Rounds that began since.
+    rounds: u32,
+    last: Option<Duration>,
+}
+
+impl QuestionBudget {
+    /// Another round has begun.
+    pub fn enter(&mut self, now: Duration) {
+        self.last.get_or_insert(now);
+        self.rounds = self.rounds.saturating_add(1);
+    }
+
+    /// A question was asked, by this robot or another.
+    pub fn spend(&mut self, now: Duration) {
+        *self = Self { rounds: 0, last: Some(now) };
+    }
+
+    /// Whether one may be asked now, about the latest round.
+    #[must_use]
+    pub fn allows(&self, now: Duration, config: &QuestionsConfig) -> bool {
+        let apart = self.last.is_some_and(|last| now >= last.saturating_add(config.apart));
+        config.ask && apart && self.rounds >= config.rounds
+    }
+
+    /// Whether it has not been made use of for twice as many rounds as it must not be.
+    #[must_use]
+    pub fn is_full(&self, config: &QuestionsConfig) -> bool {
+        self.rounds >= config.rounds.saturating_mul(2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn never_two_in_so_many_rounds_nor_closer_than_they_must_be(
+            rounds in 1u32..6,
+            apart in 0u64..40,
+            steps in prop::collection::vec((0u64..15, prop::bool::ANY, prop::bool::ANY), 1..200),
+        ) {
+            let config = QuestionsConfig { rounds, apart: Duration::from_secs(apart), ..QuestionsConfig::default() };
+            let mut budget = QuestionBudget::default();
+            let (mut now, mut round) = (Duration::ZERO, 0);
+            let mut asked: Vec<(u32, Duration)> = vec![(0, Duration::ZERO)];
+            for (seconds, enters, heard) in steps {
+                now += Duration::from_secs(seconds);
+                if enters {
+                    budget.enter(now);
+                    round += 1;
+                }
+                // Another robot's question counts, also one that was asked too soon.
+                if heard {
+                    budget.spend(now);
+                    asked.push((round, now));
+                } else if budget.allows(now, &config) {
+                    let (last, at) = asked.last().copied().unwrap();
+                    prop_assert!(round - last >= rounds, "rounds {last} and {round}");
+                    prop_assert!(asked.len() == 1 || now - at >= config.apart, "{at:?} and {now:?}");
+                    budget.spend(now);
+                    asked.push((round, now));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_there_again_after_as_many_rounds_and_full_after_twice_as_many() {
+        let config = QuestionsConfig { apart: Duration::ZERO, ..QuestionsConfig::default() };
+        let mut budget = QuestionBudget::default();
+        let allowed: Vec<(bool, bool)> = (0..6)
+            .map(|_| {
+                budget.enter(Duration::ZERO);
+                (budget.allows(Duration::ZERO, &config), budget.is_full(&config))
+            })
+            .collect();
+        assert_eq!(allowed.iter().filter(|(allowed, _)| *allowed).count(), 4);
+        assert_eq!(allowed.iter().filter(|(_, full)| *full).count(), 1);
+        let never = QuestionsConfig { ask: false, ..config };
+        assert!(!budget.allows(Duration::from_secs(99), &never));
+    }
+}
