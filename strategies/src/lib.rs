@@ -28,8 +28,8 @@ mod vector_codec;
 
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
-    Ballot, Classify, ClassifyError, Evidence, Fuse, JudgedFrame, Life, Observation, Quorum, Refusal,
-    Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
+    Ballot, Classify, ClassifyError, Evidence, Fuse, JudgedFrame, Judgement, Life, Observation, Quorum,
+    Refusal, Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
 };
 pub use gestalt_svm::{
     CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LabelledFeatures, LearnError,

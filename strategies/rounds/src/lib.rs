@@ -38,7 +38,7 @@ mod voter;
 mod withstand;
 
 pub use ballot::{Ballot, Cast, Scale};
-pub use classify::{Classify, ClassifyError};
+pub use classify::{Classify, ClassifyError, Judgement};
 pub use config::{RoundsConfig, RoundsConfigError};
 pub use correlated::CorrelatedPool;
 pub use evidence::{Evidence, JudgedFrame};

@@ -70,7 +70,7 @@ const BURST: u32 = 16;
 ///
 /// // Neither is sure enough alone; together they are.
 /// let saw = |p: f32| Input::Observed(Observation { features: vec![1.0 - p, p], quality: 1.0 });
-/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.85)), (1, saw(0.9))];
+/// let mut inbox = vec![(0, Input::Open), (1, Input::Open), (0, saw(0.92)), (1, saw(0.94))];
 /// let mut decided = Vec::new();
 /// for ms in 1..1000 {
 ///     let now = Duration::from_millis(ms);
