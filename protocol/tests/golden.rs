@@ -2,7 +2,10 @@
 //! a new protocol version.
 
 use gestalt_protocol::{
-    Announcement, Answer, Ask, Asked, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate, FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know, Known, Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    Announcement, Answer, Ask, Asked, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
+    Fate, FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know,
+    Known, Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, Question, RobotId, RoundId, SampleId,
+    SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };

@@ -31,8 +31,8 @@ mod vector_codec;
 pub use asking::{Occasion, QuestionBudget, QuestionsConfig, QuestionsConfigError, worth_asking};
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
-    Ballot, Classify, ClassifyError, Doubt, Evidence, Fuse, JudgedFrame, Life, Observation, Quorum, Refusal,
-    Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
+    Ballot, Classify, ClassifyError, Doubt, Evidence, Fuse, JudgedFrame, Judgement, Life, Observation,
+    Quorum, Refusal, Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
 };
 pub use gestalt_svm::{
     CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LabelledFeatures, LearnError,

@@ -11,8 +11,9 @@
 //! and written again has the same bytes.
 
 use gestalt_protocol::{
-    Announced, Asked, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know, Lessons, MAX_JSON, Message, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
-    Vote,
+    Announced, Asked, ClassId, DecodeError, Envelope, FeatureSpaceId, Give, Have, HeldBatch, Holding, Know,
+    Lessons, MAX_JSON, Message, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp,
+    Vector, Vote,
 };
 use half::f16;
 use serde::{Deserialize, Serialize};

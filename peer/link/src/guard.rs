@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use gestalt_strategies::{Classify, ClassifyError, Vocabulary};
+use gestalt_strategies::{Classify, ClassifyError, Judgement, Vocabulary};
 
 use crate::failure::Part;
 use crate::panics::said;
@@ -43,6 +43,11 @@ impl Classify for Guarded {
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
         // No probabilities are no distribution: whoever asked counts the look as not judged.
         self.ask(|classifier| classifier.probabilities(features)).unwrap_or_else(|| Ok(Vec::new()))
+    }
+
+    fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
+        let nothing = Judgement { probabilities: Vec::new(), unknown: None, view: None };
+        self.ask(|classifier| classifier.judge(features)).unwrap_or(Ok(nothing))
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {

@@ -25,9 +25,21 @@ pub enum ClassifyError {
     NotFinite(usize),
 }
 
+/// What a classifier makes of one look: all that a robot wants to know of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// As of [`Classify::probabilities`].
+    pub probabilities: Vec<f64>,
+    /// As of [`Classify::unknown`].
+    pub unknown: Option<f64>,
+    /// As of [`Classify::view`].
+    pub view: Option<Vec<f32>>,
+}
+
 /// Tells gestures apart: from a raw feature vector to a probability for each class.
 ///
-/// A trait, so that a researcher's own classifier can sit in a robot; `Classifier` is ours.
+/// A trait, so that a researcher's own classifier can sit in a robot; `Classifier` is ours. Only the vocabulary and the probabilities are required.
+/// A robot asks [`Self::judge`]: who finds all three answers on one way gives that too.
 pub trait Classify: Debug + Send + Sync {
     /// The gestures it can tell.
     fn vocabulary(&self) -> &Vocabulary;
@@ -45,6 +57,15 @@ pub trait Classify: Debug + Send + Sync {
     fn unknown(&self, features: &[f32]) -> Option<f64> {
         let _ = features;
         None
+    }
+
+    /// All that there is to say of a look, at once.
+    ///
+    /// # Errors
+    /// As of [`Self::probabilities`].
+    fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
+        let probabilities = self.probabilities(features)?;
+        Ok(Judgement { probabilities, unknown: self.unknown(features), view: self.view(features) })
     }
 
     /// The probabilities of a vector already reduced: coordinates in the feature space it judges in.

@@ -42,7 +42,7 @@ mod voter;
 mod withstand;
 
 pub use ballot::{Ballot, Cast, Scale};
-pub use classify::{Classify, ClassifyError};
+pub use classify::{Classify, ClassifyError, Judgement};
 pub use columns::Columns;
 pub use config::{RoundsConfig, RoundsConfigError};
 pub use correlated::CorrelatedPool;

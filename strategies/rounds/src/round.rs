@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Certificate, ClassId, Decision, Envelope, HeldVote, Message, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
+    Certificate, ClassId, Decision, Envelope, HeldVote, Message, Pool, RobotId, RoundId, Stamp, VocabularyId,
+    Vote,
 };
 
 use crate::agreement::Agreement;
 use crate::ballot::{Ballot, Scale};
-use crate::classify::Classify;
+use crate::classify::{Classify, Judgement};
 use crate::columns::Columns;
 use crate::config::RoundsConfig;
 use crate::evidence::{Evidence, JudgedFrame};
@@ -124,17 +125,16 @@ impl Round {
         config: &RoundsConfig,
     ) -> bool {
         let classes = classifier.vocabulary().classes();
-        match classifier.probabilities(&observation.features) {
-            Ok(p) if p.len() == classes && p.iter().all(|p| (0.0..=1.0).contains(p)) => {
+        match classifier.judge(&observation.features) {
+            Ok(Judgement { probabilities, unknown, view })
+                if probabilities.len() == classes
+                    && probabilities.iter().all(|p| (0.0..=1.0).contains(p)) =>
+            {
                 let quality = f64::from(observation.quality.clamp(0.0, 1.0));
-                let view = if config.discount_repeats {
-                    classifier.view(&observation.features).unwrap_or_default()
-                } else {
-                    Vec::new()
-                };
-                let unknown =
-                    classifier.unknown(&observation.features).filter(|p| p.is_finite() && *p >= 0.0);
-                self.add(JudgedFrame { at: now, probabilities: &p, unknown, quality, view: &view }, config);
+                let view = view.filter(|_| config.discount_repeats).unwrap_or_default();
+                let unknown = unknown.filter(|p| p.is_finite() && *p >= 0.0);
+                let probabilities = probabilities.as_slice();
+                self.add(JudgedFrame { at: now, probabilities, unknown, quality, view: &view }, config);
                 true
             }
             Ok(_) | Err(_) => false,

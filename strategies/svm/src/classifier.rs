@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_rounds::{Classify, ClassifyError, Vocabulary};
+use gestalt_rounds::{Classify, ClassifyError, Judgement, Vocabulary};
 
 use crate::calibration::Calibration;
 use crate::familiarity::{Familiarity, Shown};
@@ -107,8 +107,8 @@ impl Classifier {
         ratio / (met as f64 + ratio * (classes - met).max(usize::from(met == 0)) as f64)
     }
 
-    /// Judges coordinates in its space.
-    fn judge(&self, coordinates: &[f32]) -> Vec<f64> {
+    /// Judges coordinates in its space: the probabilities of all gestures of the list, and that of one beside it.
+    fn judge_in_space(&self, coordinates: &[f32]) -> (Vec<f64>, f64) {
         let (classes, met) = (self.learned.len(), self.met().count());
         let unmet = self.of_unknown(coordinates);
         let mut probabilities = vec![unmet; classes];
@@ -120,7 +120,13 @@ impl Classifier {
                 probabilities[class] = p * rest;
             }
         }
-        probabilities
+        (probabilities, unmet)
+    }
+
+    /// Coordinates in units in which errors about two views correlate by exp(−d²); `None` in a space in which nothing varies.
+    fn in_view(&self, coordinates: &[f32]) -> Option<Vec<f32>> {
+        let unit = (REPEATS * self.space.variance()).sqrt() as f32;
+        (unit > 0.0).then(|| coordinates.iter().map(|coordinate| coordinate / unit).collect())
     }
 }
 
@@ -130,7 +136,7 @@ impl Classify for Classifier {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        Ok(self.judge(&self.space.project(features)?))
+        Ok(self.judge_in_space(&self.space.project(features)?).0)
     }
 
     fn unknown(&self, features: &[f32]) -> Option<f64> {
@@ -139,14 +145,18 @@ impl Classify for Classifier {
     }
 
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
-        let unit = (REPEATS * self.space.variance()).sqrt() as f32;
-        let mut view = self.space.project(features).ok().filter(|_| unit > 0.0)?;
-        view.iter_mut().for_each(|coordinate| *coordinate /= unit);
-        Some(view)
+        self.in_view(&self.space.project(features).ok()?)
+    }
+
+    fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
+        let coordinates = self.space.project(features)?;
+        let (probabilities, unknown) = self.judge_in_space(&coordinates);
+        let unknown = self.familiarity.is_some().then_some(unknown);
+        Ok(Judgement { probabilities, unknown, view: self.in_view(&coordinates) })
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
         let fits = coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite());
-        fits.then(|| self.judge(coordinates))
+        fits.then(|| self.judge_in_space(coordinates).0)
     }
 }

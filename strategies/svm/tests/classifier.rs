@@ -185,6 +185,20 @@ fn what_is_stored_judges_the_same() {
 }
 
 #[test]
+fn what_is_judged_at_once_is_what_each_question_gives() {
+    let samples = samples(90, 0.8, &mut generator(8));
+    let classifier = trained(&samples, 8).classifier;
+    for sample in &samples {
+        let judgement = classifier.judge(&sample.features).unwrap();
+        assert_eq!(Ok(judgement.probabilities), classifier.probabilities(&sample.features));
+        assert!(judgement.unknown.is_some() && judgement.view.is_some());
+        assert_eq!(judgement.unknown, classifier.unknown(&sample.features));
+        assert_eq!(judgement.view, classifier.view(&sample.features));
+    }
+    assert_eq!(classifier.judge(&[0.0; 4]), Err(ClassifyError::Length { found: 4, expected: 5 }));
+}
+
+#[test]
 fn the_feature_space_has_a_name_of_its_own() {
     let some = samples(60, 0.5, &mut generator(9));
     let first = trained(&some, 9).classifier;

@@ -1,7 +1,11 @@
 //! Values as robots and people say them, for inputs to begin with. All of the wire that is spelt out here is in this file.
 
 use gestalt_protocol::{
-    Announcement, Answer, Ask, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate, FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message, Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample, Signature, Stamp, Status, Vector, VocabularyId, Vote, Word,
+    Announcement, Answer, Ask, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
+    FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
+    Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
+    Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
+    Signature, Stamp, Status, Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 

@@ -22,7 +22,7 @@ use gestalt_protocol::{
 };
 
 use super::{Input, Output, Rounds};
-use crate::classify::{Classify, ClassifyError};
+use crate::classify::{Classify, ClassifyError, Judgement};
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
 use crate::fusion::fuse;

@@ -44,6 +44,36 @@ fn a_frame_that_cannot_be_judged_is_counted_and_never_becomes_a_vote() {
     assert_eq!(blind.refusals().count(Refusal::NoClassifier), 1);
 }
 
+/// Its own judgement says all; asked for a part of it, it would not know.
+#[derive(Debug)]
+struct AtOnce(Vocabulary);
+
+impl Classify for AtOnce {
+    fn vocabulary(&self) -> &Vocabulary {
+        &self.0
+    }
+
+    fn probabilities(&self, _: &[f32]) -> Result<Vec<f64>, ClassifyError> {
+        Err(ClassifyError::NotFinite(0))
+    }
+
+    fn judge(&self, _: &[f32]) -> Result<Judgement, ClassifyError> {
+        Ok(Judgement { probabilities: vec![0.8, 0.1, 0.1], unknown: Some(0.2), view: Some(vec![0.0]) })
+    }
+}
+
+#[test]
+fn a_frame_is_judged_once_and_for_all_that_is_said_of_it() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Learned(Arc::new(AtOnce(vocabulary()))));
+    mind.handle(ms(0), Input::Open);
+    let mut said = mind.handle(ms(300), saw([0.0; 3]));
+    said.extend(mind.handle(ms(1000), Input::Tick));
+    let vote = broadcast(&said).pop().unwrap();
+    assert!(vote.evidence[0] > vote.evidence[1] && vote.unknown.is_some(), "{vote:?}");
+    assert_eq!(mind.refusals(), &Refusals::default());
+}
+
 #[test]
 fn a_vote_of_another_vocabulary_or_length_or_with_impossible_values_is_refused_and_counted() {
     let mut mind = mind(7);
