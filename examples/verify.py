@@ -5,7 +5,7 @@
     python3 examples/verify.py decision.json --roster keys/roster.json
 
 A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--alpha`,
-`--clip` and `--liars` are those of the swarm's `rounds`.
+`--clip`, `--liars` and `--committee` are those of the swarm's `rounds`.
 """
 import argparse
 import collections
@@ -26,7 +26,7 @@ RULES = ("majority", "mean_probability", "log_pool", "confidence_weighted", None
 PRIOR = {"likeness": 0.5, "temperature": 1.1, "rounds": 0}
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
-GESTURES = 64
+GESTURES, WORD = 64, (1 << 64) - 1
 
 
 class Refused(Exception):
@@ -164,6 +164,17 @@ def named_by(votes: list, listed: int) -> list:
     """The gestures beyond the list that any of these robots knows; of too many those that most know, then those of the smaller numbers."""
     known_by = collections.Counter(gesture for vote in votes for gesture in vote.get("named", []))
     return sorted(sorted(known_by, key=lambda gesture: (-known_by[gesture], gesture))[:GESTURES - listed])
+
+
+def lot(counter: int, robot: int) -> int:
+    """Who votes of many robots: a number that all draw alike, twice the output function of SplitMix64."""
+    def mix(seed: int) -> int:
+        z = (seed + 0x9E3779B97F4A7C15) & WORD
+        z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9 & WORD
+        z = (z ^ z >> 27) * 0x94D049BB133111EB & WORD
+        return z ^ z >> 31
+
+    return mix((mix(0x636F6D6D69747465 ^ counter) + robot) & WORD)
 
 
 def spread(vote: dict, named: list) -> dict:
@@ -306,9 +317,16 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require(named == (named_by([held["vote"] for held in votes], listed) if certificate["probabilities"] else []), "gestures that no vote names")
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
     # What a robot said before it saw anything proves nothing where liars are expected.
-    reached = len(votes) if given.liars else len(robots)
-    majority = reached >= (certificate["robots"] + given.liars) // 2 + 1
-    enough = given.liars == 0 or len(votes) > 2 * given.liars
+    counting, all_of, needed = votes if given.liars else votes + others, certificate["robots"], 0
+    committee, gave = given.committee + 4 * given.liars, votes
+    if given.committee and all_of > committee + committee // 2:
+        # Only those count who were drawn, or may have been by robots that know of half as many.
+        drawn = {held["robot"] for held in votes + others
+                 if lot(decision["round"]["counter"], held["robot"]) < min((committee << 65) // all_of, WORD)}
+        counting, gave = ([held for held in of if held["robot"] in drawn] for of in (counting, gave))
+        needed = committee // 2 + 1 + given.liars
+    majority = len(counting) >= (needed or (all_of + given.liars) // 2 + 1)
+    enough = given.liars == 0 or len(gave) > 2 * given.liars
     rule = certificate["rule"]
     pool, unknown = certificate.get("pool"), certificate.get("unknown")
     require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
@@ -344,6 +362,7 @@ def main() -> None:
     arguments.add_argument("--alpha", type=float, help="by default that of the rule: 0.05 for the pools, 0.5 for the others")
     arguments.add_argument("--clip", type=float, default=6.0)
     arguments.add_argument("--liars", type=int, default=0)
+    arguments.add_argument("--committee", type=int, default=72, help="of more robots than half as many again, so many vote; 0: always all")
     given = arguments.parse_args()
     with sys.stdin if given.decision == "-" else open(given.decision, encoding="utf-8") as file:
         decision = json.load(file)

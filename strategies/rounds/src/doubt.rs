@@ -31,10 +31,10 @@ impl Doubt {
             return None;
         }
         let votes = || votes.iter().map(|counted| &counted.vote);
-        let mut taught: Vec<(ClassId, f64)> = (0..)
-            .map(ClassId)
+        let mut taught: Vec<(ClassId, f64)> = certificate
+            .classes()
             .zip(probabilities)
-            .filter(|(class, _)| votes().any(|vote| knows(vote, class.index())))
+            .filter(|(class, _)| votes().any(|vote| knows(vote, *class)))
             .map(|(class, p)| (class, *p))
             .collect();
         taught.sort_by(|(a, of_a), (b, of_b)| of_b.total_cmp(of_a).then(a.cmp(b)));
@@ -58,7 +58,8 @@ impl Doubt {
 
 /// What that robot alone believes, over these gestures and, where it tells, all else.
 fn opinion(vote: &Vote, gestures: &[ClassId], untaught: usize, clip: f64) -> Vec<f64> {
-    let said = gestures.iter().filter_map(|class| vote.evidence.get(class.index()).copied());
+    let for_others = vote.unknown.unwrap_or(0.0);
+    let said = gestures.iter().map(|class| vote.evidence_for(*class).unwrap_or(for_others));
     let said: Vec<f32> = said.chain(vote.unknown).collect();
     let mut row = vec![0.0; said.len()];
     clip_into(&mut row, &said, clip);
@@ -106,7 +107,7 @@ mod tests {
         let mut ballot = Ballot::default();
         for (robot, (evidence, unknown)) in (0..).zip(votes) {
             let (vocabulary, evidence) = (SCALE.vocabulary, evidence.to_vec());
-            let vote = Vote { round, vocabulary, evidence, looks: 1.0, unknown: *unknown };
+            let vote = Vote { round, vocabulary, evidence, looks: 1.0, unknown: *unknown, named: vec![] };
             ballot.cast(HeldVote { robot: RobotId(robot), stamp: Stamp::default(), vote, signature: None });
         }
         let rule = FusionRule::LogPool;
@@ -125,6 +126,7 @@ mod tests {
             robots: 3,
             quorum: 2,
             elapsed_ms: 5000,
+            named: vec![],
         }
     }
 

@@ -44,6 +44,12 @@ mod tests {
     }
 
     #[test]
+    fn another_program_draws_the_same() {
+        // By examples/verify.py.
+        assert_eq!(lot(Lottery::Committee, 5, RobotId(7)), 11_821_268_644_233_891_288);
+    }
+
+    #[test]
     fn lots_are_even_over_robots_and_over_rounds() {
         // A tenth of 1000 lots lies below a tenth: a binomial of standard deviation 9.5.
         let low = |lots: Vec<u64>| lots.into_iter().filter(|lot| *lot < u64::MAX / 10).count();

@@ -1,5 +1,7 @@
 //! Whether a round is worth a question, and which.
 
+use std::collections::BTreeMap;
+
 use gestalt_protocol::{Ask, ClassId};
 use gestalt_rounds::Doubt;
 
@@ -17,7 +19,7 @@ pub struct Occasion<'a> {
     /// What its votes leave open; `None` where robots saw something, and none of them was ever taught anything.
     pub doubt: Option<&'a Doubt>,
     /// By class, of how many rounds it is known that they showed that gesture.
-    pub labels: &'a [usize],
+    pub labels: &'a BTreeMap<ClassId, usize>,
     /// Whether what is unknown was shown before, lately, and was likest the same gesture.
     pub repeated: bool,
     /// Whether nothing was asked for long.
@@ -46,7 +48,7 @@ pub fn worth_asking(occasion: &Occasion<'_>, config: &QuestionsConfig) -> Option
     if doubt.unknown >= LIKELIER_UNKNOWN && occasion.repeated {
         return Some(Ask::Name { nearest: first });
     }
-    let labels_of = |class: ClassId| occasion.labels.get(class.index()).copied().unwrap_or(0);
+    let labels_of = |class: ClassId| occasion.labels.get(&class).copied().unwrap_or(0);
     let labels = [first, second].into_iter().flatten().map(labels_of).min()?;
     let value = |nats: f64| nats / (1.0 + labels as f64 / config.familiar);
     let between = match (first, second) {
@@ -86,8 +88,8 @@ mod tests {
 
     /// After so many labels of each gesture, of which 2 has twice as many.
     fn ask(doubt: &Doubt, labels: usize, repeated: bool, quiet: bool) -> Option<Ask> {
-        let mut labels = [labels; 6];
-        labels[TWO.index()] *= 2;
+        let mut labels: BTreeMap<ClassId, usize> = (0..6).map(|class| (ClassId(class), labels)).collect();
+        labels.entry(TWO).and_modify(|labels| *labels *= 2);
         let occasion = Occasion { doubt: Some(doubt), labels: &labels, repeated, quiet };
         worth_asking(&occasion, &QuestionsConfig::default())
     }
@@ -119,7 +121,7 @@ mod tests {
         assert!(asked[0] && asked.is_sorted_by(|a, b| a >= b), "{asked:?}");
         assert!(!asked[39], "for ever");
         // The rarer of the two counts: 2 has labels enough, 3 has none.
-        let labels = [0, 0, 99];
+        let labels = [(TWO, 99)].into();
         let occasion = Occasion { doubt: Some(&torn), labels: &labels, repeated: false, quiet: false };
         assert_eq!(worth_asking(&occasion, &QuestionsConfig::default()), BETWEEN);
     }
@@ -127,12 +129,14 @@ mod tests {
     #[test]
     fn who_knows_nothing_asks_for_a_name_when_it_is_shown_again() {
         let config = QuestionsConfig::default();
-        let occasion = |repeated| Occasion { doubt: None, labels: &[], repeated, quiet: false };
+        let labels = BTreeMap::new();
+        let occasion = |repeated| Occasion { doubt: None, labels: &labels, repeated, quiet: false };
         assert_eq!(worth_asking(&occasion(false), &config), None);
         assert_eq!(worth_asking(&occasion(true), &config), Some(Ask::Name { nearest: None }));
         // One gesture is known: there are no two to choose from.
         let one = Doubt { entropy: 0.69, disagreement: 0.0, unknown: 0.4, gestures: vec![TWO] };
-        let occasion = Occasion { doubt: Some(&one), labels: &[0, 0, 1], repeated: false, quiet: false };
+        let occasion =
+            Occasion { doubt: Some(&one), labels: &[(TWO, 1)].into(), repeated: false, quiet: false };
         assert_eq!(worth_asking(&occasion, &config), Some(Ask::Name { nearest: Some(TWO) }));
     }
 }

@@ -1,6 +1,8 @@
 //! What the mind wants to know of what was learned, before it asks for more.
 
-use gestalt_protocol::RoundId;
+use std::collections::BTreeMap;
+
+use gestalt_protocol::{ClassId, RoundId};
 
 use super::config::LearningConfig;
 use super::state::Learning;
@@ -17,15 +19,14 @@ impl Learning {
         self.recent.looks(round)
     }
 
-    /// By class, of how many of the rounds that it knows of instructors say that they showed it.
-    pub fn label_counts(&self) -> Vec<usize> {
-        let classes = self.vocabulary.classes();
-        let mut counts = vec![0; classes];
+    /// For each gesture, of how many of the rounds that it knows of instructors say that they showed it.
+    pub fn label_counts(&self) -> BTreeMap<ClassId, usize> {
+        let mut counts = BTreeMap::new();
         for (round, _) in self.lessons.rounds(0) {
-            if let Verdict::Class(class) = self.lessons.verdict(round, classes)
-                && let Some(count) = counts.get_mut(class.index())
+            if let Verdict::Class(class) = self.lessons.verdict(round, &self.gestures)
+                && let Some(class) = self.trained_as(class)
             {
-                *count += 1;
+                *counts.entry(class).or_default() += 1;
             }
         }
         counts

@@ -132,6 +132,9 @@ impl Mind {
 
 /// What the gestures of a question are called.
 fn labels_of(learning: &Learning, ask: Ask) -> Vec<String> {
-    let label = |class: ClassId| learning.vocabulary().label(class).map(str::to_owned);
+    let titles = learning.names().titles(learning.vocabulary().labels());
+    let label = |class: ClassId| {
+        learning.vocabulary().label(class).or(titles.get(&class).map(String::as_str)).map(str::to_owned)
+    };
     ask.classes().into_iter().map(label).collect::<Option<_>>().unwrap_or_default()
 }

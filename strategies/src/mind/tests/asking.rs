@@ -22,7 +22,7 @@ impl Classify for Torn {
             _ if class == next => 0.96 * (1.0 - sure),
             _ => 0.01,
         };
-        Ok((0..usize::from(CLASSES)).map(p).collect())
+        Ok((0..CLASSES as usize).map(p).collect())
     }
 }
 
@@ -204,7 +204,7 @@ proptest! {
             }
             swarm.pass(Duration::from_secs(seconds));
             if answers && let Some(round) = swarm.minds[0].round() {
-                swarm.was(round, class);
+                swarm.was(round, class.into());
             }
         }
         for pair in swarm.asked.windows(2) {
