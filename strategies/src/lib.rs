@@ -35,9 +35,9 @@ pub use gestalt_rounds::{
     Quorum, Refusal, Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
 };
 pub use gestalt_svm::{
-    CALIBRATION_BINS, Classifier, Components, Evaluation, FeatureSpace, LabelledFeatures, LearnError,
-    Learner, LearnerOptions, MAX_MODEL, ModelError, Pca, Proportion, Ranking, Reduction, Scaling,
-    ScalingMethod,
+    CALIBRATION_BINS, Classifier, Components, Discriminant, Evaluation, FeatureSpace, Head, LabelledFeatures,
+    LearnError, Learner, LearnerOptions, MAX_MODEL, Machines, ModelError, Pca, Proportion, Ranking,
+    Reduction, Scaling, ScalingMethod, Shown, Teach,
 };
 #[cfg(feature = "offline")]
 pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};

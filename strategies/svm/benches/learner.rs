@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use divan::Bencher;
 use gestalt_protocol::ClassId;
-use gestalt_rounds::Vocabulary;
-use gestalt_svm::{Components, FeatureSpace, Learner, LearnerOptions, ScalingMethod};
+use gestalt_rounds::{Classify, Vocabulary};
+use gestalt_svm::{Components, DiscriminantSums, FeatureSpace, Learner, LearnerOptions, ScalingMethod};
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -125,6 +125,38 @@ fn after_a_round(bencher: Bencher, (kind, count): (&str, usize)) {
     bencher
         .with_inputs(|| taught.borrow_mut().change())
         .bench_local_values(|()| taught.borrow_mut().learner.learn());
+}
+
+/// What the head for few takes of a change: a sample out and one in, its sums and the discriminant that they make; without the kernel and the machines.
+#[divan::bench]
+fn change_of_the_head(bencher: Bencher) {
+    let mut source = Source::new("overlapping");
+    let mut sums = DiscriminantSums::new(&source.space, CLASSES);
+    for (key, (class, vector)) in (0_u64..).zip(source.take(SAMPLES)) {
+        sums.insert(key, class.index(), key / 4, &vector);
+    }
+    let (mut oldest, next) = (0, source.take(SAMPLES));
+    bencher.bench_local(|| {
+        let (class, vector) = &next[oldest as usize % SAMPLES];
+        sums.remove(oldest);
+        sums.insert(oldest + SAMPLES as u64, class.index(), (oldest + SAMPLES as u64) / 4, vector);
+        oldest += 1;
+        sums.discriminant()
+    });
+}
+
+/// One frame judged whole: probabilities, unknown and view; and what is said of unknown alone.
+#[divan::bench(args = ["judge", "unknown", "probabilities"])]
+fn frame(bencher: Bencher, what: &str) {
+    let taught = Taught::new("overlapping", SAMPLES);
+    let mut taught = taught.borrow_mut();
+    let classifier = taught.learner.learn().expect("nothing fails");
+    let features = raw(&taught.source.centres[0].clone(), 2.2, &mut taught.source.rng);
+    bencher.bench_local(|| match what {
+        "judge" => drop(divan::black_box(classifier.judge(&features))),
+        "unknown" => drop(divan::black_box(classifier.unknown(&features))),
+        _ => drop(divan::black_box(classifier.probabilities(&features))),
+    });
 }
 
 /// Six samples out and six in.

@@ -26,9 +26,17 @@ const LEAST: f64 = 1e-7;
 impl Calibration {
     /// The probability of each class, given the decision value of each pair; they sum to 1.
     pub fn probabilities(&self, decisions: &[f64], classes: usize) -> Vec<f64> {
-        let of_pairs = decisions.iter().zip(&self.sigmoids);
-        let of_pairs = of_pairs.map(|(&f, sigmoid)| sigmoid.probability(f).clamp(LEAST, 1.0 - LEAST));
-        let mut p = couple(of_pairs, classes);
+        self.coupled(self.of_pairs(decisions), classes)
+    }
+
+    /// The probability of the first class of each pair, given its decision value.
+    pub fn of_pairs(&self, decisions: &[f64]) -> impl Iterator<Item = f64> {
+        decisions.iter().zip(&self.sigmoids).map(|(&f, sigmoid)| sigmoid.probability(f))
+    }
+
+    /// The probability of each class, given those of pairs; they sum to 1.
+    pub fn coupled(&self, of_pairs: impl Iterator<Item = f64>, classes: usize) -> Vec<f64> {
+        let mut p = couple(of_pairs.map(|p| p.clamp(LEAST, 1.0 - LEAST)), classes);
         p.iter_mut().for_each(|p| *p = p.powf(self.sharpness).max(LEAST));
         let sum: f64 = p.iter().sum();
         p.iter_mut().for_each(|p| *p /= sum);

@@ -1,8 +1,9 @@
-//! The classifier of a robot: scaling, principal components, one-vs-one support vector machines, calibrated
+//! The classifier of a robot: scaling, principal components, one-vs-one support vector machines and a head for few showings, calibrated
 //! probabilities.
 //!
 //! ```text
-//! raw features ─► FeatureSpace ─► Machine: a decision per pair ─► Calibration: P(k)
+//! raw features ─► FeatureSpace ─► Machine: a decision per pair ─┐
+//!                       └───────► Head: odds of the same pairs ─┴► Blend ─► Calibration: P(k)
 //! ```
 
 use std::sync::Arc;
@@ -11,8 +12,9 @@ use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, ClassifyError, Judgement, Vocabulary};
 
 use crate::calibration::Calibration;
-use crate::familiarity::{Familiarity, Shown};
+use crate::familiarity::Familiarity;
 use crate::feature_space::FeatureSpace;
+use crate::head::{Blend, Head, Shown};
 use crate::machine::Machine;
 
 /// The squared distance at which two views are at a distance of 1, in units of the space's variance. Measured on drawn hands
@@ -37,6 +39,8 @@ pub struct Classifier {
     pub(crate) calibration: Calibration,
     /// How much what is seen looks like any gesture met; `None` where none was.
     pub(crate) familiarity: Option<Familiarity>,
+    /// A head for few showings beside the machines; `None` where they answer alone.
+    pub(crate) blend: Option<Blend>,
 }
 
 impl Classifier {
@@ -48,7 +52,12 @@ impl Classifier {
         calibration: Calibration,
         familiarity: Option<Familiarity>,
     ) -> Self {
-        Self { vocabulary, space, learned, machine, calibration, familiarity }
+        Self { vocabulary, space, learned, machine, calibration, familiarity, blend: None }
+    }
+
+    /// The same with a head for few showings beside the machines.
+    pub(crate) fn blended(self, blend: Option<Blend>) -> Self {
+        Self { blend, ..self }
     }
 
     /// The same, where nothing is left of the samples but the support vectors: each counts as a showing of its own. They lie where classes meet, so
@@ -78,6 +87,19 @@ impl Classifier {
         &self.learned
     }
 
+    /// Its support vector machines alone, as a head.
+    #[must_use]
+    pub fn machines(&self) -> Machines<'_> {
+        Machines(self)
+    }
+
+    /// Its head for few showings alone: the [`Discriminant`](crate::Discriminant), or a researcher's own. `None` for one that was trained at once, or read
+    /// from a file without.
+    #[must_use]
+    pub fn head(&self) -> Option<&dyn Head> {
+        self.blend.as_ref().map(|blend| blend.few.head())
+    }
+
     /// How many support vectors all pairs share.
     #[must_use]
     pub fn support_vectors(&self) -> usize {
@@ -92,31 +114,42 @@ impl Classifier {
     }
 
     /// The classes it has met.
-    fn met(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn met(&self) -> impl Iterator<Item = usize> {
         self.learned.iter().enumerate().filter(|(_, count)| **count > 0).map(|(class, _)| class)
     }
 
     /// The probability of each gesture that it has not met.
     ///
     /// With as many gestures met as not as the vocabulary has, all as likely beforehand, and r = P(x | unknown) / P(x | one met): r / (met + r · unmet).
-    fn of_unknown(&self, coordinates: &[f32]) -> f64 {
+    fn of_unknown(&self, coordinates: &[f32], few: Option<(&Blend, &[f64])>) -> f64 {
         let (classes, met) = (self.learned.len(), self.met().count());
-        let log_ratio = self.familiarity.as_ref().map_or(0.0, |known| known.log_ratio(coordinates));
+        let margin = few.and_then(|(blend, logs)| blend.margin(logs));
+        let log_ratio = self.familiarity.as_ref().map_or(0.0, |known| known.log_ratio(coordinates, margin));
         // Who was taught all there is to the list is seldom shown what is not on it.
         let ratio = log_ratio.exp() * if met == classes { RARE } else { 1.0 };
         ratio / (met as f64 + ratio * (classes - met).max(usize::from(met == 0)) as f64)
     }
 
+    fn logs_of_head(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
+        Some(self.head()?.logs(coordinates))
+    }
+
     /// Judges coordinates in its space: the probabilities of all gestures of the list, and that of one beside it.
     fn judge_in_space(&self, coordinates: &[f32]) -> (Vec<f64>, f64) {
         let (classes, met) = (self.learned.len(), self.met().count());
-        let unmet = self.of_unknown(coordinates);
+        let logs = self.logs_of_head(coordinates);
+        let few = self.blend.as_ref().zip(logs.as_deref());
+        let unmet = self.of_unknown(coordinates, few);
         let mut probabilities = vec![unmet; classes];
         if met > 0 {
             let mut decisions = Vec::with_capacity(self.machine.offsets.len());
             self.machine.decide(coordinates, &mut decisions);
             let rest = 1.0 - unmet * (classes - met) as f64;
-            for (class, p) in self.met().zip(self.calibration.probabilities(&decisions, met)) {
+            let mut of_pairs: Vec<f64> = self.calibration.of_pairs(&decisions).collect();
+            if let Some((blend, logs)) = few {
+                of_pairs = blend.odds(logs, &self.met().collect::<Vec<_>>(), &of_pairs);
+            }
+            for (class, p) in self.met().zip(self.calibration.coupled(of_pairs.into_iter(), met)) {
                 probabilities[class] = p * rest;
             }
         }
@@ -141,7 +174,9 @@ impl Classify for Classifier {
 
     fn unknown(&self, features: &[f32]) -> Option<f64> {
         self.familiarity.as_ref()?;
-        Some(self.of_unknown(&self.space.project(features).ok()?))
+        let coordinates = self.space.project(features).ok()?;
+        let logs = self.logs_of_head(&coordinates);
+        Some(self.of_unknown(&coordinates, self.blend.as_ref().zip(logs.as_deref())))
     }
 
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
@@ -158,5 +193,22 @@ impl Classify for Classifier {
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
         let fits = coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite());
         fits.then(|| self.judge_in_space(coordinates).0)
+    }
+}
+
+/// The support vector machines of a classifier, without the head beside them: [`Classifier::machines`].
+#[derive(Clone, Copy, Debug)]
+pub struct Machines<'a>(&'a Classifier);
+
+impl Head for Machines<'_> {
+    fn logs(&self, coordinates: &[f32]) -> Vec<f64> {
+        let mut logs = vec![f64::NEG_INFINITY; self.0.learned.len()];
+        let mut decisions = Vec::with_capacity(self.0.machine.offsets.len());
+        self.0.machine.decide(coordinates, &mut decisions);
+        let met = self.0.met().count();
+        for (class, p) in self.0.met().zip(self.0.calibration.probabilities(&decisions, met)) {
+            logs[class] = p.ln();
+        }
+        logs
     }
 }

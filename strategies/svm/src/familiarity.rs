@@ -12,16 +12,10 @@ mod tests;
 use serde::{Deserialize, Serialize};
 
 use calibrating::{calibrate, log_ratio};
-use scatter::Scatter;
+pub(crate) use scatter::{Scatter, Seen};
 
-/// A sample as it is learned from: its class, the showing it is of, and where it lies.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Shown<'a> {
-    pub class: usize,
-    /// Samples of one showing repeat each other: together they count once.
-    pub showing: u64,
-    pub vector: &'a [f32],
-}
+use crate::head::{Discriminant, Shown};
+use crate::scatter::{entries, whiten};
 
 /// How classes lie in a feature space, and what distances say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +31,9 @@ pub(crate) struct Familiarity {
     weights: [f64; 3],
     /// How far it may go either way: nobody has seen more of what is known, and of what is not, than so many showings tell.
     bounds: [f64; 2],
+    /// Of the same logarithm, the weight of the margin between the two likeliest classes; 0 without a discriminant. It is written beside it.
+    #[serde(skip)]
+    pub margin: f64,
 }
 
 /// What a view says of being known.
@@ -46,6 +43,8 @@ pub(super) struct Score {
     pub distance: f64,
     /// By how much the second nearest is farther, `0.0..=1.0`; `None` where there is none.
     pub lead: Option<f64>,
+    /// By how much a plain discriminant finds the likeliest class likelier than the second, in logarithms; `None` where it was not asked.
+    pub margin: Option<f64>,
 }
 
 impl Score {
@@ -60,7 +59,7 @@ impl Score {
             }
         }
         let lead = second.is_finite().then(|| (second - first) / (second + first).max(f64::MIN_POSITIVE));
-        first.is_finite().then(|| Self { distance: first.max(1e-6).ln(), lead })
+        first.is_finite().then(|| Self { distance: first.max(1e-6).ln(), lead, margin: None })
     }
 }
 
@@ -68,30 +67,43 @@ impl Familiarity {
     /// Learns how the classes lie, in a space whose coordinates spread so far; and calibrates what distances say by leaving out, of what is
     /// known, one showing, and of what is not, a whole class. `None` where there is no sample.
     pub fn learn(samples: &[Shown<'_>], spread: &[f32]) -> Option<Self> {
-        let scatter = Scatter::of(samples, spread)?;
-        let (known, unknown) = scatter.left_out();
-        let (weights, bounds) = calibrate(&known, &unknown);
-        let Scatter { width, whitening, classes, .. } = scatter;
-        Some(Self {
-            width,
-            whitening,
-            means: classes.iter().flat_map(|class| class.mean.iter().map(|x| *x as f32)).collect(),
-            showings: classes.iter().map(|class| class.showings.len() as u32).collect(),
-            weights,
-            bounds,
-        })
+        Some(Self::of(&Scatter::of(samples, spread)?, None))
     }
 
-    /// The logarithm of P(x | a gesture never taught) / P(x | one of those taught), as far as it is known.
-    pub fn log_ratio(&self, vector: &[f32]) -> f64 {
-        let white = scatter::whiten(&self.whitening, vector);
+    /// The same of classes that were found to lie so, and of what a discriminant makes of them.
+    pub fn of(scatter: &Scatter, discriminant: Option<&Discriminant>) -> Self {
+        let plain = discriminant.map(|discriminant| discriminant.clone().sharpened(1.0));
+        let (known, unknown) = scatter.left_out(plain.as_ref());
+        let between = plain.as_ref().map(|plain| scatter.between(plain));
+        let ([offset, distance, lead, margin], bounds) = calibrate(&known, &unknown, between);
+        Self {
+            width: scatter.width,
+            whitening: scatter.whitening.clone(),
+            means: scatter.means(),
+            showings: scatter.showings(),
+            weights: [offset, distance, lead],
+            bounds,
+            margin,
+        }
+    }
+
+    /// The discriminant of the same classes, which are these of so many.
+    pub fn discriminant(&self, met: &[usize], classes: usize) -> Discriminant {
+        Discriminant::of(&self.whitening, &self.means, &self.showings, met, classes)
+    }
+
+    /// The logarithm of P(x | a gesture never taught) / P(x | one of those taught), as far as it is known; given the margin that a plain discriminant finds.
+    pub fn log_ratio(&self, vector: &[f32], margin: Option<f64>) -> f64 {
+        let white = whiten(&self.whitening, vector);
         let class = |(mean, showings): (&[f32], &u32)| {
             let squared: f64 = mean.iter().zip(&white).map(|(m, x)| (f64::from(*m) - x).powi(2)).sum();
             scatter::a_coordinate(squared, self.width, f64::from(*showings))
         };
         let distances = self.means.chunks_exact(self.width).zip(&self.showings).map(class);
         let Some(score) = Score::of(distances) else { return 0.0 };
-        log_ratio(&self.weights, score).clamp(-self.bounds[0], self.bounds[1])
+        let [offset, distance, lead] = self.weights;
+        log_ratio(&[offset, distance, lead, self.margin], Score { margin, ..score })
+            .clamp(-self.bounds[0], self.bounds[1])
     }
 
     /// Whether it fits so many classes in a space of that width, and its numbers lie where sums of them stay finite.
@@ -99,13 +111,13 @@ impl Familiarity {
         let within = |values: &[f32]| values.iter().all(|v| v.abs() <= 1e9);
         self.width == width
             && width > 0
-            && self.whitening.len() == scatter::entries(width)
+            && self.whitening.len() == entries(width)
             && self.showings.len() == classes
             && self.showings.iter().all(|showings| *showings > 0)
             && self.means.len() == classes.saturating_mul(width)
             && within(&self.whitening)
             && within(&self.means)
-            && self.weights.iter().all(|w| w.abs() <= 1e6)
+            && self.weights.iter().chain([&self.margin]).all(|w| w.abs() <= 1e6)
             && self.bounds.iter().all(|bound| (0.0..=100.0).contains(bound))
     }
 }

@@ -4,8 +4,9 @@
 //! brings machines up to date as samples come and go, and the [`Classifier`] it makes.
 //!
 //! ```text
-//! raw features ─► Scaling ─► Reduction ─► coordinates ─► Machine: a decision per pair ─► Calibration: P(k)
-//!                 └────── FeatureSpace ──────┘               └────── Classifier ──────────────┘
+//! raw features ─► Scaling ─► Reduction ─► coordinates ─► Machine: a decision per pair ─► Calibration ─► P(k)
+//!                 └────── FeatureSpace ──────┘     │                                          ▲
+//!                                                  └──► Head for few showings: odds of pairs ─┘   (all of this: Classifier)
 //! ```
 //!
 //! With the feature `offline`, `train` makes a classifier of many samples at once: it searches for C and γ by
@@ -17,20 +18,23 @@ mod coupling;
 mod evaluation;
 mod familiarity;
 mod feature_space;
+mod head;
 mod labelled;
 mod learner;
 mod machine;
 mod model_codec;
 mod reduction;
 mod scaling;
+mod scatter;
 mod sigmoid;
 #[cfg(feature = "offline")]
 mod training;
 mod vector;
 
-pub use classifier::Classifier;
+pub use classifier::{Classifier, Machines};
 pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
 pub use feature_space::FeatureSpace;
+pub use head::{Discriminant, DiscriminantSums, Head, Shown, Teach};
 pub use labelled::LabelledFeatures;
 pub use learner::{LearnError, Learner, LearnerOptions};
 pub use model_codec::{MAX_MODEL, ModelError};

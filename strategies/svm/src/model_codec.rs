@@ -10,13 +10,16 @@ use crate::calibration::Calibration;
 use crate::classifier::Classifier;
 use crate::familiarity::Familiarity;
 use crate::feature_space::FeatureSpace;
+use crate::head::{Blend, Few};
 use crate::machine::{MAX_COORDINATE, Machine, pairs};
 
 /// Longest encoding that is read, in bytes.
 pub const MAX_MODEL: usize = 64 * 1024 * 1024;
 /// The layout below; another layout gets another number.
-const VERSION: u8 = 4;
-/// The layout before, which had no familiarity: it is read too.
+const VERSION: u8 = 5;
+/// The layout before, without a head for few showings: it is read too, and written where there is none.
+const WITHOUT_HEAD: u8 = 4;
+/// The one before that, which had no familiarity either.
 const BEFORE: u8 = 3;
 
 /// Bytes that are no classifier.
@@ -27,9 +30,7 @@ pub enum ModelError {
     #[error("{0} bytes are more than a classifier takes ({MAX_MODEL})")]
     TooLarge(usize),
     /// Written by another version of the program.
-    #[error(
-        "the classifier has layout {0}, this program reads layouts {BEFORE} and {VERSION}: train it anew"
-    )]
+    #[error("the classifier has layout {0}, this program reads layouts {BEFORE} to {VERSION}: train it anew")]
     Version(u8),
     /// Cut short, or not a classifier at all.
     #[error("the classifier is cut short or damaged")]
@@ -51,6 +52,15 @@ struct Parts {
 /// What follows them since layout 4.
 type Since = Option<Familiarity>;
 
+/// What follows in layout 5. The discriminant itself follows from the familiarity.
+#[derive(Serialize, Deserialize)]
+struct FewParts {
+    sharpness: f64,
+    shares: Vec<f64>,
+    /// The weight of the margin in the odds of unknown.
+    margin: f64,
+}
+
 impl Classifier {
     /// The classifier as bytes: a layout number, then its parts in postcard.
     #[must_use]
@@ -63,8 +73,17 @@ impl Classifier {
             calibration: self.calibration.clone(),
         };
         let since: &Since = &self.familiarity;
-        postcard::to_extend(&(parts, since), vec![VERSION])
-            .expect("postcard writes every value of known length into a vector")
+        let encoded = match &self.blend {
+            Some(Blend { few: Few::Discriminant(discriminant), shares }) => {
+                let margin = self.familiarity.as_ref().map_or(0.0, |familiarity| familiarity.margin);
+                let few = FewParts { sharpness: discriminant.sharpness(), shares: shares.clone(), margin };
+                postcard::to_extend(&(parts, since, few), vec![VERSION])
+            }
+            Some(Blend { few: Few::Own(_), .. }) | None => {
+                postcard::to_extend(&(parts, since), vec![WITHOUT_HEAD])
+            }
+        };
+        encoded.expect("postcard writes every value of known length into a vector")
     }
 
     /// Reads a classifier. Any bytes give a classifier whose answers are finite, or an error; memory stays
@@ -77,9 +96,14 @@ impl Classifier {
             return Err(ModelError::TooLarge(bytes.len()));
         }
         let (&version, body) = bytes.split_first().ok_or(ModelError::Malformed)?;
-        let ((parts, familiarity), rest) = match version {
-            VERSION => postcard::take_from_bytes::<(Parts, Since)>(body),
-            BEFORE => postcard::take_from_bytes::<Parts>(body).map(|(parts, rest)| ((parts, None), rest)),
+        let ((parts, familiarity, few), rest) = match version {
+            VERSION => postcard::take_from_bytes::<(Parts, Since, FewParts)>(body)
+                .map(|((parts, since, few), rest)| ((parts, since, Some(few)), rest)),
+            WITHOUT_HEAD => postcard::take_from_bytes::<(Parts, Since)>(body)
+                .map(|((parts, since), rest)| ((parts, since, None), rest)),
+            BEFORE => {
+                postcard::take_from_bytes::<Parts>(body).map(|(parts, rest)| ((parts, None, None), rest))
+            }
             other => return Err(ModelError::Version(other)),
         }
         .map_err(|_| ModelError::Malformed)?;
@@ -93,7 +117,30 @@ impl Classifier {
         }
         let Parts { vocabulary, space, learned, machine, calibration } = parts;
         let classifier = Self::new(vocabulary, Arc::new(space), learned, machine, calibration, familiarity);
+        if let Some(few) = few {
+            return classifier.with_few(few).map_err(ModelError::Inconsistent);
+        }
         Ok(if version == BEFORE { classifier.by_its_vectors() } else { classifier })
+    }
+}
+
+impl Classifier {
+    fn with_few(mut self, few: FewParts) -> Result<Self, &'static str> {
+        let FewParts { sharpness, shares, margin } = few;
+        let familiarity = self.familiarity.as_mut().ok_or("a head for few showings of no class")?;
+        familiarity.margin = margin;
+        let familiarity = self.familiarity.as_ref().ok_or("a head for few showings of no class")?;
+        if shares.len() != self.calibration.sigmoids.len()
+            || !shares.iter().all(|share| (0.0..=1.0).contains(share))
+            || !(0.01..=100.0).contains(&sharpness)
+            || margin.is_nan()
+            || margin.abs() > 1e6
+        {
+            return Err("a head for few showings of other pairs");
+        }
+        let met: Vec<usize> = self.met().collect();
+        let discriminant = familiarity.discriminant(&met, self.learned.len()).sharpened(sharpness);
+        Ok(self.blended(Some(Blend { few: Few::Discriminant(discriminant), shares })))
     }
 }
 

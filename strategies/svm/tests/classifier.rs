@@ -178,6 +178,11 @@ fn what_is_stored_judges_the_same() {
     let classifier = trained(&samples, 8).classifier;
     let read = Classifier::decode(&classifier.encode()).unwrap();
     assert_eq!(read, classifier);
+    assert_eq!(
+        classifier.encode()[0],
+        4,
+        "without a head for few showings it is written as before there were any"
+    );
     assert_eq!((read.space().feature_set(), read.space().features()), ("shape-1", 5));
     for sample in &samples {
         assert_eq!(read.probabilities(&sample.features), classifier.probabilities(&sample.features));

@@ -3,24 +3,23 @@
 use std::collections::BTreeMap;
 
 use super::{Score, Shown};
+use crate::head::{Discriminant, margin_of};
+use crate::scatter::{Covariance, whiten};
 
-/// In wider spaces coordinates are taken to vary independently: a covariance costs the cube of the width.
-const WIDEST: usize = 128;
+/// The mean of a showing, and its samples, each with its place among all.
+type Showing<'a> = (Vec<f64>, Vec<(usize, &'a [f32])>);
 
-/// What is believed of the scatter within a class before any is known: it is that part of the variance of the space, and weighs as much as so many
-/// showings. Measured on drawn and real hands, see `docs/results.md`.
-const PRIOR_PART: f64 = 0.35;
-const PRIOR_SHOWINGS: f64 = 10.0;
-
-/// The mean of a showing, and its samples.
-type Showing<'a> = (Vec<f64>, Vec<&'a [f32]>);
+/// The showings of each class.
+type ByClass<'a> = BTreeMap<usize, Vec<Showing<'a>>>;
 
 /// What views score, with what each weighs.
-type Scores = Vec<(Score, f64)>;
+pub(super) type Scores = Vec<(Score, f64)>;
 
 /// A class.
 #[derive(Debug)]
-pub(super) struct OfClass {
+pub(crate) struct OfClass {
+    /// Its number in the vocabulary.
+    pub name: usize,
     /// The mean of its showings, whitened.
     pub mean: Vec<f64>,
     /// The mean of each showing, whitened.
@@ -29,25 +28,30 @@ pub(super) struct OfClass {
 
 /// All classes with a sample.
 #[derive(Debug)]
-pub(super) struct Scatter {
+pub(crate) struct Scatter {
     pub width: usize,
     pub whitening: Vec<f32>,
     pub classes: Vec<OfClass>,
-    /// Each sample whitened, with its class and its showing, and what it weighs.
-    samples: Vec<(usize, usize, f64, Vec<f64>)>,
+    pub samples: Vec<Seen>,
+}
+
+/// A sample, whitened.
+#[derive(Debug)]
+pub(crate) struct Seen {
+    /// Its place among those it came with.
+    pub sample: usize,
+    /// Its class and its showing, by their places here.
+    pub class: usize,
+    pub showing: usize,
+    /// What it weighs: all of a showing together weigh 1.
+    pub weight: f64,
+    pub white: Vec<f64>,
 }
 
 impl Scatter {
     pub fn of(samples: &[Shown<'_>], spread: &[f32]) -> Option<Self> {
+        let by_class = by_class(samples, spread.len());
         let width = spread.len();
-        let mut showings: BTreeMap<(usize, u64), Vec<&[f32]>> = BTreeMap::new();
-        for sample in samples.iter().filter(|sample| sample.vector.len() == width) {
-            showings.entry((sample.class, sample.showing)).or_default().push(sample.vector);
-        }
-        let mut by_class: BTreeMap<usize, Vec<Showing<'_>>> = BTreeMap::new();
-        for ((class, _), vectors) in showings {
-            by_class.entry(class).or_default().push((mean(&vectors, width), vectors));
-        }
         if by_class.is_empty() || width == 0 {
             return None;
         }
@@ -55,31 +59,88 @@ impl Scatter {
         for showings in by_class.values() {
             let center = center(showings.iter().map(|(mean, _)| mean.as_slice()), width);
             covariance.free(showings.len().saturating_sub(1) as f64);
-            for (_, vectors) in showings {
-                let weight = 1.0 / vectors.len() as f64;
-                vectors.iter().for_each(|vector| covariance.add(weight, vector, &center));
+            for (_, samples) in showings {
+                let weight = 1.0 / samples.len() as f64;
+                samples.iter().for_each(|(_, vector)| covariance.add(weight, vector, &center));
             }
         }
-        let whitening = covariance.whitening();
+        Some(Self::whitened(by_class, width, covariance.whitening()))
+    }
+
+    /// The same in a space of that width, where the covariance is known.
+    pub fn by(samples: &[Shown<'_>], width: usize, whitening: Vec<f32>) -> Option<Self> {
+        let by_class = by_class(samples, width);
+        (!by_class.is_empty() && width > 0).then(|| Self::whitened(by_class, width, whitening))
+    }
+
+    fn whitened(by_class: ByClass<'_>, width: usize, whitening: Vec<f32>) -> Self {
         let mut whitened = Vec::new();
-        let classes = by_class.into_values().enumerate().map(|(class, showings)| {
+        let classes = by_class.into_iter().enumerate().map(|(class, (name, showings))| {
             let mut means = Vec::with_capacity(showings.len());
-            for (showing, (_, vectors)) in showings.into_iter().enumerate() {
-                let weight = 1.0 / vectors.len() as f64;
-                let white: Vec<Vec<f64>> = vectors.iter().map(|vector| whiten(&whitening, vector)).collect();
-                means.push(center(white.iter().map(Vec::as_slice), width));
-                whitened.extend(white.into_iter().map(|white| (class, showing, weight, white)));
+            for (showing, (_, samples)) in showings.into_iter().enumerate() {
+                let weight = 1.0 / samples.len() as f64;
+                let white: Vec<(usize, Vec<f64>)> =
+                    samples.iter().map(|(sample, vector)| (*sample, whiten(&whitening, vector))).collect();
+                means.push(center(white.iter().map(|(_, white)| white.as_slice()), width));
+                let of_sample = |(sample, white)| Seen { sample, class, showing, weight, white };
+                whitened.extend(white.into_iter().map(of_sample));
             }
-            OfClass { mean: center(means.iter().map(Vec::as_slice), width), showings: means }
+            OfClass { name, mean: center(means.iter().map(Vec::as_slice), width), showings: means }
         });
         let classes = classes.collect();
-        Some(Self { width, whitening, classes, samples: whitened })
+        Self { width, whitening, classes, samples: whitened }
+    }
+
+    /// What views score that lie between gestures: half-way from each sample to a showing of another class. What is no gesture at all, a thing or a hand
+    /// on its way, lies there more often than where another gesture would.
+    pub fn between(&self, plain: &Discriminant) -> Scores {
+        let showings: Vec<(usize, &Vec<f64>)> = self
+            .classes
+            .iter()
+            .enumerate()
+            .flat_map(|(class, of)| of.showings.iter().map(move |showing| (class, showing)))
+            .collect();
+        let firsts: Vec<usize> = self
+            .classes
+            .iter()
+            .scan(0, |next, class| Some(std::mem::replace(next, *next + class.showings.len())))
+            .collect();
+        let halfway = self.samples.iter().filter_map(|seen| {
+            // Showings lie here by class: some fifths of the way round is seldom the same one.
+            let (place, count) = (firsts[seen.class] + seen.showing, showings.len());
+            let others = (1..=4).map(|step| showings[(place + count * step / 5) % count]);
+            let (_, other) = others.into_iter().find(|(class, _)| *class != seen.class)?;
+            let white = seen.white.iter().zip(other).map(|(a, b)| f64::midpoint(*a, *b));
+            Some((seen.weight, white.collect::<Vec<f64>>()))
+        });
+        let score = |(weight, white): (f64, Vec<f64>)| {
+            let to =
+                |of: &OfClass| a_coordinate(squared(&of.mean, &white), self.width, of.showings.len() as f64);
+            let score = Score::of(self.classes.iter().map(to))?;
+            Some((Score { margin: margin_of(&plain.logs_at(&plain.spot(&white))), ..score }, weight))
+        };
+        halfway.filter_map(score).collect()
+    }
+
+    /// The means of the classes, one after the other, and how many showings each rests on.
+    pub fn means(&self) -> Vec<f32> {
+        self.classes.iter().flat_map(|class| class.mean.iter().map(|x| *x as f32)).collect()
+    }
+
+    pub fn showings(&self) -> Vec<u32> {
+        self.classes.iter().map(|class| class.showings.len() as u32).collect()
+    }
+
+    /// The discriminant of the classes, of so many.
+    pub fn discriminant(&self, classes: usize) -> Discriminant {
+        let met: Vec<usize> = self.classes.iter().map(|class| class.name).collect();
+        Discriminant::of(&self.whitening, &self.means(), &self.showings(), &met, classes)
     }
 
     /// What views of known gestures score, each without its showing, and views of unknown ones, each without its class; with what each weighs.
-    pub fn left_out(&self) -> (Scores, Scores) {
+    pub fn left_out(&self, plain: Option<&Discriminant>) -> (Scores, Scores) {
         let (mut known, mut unknown) = (Vec::new(), Vec::new());
-        for (class, showing, weight, white) in &self.samples {
+        for Seen { class, showing, weight, white, .. } in &self.samples {
             let to = |(k, of_class): (usize, &OfClass)| {
                 let n = of_class.showings.len() as f64;
                 if k != *class {
@@ -93,9 +154,20 @@ impl Scatter {
             };
             let distances: Vec<(usize, f64)> = self.classes.iter().enumerate().filter_map(to).collect();
             let others = distances.iter().filter(|(k, _)| k != class).map(|(_, distance)| *distance);
-            unknown.extend(Score::of(others).map(|score| (score, *weight)));
+            let spot = plain.map(|plain| plain.spot(white));
+            let margin = plain.zip(spot.as_ref()).and_then(|(plain, spot)| {
+                let mut logs = plain.logs_at(spot);
+                logs[self.classes[*class].name] = f64::NEG_INFINITY;
+                margin_of(&logs)
+            });
+            unknown.extend(Score::of(others).map(|score| (Score { margin, ..score }, *weight)));
             if distances.len() == self.classes.len() {
-                known.extend(Score::of(distances.iter().map(|(_, d)| *d)).map(|score| (score, *weight)));
+                let margin = plain.zip(spot.as_ref()).and_then(|(plain, spot)| {
+                    let own = plain.spot(&self.classes[*class].showings[*showing]);
+                    margin_of(&plain.logs_without(spot, self.classes[*class].name, &own)?)
+                });
+                let score = Score::of(distances.iter().map(|(_, d)| *d));
+                known.extend(score.map(|score| (Score { margin, ..score }, *weight)));
             }
         }
         (known, unknown)
@@ -107,36 +179,28 @@ pub(super) fn a_coordinate(squared: f64, width: usize, showings: f64) -> f64 {
     squared / (width as f64 * (1.0 + 1.0 / showings))
 }
 
-/// How many numbers the whitening of a space of that width has.
-pub(super) fn entries(width: usize) -> usize {
-    if width > WIDEST { width } else { width * (width + 1) / 2 }
-}
-
-/// A vector in coordinates in which the shared covariance is that of independent ones.
-pub(super) fn whiten(whitening: &[f32], vector: &[f32]) -> Vec<f64> {
-    if vector.len() > WIDEST {
-        return vector.iter().zip(whitening).map(|(x, w)| f64::from(*x) * f64::from(*w)).collect();
-    }
-    let mut rest = whitening;
-    (1..=vector.len())
-        .map(|length| {
-            let (row, after) = rest.split_at(length.min(rest.len()));
-            rest = after;
-            row.iter().zip(vector).map(|(w, x)| f64::from(*w) * f64::from(*x)).sum()
-        })
-        .collect()
-}
-
 fn squared(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-fn mean(vectors: &[&[f32]], width: usize) -> Vec<f64> {
+fn by_class<'a>(samples: &[Shown<'a>], width: usize) -> ByClass<'a> {
+    let mut showings: BTreeMap<(usize, u64), Vec<(usize, &[f32])>> = BTreeMap::new();
+    for (place, sample) in samples.iter().enumerate().filter(|(_, sample)| sample.vector.len() == width) {
+        showings.entry((sample.class, sample.showing)).or_default().push((place, sample.vector));
+    }
+    let mut by_class = ByClass::new();
+    for ((class, _), samples) in showings {
+        by_class.entry(class).or_default().push((mean(&samples, width), samples));
+    }
+    by_class
+}
+
+fn mean(samples: &[(usize, &[f32])], width: usize) -> Vec<f64> {
     let mut sum = vec![0.0; width];
-    for vector in vectors {
+    for (_, vector) in samples {
         sum.iter_mut().zip(*vector).for_each(|(sum, x)| *sum += f64::from(*x));
     }
-    sum.iter_mut().for_each(|sum| *sum /= vectors.len() as f64);
+    sum.iter_mut().for_each(|sum| *sum /= samples.len() as f64);
     sum
 }
 
@@ -149,76 +213,4 @@ fn center<'a>(points: impl Iterator<Item = &'a [f64]>, width: usize) -> Vec<f64>
     }
     sum.iter_mut().for_each(|sum| *sum /= f64::max(count, 1.0));
     sum
-}
-
-/// The covariance about the classes, shrunk towards what is believed of it: the more, the less is known.
-struct Covariance {
-    width: usize,
-    diagonal: bool,
-    /// The lower triangle, row by row, or the diagonal.
-    sums: Vec<f64>,
-    freedom: f64,
-}
-
-impl Covariance {
-    fn new(spread: &[f32]) -> Self {
-        let width = spread.len();
-        let diagonal = width > WIDEST;
-        let greatest = spread.iter().copied().fold(0.0_f32, f32::max);
-        // A coordinate in which nothing ever varied says nothing, not everything.
-        let least = f64::from(greatest) * 1e-3 + 1e-9;
-        let variance = |x: &f32| PRIOR_SHOWINGS * PRIOR_PART * f64::from(*x).max(least).powi(2);
-        let mut sums = vec![0.0; entries(width)];
-        for (k, x) in spread.iter().enumerate() {
-            sums[if diagonal { k } else { k * (k + 1) / 2 + k }] = variance(x);
-        }
-        Self { width, diagonal, sums, freedom: PRIOR_SHOWINGS }
-    }
-
-    fn free(&mut self, degrees: f64) {
-        self.freedom += degrees;
-    }
-
-    fn add(&mut self, weight: f64, vector: &[f32], center: &[f64]) {
-        let away: Vec<f64> = vector.iter().zip(center).map(|(x, c)| f64::from(*x) - c).collect();
-        if self.diagonal {
-            self.sums.iter_mut().zip(&away).for_each(|(sum, a)| *sum += weight * a * a);
-            return;
-        }
-        let mut place = 0;
-        for (k, a) in away.iter().enumerate() {
-            let a = weight * a;
-            let row = &mut self.sums[place..=place + k];
-            row.iter_mut().zip(&away).for_each(|(sum, b)| *sum += a * b);
-            place += k + 1;
-        }
-    }
-
-    /// The inverse of its Cholesky factor, packed.
-    fn whitening(mut self) -> Vec<f32> {
-        let freedom = self.freedom;
-        self.sums.iter_mut().for_each(|sum| *sum /= freedom);
-        if self.diagonal {
-            return self.sums.iter().map(|variance| (1.0 / variance.sqrt()) as f32).collect();
-        }
-        let at = |row: usize, column: usize| row * (row + 1) / 2 + column;
-        let mut factor = self.sums;
-        for j in 0..self.width {
-            for k in 0..=j {
-                let dot: f64 = (0..k).map(|i| factor[at(j, i)] * factor[at(k, i)]).sum();
-                let left = factor[at(j, k)] - dot;
-                // The prior makes it positive definite; rounding may not.
-                factor[at(j, k)] = if j == k { left.max(1e-18).sqrt() } else { left / factor[at(k, k)] };
-            }
-        }
-        let mut inverse = vec![0.0; factor.len()];
-        for column in 0..self.width {
-            inverse[at(column, column)] = 1.0 / factor[at(column, column)];
-            for row in column + 1..self.width {
-                let dot: f64 = (column..row).map(|i| factor[at(row, i)] * inverse[at(i, column)]).sum();
-                inverse[at(row, column)] = -dot / factor[at(row, row)];
-            }
-        }
-        inverse.into_iter().map(|x| x as f32).collect()
-    }
 }

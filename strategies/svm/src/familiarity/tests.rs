@@ -2,6 +2,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::head::Shown;
 
 const WIDTH: usize = 12;
 
@@ -68,7 +69,7 @@ fn what_was_never_taught_is_told_from_what_was_and_the_ratio_means_what_it_says(
         let taught = world.taught(5, 6, &mut rng).unwrap();
         for _ in 0..20 {
             for class in 0..8 {
-                let ratio = taught.log_ratio(&world.showing(class, 1, &mut rng)[0]);
+                let ratio = taught.log_ratio(&world.showing(class, 1, &mut rng)[0], None);
                 if class < 5 { known.push(ratio) } else { unknown.push(ratio) }
             }
         }
@@ -90,7 +91,7 @@ fn who_knows_little_says_little() {
     let world = World::new(4, &mut rng);
     let of = |classes, showings, rng: &mut ChaCha8Rng| {
         let taught = world.taught(classes, showings, rng).unwrap();
-        let ratios = (0..40).map(|n| taught.log_ratio(&world.showing(n % 4, 1, rng)[0]));
+        let ratios = (0..40).map(|n| taught.log_ratio(&world.showing(n % 4, 1, rng)[0], None));
         ratios.fold((0.0_f64, 0.0_f64), |(low, high), ratio| (low.min(ratio), high.max(ratio)))
     };
     let most = 2.0_f64.ln() + 1e-12;
@@ -120,7 +121,7 @@ fn samples_of_one_showing_count_once() {
     };
     let (one, ten) = (shown(1), shown(10));
     let view = &world.showing(1, 1, &mut rng)[0];
-    assert!((one.log_ratio(view) - ten.log_ratio(view)).abs() < 1e-4);
+    assert!((one.log_ratio(view, None) - ten.log_ratio(view, None)).abs() < 1e-4);
 }
 
 #[test]
@@ -134,7 +135,7 @@ fn nothing_to_learn_from_is_nothing_and_a_wide_space_is_no_trouble() {
         .map(|(n, vector)| Shown { class: n % 2, showing: n as u64, vector })
         .collect();
     let taught = Familiarity::learn(&shown, &[1.0; 300]).unwrap();
-    assert!(taught.check(2, 300) && taught.log_ratio(&wide[0]).is_finite());
+    assert!(taught.check(2, 300) && taught.log_ratio(&wide[0], None).is_finite());
     let flat = Familiarity::learn(&shown, &[0.0; 300]).unwrap();
-    assert!(flat.check(2, 300) && flat.log_ratio(&wide[0]).is_finite());
+    assert!(flat.check(2, 300) && flat.log_ratio(&wide[0], None).is_finite());
 }

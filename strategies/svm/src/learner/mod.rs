@@ -1,5 +1,6 @@
 //! Learning on the spot: support vector machines that are brought up to date, not trained again.
 
+mod few;
 mod folds;
 mod growing;
 mod options;
@@ -10,12 +11,12 @@ mod solution;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, Vocabulary};
 
+use few::FewShowings;
 use folds::folds;
 pub use options::{LearnError, LearnerOptions};
 use pair::Pair;
@@ -23,8 +24,8 @@ use samples::{KernelMatrix, Key, Place};
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
-use crate::familiarity::{Familiarity, Shown};
 use crate::feature_space::FeatureSpace;
+use crate::head::{Blend, Losses, Teach, YOUNG};
 use crate::machine::{MAX_COORDINATE, Machine, pairs};
 
 /// Learns from samples that come and go, in one feature space.
@@ -32,8 +33,11 @@ use crate::machine::{MAX_COORDINATE, Machine, pairs};
 /// A soft-margin machine for each pair of classes, as the offline trainer makes them. It keeps the kernel of
 /// every two samples (n² · 4 bytes for n samples) and the last solution of each pair, from which a change sets out.
 ///
-/// Cross-validation takes each sample for itself. Samples that repeat each other, such as the frames of one showing,
-/// make the probabilities too sure: thin them out before.
+/// Beside the machines stands a [`Head`](crate::Head) for few showings: it answers alone for pairs with a class of fewer than six showings, and for the
+/// others together with the machine, in the part that loses least over showings that neither has met.
+///
+/// Cross-validation holds out whole showings: samples of one repeat each other. Who does not say of which showing a sample is has each taken for a showing
+/// of its own, and probabilities too sure where frames repeat each other.
 #[derive(Debug)]
 pub struct Learner {
     space: Arc<FeatureSpace>,
@@ -41,8 +45,7 @@ pub struct Learner {
     options: LearnerOptions,
     gamma: f32,
     samples: KernelMatrix,
-    /// Of which showing each inserted sample is.
-    showings: BTreeMap<u64, u64>,
+    few: FewShowings,
     supports: u32,
     /// All pairs of the vocabulary.
     pairs: Vec<Pair>,
@@ -72,7 +75,7 @@ impl Learner {
         Ok(Self {
             gamma,
             samples: KernelMatrix::new(classes, gamma),
-            showings: BTreeMap::new(),
+            few: FewShowings::new(&space),
             supports: 0,
             pairs: pairs(classes).map(|(i, j)| Pair::new([i, j])).collect(),
             touched: vec![false; classes],
@@ -82,6 +85,15 @@ impl Learner {
             vocabulary,
             options,
         })
+    }
+
+    /// The same with a head of one's own for few showings, in place of the discriminant. It is not part of what [`Classifier::encode`] writes: who reads
+    /// that has the machines alone, until they learn again.
+    #[must_use]
+    pub fn with_head(mut self, own: Arc<dyn Teach>) -> Self {
+        self.few.own = Some(own);
+        self.touched.fill(true);
+        self
     }
 
     /// The space it learns in.
@@ -148,10 +160,11 @@ impl Learner {
             return Err(LearnError::Range(coordinate));
         }
         let class = self.place_for(class)?;
-        self.showings.insert(key, showing);
+        let shown_before = self.few.showing(Key::Inserted(key));
+        self.few.note(key, showing);
         let key = Key::Inserted(key);
         if let Some(place) = self.samples.place(key) {
-            if place.class == class && self.samples.at(place).vector == vector {
+            if place.class == class && self.samples.at(place).vector == vector && shown_before == showing {
                 return Ok(());
             }
             self.take(place);
@@ -163,10 +176,10 @@ impl Learner {
     /// Takes out a sample; whether it was there.
     pub fn remove(&mut self, key: u64) -> bool {
         let place = self.samples.place(Key::Inserted(key));
-        self.showings.remove(&key);
         if let Some(place) = place {
             self.take(place);
         }
+        self.few.forget(key);
         place.is_some()
     }
 
@@ -180,6 +193,7 @@ impl Learner {
         if place.class != class {
             self.leave(place);
             let place = self.samples.relabel(place, class);
+            self.few.sums.relabel(Key::Inserted(key), class);
             self.join(place);
         }
         Ok(true)
@@ -210,7 +224,8 @@ impl Learner {
         let (cost, count) = (self.options.cost, self.options.folds);
         for class in 0..self.touched.len() {
             if self.touched[class] {
-                self.folds[class] = folds(self.samples.of(class), count);
+                let few = &self.few;
+                self.folds[class] = folds(self.samples.of(class), count, |key| few.showing(key));
             }
         }
         for pair in &mut self.pairs {
@@ -218,54 +233,67 @@ impl Learner {
                 pair.solve(&self.samples, cost);
             }
         }
-        self.calibrate();
-        self.touched.fill(false);
         let present = self.present();
+        let scatter = self.few.scatter(&self.samples);
+        let familiarity = scatter.as_ref().map(|scatter| self.few.familiarity(scatter, self.touched.len()));
+        // A head of the classes of these places.
+        let head = |few: &FewShowings, places: &[usize]| {
+            let familiarity = familiarity.as_ref()?;
+            Some(few.head(&self.samples, familiarity, &present, (places, &self.space)))
+        };
+        let (stale, all) = (self.stale(), self.classes().collect::<Vec<_>>());
+        if let (Some(scatter), Some(head), false) = (&scatter, head(&self.few, &all), stale.is_empty()) {
+            let left_out = self.few.left_out(&self.samples, scatter, &self.folds, &head, &self.space);
+            for index in stale {
+                self.pairs[index].calibrate(&self.samples, cost, (&self.folds, count), &left_out);
+            }
+        }
+        self.touched.fill(false);
         let sigmoids = self.trained().map(|pair| pair.sigmoid).collect();
         let calibration = Calibration { sigmoids, sharpness: 1.0 };
         // A gesture that was named and is no longer shown is none that this robot tells apart; those of the list always are.
         let mut vocabulary = self.vocabulary.clone();
         vocabulary.keep_named(|place| present.contains(&place));
         let listed = vocabulary.labels().len();
-        let kept = self.classes().filter(|place| *place < listed || present.contains(place));
-        let learned = kept.map(|class| self.samples.of(class).len() as u32).collect();
+        let kept: Vec<usize> =
+            all.into_iter().filter(|place| *place < listed || present.contains(place)).collect();
+        let learned = kept.iter().map(|class| self.samples.of(*class).len() as u32).collect();
         let machine = self.machine(&present);
-        let classifier = Classifier::new(
-            vocabulary,
-            self.space.clone(),
-            learned,
-            machine,
-            calibration,
-            self.familiarity(),
-        );
-        Ok(self.classifier.insert(Arc::new(classifier)).clone())
+        let shares = self.shares(present.len());
+        let blend = head(&self.few, &kept).map(|few| Blend { few, shares });
+        let space = self.space.clone();
+        let classifier = Classifier::new(vocabulary, space, learned, machine, calibration, familiarity);
+        Ok(self.classifier.insert(Arc::new(classifier.blended(blend))).clone())
     }
 
-    /// Calibrates pairs that are stale, the stalest first: an eighth of them at a time, so that no call has to do all;
-    /// and those that are twice as stale.
-    fn calibrate(&mut self) {
-        let LearnerOptions { cost, folds, staleness: limit, .. } = self.options;
+    /// The part of each pair's machine in its odds: none where a class is young, else the mean of what is best for either class.
+    fn shares(&self, met: usize) -> Vec<f64> {
+        let of_class = |class: usize| {
+            let sides = self.trained().flat_map(|pair| pair.classes.iter().zip(&pair.losses));
+            let sides = sides.filter(|(of, _)| **of == class).map(|(_, losses)| losses);
+            let young = self.few.sums.showings(class) < YOUNG;
+            (!young).then(|| Losses::share(sides, met.saturating_sub(1)))
+        };
+        let of_classes: Vec<Option<f64>> = self.classes().map(of_class).collect();
+        let share = |pair: &Pair| {
+            let [first, second] = pair.classes.map(|class| of_classes[class]);
+            first.zip(second).map_or(0.0, |(first, second)| f64::midpoint(first, second))
+        };
+        self.trained().map(share).collect()
+    }
+
+    /// The pairs that are to be calibrated, the stalest first: an eighth of those that are stale at a time, so that no call has to do all; and those that
+    /// are twice as stale.
+    fn stale(&self) -> Vec<usize> {
+        let limit = self.options.staleness;
         let trained = self.pairs.iter().enumerate().filter(|(_, pair)| !pair.is_empty(&self.samples));
         let staleness = trained.map(|(index, pair)| (pair.staleness(&self.samples), index));
         let mut stale: Vec<(f64, usize)> = staleness.filter(|(staleness, _)| *staleness > limit).collect();
         stale.sort_by(|a, b| b.0.total_cmp(&a.0));
         let some = stale.len().div_ceil(8);
-        for (rank, (staleness, index)) in stale.iter().enumerate() {
-            if rank < some || *staleness > 2.0 * limit {
-                self.pairs[*index].calibrate(&self.samples, cost, &self.folds, folds);
-            }
-        }
-    }
-
-    fn familiarity(&self) -> Option<Familiarity> {
-        let shown = self.samples.places().iter().map(|(key, place)| {
-            let showing = match key {
-                Key::Inserted(key) => self.showings.get(key).copied().unwrap_or(*key),
-                Key::Support(index) => !u64::from(*index),
-            };
-            Shown { class: place.class, showing, vector: &self.samples.at(*place).vector }
-        });
-        Familiarity::learn(&shown.collect::<Vec<_>>(), self.space.spread())
+        let ranked = stale.iter().enumerate();
+        let now = ranked.filter(|(rank, (staleness, _))| *rank < some || *staleness > 2.0 * limit);
+        now.map(|(_, (_, index))| *index).collect()
     }
 
     /// The machines of all pairs with a sample each.
@@ -317,11 +345,13 @@ impl Learner {
 
     fn put(&mut self, key: Key, class: usize, vector: &[f32]) {
         let place = self.samples.insert(key, class, vector);
+        self.few.sums.insert(key, class, self.few.showing(key), vector);
         self.join(place);
     }
 
     fn take(&mut self, place: Place) {
         self.leave(place);
+        self.few.sums.remove(self.samples.at(place).key);
         self.samples.remove(place);
     }
 

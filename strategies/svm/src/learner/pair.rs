@@ -1,7 +1,9 @@
 //! What a learner knows of one pair of classes.
 
+use super::few::LeftOut;
 use super::samples::{KernelMatrix, Place};
 use super::solution::Solution;
+use crate::head::{Losses, blended};
 use crate::sigmoid::Sigmoid;
 
 /// The machine of two classes, and its calibration.
@@ -10,6 +12,8 @@ pub(super) struct Pair {
     pub classes: [usize; 2],
     pub solution: Solution,
     pub sigmoid: Sigmoid,
+    /// What was lost over samples of either class, by its part in the odds beside the head for few showings.
+    pub losses: [Losses; 2],
     /// Samples that came or went since the calibration.
     pub changes: usize,
 }
@@ -17,7 +21,7 @@ pub(super) struct Pair {
 impl Pair {
     pub fn new(classes: [usize; 2]) -> Self {
         let sigmoid = Sigmoid::fit_at_border(&[]);
-        Self { classes, solution: Solution::default(), sigmoid, changes: 0 }
+        Self { classes, solution: Solution::default(), sigmoid, losses: [Losses::default(); 2], changes: 0 }
     }
 
     /// Takes in the sample that now stands at the end of its class.
@@ -44,13 +48,39 @@ impl Pair {
         self.solution.solve(cost, &rows(samples, classes), |_, _| false);
     }
 
-    /// Fits the sigmoid to what machines say of samples that they have not seen. `folds` by class, of `count` folds.
-    pub fn calibrate(&mut self, samples: &KernelMatrix, cost: f64, folds: &[Vec<usize>], count: usize) {
+    /// Fits the sigmoid to what machines say of samples that they have not seen, and weighs the machine against the head for few showings by what both
+    /// say of those. `folds` by class, of `count` folds; `left_out` is what the head says, by class.
+    pub fn calibrate(
+        &mut self,
+        samples: &KernelMatrix,
+        cost: f64,
+        (folds, count): (&[Vec<usize>], usize),
+        left_out: &[Vec<LeftOut>],
+    ) {
         let sides = self.held_out(samples, cost, folds, count);
         let values = sides.iter().zip([true, false]);
         let values = values.flat_map(|(values, first)| values.iter().flatten().map(move |f| (*f, first)));
         self.sigmoid = Sigmoid::fit_at_border(&values.collect::<Vec<_>>());
+        self.weigh(&sides, left_out);
         self.changes = 0;
+    }
+
+    /// What each share would lose over what was held out, by side.
+    fn weigh(&mut self, held_out: &[Vec<Option<f64>>; 2], left_out: &[Vec<LeftOut>]) {
+        let [first, second] = self.classes;
+        self.losses = [Losses::default(); 2];
+        for (side, values) in held_out.iter().enumerate() {
+            let both = values.iter().zip(left_out.get(self.classes[side]).into_iter().flatten());
+            let both = both.filter_map(|(value, left)| Some(((*value)?, left.as_ref()?)));
+            for (value, (weight, logs)) in both {
+                let machine = self.sigmoid.probability(value);
+                let log_odds = logs[first] - logs[second];
+                self.losses[side].add(*weight, |share| {
+                    let p = blended(machine, log_odds, share);
+                    if side == 0 { p } else { 1.0 - p }
+                });
+            }
+        }
     }
 
     /// For each sample, by class, the decision of a machine that has not seen its fold; none where that leaves a class
@@ -121,6 +151,12 @@ mod tests {
 
     const COST: f64 = 10.0;
 
+    /// Each sample is a showing of its own.
+    fn own(key: Key) -> u64 {
+        let Key::Inserted(key) = key else { unreachable!() };
+        key
+    }
+
     fn vectors(count: usize, seed: u64) -> Vec<Vec<f32>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count).map(|_| (0..5).map(|_| rng.random_range(-1.0..1.0)).collect()).collect()
@@ -144,7 +180,7 @@ mod tests {
     fn a_held_out_decision_is_that_of_a_machine_which_never_met_the_sample() {
         let vectors = vectors(80, 1);
         let (samples, pair) = trained(&vectors, |_| true);
-        let folds: Vec<Vec<usize>> = [0, 1].map(|class| folds(samples.of(class), 5)).to_vec();
+        let folds: Vec<Vec<usize>> = [0, 1].map(|class| folds(samples.of(class), 5, own)).to_vec();
         let held_out = pair.held_out(&samples, COST, &folds, 5);
         for fold in 0..5 {
             let fold_of = |key: u64| {

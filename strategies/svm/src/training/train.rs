@@ -10,8 +10,9 @@ use super::folds::Folding;
 use super::options::TrainOptions;
 use super::search::{Choice, Fold, HeldOut, Search};
 use crate::classifier::Classifier;
-use crate::familiarity::{Familiarity, Shown};
+use crate::familiarity::Familiarity;
 use crate::feature_space::FeatureSpace;
+use crate::head::Shown;
 use crate::labelled::LabelledFeatures;
 
 /// How far training has come.

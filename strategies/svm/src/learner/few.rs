@@ -1,0 +1,155 @@
+//! The head for few showings, as a learner keeps it up to date.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::samples::{KernelMatrix, Key};
+use crate::familiarity::{Familiarity, Scatter, Seen};
+use crate::feature_space::FeatureSpace;
+use crate::head::{Few, Shown, Sums, Teach, sharpness};
+
+/// What the head for few says of a sample, not having met its showing; and what the sample weighs.
+pub(super) type LeftOut = Option<(f64, Vec<f64>)>;
+
+/// The sums that the discriminant rests on, and a researcher's head in its place.
+#[derive(Debug)]
+pub(super) struct FewShowings {
+    pub sums: Sums<Key>,
+    /// Of which showing each inserted sample is.
+    showings: BTreeMap<u64, u64>,
+    pub own: Option<Arc<dyn Teach>>,
+    sharpness: f64,
+}
+
+impl FewShowings {
+    pub fn new(space: &FeatureSpace) -> Self {
+        let sharpness = sharpness(std::iter::empty());
+        Self { sums: Sums::new(space.spread()), showings: BTreeMap::new(), own: None, sharpness }
+    }
+
+    /// Notes of which showing a sample is.
+    pub fn note(&mut self, key: u64, showing: u64) {
+        self.showings.insert(key, showing);
+    }
+
+    pub fn forget(&mut self, key: u64) {
+        self.showings.remove(&key);
+    }
+
+    pub fn showing(&self, key: Key) -> u64 {
+        match key {
+            Key::Inserted(key) => self.showings.get(&key).copied().unwrap_or(key),
+            Key::Support(index) => !u64::from(index),
+        }
+    }
+
+    /// All samples, in the order of their keys.
+    fn shown<'a>(&self, samples: &'a KernelMatrix) -> Vec<Shown<'a>> {
+        let shown = samples.places().iter().map(|(key, place)| Shown {
+            class: place.class,
+            showing: self.showing(*key),
+            vector: &samples.at(*place).vector,
+        });
+        shown.collect()
+    }
+
+    /// How the classes lie; `None` where there is no sample.
+    pub fn scatter(&self, samples: &KernelMatrix) -> Option<Scatter> {
+        let whitening = self.sums.covariance(&self.sums.clouds()).whitening();
+        Scatter::by(&self.shown(samples), self.sums.spread().len(), whitening)
+    }
+
+    /// What is familiar, of so many classes; with the margins of the discriminant, where that is the head.
+    pub fn familiarity(&self, scatter: &Scatter, classes: usize) -> Familiarity {
+        let discriminant = self.own.is_none().then(|| scatter.discriminant(classes));
+        Familiarity::of(scatter, discriminant.as_ref())
+    }
+
+    /// The head that knows all samples, of the classes at these places, in that order.
+    pub fn head(
+        &self,
+        samples: &KernelMatrix,
+        familiarity: &Familiarity,
+        present: &[usize],
+        (places, space): (&[usize], &FeatureSpace),
+    ) -> Few {
+        let number = |class: usize| places.iter().position(|place| *place == class);
+        match &self.own {
+            Some(own) => {
+                let shown = self.shown(samples).into_iter();
+                let shown: Vec<Shown<'_>> =
+                    shown.filter_map(|shown| Some(Shown { class: number(shown.class)?, ..shown })).collect();
+                Few::Own(own.teach(&shown, places.len(), space))
+            }
+            None => {
+                let present: Vec<usize> = present.iter().filter_map(|class| number(*class)).collect();
+                Few::Discriminant(familiarity.discriminant(&present, places.len()).sharpened(self.sharpness))
+            }
+        }
+    }
+
+    /// What the head says of each sample without its showing, by class and position. Settles how sharp a discriminant is.
+    pub fn left_out(
+        &mut self,
+        samples: &KernelMatrix,
+        scatter: &Scatter,
+        folds: &[Vec<usize>],
+        head: &Few,
+        space: &FeatureSpace,
+    ) -> Vec<Vec<LeftOut>> {
+        let mut by_place: Vec<Vec<LeftOut>> =
+            folds.iter().map(|of_class| vec![None; of_class.len()]).collect();
+        let places: Vec<_> = samples.places().values().copied().collect();
+        match head {
+            Few::Discriminant(discriminant) => {
+                let plain = discriminant.clone().sharpened(1.0);
+                let showings: Vec<Vec<_>> = scatter
+                    .classes
+                    .iter()
+                    .map(|class| class.showings.iter().map(|mean| plain.spot(mean)).collect())
+                    .collect();
+                let logs = |seen: &Seen| {
+                    let own = &showings[seen.class][seen.showing];
+                    plain.logs_without(&plain.spot(&seen.white), scatter.classes[seen.class].name, own)
+                };
+                let all: Vec<(&Seen, Vec<f64>)> =
+                    scatter.samples.iter().filter_map(|seen| Some((seen, logs(seen)?))).collect();
+                // In an order that does not depend on what came first.
+                self.sharpness =
+                    sharpness(all.iter().map(|(seen, logs)| {
+                        (scatter.classes[seen.class].name, seen.weight, logs.as_slice())
+                    }));
+                for (seen, mut logs) in all {
+                    let place = places[seen.sample];
+                    logs.iter_mut().for_each(|log| *log *= self.sharpness);
+                    by_place[place.class][place.position] = Some((seen.weight, logs));
+                }
+            }
+            Few::Own(_) => {
+                let Some(own) = &self.own else { return by_place };
+                let shown = self.shown(samples);
+                let fold = |place: &super::Place| folds[place.class][place.position];
+                let count = folds.iter().flatten().max().map_or(0, |last| last + 1);
+                for left in 0..count {
+                    let rest = shown.iter().zip(&places).filter(|(_, place)| fold(place) != left);
+                    let rest: Vec<Shown<'_>> = rest.map(|(shown, _)| *shown).collect();
+                    let met = |class: usize| rest.iter().any(|shown| shown.class == class);
+                    let met: Vec<bool> = (0..folds.len()).map(met).collect();
+                    let head = own.teach(&rest, folds.len(), space);
+                    for (shown, place) in shown.iter().zip(&places).filter(|(_, place)| fold(place) == left) {
+                        let logs = met[place.class].then(|| head.logs(shown.vector));
+                        by_place[place.class][place.position] = logs.map(|logs| (1.0, logs));
+                    }
+                }
+                // A showing counts once, however many samples it has.
+                for seen in &scatter.samples {
+                    let place = places[seen.sample];
+                    if let Some((weight, _)) = &mut by_place[place.class][place.position] {
+                        *weight = seen.weight;
+                    }
+                }
+            }
+        }
+        by_place
+    }
+}
