@@ -283,6 +283,10 @@ def judge(rule: str, votes: list, given: argparse.Namespace, pool: dict) -> tupl
         # What liars pretend to have been taught is nobody's gesture without them.
         firm = more_than(liars)
         sure = taught(firm, liars)[0] * min(sure, which_at_least(firm, top, liars))
+        if rule == "majority":
+            # Nor can they make those abstain who find it likelier than all else.
+            always = sum(all(vote["evidence"][k] < vote["evidence"][top] for k in gestures if k != top) for vote in votes)
+            sure = min(sure, taught(firm, liars)[0] * max(always - liars, 0) / (len(votes) - liars)) if len(votes) > liars else 0.0
     return probabilities, sure
 
 

@@ -1,6 +1,6 @@
 //! Votes as fusion rules take them: first whether it is a gesture that was taught at all, then which.
 
-use gestalt_protocol::{ClassId, Vote};
+use gestalt_protocol::{ClassId, FusionRule, Vote};
 
 use crate::columns::Columns;
 use crate::fuse::Fuse;
@@ -104,7 +104,21 @@ impl Rows {
         let firm = self.known_by_more_than(liars as usize);
         let [taught, _] = shares(self.odds(liars as usize), self.known_by.len() - firm.len());
         let which = [which(0), which(liars as usize)].into_iter().map(|which| which.unwrap_or(0.0));
-        taught * which.fold(1.0, f64::min)
+        let always = if rule.rule() == FusionRule::Majority { self.always_for(top, liars) } else { 1.0 };
+        taught * which.fold(always, f64::min)
+    }
+
+    /// The least part of a majority that is for a gesture, whatever liars pretend to have been taught: by that they can make robots abstain who find what they
+    /// do not know themselves likeliest. Who finds that gesture likelier than all others is for it in any case.
+    fn always_for(&self, top: usize, liars: u32) -> f64 {
+        let is_for = |row: &&Vec<f32>| {
+            let others = row.iter().enumerate().filter(|(class, _)| *class != top);
+            row.get(top)
+                .is_some_and(|of_top| others.map(|(_, of_other)| of_other).all(|other| other < of_top))
+        };
+        let [always, robots] = [self.rows.iter().filter(is_for).count(), self.rows.len()]
+            .map(|robots| robots.saturating_sub(liars as usize));
+        if robots == 0 { 0.0 } else { always as f64 / robots as f64 }
     }
 
     fn tells(&self) -> bool {
@@ -183,7 +197,7 @@ fn shares(odds: f64, untaught: usize) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{FusionRule, RobotId, RoundId, VocabularyId};
+    use gestalt_protocol::{RobotId, RoundId, VocabularyId};
     use proptest::prelude::*;
 
     use super::*;

@@ -3,6 +3,7 @@
 use gestalt_protocol::ClassId;
 
 use super::pair::Pair;
+use super::samples::Place;
 use super::{LearnError, Learner};
 use crate::machine::pairs;
 
@@ -28,10 +29,23 @@ impl Learner {
             self.folds.push(Vec::new());
             let mut known = std::mem::take(&mut self.pairs).into_iter().peekable();
             let all = pairs(self.vocabulary.classes()).map(|(i, j)| [i, j]);
-            self.pairs = all
-                .map(|classes| known.next_if(|pair| pair.classes == classes).unwrap_or(Pair::new(classes)))
-                .collect();
+            let pair = |classes| match known.next_if(|pair| pair.classes == classes) {
+                Some(known) => known,
+                None => self.fresh(classes),
+            };
+            self.pairs = all.map(pair).collect();
         }
         self.vocabulary.place(class).ok_or(LearnError::Class(class))
+    }
+
+    /// A pair that knows the samples of its classes.
+    fn fresh(&self, classes: [usize; 2]) -> Pair {
+        let mut pair = Pair::new(classes);
+        for class in classes {
+            for position in 0..self.samples.of(class).len() {
+                pair.insert(&self.samples, Place { class, position });
+            }
+        }
+        pair
     }
 }
