@@ -120,14 +120,21 @@ fn named(label: &str) -> ClassId {
     ClassId::named(&"ana".parse().unwrap(), label)
 }
 
+/// A view of a gesture that is not on the list.
+fn new_view(rng: &mut impl Rng) -> Vec<f32> {
+    let mut view = vector(4, rng);
+    view[4] += 2.0;
+    view
+}
+
 #[test]
 fn a_gesture_that_is_met_while_it_learns_is_told_apart_as_one_of_the_list() {
     let mut rng = generator(5);
     let mut learner = taught(80, &mut rng);
     let before = learner.learn().unwrap();
-    let probes: Vec<Vec<f32>> = (0..60).map(|_| vector(4, &mut rng)).collect();
+    let probes: Vec<Vec<f32>> = (0..60).map(|_| new_view(&mut rng)).collect();
     for key in 0..20 {
-        learner.insert(1000 + key, named("circle"), &vector(4, &mut rng)).unwrap();
+        learner.insert(1000 + key, named("circle"), &new_view(&mut rng)).unwrap();
     }
     let grown = learner.learn().unwrap();
     assert_eq!(grown.vocabulary().classes(), CLASSES + 1);
@@ -144,15 +151,15 @@ fn a_gesture_that_is_met_while_it_learns_is_told_apart_as_one_of_the_list() {
     };
     let p = judged(&grown);
     let mean = p.iter().sum::<f64>() / 60.0;
-    assert!(mean > 0.4, "twice as likely as by chance, of five that overlap: {mean}");
+    assert!(mean > 0.6, "{mean}");
 
     // As one that had met it from the beginning, whatever came between.
     let mut other = self::learner();
     let mut rng = generator(5);
     let first: Vec<Vec<f32>> = (0..80).map(|key| vector(key % CLASSES, &mut rng)).collect();
-    (0..60).for_each(|_| drop(vector(4, &mut rng)));
+    (0..60).for_each(|_| drop(new_view(&mut rng)));
     for key in 0..20 {
-        other.insert(1000 + key, named("circle"), &vector(4, &mut rng)).unwrap();
+        other.insert(1000 + key, named("circle"), &new_view(&mut rng)).unwrap();
     }
     for (key, vector) in first.iter().enumerate() {
         other.insert(key as u64, ClassId((key % CLASSES) as u32), vector).unwrap();
@@ -166,7 +173,7 @@ fn a_gesture_that_is_met_while_it_learns_is_told_apart_as_one_of_the_list() {
     let without = learner.learn().unwrap();
     assert_eq!(without.vocabulary(), before.vocabulary());
     for key in 0..3 {
-        learner.insert(2000 + key, named("fist"), &vector(4, &mut rng)).unwrap();
+        learner.insert(2000 + key, named("fist"), &new_view(&mut rng)).unwrap();
     }
     assert_eq!(learner.pairs.len(), pairs(CLASSES + 1).count());
     assert_eq!(learner.learn().unwrap().vocabulary().named(), [named("fist")]);
