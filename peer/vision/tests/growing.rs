@@ -16,7 +16,7 @@ use gestalt_vision::model::RobotModel;
 use gestalt_vision::perception::{HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{EmulatedView, read_image};
-use rand::seq::SliceRandom;
+use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
