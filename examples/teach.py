@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Teaches a running swarm from the keyboard: shows its decision, asks what the gesture really was, prints the answer.
+"""Teaches a running swarm from the keyboard: shows its decision, and what the swarm asks; asks what the gesture really was, prints the answer.
 
     pip install eclipse-zenoh
     python3 examples/teach.py --connect tcp/127.0.0.1:7447 --swarm gestalt
@@ -42,6 +42,7 @@ def main() -> None:
     with zenoh.open(config) as session:
         decisions = session.declare_subscriber(f"{prefix}/decision")
         answers = session.declare_subscriber(f"{prefix}/instructor/{given.name}/answer")
+        questions = session.declare_subscriber(f"{prefix}/question")
         told = iter(given.gestures) if given.gestures is not None else None
         while True:
             # Half a second after a round began, a request to open is taken for an echo of the one before.
@@ -52,6 +53,11 @@ def main() -> None:
                 print("no decision: is a robot alive?")
                 return
             print(f"round {decision['round']['counter']}: {decision['label'] or 'no decision'}", flush=True)
+            if told is None:
+                # The swarm asks a second after a round that is worth it; any word on the round answers.
+                question = wait_for(questions, 2.5)
+                if question is not None and question["round"] == decision["round"]:
+                    print(f"  the swarm asks: {question['ask']['kind']} {' or '.join(question['labels'])}", flush=True)
             gesture = next(told, "") if told is not None else input("it was (empty to end): ")
             if not gesture:
                 return

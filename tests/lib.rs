@@ -21,5 +21,5 @@ pub use classifier::{Fixed, look};
 pub use learning::{gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;
 pub use process::Process;
-pub use robots::{Watched, agreed, config, start, start_learning, unique};
+pub use robots::{Watched, agreed, config, start, start_learning, start_looking, unique};
 pub use streaming::{Hands, center_config, model, sender_config};

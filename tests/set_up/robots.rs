@@ -77,10 +77,20 @@ pub async fn start(config: RobotConfig, sees: Option<ClassId>) -> Watched {
 /// When it cannot start.
 pub async fn start_learning(config: RobotConfig, shown: Arc<AtomicU8>) -> Watched {
     let seed = u64::from(config.id.0) << 32 | u64::from(config.nonce as u32);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    start_looking(config, move || gesture(ClassId(shown.load(Ordering::Relaxed).into()), &mut rng)).await
+}
+
+/// Starts a robot that looks fifty times a second, and sees that.
+///
+/// # Panics
+/// When it cannot start.
+pub async fn start_looking(
+    config: RobotConfig,
+    frame: impl FnMut() -> Observation + Send + 'static,
+) -> Watched {
     let robot = Arc::new(Robot::start(config).await.expect("the robot starts"));
     let (events, of_eye) = (robot.events(), robot.events());
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let frame = move || gesture(ClassId(shown.load(Ordering::Relaxed).into()), &mut rng);
     let period = Duration::from_millis(20);
     let looking = tokio::spawn(look_when_open(Arc::downgrade(&robot), of_eye, period, frame));
     Watched { robot, events, looking: Some(looking) }

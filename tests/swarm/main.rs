@@ -1,6 +1,7 @@
 //! Whole swarms on real Zenoh, one subject a file. Each line of the table says what a scenario does most of its time, and
 //! what it needs of the machine; what waits runs side by side. The long ones come first.
 
+mod asking;
 mod cameras;
 mod center;
 mod churn;
@@ -66,6 +67,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Namespaces] ring::a_ring_goes_on_after_a_relay_is_killed,
         [Waits] in_process::what_the_first_two_of_a_line_see_the_last_decides.await,
         [Waits] naming::a_gesture_that_is_named_and_shown_five_times_is_known_to_all_of_a_line.await,
+        [Waits] asking::robots_that_see_different_gestures_ask_once_and_again_no_sooner_than_they_may.await,
         [Waits] learning::a_correction_and_an_undo_reach_every_robot.await,
         [Waits] learning::forged_samples_are_refused_counted_and_named_and_nothing_is_trained_on_them.await,
         [Works] learning::a_robot_votes_and_decides_while_it_trains.await,

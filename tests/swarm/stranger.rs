@@ -8,8 +8,9 @@ use std::time::Duration;
 
 use gestalt_link::{Bearer, Certificate, Client, Credentials, LinkConfig, RobotConfig, Seal};
 use gestalt_protocol::{
-    Announcement, Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction,
-    Keys, Lesson, Lessons, Message, Outcome, RobotId, RoundId, Stamp, Topic, Vote, Word,
+    Announcement, Ask, Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
+    Instruction, Keys, Lesson, Lessons, Message, Outcome, Question, RobotId, RoundId, Stamp, Topic, Vote,
+    Word,
 };
 use gestalt_strategies::Classify;
 use gestalt_tests::{Fixed, Watched, agreed, config, learning, short_rounds, start, start_learning, unique};
@@ -146,6 +147,24 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
     for announced in [announced.clone(), Announcement { signature, ..announced }] {
         put(Topic::Decision, serde_json::to_vec(&announced).unwrap()).await;
     }
+    // A question in the name of a robot: unsigned, and by a key that is nobody's.
+    let ask = Ask::Between { classes: [ClassId(4), ClassId(2)] };
+    let (robot, stamp) = (RobotId(1), Stamp { boot: u32::MAX, sequence: 2 });
+    let question = Question {
+        round,
+        ask,
+        labels: vec![],
+        entropy: 0.5,
+        disagreement: 0.5,
+        robot,
+        stamp,
+        signature: None,
+    };
+    let statement = Envelope::from(question.clone()).statement();
+    let signature = Some(statement::sign(&stranger, &swarm_id, &statement));
+    for question in [question.clone(), Question { signature, ..question }] {
+        put(Topic::Question, serde_json::to_vec(&question).unwrap()).await;
+    }
     let held = |robot| {
         let Envelope { author, stamp, message: Message::Vote(vote), signature } = vote(2, robot) else {
             unreachable!()
@@ -182,6 +201,8 @@ pub async fn one_who_is_no_member_changes_nothing_and_every_lie_is_named() {
         ("refused_vote_stranger", 1),
         ("refused_decision_unsigned", 1),
         ("refused_decision_forged", 1),
+        ("refused_question_unsigned", 1),
+        ("refused_question_forged", 1),
         ("refused_robot_decision_unsigned", 1),
         ("refused_repair_unsigned", 1),
     ] {

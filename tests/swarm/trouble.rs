@@ -57,6 +57,7 @@ pub async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on
             Topic::Repair(RobotId(1)),
             Topic::RobotDecision(RobotId(9)),
             Topic::Decision,
+            Topic::Question,
             Topic::Feedback("vandal".parse().unwrap()),
             Topic::Answer("vandal".parse().unwrap()),
         ] {
@@ -66,7 +67,9 @@ pub async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on
         }
     }
     for robot in [&first, &second] {
-        for kind in ["vote", "sample", "repair", "robot_decision", "decision", "feedback", "answer"] {
+        for kind in
+            ["vote", "sample", "repair", "robot_decision", "decision", "question", "feedback", "answer"]
+        {
             counted(robot, &format!("refused_{kind}_"), 8).await;
         }
         let status = robot.robot.status();

@@ -12,6 +12,8 @@ use crate::rows::knows;
 pub struct Doubt {
     /// H of the pooled opinion over these outcomes, in nats: how unsure the swarm is.
     pub entropy: f64,
+    /// H over the gestures alone, if it is one of those that were taught, in nats: how unsure the swarm is which of them.
+    pub among_gestures: f64,
     /// H(mean of p) − mean of H(p) over the robots' own opinions p, in nats: the Jensen-Shannon divergence. It is high where robots see different
     /// things, as for a committee (BALD; Houlsby et al. 2011), and nothing where each is as unsure as all.
     pub disagreement: f64,
@@ -41,6 +43,7 @@ impl Doubt {
         let known: f64 = taught.iter().map(|(_, p)| p).sum();
         let rest = (1.0 - known).clamp(0.0, 1.0);
         let pooled: Vec<f64> = taught.iter().map(|(_, p)| *p).chain([rest]).collect();
+        let among: Vec<f64> = taught.iter().map(|(_, p)| p / known.max(f64::MIN_POSITIVE)).collect();
         let gestures: Vec<ClassId> = taught.into_iter().map(|(class, _)| class).collect();
 
         let untaught = probabilities.len() - gestures.len();
@@ -49,6 +52,7 @@ impl Doubt {
         let opinions: Vec<Vec<f64>> = opinions.map(|vote| opinion(vote, &gestures, untaught, clip)).collect();
         Some(Self {
             entropy: entropy(&pooled),
+            among_gestures: entropy(&among),
             disagreement: divergence(&opinions),
             unknown: if tells || untaught > 0 { rest } else { 0.0 },
             gestures,
@@ -159,7 +163,7 @@ mod tests {
         assert!((one.unknown - rest).abs() < 1e-9, "{one:?}");
         let h = -rest * rest.ln() - (1.0 - rest) * (1.0 - rest).ln();
         assert!((one.entropy - h).abs() < 1e-9, "{one:?}");
-        assert!(one.disagreement < 1e-9, "{one:?}");
+        assert!(one.disagreement < 1e-9 && one.among_gestures == 0.0, "{one:?}");
     }
 
     #[test]
@@ -176,6 +180,7 @@ mod tests {
             let most = (doubt.gestures.len() as f64 + 1.0).ln() + 1e-9;
             prop_assert!((0.0..=most).contains(&doubt.entropy), "{doubt:?}");
             prop_assert!((0.0..=most).contains(&doubt.disagreement), "{doubt:?}");
+            prop_assert!((0.0..=most).contains(&doubt.among_gestures), "{doubt:?}");
             prop_assert!((0.0..=1.0).contains(&doubt.unknown), "{doubt:?}");
         }
     }

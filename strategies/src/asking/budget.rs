@@ -33,10 +33,10 @@ impl QuestionBudget {
         config.ask && apart && self.rounds >= config.rounds
     }
 
-    /// Whether it has not been made use of for twice as many rounds as it must not be.
+    /// Since how many rounds no question was asked, in units of those that must lie between two.
     #[must_use]
-    pub fn is_full(&self, config: &QuestionsConfig) -> bool {
-        self.rounds >= config.rounds.saturating_mul(2)
+    pub fn quiet(&self, config: &QuestionsConfig) -> u32 {
+        self.rounds / config.rounds.max(1)
     }
 }
 
@@ -79,17 +79,16 @@ mod tests {
     }
 
     #[test]
-    fn it_is_there_again_after_as_many_rounds_and_full_after_twice_as_many() {
+    fn it_is_there_again_after_as_many_rounds_and_counts_them() {
         let config = QuestionsConfig { apart: Duration::ZERO, ..QuestionsConfig::default() };
         let mut budget = QuestionBudget::default();
-        let allowed: Vec<(bool, bool)> = (0..6)
+        let allowed: Vec<(bool, u32)> = (0..6)
             .map(|_| {
                 budget.enter(Duration::ZERO);
-                (budget.allows(Duration::ZERO, &config), budget.is_full(&config))
+                (budget.allows(Duration::ZERO, &config), budget.quiet(&config))
             })
             .collect();
-        assert_eq!(allowed.iter().filter(|(allowed, _)| *allowed).count(), 4);
-        assert_eq!(allowed.iter().filter(|(_, full)| *full).count(), 1);
+        assert_eq!(allowed, [(false, 0), (false, 0), (true, 1), (true, 1), (true, 1), (true, 2)]);
         let never = QuestionsConfig { ask: false, ..config };
         assert!(!budget.allows(Duration::from_secs(99), &never));
     }

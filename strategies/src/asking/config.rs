@@ -40,9 +40,9 @@ pub enum QuestionsConfigError {
 /// | `after` | 1s | how long after a round's end: an instructor may say it unasked | ≤ 1 day |
 /// | `gone` | 15s | how long a question waits for its answer | ≤ 1 day |
 /// | `repeated` | 60s | within which what is unknown must be shown again for its name to be asked | ≤ 1 day |
-/// | `unsure` | 0.35 | least entropy, in nats, from which a round is worth a question | 0–8 |
+/// | `worth` | 0.15 | least worth of a label, see [`worth_asking`](crate::worth_asking) | 0–8 |
 /// | `disagreement` | 0.1 | from how many nats on robots see different things | 0–8 |
-/// | `familiar` | 4 | labels of a gesture after which the entropy about it counts half | > 0 |
+/// | `familiar` | 4 | labels of a gesture after which a doubt about it counts half | > 0 |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuestionsConfig {
@@ -62,11 +62,11 @@ pub struct QuestionsConfig {
     /// Within which time what is unknown must be shown again for its name to be asked.
     #[serde(with = "humantime_serde")]
     pub repeated: Duration,
-    /// The least entropy, in nats, from which a round is worth a question.
-    pub unsure: f64,
+    /// The least worth of a label, as [`worth_asking`](crate::worth_asking) reckons it.
+    pub worth: f64,
     /// From how many nats on robots see different things.
     pub disagreement: f64,
-    /// The labels of a gesture after which the entropy about it counts half: the more was said of it, the less another label teaches.
+    /// The labels of a gesture after which a doubt about it counts half: the more was said of it, the less another label teaches.
     pub familiar: f64,
 }
 
@@ -79,7 +79,7 @@ impl Default for QuestionsConfig {
             after: Duration::from_secs(1),
             gone: Duration::from_secs(15),
             repeated: Duration::from_secs(60),
-            unsure: 0.35,
+            worth: 0.15,
             disagreement: 0.1,
             familiar: 4.0,
         }
@@ -101,8 +101,7 @@ impl QuestionsConfig {
         if let Some((field, _)) = durations.iter().find(|(_, duration)| *duration > day) {
             return Err(QuestionsConfigError::TooLong(field));
         }
-        for (field, nats, example) in
-            [("unsure", self.unsure, 0.35), ("disagreement", self.disagreement, 0.1)]
+        for (field, nats, example) in [("worth", self.worth, 0.15), ("disagreement", self.disagreement, 0.1)]
         {
             if !(0.0..=8.0).contains(&nats) {
                 return Err(QuestionsConfigError::Nats { field, nats, example });
@@ -127,7 +126,7 @@ mod tests {
             (QuestionsConfig { rounds: 0, ..default() }, "rounds"),
             (QuestionsConfig { apart: Duration::MAX, ..default() }, "apart"),
             (QuestionsConfig { gone: Duration::MAX, ..default() }, "gone"),
-            (QuestionsConfig { unsure: f64::NAN, ..default() }, "unsure"),
+            (QuestionsConfig { worth: f64::NAN, ..default() }, "worth"),
             (QuestionsConfig { disagreement: -1.0, ..default() }, "disagreement"),
             (QuestionsConfig { familiar: 0.0, ..default() }, "familiar"),
         ] {

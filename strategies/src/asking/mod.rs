@@ -14,5 +14,5 @@ mod rule;
 
 pub use budget::QuestionBudget;
 pub use config::{QuestionsConfig, QuestionsConfigError};
-pub(crate) use rule::unknown;
+pub(crate) use rule::is_unknown;
 pub use rule::{Occasion, worth_asking};

@@ -13,6 +13,13 @@ const LIKELIER_UNKNOWN: f64 = 0.5;
 /// And from which on that cannot be left out of account: a label may be the first of its gesture.
 const PERHAPS_UNKNOWN: f64 = 0.2;
 
+/// What was said once is asked about again when nothing was asked for so many times the rounds that must lie between two questions; what was said n times, for
+/// n times as many.
+const CONFIRMED_AFTER: usize = 3;
+
+/// Nothing was asked for long when nothing was for so many times those rounds.
+const LONG: u32 = 2;
+
 /// A round that is over, as the rule sees it.
 #[derive(Debug)]
 pub struct Occasion<'a> {
@@ -20,59 +27,88 @@ pub struct Occasion<'a> {
     pub doubt: Option<&'a Doubt>,
     /// By class, of how many rounds it is known that they showed that gesture.
     pub labels: &'a BTreeMap<ClassId, usize>,
-    /// Whether what is unknown was shown before, lately, and was likest the same gesture.
+    /// The worth of the rounds before, as far as nobody said what they showed.
+    pub before: &'a [f64],
+    /// Whether something unknown was shown before, lately.
     pub repeated: bool,
-    /// Whether nothing was asked for long.
-    pub quiet: bool,
+    /// Since how many rounds nothing was asked, in units of [`rounds`](QuestionsConfig::rounds).
+    pub quiet: u32,
+}
+
+impl Occasion<'_> {
+    /// What a label of the round would be worth: u + (1 − u) h / (1 + n / [`familiar`](QuestionsConfig::familiar)), with u the probability of something that
+    /// nobody was taught, h the entropy over the gestures that were if it is one of them, in nats, and n the labels of that of the two likeliest that has
+    /// fewer. The first label of a gesture teaches most; what another one teaches falls with those before.
+    #[must_use]
+    pub fn worth(&self, config: &QuestionsConfig) -> f64 {
+        self.doubt.map_or(1.0, |doubt| {
+            doubt.unknown + (1.0 - doubt.unknown) * self.discounted(doubt.among_gestures, config)
+        })
+    }
+
+    /// So many nats, the less the more was said of the gestures in doubt.
+    fn discounted(&self, nats: f64, config: &QuestionsConfig) -> f64 {
+        let likeliest = self.doubt.map_or(&[][..], |doubt| &doubt.gestures);
+        let least = likeliest.iter().take(2).map(|class| self.labels_of(*class)).min().unwrap_or(0);
+        nats / (1.0 + least as f64 / config.familiar)
+    }
+
+    fn labels_of(&self, class: ClassId) -> usize {
+        self.labels.get(&class).copied().unwrap_or(0)
+    }
+
+    /// Whether it is time to have a gesture confirmed, which was said so often to be what it is.
+    fn is_for_confirming(&self, nearest: ClassId) -> bool {
+        self.quiet as usize >= CONFIRMED_AFTER.saturating_mul(self.labels_of(nearest).max(1))
+    }
 }
 
 /// What to ask about a round, if that is worth it.
 ///
-/// | the swarm is | robots | it looks unknown | it asks |
+/// | a label is worth it | robots | it looks unknown | it asks |
 /// |---|---|---|---|
-/// | – | – | yes, and did before, lately | "a new gesture? its name?" |
-/// | unsure | disagree, or it may be unknown | no | "two or three?" |
-/// | unsure | are as unsure as each other | no | "show it again, nearer" |
-/// | sure | disagree | no | "two or three?", where nothing was asked for long |
-/// | sure | agree | no | nothing |
+/// | yes | – | likelier than not, and something did before, lately | "a new gesture? its name?" |
+/// | yes | disagree, or it may be unknown | less likely than not | "two or three?" |
+/// | yes | are as unsure as each other | hardly | "show it again, nearer" |
+/// | no | disagree | less likely than not | "two or three?", where nothing was asked for long |
+/// | no | agree | less likely than not | "two or three?", where nothing was asked for longer, the longer the more often two was said |
 ///
-/// Unsure is whose entropy reaches [`unsure`](QuestionsConfig::unsure) after it was divided by 1 + n / [`familiar`](QuestionsConfig::familiar), with n the
-/// labels of that of the two likeliest gestures that has fewer: what the next label teaches falls with those before, so that a swarm in which something
-/// stays hard to see does not ask about it for ever.
+/// The last is for answers that were wrong: a gesture that was named wrongly once is taken for another with certainty, and no vote tells of it.
+///
+/// It is worth it from [`worth`](QuestionsConfig::worth) on, and if at most a third of the rounds before were worth more: questions are few, and how unknown things
+/// look falls with all that was learned.
 #[must_use]
 pub fn worth_asking(occasion: &Occasion<'_>, config: &QuestionsConfig) -> Option<Ask> {
-    let Some(doubt) = occasion.doubt else {
-        return occasion.repeated.then_some(Ask::Name { nearest: None });
-    };
-    let (first, second) = (doubt.gestures.first().copied(), doubt.gestures.get(1).copied());
-    if doubt.unknown >= LIKELIER_UNKNOWN && occasion.repeated {
-        return Some(Ask::Name { nearest: first });
+    let worth = occasion.worth(config);
+    let more = occasion.before.iter().filter(|before| **before > worth).count();
+    let is_worth = worth >= config.worth && 3 * more <= occasion.before.len();
+    let gestures = occasion.doubt.map_or(&[][..], |doubt| &doubt.gestures);
+    let nearest = gestures.first().copied();
+    let [unknown, disagreement] =
+        occasion.doubt.map_or([1.0, 0.0], |doubt| [doubt.unknown, doubt.disagreement]);
+    if unknown >= LIKELIER_UNKNOWN {
+        return (is_worth && occasion.repeated).then_some(Ask::Name { nearest });
     }
-    let labels_of = |class: ClassId| occasion.labels.get(&class).copied().unwrap_or(0);
-    let labels = [first, second].into_iter().flatten().map(labels_of).min()?;
-    let value = |nats: f64| nats / (1.0 + labels as f64 / config.familiar);
-    let between = match (first, second) {
-        (Some(first), Some(second)) => Ask::Between { classes: [first, second] },
-        (nearest, _) => Ask::Name { nearest },
+    let between = match gestures {
+        [first, second, ..] => Ask::Between { classes: [*first, *second] },
+        _ => Ask::Name { nearest },
     };
-    let disagree = doubt.disagreement >= config.disagreement;
-    if value(doubt.entropy) >= config.unsure {
-        return Some(if disagree || doubt.unknown >= PERHAPS_UNKNOWN {
-            between
-        } else {
-            Ask::Again { nearest: first? }
-        });
+    let disagree = disagreement >= config.disagreement;
+    match is_worth {
+        true if disagree || unknown >= PERHAPS_UNKNOWN => Some(between),
+        true => Some(Ask::Again { nearest: nearest? }),
+        false => {
+            let dissent = occasion.discounted(disagreement, config) >= config.disagreement;
+            let asks = occasion.quiet >= LONG && dissent || occasion.is_for_confirming(nearest?);
+            asks.then_some(between)
+        }
     }
-    (occasion.quiet && disagree && value(doubt.disagreement) >= config.disagreement).then_some(between)
 }
 
-/// Whether what was shown is likelier something that nobody was taught; then what it is likest.
+/// Whether what was shown is likelier something that nobody was taught.
 #[must_use]
-pub(crate) fn unknown(doubt: Option<&Doubt>) -> Option<Option<ClassId>> {
-    match doubt {
-        None => Some(None),
-        Some(doubt) => (doubt.unknown >= LIKELIER_UNKNOWN).then(|| doubt.gestures.first().copied()),
-    }
+pub(crate) fn is_unknown(doubt: Option<&Doubt>) -> bool {
+    doubt.is_none_or(|doubt| doubt.unknown >= LIKELIER_UNKNOWN)
 }
 
 #[cfg(test)]
@@ -82,15 +118,16 @@ mod tests {
     const TWO: ClassId = ClassId(2);
     const THREE: ClassId = ClassId(3);
 
-    fn doubt(entropy: f64, disagreement: f64, unknown: f64) -> Doubt {
-        Doubt { entropy, disagreement, unknown, gestures: vec![TWO, THREE, ClassId(0)] }
+    fn doubt(among_gestures: f64, disagreement: f64, unknown: f64) -> Doubt {
+        let gestures = vec![TWO, THREE, ClassId(0)];
+        Doubt { entropy: among_gestures, among_gestures, disagreement, unknown, gestures }
     }
 
     /// After so many labels of each gesture, of which 2 has twice as many.
-    fn ask(doubt: &Doubt, labels: usize, repeated: bool, quiet: bool) -> Option<Ask> {
+    fn ask(doubt: &Doubt, labels: usize, repeated: bool, quiet: u32) -> Option<Ask> {
         let mut labels: BTreeMap<ClassId, usize> = (0..6).map(|class| (ClassId(class), labels)).collect();
         labels.entry(TWO).and_modify(|labels| *labels *= 2);
-        let occasion = Occasion { doubt: Some(doubt), labels: &labels, repeated, quiet };
+        let occasion = Occasion { doubt: Some(doubt), labels: &labels, before: &[], repeated, quiet };
         worth_asking(&occasion, &QuestionsConfig::default())
     }
 
@@ -99,44 +136,66 @@ mod tests {
     #[test]
     fn each_line_of_the_table() {
         let sure = doubt(0.05, 0.01, 0.02);
-        assert_eq!(ask(&sure, 0, false, true), None);
+        assert_eq!(ask(&sure, 0, false, 2), None);
         let torn = doubt(0.65, 0.4, 0.02);
-        assert_eq!(ask(&torn, 0, false, false), BETWEEN);
+        assert_eq!(ask(&torn, 0, false, 1), BETWEEN);
         let dim = doubt(0.65, 0.02, 0.02);
-        assert_eq!(ask(&dim, 0, false, false), Some(Ask::Again { nearest: TWO }));
-        let perhaps_new = doubt(0.65, 0.02, 0.3);
-        assert_eq!(ask(&perhaps_new, 0, false, false), BETWEEN, "a label may be its gesture's first");
+        assert_eq!(ask(&dim, 0, false, 1), Some(Ask::Again { nearest: TWO }));
+        let perhaps_new = doubt(0.05, 0.02, 0.3);
+        assert_eq!(ask(&perhaps_new, 9, false, 1), BETWEEN, "a label may be its gesture's first");
         let new = doubt(0.1, 0.0, 0.97);
-        assert_eq!(ask(&new, 9, true, false), Some(Ask::Name { nearest: Some(TWO) }));
-        assert_eq!(ask(&new, 9, false, false), None, "once is not often enough");
-        let overruled = doubt(0.2, 0.3, 0.02);
-        assert_eq!(ask(&overruled, 0, false, false), None);
-        assert_eq!(ask(&overruled, 0, false, true), BETWEEN);
+        assert_eq!(ask(&new, 9, true, 1), Some(Ask::Name { nearest: Some(TWO) }));
+        assert_eq!(ask(&new, 9, false, 1), None, "once is not often enough");
+        let overruled = doubt(0.1, 0.3, 0.02);
+        assert_eq!(ask(&overruled, 0, false, 1), None);
+        assert_eq!(ask(&overruled, 0, false, 2), BETWEEN);
     }
 
     #[test]
     fn the_more_was_said_the_less_is_asked() {
         let torn = doubt(0.65, 0.4, 0.02);
-        let asked: Vec<bool> = (0..40).map(|labels| ask(&torn, labels, false, true).is_some()).collect();
+        let asked: Vec<bool> = (1..60).map(|labels| ask(&torn, labels, false, 2).is_some()).collect();
         assert!(asked[0] && asked.is_sorted_by(|a, b| a >= b), "{asked:?}");
-        assert!(!asked[39], "for ever");
+        assert!(!asked[58], "for ever");
         // The rarer of the two counts: 2 has labels enough, 3 has none.
         let labels = [(TWO, 99)].into();
-        let occasion = Occasion { doubt: Some(&torn), labels: &labels, repeated: false, quiet: false };
+        let occasion =
+            Occasion { doubt: Some(&torn), labels: &labels, before: &[], repeated: false, quiet: 1 };
         assert_eq!(worth_asking(&occasion, &QuestionsConfig::default()), BETWEEN);
+    }
+
+    #[test]
+    fn what_is_sure_is_confirmed_the_more_seldom_the_more_often_it_was_said() {
+        let sure = doubt(0.0, 0.0, 0.0);
+        // Of gesture 2 there are twice as many labels.
+        let first = |labels: usize| (1..99).find(|quiet| ask(&sure, labels, false, *quiet).is_some());
+        assert_eq!([0, 1, 2, 4].map(first), [Some(3), Some(6), Some(12), Some(24)]);
+        assert_eq!(ask(&sure, 1, false, 6), BETWEEN);
+    }
+
+    #[test]
+    fn what_is_worth_less_than_the_rounds_before_waits_for_better() {
+        let config = QuestionsConfig::default();
+        let torn = doubt(0.4, 0.4, 0.02);
+        let asks = |before: &[f64]| {
+            let occasion = Occasion { doubt: Some(&torn), labels: &[], before, repeated: false, quiet: 1 };
+            worth_asking(&occasion, &config).is_some()
+        };
+        assert!(asks(&[]) && asks(&[0.1, 0.2]) && asks(&[0.9, 0.1, 0.1]));
+        assert!(!asks(&[0.9]) && !asks(&[0.9, 0.9, 0.1]));
     }
 
     #[test]
     fn who_knows_nothing_asks_for_a_name_when_it_is_shown_again() {
         let config = QuestionsConfig::default();
         let labels = BTreeMap::new();
-        let occasion = |repeated| Occasion { doubt: None, labels: &labels, repeated, quiet: false };
+        let occasion = |repeated| Occasion { doubt: None, labels: &labels, before: &[1.0], repeated, quiet: 1 };
         assert_eq!(worth_asking(&occasion(false), &config), None);
         assert_eq!(worth_asking(&occasion(true), &config), Some(Ask::Name { nearest: None }));
         // One gesture is known: there are no two to choose from.
-        let one = Doubt { entropy: 0.69, disagreement: 0.0, unknown: 0.4, gestures: vec![TWO] };
+        let one = Doubt { gestures: vec![TWO], ..doubt(0.0, 0.0, 0.4) };
         let occasion =
-            Occasion { doubt: Some(&one), labels: &[(TWO, 1)].into(), repeated: false, quiet: false };
+            Occasion { doubt: Some(&one), labels: &[(TWO, 1)].into(), before: &[], repeated: false, quiet: 1 };
         assert_eq!(worth_asking(&occasion, &config), Some(Ask::Name { nearest: Some(TWO) }));
     }
 }

@@ -1,5 +1,6 @@
 //! What the swarm asks, and what this robot knows of that: one question at a time, seldom, and never while a round is open.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use gestalt_protocol::{Ask, Asked, ClassId, Message, Question, Reason, RoundId};
@@ -7,9 +8,12 @@ use gestalt_rounds::{Doubt, Input as AboutRounds, outcome};
 
 use super::machine::Mind;
 use super::output::Output;
-use crate::asking::{Occasion, QuestionBudget, QuestionsConfig, unknown, worth_asking};
+use crate::asking::{Occasion, QuestionBudget, QuestionsConfig, is_unknown, worth_asking};
 use crate::learning::Learning;
 use crate::lessons::Verdict;
+
+/// With how many rounds before it a round is compared.
+const COMPARED: usize = 6;
 
 /// What this robot knows of the swarm's questions.
 #[derive(Clone, Debug, Default)]
@@ -21,8 +25,10 @@ pub(super) struct Asks {
     due: Option<Duration>,
     /// The question that waits for its answer, and until when.
     open: Option<(Question, Duration)>,
-    /// When something unknown was last shown, and what it was likest.
-    unknown: Option<(Duration, Option<ClassId>)>,
+    /// When something unknown was last shown.
+    unknown: Option<Duration>,
+    /// What labels of the latest rounds were worth of which nobody said what they showed: at most [`COMPARED`].
+    worth: VecDeque<f64>,
 }
 
 impl Asks {
@@ -45,9 +51,18 @@ impl Asks {
     }
 
     /// Notes that something unknown was shown; says whether it was before, lately.
-    fn repeats(&mut self, now: Duration, likest: Option<ClassId>, within: Duration) -> bool {
-        let before = self.unknown.replace((now, likest));
-        before.is_some_and(|(at, of)| of == likest && now <= at.saturating_add(within))
+    fn repeats(&mut self, now: Duration, within: Duration) -> bool {
+        self.unknown.replace(now).is_some_and(|before| now <= before.saturating_add(within))
+    }
+
+    /// Notes what a label of a round is worth; says what those of the rounds before were.
+    fn compare(&mut self, worth: f64) -> Vec<f64> {
+        let before = self.worth.iter().copied().collect();
+        self.worth.push_back(worth);
+        if self.worth.len() > COMPARED {
+            self.worth.pop_front();
+        }
+        before
     }
 }
 
@@ -116,15 +131,14 @@ impl Mind {
         if doubt.is_none() && !untaught || doubt.is_some() && too_few {
             return None;
         }
-        let repeated =
-            unknown(doubt.as_ref()).is_some_and(|likest| self.asks.repeats(now, likest, config.repeated));
+        let repeated = is_unknown(doubt.as_ref()) && self.asks.repeats(now, config.repeated);
+        let (labels, quiet) = (learning.label_counts(), self.asks.budget.quiet(config));
+        let occasion = Occasion { doubt: doubt.as_ref(), labels: &labels, before: &[], repeated, quiet };
+        let before = self.asks.compare(occasion.worth(config));
         if !self.asks.budget.allows(now, config) {
             return None;
         }
-        let labels = learning.label_counts();
-        let quiet = self.asks.budget.is_full(config);
-        let ask =
-            worth_asking(&Occasion { doubt: doubt.as_ref(), labels: &labels, repeated, quiet }, config)?;
+        let ask = worth_asking(&Occasion { before: &before, ..occasion }, config)?;
         let [entropy, disagreement] = doubt.map_or([0.0; 2], |doubt| [doubt.entropy, doubt.disagreement]);
         Some(Asked { round, ask, labels: labels_of(learning, ask), entropy, disagreement })
     }

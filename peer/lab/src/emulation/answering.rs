@@ -11,9 +11,9 @@ pub enum AskedBy {
     Swarm,
     /// Chance: every second round about which a question may be asked.
     Random,
-    /// Whatever leaves at least as much entropy as the swarm's own threshold, of whatever was said before.
+    /// Entropy: whatever leaves at least .35 nats of it, of whatever was said before.
     Entropy,
-    /// Whatever the two likeliest outcomes of which lie less than a half apart.
+    /// The margin: whatever has its two likeliest outcomes less than a half apart.
     Margin,
 }
 

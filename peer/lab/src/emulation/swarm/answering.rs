@@ -18,6 +18,9 @@ const THINKS: Duration = Duration::from_millis(800);
 /// Less than this between the two likeliest outcomes is no lead.
 const NO_LEAD: f64 = 0.5;
 
+/// As many nats are no certainty.
+const UNSURE: f64 = 0.35;
+
 /// What was asked and answered so far.
 pub(super) struct Asking {
     /// Of those who ask in the swarm's place.
@@ -71,7 +74,7 @@ impl Swarm<'_> {
         let asks = match teaching.answering.asked_by {
             AskedBy::Swarm => false,
             AskedBy::Random => self.asking.rng.random(),
-            AskedBy::Entropy => doubt.is_none_or(|(entropy, _)| entropy >= questions.unsure),
+            AskedBy::Entropy => doubt.is_none_or(|(entropy, _)| entropy >= UNSURE),
             AskedBy::Margin => doubt.is_none_or(|(_, lead)| lead < NO_LEAD),
         };
         if asks {
