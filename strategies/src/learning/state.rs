@@ -17,7 +17,7 @@ use rand::Rng;
 use siphasher::sip::SipHasher24;
 
 use super::budget::SharedSoFar;
-use super::changes::{TrainingChange, inserted, showing};
+use super::changes::{TrainingChange, showing};
 use super::config::LearningConfig;
 use super::judged::JudgedRounds;
 use super::memory::{self, Counters, Item, Owner, RecordChange, RobotMemory};
@@ -136,7 +136,7 @@ impl Learning {
             let (vector, showing) = (aside.vector.clone(), showing(aside.round));
             Some(TrainingChange::Insert { key, class: aside.guess?, vector, showing })
         });
-        let training = set.iter().map(inserted).chain(guesses).collect();
+        let training = set.iter().map(TrainingChange::insert).chain(guesses).collect();
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
         let mut batches = Batches::default();
         let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
@@ -293,7 +293,7 @@ impl Learning {
             match change {
                 SetChange::Added(key) => {
                     self.dirty.insert(Item::Sample(key));
-                    self.training.extend(self.set.get(key).map(inserted));
+                    self.training.extend(self.set.get(key).map(TrainingChange::insert));
                 }
                 SetChange::Removed(sample) => {
                     self.dirty.insert(Item::Sample(sample.key));
@@ -311,7 +311,7 @@ impl Learning {
                 }
                 SetChange::Shared(key, id) => {
                     self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);
-                    self.training.extend(self.set.get(key).map(inserted));
+                    self.training.extend(self.set.get(key).map(TrainingChange::insert));
                 }
             }
         }
