@@ -315,9 +315,10 @@ fn told_only_right_or_wrong_robots_that_know_nothing_learn_nothing() {
 fn large() -> Scenario {
     let mut scenario = learning(130, 1.0, NetworkShape::Random);
     scenario.link.loss = 0.05;
-    scenario.rounds = 4;
+    scenario.rounds = 2;
+    scenario.learning.as_mut().unwrap().robots.capacity = 60;
     let fault = |at: u64, event| Fault { at: Duration::from_secs(at), event };
-    scenario.faults = vec![fault(9, Event::Kill(RobotId(5))), fault(15, Event::Kill(RobotId(77)))];
+    scenario.faults = vec![fault(9, Event::Kill(RobotId(5))), fault(12, Event::Kill(RobotId(77)))];
     scenario
 }
 
