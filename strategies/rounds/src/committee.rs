@@ -27,6 +27,13 @@ impl RoundsConfig {
         self.all_vote_up_to().filter(|most| robots > *most).map(|_| size)
     }
 
+    /// Who votes in the round of that counter, of these robots; `None` where all do.
+    #[must_use]
+    pub fn draw(&self, counter: u32, robots: &BTreeSet<RobotId>) -> Option<BTreeSet<RobotId>> {
+        let count = u32::try_from(robots.len()).unwrap_or(u32::MAX);
+        self.committee_of(count).map(|size| draw(counter, size, count, robots.iter().copied()))
+    }
+
     /// The most robots of which all vote; `None` where all do, however many there are.
     pub(crate) fn all_vote_up_to(&self) -> Option<u32> {
         let size = self.committee_size();

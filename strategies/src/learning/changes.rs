@@ -5,6 +5,9 @@ use std::sync::Arc;
 use gestalt_protocol::{ClassId, Fnv1a, RoundId};
 use gestalt_svm::{LearnError, Learner};
 
+use super::unresolved;
+use crate::sample::HeldSample;
+
 /// One change of the samples that a classifier is to be trained on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrainingChange {
@@ -31,6 +34,20 @@ pub enum TrainingChange {
 }
 
 impl TrainingChange {
+    /// A sample of the training set as one that is new to a learner.
+    #[must_use]
+    pub fn insert(sample: &HeldSample) -> Self {
+        let HeldSample { key, class, round, vector, .. } = sample;
+        Self::Insert { key: *key, class: *class, vector: vector.clone(), showing: showing(*round) }
+    }
+
+    /// Whether it is about a sample of which it is open what it shows, and which is not of the training set: one that the robot has guessed.
+    #[must_use]
+    pub fn is_guess(&self) -> bool {
+        let (Self::Insert { key, .. } | Self::Relabel { key, .. } | Self::Remove(key)) = self;
+        *key >= unresolved::FIRST_KEY
+    }
+
     /// Makes a learner follow it.
     ///
     /// # Errors

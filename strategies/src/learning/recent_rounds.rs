@@ -97,10 +97,11 @@ impl RecentRounds {
     }
 
     fn find(&self, round: RoundId) -> Option<&RecentRound> {
-        self.0.iter().find(|known| known.names.contains(&round))
+        // Most that is said is about the newest.
+        self.0.iter().rev().find(|known| known.names.contains(&round))
     }
 
     fn find_mut(&mut self, round: RoundId) -> Option<&mut RecentRound> {
-        self.0.iter_mut().find(|known| known.names.contains(&round))
+        self.0.iter_mut().rev().find(|known| known.names.contains(&round))
     }
 }

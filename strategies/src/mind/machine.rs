@@ -168,6 +168,25 @@ impl Mind {
 
     /// Learns from what concerns the rounds, before they take it in.
     fn learn_along(&mut self, now: Duration, input: AboutRounds, out: &mut Vec<Output>) -> AboutRounds {
+        let input = match input {
+            // The rounds have no part in these.
+            AboutRounds::Received(Envelope {
+                author,
+                stamp,
+                message: Message::Samples(samples),
+                signature,
+            }) if author != self.me() => {
+                self.on_batch(author, HeldBatch { robot: author, stamp, samples, signature });
+                return AboutRounds::Tick;
+            }
+            AboutRounds::Received(Envelope { author, message: Message::Batches(batches), .. })
+                if author != self.me() =>
+            {
+                batches.batches.into_iter().for_each(|batch| self.on_batch(author, batch));
+                return AboutRounds::Tick;
+            }
+            input => input,
+        };
         match &input {
             AboutRounds::Observed(observation) => {
                 if let (Some(learning), Some(round)) = (&mut self.learning, self.rounds.looking()) {
@@ -193,18 +212,13 @@ impl Mind {
         let author = envelope.author;
         match &envelope.message {
             Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
-            Message::Samples(samples) => {
-                let Envelope { author: robot, stamp, signature, .. } = *envelope;
-                self.on_batch(author, &HeldBatch { robot, stamp, samples: samples.clone(), signature });
-            }
-            Message::Batches(batches) => {
-                batches.batches.iter().for_each(|batch| self.on_batch(author, batch));
-            }
             Message::Know(know) => self.on_know(author, know, out),
             Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
             Message::Namings(namings) => self.on_namings(namings),
             Message::Vote(_)
             | Message::Have(_)
+            | Message::Samples(_)
+            | Message::Batches(_)
             | Message::Give(_)
             | Message::Holding(_)
             | Message::Announced(_)

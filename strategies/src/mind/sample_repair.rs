@@ -144,8 +144,9 @@ impl Mind {
     }
 
     /// Takes in samples, from their author or from a neighbour that had them.
-    pub(super) fn on_batch(&mut self, from: RobotId, batch: &HeldBatch) {
+    pub(super) fn on_batch(&mut self, from: RobotId, batch: HeldBatch) {
         let is_neighbour = self.compares_with(from);
+        let author = batch.robot;
         let Some(learning) = &mut self.learning else { return };
         let mut news = false;
         for sample in &batch.samples.samples {
@@ -165,9 +166,9 @@ impl Mind {
             }
         }
         if news {
-            learning.keep_batch(batch.clone());
+            learning.keep_batch(batch);
         }
-        if news && batch.robot != from {
+        if news && author != from {
             // The other neighbours may lack it too.
             self.rounds.hurry_repair();
         }

@@ -160,6 +160,18 @@ impl<'a> Emulation<'a> {
         true
     }
 
+    /// The same run, in which robots learn on so many threads, in place of as many as the machine has. What comes of it is the same.
+    #[must_use]
+    pub fn on_threads(mut self, threads: usize) -> Self {
+        self.swarm.threads = threads.max(1);
+        self
+    }
+
+    /// Makes these robots, by their position, learn from all they hold, at once: they are about to be asked for their classifiers.
+    pub fn learn(&mut self, robots: &[usize]) {
+        self.swarm.keep_up(robots);
+    }
+
     /// The classifier of a robot, by its position, after learning from all it holds; `None` of a robot that does not
     /// learn, is down, or never met a sample.
     pub fn classifier(&mut self, robot: usize) -> Option<Arc<Classifier>> {

@@ -18,6 +18,14 @@ pub(super) struct Pupil {
     disk: BTreeMap<Vec<u8>, Vec<u8>>,
     /// Whether anybody ever reads what is on it.
     is_read: bool,
+    /// Whether its learner goes once it has learned, with all that it keeps to follow changes: of a large swarm few are asked, and seldom.
+    starts_over: bool,
+    /// What it has guessed of samples that are not of its training set, where it starts over.
+    guesses: BTreeMap<u64, TrainingChange>,
+    /// Whether there is anything that the classifier has not followed.
+    is_behind: bool,
+    /// Whether its mind was not told of the classifier yet.
+    is_news: bool,
     /// The revision on the disk.
     pub remembered: u64,
     learner: Option<Learner>,
@@ -45,13 +53,14 @@ impl Pupil {
         let memory = RobotMemory::read(records).expect("it holds what this robot's minds wrote");
         self.stop();
         self.classifier = school.start().cloned();
-        self.learner = Some(school.learner().expect("the school was tried when it was made"));
+        self.learner = (!self.starts_over).then(|| new_learner(school));
         let setup = LearningSetup {
             config: config.clone(),
             space: school.space().clone(),
             vocabulary: school.vocabulary().clone(),
             rng: Box::new(rng),
-            memory: Some(memory),
+            // Of a large swarm what nobody ever reads is not even written.
+            memory: (self.is_read || !self.starts_over).then_some(memory),
             rules: rules.clone(),
         };
         Mind::new(me, life, mind)
@@ -64,6 +73,29 @@ impl Pupil {
     pub fn stop(&mut self) {
         (self.remembered, self.learner, self.classifier) = (0, None, None);
         self.due.clear();
+        self.guesses.clear();
+        (self.is_behind, self.is_news) = (false, false);
+    }
+
+    /// From now on it learns all anew each time it is asked: before it has learned anything.
+    pub fn start_over(&mut self) {
+        (self.starts_over, self.learner) = (true, None);
+    }
+
+    /// From now on it keeps what follows changes: it is asked often.
+    pub fn keep_up(&mut self, mind: Option<&Mind>, school: &School) {
+        if self.starts_over {
+            self.starts_over = false;
+            self.gather(mind, school);
+            self.is_behind = !self.due.is_empty();
+        }
+    }
+
+    /// Gets ready to learn anew, from the samples that its mind holds.
+    fn gather(&mut self, mind: Option<&Mind>, school: &School) {
+        let samples = mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
+        self.due = samples.map(TrainingChange::insert).chain(self.guesses.values().cloned()).collect();
+        self.learner = Some(new_learner(school));
     }
 
     pub fn remember(&mut self, revision: u64, changes: Vec<RecordChange>) {
@@ -78,22 +110,56 @@ impl Pupil {
     }
 
     pub fn train_later(&mut self, changes: Vec<TrainingChange>) {
-        self.due.extend(changes);
+        self.is_behind |= !changes.is_empty();
+        if !self.starts_over {
+            return self.due.extend(changes);
+        }
+        for change in changes.into_iter().filter(TrainingChange::is_guess) {
+            match change {
+                TrainingChange::Insert { key, .. } => _ = self.guesses.insert(key, change),
+                TrainingChange::Remove(key) => _ = self.guesses.remove(&key),
+                TrainingChange::Relabel { key, class: now } => {
+                    if let Some(TrainingChange::Insert { class, .. }) = self.guesses.get_mut(&key) {
+                        *class = now;
+                    }
+                }
+            }
+        }
     }
 
-    /// The classifier, brought up to date, and whether that changed it.
-    pub fn learn(&mut self) -> Option<Arc<Classifier>> {
-        let learner = self.learner.as_mut().filter(|_| !self.due.is_empty())?;
+    /// Whether it has anything to learn; gets ready to.
+    pub fn prepare(&mut self, mind: Option<&Mind>, school: &School) -> bool {
+        if self.is_behind && self.starts_over {
+            self.gather(mind, school);
+        }
+        self.is_behind
+    }
+
+    /// Brings the classifier up to date, once it is [prepared](Self::prepare).
+    pub fn learn(&mut self) {
+        let Some(learner) = self.learner.as_mut().filter(|_| self.is_behind) else { return };
         for change in what_lasts(std::mem::take(&mut self.due)) {
             change.apply_to(learner).expect("a mind trains on vectors of the school's space and classes");
         }
         self.classifier = Some(learner.learn().expect("a learner learns from any samples it took"));
-        self.classifier.clone()
+        (self.is_behind, self.is_news) = (false, true);
+        if self.starts_over {
+            self.learner = None;
+        }
+    }
+
+    /// The classifier, if it was learned since it was last asked for.
+    pub fn take_news(&mut self) -> Option<Arc<Classifier>> {
+        self.classifier.clone().filter(|_| std::mem::take(&mut self.is_news))
     }
 
     pub fn classifier(&self) -> Option<&Arc<Classifier>> {
         self.classifier.as_ref()
     }
+}
+
+fn new_learner(school: &School) -> Learner {
+    school.learner().expect("the school was tried when it was made")
 }
 
 /// The changes without those of samples that came and went meanwhile. Of a large swarm's samples most do: each costs its kernel with

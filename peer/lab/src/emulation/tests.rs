@@ -310,3 +310,61 @@ fn told_only_right_or_wrong_robots_that_know_nothing_learn_nothing() {
     let learned = run(&scenario, 1).unwrap().learned.unwrap();
     assert_eq!(learned.samples.mean, 0.0);
 }
+
+/// So many that a committee votes, two of whom are killed, with messages lost.
+fn large() -> Scenario {
+    let mut scenario = learning(130, 1.0, NetworkShape::Random);
+    scenario.link.loss = 0.05;
+    scenario.rounds = 2;
+    scenario.learning.as_mut().unwrap().robots.capacity = 60;
+    let fault = |at: u64, event| Fault { at: Duration::from_secs(at), event };
+    scenario.faults = vec![fault(9, Event::Kill(RobotId(5))), fault(12, Event::Kill(RobotId(77)))];
+    scenario
+}
+
+#[test]
+fn of_a_large_swarm_too_a_seed_fixes_every_byte_on_any_number_of_threads() {
+    let scenario = large();
+    assert_eq!(scenario.mind.committee_of(130), Some(72));
+    let on = |threads: usize| {
+        let mut bytes = Vec::new();
+        let mut observers = statistical_observers(&scenario).unwrap();
+        let school = school_of_scores(&scenario, &mut observers).unwrap();
+        let emulation = Emulation::new(&scenario, 1, observers, school, Trace::to(&mut bytes)).unwrap();
+        let (report, written) = emulation.on_threads(threads).finish();
+        written.unwrap();
+        (bytes, report)
+    };
+    let first = on(1);
+    assert!(String::from_utf8_lossy(&first.0).contains("learn"));
+    assert!(first == on(2), "two threads make another trace than one");
+    assert!(first == on(8), "eight threads make another trace than one");
+}
+
+#[test]
+fn a_committee_decides_for_all_and_costs_each_less_than_all_would() {
+    let run = |committee| {
+        let mut scenario = calm(150, 0, NetworkShape::Random, 6);
+        scenario.robots.pop();
+        scenario.mind.committee = committee;
+        run(&scenario, 3).unwrap()
+    };
+    let (some, all) = (run(72), run(0));
+    for report in [&some, &all] {
+        assert_eq!((report.right.hits, report.unanimous.hits), (6, 6), "{report:?}");
+        assert_eq!(report.announcements.mean, 1.0);
+    }
+    let bytes = |report: &Report| report.bytes_per_robot.votes + report.bytes_per_robot.relayed;
+    assert!(bytes(&some) < 0.6 * bytes(&all), "{} and {}", bytes(&some), bytes(&all));
+}
+
+#[test]
+fn a_small_swarm_knows_neither_committee_nor_budget() {
+    let mut scenario = learning(20, 1.0, NetworkShape::Random);
+    scenario.link.loss = 0.1;
+    scenario.rounds = 3;
+    let by_default = traced(&scenario, 1);
+    scenario.mind.committee = 0;
+    scenario.learning.as_mut().unwrap().robots.share_per_round = None;
+    assert!(by_default == traced(&scenario, 1));
+}

@@ -182,6 +182,7 @@ impl Exam {
     }
 
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
+        emulation.learn(&self.examined);
         let classifiers: Vec<Option<Arc<Classifier>>> =
             self.examined.iter().map(|robot| emulation.classifier(*robot)).collect();
         let chance = 1.0 / self.classes as f64;

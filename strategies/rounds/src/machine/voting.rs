@@ -10,7 +10,7 @@ use super::output::Output;
 use super::rounds::{Effects, Rounds};
 use crate::agreement::Agreement;
 use crate::ballot::Scale;
-use crate::round::{Speaker, View};
+use crate::round::{Round, Speaker, View};
 
 impl Rounds {
     pub(super) fn on_alive(&mut self, robots: BTreeSet<RobotId>) {
@@ -44,19 +44,8 @@ impl Rounds {
 
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
     pub(super) fn decide(&mut self, effects: &mut Effects<'_>) {
-        let scale = self.own_scale();
-        let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
-        let committee = self.committee.as_ref().map(Committee::members);
-        let robots = self.electorate.count();
-        let view = View { me: self.me, expected: &expected, robots, committee, scale };
+        self.conclude(effects);
         let Some(round) = self.round.as_mut() else { return };
-        // Where liars are expected nothing that anybody said moves the rule by which they are judged.
-        if round.is_unconcluded() {
-            let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
-            let fitted = learned.and_then(|pool| self.fusion.with(pool));
-            let rule = fitted.as_deref().unwrap_or(&*self.fusion);
-            round.conclude(self.now, &view, rule, &self.config);
-        }
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
@@ -64,6 +53,24 @@ impl Rounds {
             effects.out.push(Output::Hold(decision.clone()));
             self.say_holding(effects);
         }
+    }
+
+    fn conclude(&mut self, effects: &mut Effects<'_>) {
+        // Asked at every input: what goes into a conclusion is looked up while there is none.
+        if !self.round.as_ref().is_some_and(Round::is_unconcluded) {
+            return;
+        }
+        let scale = self.own_scale();
+        let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
+        let committee = self.committee.as_ref().map(Committee::members);
+        let robots = self.electorate.count();
+        let view = View { me: self.me, expected: &expected, robots, committee, scale };
+        let Some(round) = self.round.as_mut() else { return };
+        // Where liars are expected nothing that anybody said moves the rule by which they are judged.
+        let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
+        let fitted = learned.and_then(|pool| self.fusion.with(pool));
+        let rule = fitted.as_deref().unwrap_or(&*self.fusion);
+        round.conclude(self.now, &view, rule, &self.config);
     }
 
     /// Says which gesture this robot holds, unless that is what it said last: a greater decision for the same is news to nobody.

@@ -47,6 +47,9 @@ impl Swarm<'_> {
         // A robot that is still busy with the round before does not open another.
         let opened = after.filter(|round| Some(*round) != before);
         self.record.show(self.now, self.shown, opened.map(|round| round.counter));
+        if let Some(round) = opened {
+            self.train_voters(round.counter, opener);
+        }
         if let Some(teaching) = self.scenario.learning.as_ref().filter(|_| opened.is_some()) {
             self.at(self.now + teaching.after, Due::Teach(n, opener));
         }
@@ -150,10 +153,13 @@ impl Swarm<'_> {
     /// Makes a robot's classifier follow its samples.
     pub(super) fn train(&mut self, i: usize) {
         let up = self.network.presence(i) == Presence::Up;
-        let Some(pupil) = self.robots[i].pupil.as_mut().filter(|_| up) else { return };
-        if let Some(classifier) = pupil.learn() {
-            let samples =
-                self.robots[i].mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
+        let Robot { pupil, mind, .. } = &mut self.robots[i];
+        let (Some(pupil), Some(school)) = (pupil.as_mut().filter(|_| up), &self.school) else { return };
+        if pupil.prepare(mind.as_ref(), school) {
+            pupil.learn();
+        }
+        if let Some(classifier) = pupil.take_news() {
+            let samples = mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
             self.note(&Happening::Learn { robot: self.robots[i].id, samples });
             self.tell_mind(i, Input::Learned(classifier));
         }

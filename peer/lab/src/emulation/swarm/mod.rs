@@ -10,6 +10,7 @@
 //! | `carry` | what does a mind want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
 //! | `poisoning` | what do poisoners share? |
+//! | `training` | who learns, on which thread? |
 
 mod answering;
 mod carry;
@@ -23,8 +24,10 @@ mod poisoning;
 mod queue;
 mod robot;
 mod seed;
+mod training;
 
 use std::collections::BTreeSet;
+use std::num::NonZero;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,6 +37,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::network::{Network, Traffic};
 use super::observer::Observer;
+use super::pupil::Pupil;
 use super::record::Record;
 use super::report::Learned;
 use super::rules::Rules;
@@ -66,6 +70,8 @@ pub(super) struct Swarm<'a> {
     plot: Plot,
     record: Record,
     trace: Trace<'a>,
+    /// On how many threads robots learn.
+    pub threads: usize,
 }
 
 impl<'a> Swarm<'a> {
@@ -88,6 +94,7 @@ impl<'a> Swarm<'a> {
                 Robot::new(RobotId(id), observer, seed, learns, (group.lies, poison))
             })
             .collect();
+        let size = u32::try_from(robots.len()).unwrap_or(u32::MAX);
         let record = Record::new(robots.iter().map(|robot| robot.lies.is_none()).collect());
         let mut swarm = Self {
             scenario,
@@ -105,7 +112,11 @@ impl<'a> Swarm<'a> {
             plot: Plot::default(),
             record,
             trace,
+            threads: std::thread::available_parallelism().map_or(1, NonZero::get),
         };
+        if scenario.mind.committee_of(size).is_some() {
+            swarm.robots.iter_mut().filter_map(|robot| robot.pupil.as_mut()).for_each(Pupil::start_over);
+        }
         (0..swarm.robots.len()).for_each(|robot| swarm.start(robot));
         swarm.tell_who_is_there();
         (0..scenario.rounds).for_each(|n| swarm.at(scenario.showing_at(n), Due::Show(n)));
@@ -148,6 +159,7 @@ impl<'a> Swarm<'a> {
 
     /// What that robot judges by after learning from all it holds.
     pub fn learned(&mut self, i: usize) -> Option<Arc<Classifier>> {
+        self.keep_up(&[i]);
         self.train(i);
         self.robots[i].pupil.as_ref()?.classifier().cloned()
     }

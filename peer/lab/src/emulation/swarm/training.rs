@@ -1,0 +1,61 @@
+//! Many robots learn at once, on as many threads as there are: what each learns depends on nothing but its own samples.
+
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+use super::Swarm;
+use super::robot::Robot;
+use crate::emulation::network::Presence;
+use crate::emulation::pupil::Pupil;
+
+impl Swarm<'_> {
+    /// Those who will be asked to vote in the round of that counter, which that robot opened, learn from all they hold, where a committee votes. They
+    /// would when they look, one after the other; of a small swarm they do.
+    pub(super) fn train_voters(&mut self, counter: u32, opener: usize) {
+        if self.school.is_some() {
+            let alive = self.network.reachable(opener);
+            if let Some(members) = self.scenario.mind.draw(counter, &alive) {
+                self.train_together(members.iter().map(|robot| robot.0 as usize - 1).collect());
+            }
+        }
+    }
+
+    /// These learn from all they hold, and go on to follow what changes.
+    pub fn keep_up(&mut self, robots: &[usize]) {
+        let Some(school) = &self.school else { return };
+        for i in robots {
+            let Robot { pupil, mind, .. } = &mut self.robots[*i];
+            if let Some(pupil) = pupil {
+                pupil.keep_up(mind.as_ref(), school);
+            }
+        }
+        self.train_together(robots.iter().copied().collect());
+    }
+
+    fn train_together(&mut self, robots: BTreeSet<usize>) {
+        let Some(school) = &self.school else { return };
+        let network = &self.network;
+        let all = self.robots.iter_mut().enumerate();
+        let behind = all.filter(|(i, _)| robots.contains(i) && network.presence(*i) == Presence::Up);
+        let behind: Vec<&mut Pupil> = behind
+            .filter_map(|(_, Robot { pupil, mind, .. })| {
+                pupil.as_mut().and_then(|pupil| pupil.prepare(mind.as_ref(), school).then_some(pupil))
+            })
+            .collect();
+        let threads = self.threads.min(behind.len());
+        if threads <= 1 {
+            return behind.into_iter().for_each(Pupil::learn);
+        }
+        let left = Mutex::new(behind.into_iter());
+        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    while let Some(pupil) = next() {
+                        pupil.learn();
+                    }
+                });
+            }
+        });
+    }
+}
