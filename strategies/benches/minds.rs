@@ -58,7 +58,7 @@ fn swarm(robots: u32) -> BTreeSet<RobotId> {
 fn vote(robot: u32, sequence: u32) -> Input {
     let evidence = (0..6).map(|class| if class == robot % 6 { 2.5 } else { -0.5 }).collect();
     let vocabulary = vocabulary().id();
-    let vote = Vote { round: ROUND, vocabulary, evidence, looks: 1.0, unknown: None };
+    let vote = Vote { round: ROUND, vocabulary, evidence, looks: 1.0, unknown: None, named: vec![] };
     let stamp = Stamp { boot: 1, sequence };
     Input::Received(Envelope { author: RobotId(robot), stamp, message: Message::Vote(vote), signature: None })
 }
