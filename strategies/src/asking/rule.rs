@@ -13,11 +13,7 @@ const LIKELIER_UNKNOWN: f64 = 0.5;
 /// And from which on that cannot be left out of account: a label may be the first of its gesture.
 const PERHAPS_UNKNOWN: f64 = 0.2;
 
-/// What was said once is asked about again when nothing was asked for so many times the rounds that must lie between two questions; what was said n times, for
-/// n times as many.
-const CONFIRMED_AFTER: usize = 3;
-
-/// Nothing was asked for long when nothing was for so many times those rounds.
+/// Nothing was asked for long when nothing was for so many times the rounds that must lie between two questions.
 const LONG: u32 = 2;
 
 /// A round that is over, as the rule sees it.
@@ -56,11 +52,6 @@ impl Occasion<'_> {
     fn labels_of(&self, class: ClassId) -> usize {
         self.labels.get(&class).copied().unwrap_or(0)
     }
-
-    /// Whether it is time to have a gesture confirmed, which was said so often to be what it is.
-    fn is_for_confirming(&self, nearest: ClassId) -> bool {
-        self.quiet as usize >= CONFIRMED_AFTER.saturating_mul(self.labels_of(nearest).max(1))
-    }
 }
 
 /// What to ask about a round, if that is worth it.
@@ -71,9 +62,7 @@ impl Occasion<'_> {
 /// | yes | disagree, or it may be unknown | less likely than not | "two or three?" |
 /// | yes | are as unsure as each other | hardly | "show it again, nearer" |
 /// | no | disagree | less likely than not | "two or three?", where nothing was asked for long |
-/// | no | agree | less likely than not | "two or three?", where nothing was asked for longer, the longer the more often two was said |
-///
-/// The last is for answers that were wrong: a gesture that was named wrongly once is taken for another with certainty, and no vote tells of it.
+/// | no | agree | – | nothing |
 ///
 /// It is worth it from [`worth`](QuestionsConfig::worth) on, and if at most a third of the rounds before were worth more: questions are few, and how unknown things
 /// look falls with all that was learned.
@@ -99,8 +88,7 @@ pub fn worth_asking(occasion: &Occasion<'_>, config: &QuestionsConfig) -> Option
         true => Some(Ask::Again { nearest: nearest? }),
         false => {
             let dissent = occasion.discounted(disagreement, config) >= config.disagreement;
-            let asks = occasion.quiet >= LONG && dissent || occasion.is_for_confirming(nearest?);
-            asks.then_some(between)
+            (occasion.quiet >= LONG && dissent).then_some(between)
         }
     }
 }
@@ -162,15 +150,6 @@ mod tests {
         let occasion =
             Occasion { doubt: Some(&torn), labels: &labels, before: &[], repeated: false, quiet: 1 };
         assert_eq!(worth_asking(&occasion, &QuestionsConfig::default()), BETWEEN);
-    }
-
-    #[test]
-    fn what_is_sure_is_confirmed_the_more_seldom_the_more_often_it_was_said() {
-        let sure = doubt(0.0, 0.0, 0.0);
-        // Of gesture 2 there are twice as many labels.
-        let first = |labels: usize| (1..99).find(|quiet| ask(&sure, labels, false, *quiet).is_some());
-        assert_eq!([0, 1, 2, 4].map(first), [Some(3), Some(6), Some(12), Some(24)]);
-        assert_eq!(ask(&sure, 1, false, 6), BETWEEN);
     }
 
     #[test]

@@ -29,10 +29,13 @@ pub fn asking(
     seeds: u32,
 ) -> Option<String> {
     let asked = cells.iter().any(|cell| cell.setting.feedback == Feedback::Asked);
-    let (first, runs_of) = (cells.first().filter(|_| asked)?, |cell: &Cell| -> BTreeMap<u64, &[Standing]> {
+    if !asked {
+        return None;
+    }
+    let runs_of = |cell: &Cell| -> BTreeMap<u64, &[Standing]> {
         let run = |seed| runs.get(&(cell.line.clone(), cell.value.clone(), seed)).map(Vec::as_slice);
         (0..u64::from(seeds)).filter_map(|seed| Some((seed, run(seed)?))).collect()
-    });
+    };
     let mut text = "\n## Labels and questions\n\n".to_owned();
     // Writing to a string cannot fail.
     let _ =
@@ -44,8 +47,8 @@ pub fn asking(
     }
     let _ = writeln!(text, "| questions per round, by thirds of the rounds |");
     let _ = writeln!(text, "|{}", "---|".repeat(6 + 2 * WHOSE.len() * MILESTONES.len()));
-    let firsts = runs_of(first);
     for cell in cells {
+        let firsts = cells.iter().find(|first| first.line == cell.line).map(runs_of).unwrap_or_default();
         let of_cell = runs_of(cell);
         let last = |measure: Measure| {
             Mean::of(&of_cell.values().filter_map(|run| run.last()).map(measure).collect::<Vec<_>>())
@@ -86,7 +89,7 @@ pub fn asking(
     let _ = writeln!(
         text,
         "\n`labels`: answers of the instructor. `to`: given when the accuracy on held-out hands had first been that high after {IN_A_ROW} rounds in a row, over the \
-         seeds in which it was; how many of all is said beside it. `of the first's`: the geometric mean of the ratio to the first row, seed by seed, where both \
+         seeds in which it was; how many of all is said beside it. `of the first's`: the geometric mean of the ratio to the first row of its line, seed by seed, where both \
          reached it. Means with 95 % intervals (Student's t)."
     );
     Some(text)
