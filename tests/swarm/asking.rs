@@ -29,7 +29,7 @@ const APART: Duration = Duration::from_secs(4);
 /// What robot `id` sees: a gesture, or what lies between two, to each robot nearer another one of them.
 fn seen(id: u32, shown: u8, rng: &mut ChaCha8Rng) -> Observation {
     if shown != BETWEEN {
-        return gesture(ClassId(shown), rng);
+        return gesture(ClassId(shown.into()), rng);
     }
     let share = [0.75, 0.25, 0.5][id as usize % 3];
     let (two, three) = (gesture(TWO, rng), gesture(THREE, rng));
@@ -76,7 +76,8 @@ impl School {
         let mut school = Self { robots: line, client, news, shown, ada, asked: Vec::new() };
         for class in 0..6 {
             let round = school.show(class).await;
-            let answer = school.say(Instruction::Was { round, class: Gesture::Class(ClassId(class)) }).await;
+            let answer =
+                school.say(Instruction::Was { round, class: Gesture::Class(ClassId(class.into())) }).await;
             assert_eq!(answer.outcome, Outcome::Learned);
         }
         assert_eq!(school.asked, [], "what is said unasked is not asked for");

@@ -109,7 +109,7 @@ fn grow(sets: &BTreeMap<&str, Set>, at: &str, new: &[&str], shows: usize, seed: 
     let (mut key, mut showing) = (0, 0);
     let mut show = |learner: &mut Learner, class: usize, views: &[Vec<f32>]| {
         for view in views {
-            learner.insert_shown(key, ClassId(class as u8), view, showing).unwrap();
+            learner.insert_shown(key, ClassId(class as u32), view, showing).unwrap();
             key += 1;
         }
         showing += 1;

@@ -157,7 +157,8 @@ mod tests {
         let config = QuestionsConfig::default();
         let torn = doubt(0.4, 0.4, 0.02);
         let asks = |before: &[f64]| {
-            let occasion = Occasion { doubt: Some(&torn), labels: &[], before, repeated: false, quiet: 1 };
+            let occasion =
+                Occasion { doubt: Some(&torn), labels: &BTreeMap::new(), before, repeated: false, quiet: 1 };
             worth_asking(&occasion, &config).is_some()
         };
         assert!(asks(&[]) && asks(&[0.1, 0.2]) && asks(&[0.9, 0.1, 0.1]));
@@ -168,13 +169,19 @@ mod tests {
     fn who_knows_nothing_asks_for_a_name_when_it_is_shown_again() {
         let config = QuestionsConfig::default();
         let labels = BTreeMap::new();
-        let occasion = |repeated| Occasion { doubt: None, labels: &labels, before: &[1.0], repeated, quiet: 1 };
+        let occasion =
+            |repeated| Occasion { doubt: None, labels: &labels, before: &[1.0], repeated, quiet: 1 };
         assert_eq!(worth_asking(&occasion(false), &config), None);
         assert_eq!(worth_asking(&occasion(true), &config), Some(Ask::Name { nearest: None }));
         // One gesture is known: there are no two to choose from.
         let one = Doubt { gestures: vec![TWO], ..doubt(0.0, 0.0, 0.4) };
-        let occasion =
-            Occasion { doubt: Some(&one), labels: &[(TWO, 1)].into(), before: &[], repeated: false, quiet: 1 };
+        let occasion = Occasion {
+            doubt: Some(&one),
+            labels: &[(TWO, 1)].into(),
+            before: &[],
+            repeated: false,
+            quiet: 1,
+        };
         assert_eq!(worth_asking(&occasion, &config), Some(Ask::Name { nearest: Some(TWO) }));
     }
 }
