@@ -1,11 +1,13 @@
 //! What instructors said of which round: one latest word per instructor and round, so that what is heard twice, late
 //! or in another order comes to the same.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::hash::Hasher;
 
 use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RoundId, Word};
 use siphasher::sip::SipHasher24;
+
+use crate::candidates::Candidates;
 
 /// The most instructors of one round: beyond, those who were heard of first, on whatever round, are kept. Names made up
 /// later lock nobody out.
@@ -34,40 +36,6 @@ pub enum Verdict {
     Among(Candidates),
     /// All that was said was taken back.
     Retracted,
-}
-
-/// A set of classes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Candidates(BTreeSet<ClassId>);
-
-impl Candidates {
-    /// These.
-    #[must_use]
-    pub fn of(classes: impl IntoIterator<Item = ClassId>) -> Self {
-        Self(classes.into_iter().collect())
-    }
-
-    /// Whether that class is one of them.
-    #[must_use]
-    pub fn contains(&self, class: ClassId) -> bool {
-        self.0.contains(&class)
-    }
-
-    /// The only one, if it is one.
-    #[must_use]
-    pub fn only(&self) -> Option<ClassId> {
-        self.0.first().copied().filter(|_| self.0.len() == 1)
-    }
-
-    fn restrict(&mut self, word: Word) {
-        match word {
-            Word::Was(class) => self.0.retain(|candidate| *candidate == class),
-            Word::Not(class) => {
-                self.0.remove(&class);
-            }
-            Word::Retracted => {}
-        }
-    }
 }
 
 /// What came of a lesson.

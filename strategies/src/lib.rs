@@ -16,6 +16,7 @@
 //! needs of both is re-exported here.
 
 mod asking;
+mod candidates;
 pub mod forgetting;
 pub mod geometry;
 mod learning;
@@ -29,6 +30,7 @@ mod training_set;
 mod vector_codec;
 
 pub use asking::{Occasion, QuestionBudget, QuestionsConfig, QuestionsConfigError, worth_asking};
+pub use candidates::Candidates;
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
     Ballot, Classify, ClassifyError, Doubt, Evidence, Fuse, JudgedFrame, Judgement, Life, Observation,
@@ -45,7 +47,7 @@ pub use learning::{
     LearningConfig, LearningConfigError, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange,
     RobotMemory, TrainingChange,
 };
-pub use lessons::{Candidates, LessonBook, LessonReceipt, Verdict};
+pub use lessons::{LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
 pub use names::{NameBook, NamingReceipt};
 pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};

@@ -9,7 +9,8 @@ use super::changes::{TrainingChange, inserted_as};
 use super::memory::Item;
 use super::state::Learning;
 use super::unresolved::{self, UnresolvedSample};
-use crate::lessons::{Candidates, Verdict};
+use crate::candidates::Candidates;
+use crate::lessons::Verdict;
 use crate::sample::{HeldSample, SetPart};
 use crate::training_set::SetChange;
 

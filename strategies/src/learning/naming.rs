@@ -8,7 +8,7 @@ use super::changes::{TrainingChange, inserted_as};
 use super::memory::Item;
 use super::state::Learning;
 use super::unresolved;
-use crate::lessons::Candidates;
+use crate::candidates::Candidates;
 use crate::names::{NameBook, NamingReceipt};
 
 impl Learning {

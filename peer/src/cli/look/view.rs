@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, Observation};
 use opencv::core::{Mat, Rect};
 use opencv::prelude::*;
