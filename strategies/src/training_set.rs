@@ -360,11 +360,8 @@ impl TrainingSet {
     /// shown for longer. The oldest of the gesture of which there are most goes in their place.
     fn in_place_of_young(&self, victim: u64) -> Option<u64> {
         let class = self.samples.get(victim).map(|sample| sample.class).filter(|class| class.is_named())?;
-        let counts =
-            self.samples.iter().fold(BTreeMap::new(), |mut counts: BTreeMap<ClassId, usize>, sample| {
-                *counts.entry(sample.class).or_default() += 1;
-                counts
-            });
+        let mut counts: BTreeMap<ClassId, usize> = BTreeMap::new();
+        self.samples.iter().for_each(|sample| *counts.entry(sample.class).or_default() += 1);
         let young = counts.get(&class).is_some_and(|count| *count <= YOUNG);
         let (most, count) = counts.into_iter().filter(|_| young).max_by_key(|(class, n)| (*n, *class))?;
         let oldest = self.samples.iter().find(|sample| sample.class == most)?;
