@@ -323,7 +323,7 @@ fn no_bytes_too_many_bytes_and_another_version_are_told_apart() {
 #[test]
 fn a_vote_says_only_what_a_robot_can_mean() {
     for (vote, what) in [
-        (vote_of(vec![1.0]), "single class"),
+        (vote_of(vec![1.0]), "fewer than two"),
         (vote_of(vec![f32::NAN, 0.0]), "not finite"),
         (vote_of(vec![f32::INFINITY, 0.0]), "not finite"),
         (Vote { looks: -1.0, ..vote_of(vec![]) }, "looks"),

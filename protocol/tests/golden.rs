@@ -204,13 +204,13 @@ fn what_an_asker_signs() {
         (Ask::Name { nearest: Some(ClassId(2)) }, "02 01 02"),
         (Ask::Name { nearest: None }, "02 00"),
     ] {
-        travels_as(Message::Asked(asked(ask, vec![])), &format!("{HEAD} 09 ac0202a101 {said} 00 {nats}"));
+        travels_as(Message::Asked(asked(ask, vec![])), &format!("{HEAD} 0a ac0202a101 {said} 00 {nats}"));
     }
     let envelope = Envelope::from(question());
     assert_eq!(envelope, self::envelope(Message::Asked(asked(question().ask, named))));
     assert_eq!(
         hex(&envelope.statement()),
-        format!("{HEAD} 09 ac0202a101 00 02 03 {labels} {nats}").replace(' ', "")
+        format!("{HEAD} 0a ac0202a101 00 02 03 {labels} {nats}").replace(' ', "")
     );
     assert_eq!(Question::of(envelope), Some(question()));
 }

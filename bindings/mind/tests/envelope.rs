@@ -37,7 +37,7 @@ fn comes_back(bytes: &[u8]) -> String {
 fn a_golden_vote_is_spelt_as_documented() {
     // As in protocol/tests/golden.rs.
     let head = [3, 7, 1, 0x82, 1, 0, 0xac, 2, 2, 0xa1, 1, 0x84, 0x86, 0x88, 8, 2];
-    let bytes = [&head[..], &[0, 0, 0xc0, 0x3f, 0, 0, 0xc0, 0xbf, 0, 0, 0, 0x40, 0]].concat();
+    let bytes = [&head[..], &[0, 0, 0xc0, 0x3f, 0, 0, 0xc0, 0xbf, 0, 0, 0, 0x40, 0, 0]].concat();
     let json = comes_back(&bytes);
     let start = r#"{"author":7,"stamp":{"boot":1,"sequence":130},"signature":null,"message":{"kind":"vote","body":{"round":{"counter":300"#;
     assert!(json.starts_with(start), "{json}");

@@ -97,7 +97,7 @@ class Sets(unittest.TestCase):
         for arguments in (dict(capacity=0), dict(selection="best"), dict(forgetting=3)):
             with self.assertRaises(g.SettingsError):
                 g.TrainingSet(**arguments)
-        with self.assertRaises(OverflowError):
+        with self.assertRaises(g.DataError):
             samples.keep(256, [1.0, 2.0], round=2)
 
 

@@ -6,8 +6,8 @@ import unittest
 import gestalt_swarm as g
 
 # As in protocol/tests/golden.rs.
-VOTE = bytes.fromhex("03070182010 0ac0202a1018486880802 0000c03f0000c0bf00000040 00".replace(" ", ""))
-NULL_VOTE = bytes.fromhex("03070182 0100ac0202a1018486880800 00000000 00".replace(" ", ""))
+VOTE = bytes.fromhex("03070182010 0ac0202a1018486880802 0000c03f0000c0bf00000040 00 00".replace(" ", ""))
+NULL_VOTE = bytes.fromhex("03070182 0100ac0202a1018486880800 00000000 00 00".replace(" ", ""))
 NOTHING = bytes.fromhex("0307018201 01000000000000".replace(" ", ""))
 HOLDING = bytes.fromhex("0307018201 07ac0202a10101010101000000400000403f0401".replace(" ", ""))
 

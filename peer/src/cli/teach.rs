@@ -22,7 +22,6 @@ use gestalt_link::{Client, Heard, News};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt teach open -e tcp/192.168.1.5:7447
-  gestalt teach was three --round 5@2-3f9a01c7
   gestalt teach new circle --shows 5")]
 pub struct Args {
     #[command(flatten)]
