@@ -68,11 +68,11 @@ fn own() -> Rules {
     Rules { learning, fusion: Some(Arc::new(Approval)) }
 }
 
-/// Eight robots with poor eyes, taught each of three gestures four times; no robot keeps more than 40 samples.
+/// Eight robots with poor eyes, taught each of three gestures eight times; no robot keeps more than 40 samples.
 fn scenario() -> Result<Scenario, Box<dyn Error>> {
     let text = "{
         robots: [{ name: 'robot', count: 8, view: { fps: 2, signal: 2, persistence: 0.5 } }],
-        topology: 'ring', classes: 3, rounds: 12, order: 'in_turn',
+        topology: 'ring', classes: 3, rounds: 24, order: 'in_turn',
         mind: { alpha: 0.4 },
         learning: { robots: { capacity: 40 } },
     }";
