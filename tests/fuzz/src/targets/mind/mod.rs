@@ -58,8 +58,14 @@ fn live(bytes: &[u8]) -> World {
 }
 
 fn alike(one: &Mind, other: &Mind) {
-    let gesture = |mind: &Mind| (mind.round(), mind.held().and_then(|held| held.class));
-    assert_eq!(gesture(one), gesture(other), "robots {} and {}", one.me(), other.me());
+    assert_eq!(one.round(), other.round(), "robots {} and {}", one.me(), other.me());
+    let gesture = |mind: &Mind| mind.held().and_then(|held| held.class);
+    // Whom a stranger has made believe in robots that are not there decides nothing, and believes nobody who counts fewer.
+    let robots = |mind: &Mind| mind.held().map(|held| held.certificate.robots);
+    let is_misled = robots(one) != robots(other) && (gesture(one).is_none() || gesture(other).is_none());
+    if !is_misled {
+        assert_eq!(gesture(one), gesture(other), "robots {} and {}", one.me(), other.me());
+    }
     let lessons = |mind: &Mind| mind.learned().map(|learned| learned.lessons);
     assert_eq!(lessons(one), lessons(other), "lessons of robots {} and {}", one.me(), other.me());
 }
