@@ -141,7 +141,7 @@ fn fast_and_plain_pick_the_same_among_many() {
             let mut changes = Vec::new();
             for number in 1..=700 {
                 let vector = |rng: &mut ChaCha8Rng| (0..40).map(|_| rng.random_range(-1.0..1.0)).collect();
-                let class = ClassId(number as u32 % 2);
+                let class = ClassId(number % 2);
                 let (own, other) = (vector(&mut rng), vector(&mut rng));
                 changes.extend(set.keep(class, round(number), own, &mut rng));
                 match set.receive(id(1, number), class, round(number), other, &mut rng) {

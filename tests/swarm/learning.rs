@@ -261,7 +261,7 @@ pub async fn a_robot_votes_and_decides_while_it_trains() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut sample = |number| SharedSample {
         id: SampleId { author: RobotId(9), life: 0, number },
-        class: ClassId((rng.next_u32() % 6) as u32),
+        class: ClassId(rng.next_u32() % 6),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::I8((0..8).map(|_| (rng.next_u32() % 200) as i8).collect()),
     };

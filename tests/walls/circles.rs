@@ -39,7 +39,13 @@ pub fn circles(folder: &str) -> Vec<Vec<String>> {
     let reached: BTreeMap<&Module, BTreeSet<Module>> =
         files.keys().map(|module| (module, reach(module, &edges))).collect();
     let circle = |module: &Module| -> Vec<String> {
-        let others = reached[module].iter().filter(|other| reached[*other].contains(module));
+        let back = |other: &&Module| {
+            let reached = reached
+                .get(*other)
+                .unwrap_or_else(|| panic!("{module:?} imports {other:?}, which is no file"));
+            reached.contains(module)
+        };
+        let others = reached[module].iter().filter(back);
         others.map(|other| files[other].path.clone()).collect()
     };
     let circles: BTreeSet<Vec<String>> = files.keys().map(circle).filter(|files| files.len() > 1).collect();

@@ -17,7 +17,6 @@ const MAX_WAITING: usize = 1024;
 
 /// One thing that happened.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "each is looked at as it comes, and not kept")]
 pub enum Heard {
     /// The swarm decided.
     Decided(Announcement),

@@ -63,6 +63,7 @@ pub struct Instructed {
 }
 
 /// What an input is about.
+#[expect(clippy::large_enum_variant, reason = "it is taken apart at once, and never kept")]
 pub(super) enum Concern {
     Rounds(AboutRounds),
     Word(Instructed),

@@ -247,7 +247,7 @@ fn a_decision_of_a_vocabulary_that_nobody_reports_has_numbers_for_names() {
 /// The same with a confidence of its own, for no two decisions of a round are of one rank unless they are one.
 fn ranked(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
     let mut made = decided(counter, class, votes);
-    let digits = votes.iter().chain(&class).fold(1_u32, |sum, class| sum * 4 + u32::from(*class));
+    let digits = votes.iter().chain(&class).fold(1_u32, |sum, class| sum * 4 + *class);
     made.decision.confidence = 0.5 + f64::from(digits) / 10_000.0;
     made
 }

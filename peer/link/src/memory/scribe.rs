@@ -113,6 +113,7 @@ impl Scribe {
 }
 
 /// What came of trying to write.
+#[expect(clippy::large_enum_variant, reason = "it is looked at as it comes, and not kept")]
 enum Done {
     /// There was nothing to write, and the file is still there.
     Nothing,

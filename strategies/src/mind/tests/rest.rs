@@ -66,7 +66,7 @@ fn what_is_left_in_scattered_places_is_all_given() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 22);
     let sample = |number| SharedSample {
         id: SampleId { author: RobotId(9), life: 5, number },
-        class: ClassId((number % 6) as u32),
+        class: ClassId(number % 6),
         round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
         vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
     };

@@ -7,10 +7,13 @@ use crate::head::{Discriminant, margin_of};
 use crate::scatter::{Covariance, whiten};
 
 /// The mean of a showing, and its samples, each with its place among all.
-type Showing<'a> = (Vec<f64>, Vec<(usize, &'a [f32])>);
+type Showing<'a> = (Vec<f64>, Views<'a>);
 
 /// The showings of each class.
 type ByClass<'a> = BTreeMap<usize, Vec<Showing<'a>>>;
+
+/// The samples of a showing, each with its place among all.
+type Views<'a> = Vec<(usize, &'a [f32])>;
 
 /// What views score, with what each weighs.
 pub(super) type Scores = Vec<(Score, f64)>;
@@ -184,7 +187,7 @@ fn squared(a: &[f64], b: &[f64]) -> f64 {
 }
 
 fn by_class<'a>(samples: &[Shown<'a>], width: usize) -> ByClass<'a> {
-    let mut showings: BTreeMap<(usize, u64), Vec<(usize, &[f32])>> = BTreeMap::new();
+    let mut showings: BTreeMap<(usize, u64), Views<'_>> = BTreeMap::new();
     for (place, sample) in samples.iter().enumerate().filter(|(_, sample)| sample.vector.len() == width) {
         showings.entry((sample.class, sample.showing)).or_default().push((place, sample.vector));
     }

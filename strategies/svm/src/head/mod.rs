@@ -51,5 +51,5 @@ pub(crate) fn margin_of(logs: &[f64]) -> Option<f64> {
             second = *log;
         }
     }
-    second.is_finite().then(|| first - second)
+    second.is_finite().then_some(first - second)
 }

@@ -75,7 +75,7 @@ fn gaps(swarm: &mut Swarm) {
     teach_some(swarm);
     let of = |author: u32| {
         let id = move |n: u32| SampleId { author: RobotId(100 + author), life: 5, number: 1 + 1_000_000 * n };
-        (0..250).map(move |n| forged::sample(id(n), (n % 6) as u32, STRANGE, &[n as f32 / 30.0, 0.3]))
+        (0..250).map(move |n| forged::sample(id(n), n % 6, STRANGE, &[n as f32 / 30.0, 0.3]))
     };
     let all: Vec<SharedSample> = (0..80).flat_map(of).collect();
     for part in all.chunks(10_000) {

@@ -165,7 +165,7 @@ fn round_after_round(swarm: &mut Swarm, robot: u32, signs: bool) {
         for n in 0..25 {
             swarm.pass(100 * MS);
             let round = RoundId { counter: swarm.round().counter + 1, opener: RobotId(robot), life: 9 };
-            say(swarm, robot, signs, 100 * u32::from(class) + n, round);
+            say(swarm, robot, signs, 100 * class + n, round);
         }
         swarm.end(began);
         swarm.pass(6000 * MS);
@@ -181,7 +181,7 @@ fn one_after_the_other(swarm: &mut Swarm) {
             swarm.pass(100 * MS);
             let robot = swarm.liar();
             let round = RoundId { counter: swarm.round().counter + 1, opener: RobotId(robot), life: 9 };
-            let stamp = Stamp { boot: 1, sequence: 100 * u32::from(class) + n };
+            let stamp = Stamp { boot: 1, sequence: 100 * class + n };
             let said = forged::said(robot, stamp, forged::null_vote(round));
             let said = forged::signed(said, &key(robot), &swarm.id());
             swarm.put_to(1 + n % swarm.honest(), &Topic::Vote(said.author), &said.encode());
@@ -280,7 +280,7 @@ fn ghosts(swarm: &mut Swarm) {
 
 fn other_ghosts(swarm: &mut Swarm) {
     for class in [1, 2, 3] {
-        let first = 10_000 * u32::from(class);
+        let first = 10_000 * class;
         swarm.show_tokens(first..first + 4090);
         swarm.show(class);
         swarm.pass(6000 * MS);

@@ -179,7 +179,7 @@ fn far_out(swarm: &mut Swarm, from: u32) {
             life: 5,
             number: 1 + n,
         };
-        forged::sample(id, (n % 6) as u32, round, &[1e30, -1e30, 11.0 + n as f32])
+        forged::sample(id, n % 6, round, &[1e30, -1e30, 11.0 + n as f32])
     };
     swarm.whisper(from, &forged::samples((0..1000).map(sample).collect()));
     show_and_teach(swarm, 2);

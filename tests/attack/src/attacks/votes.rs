@@ -151,7 +151,7 @@ fn wrong_together(seed: u64, expected: bool) -> Played {
             swarm.pass(100 * MS);
             let round = swarm.round();
             for liar in 0..liars {
-                let stamp = Stamp { boot: 1, sequence: u32::from(n) + 1 };
+                let stamp = Stamp { boot: 1, sequence: n + 1 };
                 swarm.put_vote(&forged::said(
                     9 - liars + liar,
                     stamp,

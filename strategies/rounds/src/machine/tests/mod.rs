@@ -130,7 +130,7 @@ fn decision(counter: u32, class: Option<u32>, robots: u32, author: u32) -> Decis
         let counted = |robot| CountedVote {
             robot: RobotId(10 + robot),
             // Another vote of it for each class.
-            stamp: Stamp { boot: 1, sequence: 1 + u32::from(class) },
+            stamp: Stamp { boot: 1, sequence: 1 + class },
             class: ClassId(class),
             weight: 1.0,
             vote: vote(counter, class as usize, SURE),

@@ -74,11 +74,11 @@ fn a_vote_names_what_its_robot_knows_in_order() {
     let features = vec![0.1, 0.1, 0.1, 0.4, 0.2, 0.1];
     mind.handle(ms(10), Input::Observed(Observation { features, quality: 1.0 }));
     let out = live(&mut mind, ms(300));
-    let said = out.iter().filter_map(|(_, output)| match output {
+    let mut said = out.iter().filter_map(|(_, output)| match output {
         Output::Broadcast(Envelope { message: Message::Vote(vote), .. }) => Some(vote),
         _ => None,
     });
-    let vote = said.last().expect("it votes");
+    let vote = said.next_back().expect("it votes");
     assert_eq!((vote.listed(), &vote.named[..]), (3, &named[..]));
     let by_number: Vec<f32> = named.iter().map(|class| vote.evidence_for(*class).unwrap()).collect();
     assert!(by_number[2] > by_number[0] && by_number[0] > by_number[1], "{vote:?}");
