@@ -33,19 +33,16 @@ pub fn circles(folder: &str) -> Vec<Vec<String>> {
             let paths = paths(code).into_iter().chain(imports(code));
             let targets = paths.filter_map(|path| absolute(&path, module, &files));
             let targets = targets.map(|path| declared_in(&path, &files, &names));
-            (*module, targets.filter(|target| !module.starts_with(target)).collect())
+            (
+                *module,
+                targets.filter(|target| files.contains_key(target) && !module.starts_with(target)).collect(),
+            )
         })
         .collect();
     let reached: BTreeMap<&Module, BTreeSet<Module>> =
         files.keys().map(|module| (module, reach(module, &edges))).collect();
     let circle = |module: &Module| -> Vec<String> {
-        let back = |other: &&Module| {
-            let reached = reached
-                .get(*other)
-                .unwrap_or_else(|| panic!("{module:?} imports {other:?}, which is no file"));
-            reached.contains(module)
-        };
-        let others = reached[module].iter().filter(back);
+        let others = reached[module].iter().filter(|other| reached[*other].contains(module));
         others.map(|other| files[other].path.clone()).collect()
     };
     let circles: BTreeSet<Vec<String>> = files.keys().map(circle).filter(|files| files.len() > 1).collect();

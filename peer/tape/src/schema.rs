@@ -110,7 +110,7 @@ fn robot() -> Value {
 }
 
 fn class(about: &str) -> Value {
-    json!({"type": "integer", "minimum": 0, "maximum": 255, "description": about})
+    json!({"type": "integer", "minimum": 0, "maximum": 0x0fff_ffff, "description": about})
 }
 
 fn wire() -> Value {
@@ -162,8 +162,13 @@ fn vote() -> Value {
                 "unknown",
                 number("Nats for a gesture that the robot was never taught, on the scale of the evidence."),
             ),
+            must("named", named()),
         ],
     )
+}
+
+fn named() -> Value {
+    list("The gestures named since the list was made: the last values are theirs.", class("One of them."))
 }
 
 fn signature() -> Value {
@@ -194,6 +199,7 @@ fn decision() -> Vec<Field> {
         may("pool", object("How alike a correlated pool takes its robots to be.", pool)),
         must("probabilities", list("The fused probability of each class.", probability("Of one class."))),
         may("unknown", probability("The fused probability of a gesture that nobody taught.")),
+        must("named", named()),
         must("votes", list("The votes counted, by robot.", object("One of them.", counted))),
         must("others", list("Votes of those who took part and are not counted.", object("One.", vote_of()))),
         must("robots", count("n: how many robots its author had heard lately.")),
@@ -295,6 +301,11 @@ fn status() -> Vec<Field> {
         may("opinion", object("What its last frame showed, in its own opinion.", opinion)),
     ];
     let classes = |about| list(about, count("Of one class."));
+    let titled = vec![
+        must("class", class("Its number.")),
+        must("label", text("What it is called.")),
+        must("samples", count("The samples that show it.")),
+    ];
     let learning = vec![
         must("space", text("The feature space of its samples.")),
         must("capacity", count("T: how many samples it may hold.")),
@@ -305,6 +316,7 @@ fn status() -> Vec<Field> {
         must("common", text("A digest of the common knowledge.")),
         must("lessons", count("Rounds of which it knows what an instructor said.")),
         must("memory", text("Where it keeps all this.")),
+        must("named", list("The gestures that were named since, and are in use.", object("One.", titled))),
         must("trainings", count("How often it has trained.")),
     ];
     let error = vec![must("at_ms", count("Since the robot's start.")), must("what", text("Cause and mend."))];
@@ -331,24 +343,36 @@ fn status() -> Vec<Field> {
 }
 
 fn feedback() -> Vec<Field> {
+    let words = ["open", "was", "right", "wrong", "retract", "new", "same", "retire", "restore"];
     vec![
-        must("say", one_of("What is said.", &["open", "was", "right", "wrong", "retract"])),
+        must("say", one_of("What is said.", &words)),
         may("round", round()),
-        may("class", class("was: the gesture, by class.")),
-        may("class_label", text("was: the gesture, by label.")),
-        may("of", class("right, wrong: the gesture decided, by class.")),
-        may("of_label", text("right, wrong: the gesture decided, by label.")),
+        may("class", class("was, same, retire, restore: the gesture, by class.")),
+        may("class_label", text("was, same, retire, restore: the gesture, by label.")),
+        may("label", text("new: what the gesture is called.")),
+        may("of", class("right, wrong: the gesture decided, by class; same: what the other is.")),
+        may("of_label", text("right, wrong: the gesture decided, by label; same: what the other is.")),
     ]
 }
 
 fn answer() -> Vec<Field> {
-    let outcomes = ["learned", "known", "nothing_seen", "unknown_round", "unknown_gesture", "not_learning"];
+    let outcomes = [
+        "learned",
+        "known",
+        "nothing_seen",
+        "unknown_round",
+        "unknown_gesture",
+        "no_room",
+        "not_learning",
+        "not_allowed",
+    ];
     vec![
         must("robot", robot()),
         must("at", count("The time of the word that is answered, as NTP64.")),
         must("to", object("The word that is answered.", feedback())),
         must("outcome", one_of("What became of it.", &outcomes)),
         may("class", class("The gesture that the round's samples stand for.")),
+        may("looks_like", class("Of a gesture that was named: what the swarm took it for.")),
         must("samples", count("How many samples of that round the robot holds.")),
     ]
 }
