@@ -10,6 +10,7 @@ mod instruct;
 mod machine;
 mod naming;
 mod output;
+mod questions;
 mod sample_repair;
 #[cfg(test)]
 mod tests;

@@ -1,42 +1,13 @@
 //! Who votes in the newest round, of a large swarm.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use gestalt_protocol::RobotId;
 
+use super::members::Committee;
 use super::rounds::Rounds;
 use crate::committee::draw;
-use crate::electorate::Electorate;
 use crate::round::Voice;
-
-/// The committee of the newest round, as this robot draws it from all that it knows of.
-#[derive(Clone, Debug)]
-pub(super) struct Committee {
-    members: BTreeSet<RobotId>,
-    /// The others of them that are alive.
-    expected: BTreeSet<RobotId>,
-    /// Those of them that came while the round was open: they may not have heard of it.
-    late: BTreeSet<RobotId>,
-}
-
-impl Committee {
-    pub fn members(&self) -> &BTreeSet<RobotId> {
-        &self.members
-    }
-}
-
-/// The other robots of whom a vote is to be expected in the newest round.
-pub(super) fn expected<'a>(
-    committee: Option<&'a Committee>,
-    electorate: &Electorate,
-    alive: &'a BTreeSet<RobotId>,
-) -> Cow<'a, BTreeSet<RobotId>> {
-    match committee {
-        Some(committee) => Cow::Borrowed(&committee.expected),
-        None => electorate.expected(alive),
-    }
-}
 
 impl Rounds {
     /// Draws who votes in the newest round, at its beginning or when other robots are there. `new`: who came since.

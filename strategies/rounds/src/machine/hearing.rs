@@ -9,7 +9,7 @@ use gestalt_protocol::{
     Stamp,
 };
 
-use super::committee::{Committee, expected};
+use super::members::expected;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
@@ -300,7 +300,7 @@ impl Rounds {
             Ok(Ordering::Equal) => {}
         }
         let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
-        let committee = self.committee.as_ref().map(Committee::members);
+        let committee = self.committee.as_ref().map(|committee| &committee.members);
         let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
         for counted in &decision.certificate.votes {

@@ -15,6 +15,7 @@ mod follow;
 mod hearing;
 mod input;
 mod inspect;
+mod members;
 mod output;
 mod partners;
 mod preempting;

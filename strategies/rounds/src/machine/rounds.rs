@@ -7,9 +7,9 @@ use std::time::Duration;
 use gestalt_protocol::{ClassId, Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
-use super::committee::Committee;
 use super::follow::Follow;
 use super::input::Input;
+use super::members::Committee;
 use super::output::Output;
 use super::partners::Partners;
 use super::wanted::Wanted;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Announced, Announcement, Decision, Envelope, Holder, Message, RobotId};
 
-use super::committee::{Committee, expected};
+use super::members::expected;
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
 use crate::agreement::Agreement;
@@ -62,7 +62,7 @@ impl Rounds {
         }
         let scale = self.own_scale();
         let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
-        let committee = self.committee.as_ref().map(Committee::members);
+        let committee = self.committee.as_ref().map(|committee| &committee.members);
         let robots = self.electorate.count();
         let view = View { me: self.me, expected: &expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
