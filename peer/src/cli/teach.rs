@@ -15,6 +15,9 @@ use super::{Failure, interrupted};
 use gestalt_desk::SHOWN;
 use gestalt_link::{Client, Heard, News};
 
+/// The time to hold the hand otherwise, and longer than robots take requests for copies of one.
+const BETWEEN_SHOWS: Duration = Duration::from_secs(1);
+
 /// Give a swarm feedback on its decisions
 ///
 /// With a command, sends it and exits. Without one, reads commands from the keyboard, one per line, until `quit`, and shows what the swarm asks: a line that
@@ -158,6 +161,7 @@ impl Lesson<'_> {
             self.open().await?;
             let Some((round, _)) = self.last else { continue };
             self.tell(&Instruction::Was { round, class: Gesture::Class(class) }).await?;
+            tokio::time::sleep(BETWEEN_SHOWS).await;
         }
         Ok(())
     }
