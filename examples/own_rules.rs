@@ -71,9 +71,9 @@ fn own() -> Rules {
 /// Eight robots with poor eyes, taught each of three gestures eight times; no robot keeps more than 40 samples.
 fn scenario() -> Result<Scenario, Box<dyn Error>> {
     let text = "{
-        robots: [{ name: 'robot', count: 8, view: { fps: 2, signal: 3, persistence: 0.5 } }],
+        robots: [{ name: 'robot', count: 8, view: { fps: 2, signal: 4, persistence: 0.5 } }],
         topology: 'ring', classes: 3, rounds: 24, order: 'in_turn',
-        mind: { alpha: 0.5 },
+        mind: { alpha: 0.45 },
         learning: { robots: { capacity: 40 } },
     }";
     Ok(Scenario::parse(text, "own_rules")?)
