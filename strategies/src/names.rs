@@ -32,24 +32,30 @@ pub struct NameBook {
 impl NameBook {
     /// Takes in what was said of a gesture. Of two words of one count and time the greater counts.
     pub fn hear(&mut self, naming: &Naming) -> NamingReceipt {
-        let gesture = naming.gesture();
-        let known = self.namings.get(&gesture);
-        if known.is_some_and(|known| order(known) >= order(naming)) {
-            return NamingReceipt::Known;
-        }
-        if naming.count > known.map_or(0, |known| known.count).saturating_add(COUNT_LEAP) {
-            return NamingReceipt::FarAhead;
-        }
-        if known.is_none() && self.namings.len() >= MAX_NAMED {
-            match self.namings.last_key_value() {
-                Some((greatest, _)) if *greatest > gesture => {
-                    self.namings.pop_last();
-                }
-                _ => return NamingReceipt::Full,
+        let receipt = self.would_hear(naming);
+        if receipt == NamingReceipt::New {
+            self.namings.insert(naming.gesture(), naming.clone());
+            if self.namings.len() > MAX_NAMED {
+                self.namings.pop_last();
             }
         }
-        self.namings.insert(gesture, naming.clone());
-        NamingReceipt::New
+        receipt
+    }
+
+    /// What would come of it.
+    pub(crate) fn would_hear(&self, naming: &Naming) -> NamingReceipt {
+        let gesture = naming.gesture();
+        let known = self.namings.get(&gesture);
+        let greatest = self.namings.last_key_value().map(|(greatest, _)| *greatest);
+        if known.is_some_and(|known| order(known) >= order(naming)) {
+            NamingReceipt::Known
+        } else if naming.count > known.map_or(0, |known| known.count).saturating_add(COUNT_LEAP) {
+            NamingReceipt::FarAhead
+        } else if known.is_none() && self.namings.len() >= MAX_NAMED && greatest <= Some(gesture) {
+            NamingReceipt::Full
+        } else {
+            NamingReceipt::New
+        }
     }
 
     /// Takes in what this robot knew before, whatever its count.

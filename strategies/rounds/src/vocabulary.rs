@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use gestalt_protocol::{ClassId, MAX_CLASSES, MAX_NAMED, Status, VocabularyId};
+use gestalt_protocol::{ClassId, MAX_CLASSES, MAX_LABEL, MAX_NAMED, Status, VocabularyId};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -50,7 +50,7 @@ impl Vocabulary {
             return Err(VocabularyError::TooLarge(labels.len()));
         }
         for (i, label) in labels.iter().enumerate() {
-            if !(1..=64).contains(&label.len()) {
+            if !(1..=MAX_LABEL).contains(&label.len()) {
                 return Err(VocabularyError::Label(label.chars().take(70).collect()));
             }
             if labels[..i].contains(label) {

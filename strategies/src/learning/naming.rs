@@ -1,6 +1,6 @@
 //! What becomes of samples by what instructors name, merge, retire and restore.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{ClassId, MAX_CLASSES, NamedGesture, Naming};
 
@@ -23,13 +23,16 @@ impl Learning {
 
     /// Takes in what was said of a gesture that was named, and trains by it.
     pub fn hear_naming(&mut self, naming: &Naming) -> NamingReceipt {
-        let before: BTreeMap<ClassId, Option<ClassId>> =
-            self.classes_of_samples().map(|class| (class, self.trained_as(class))).collect();
-        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
-        let heard = self.names.hear(naming);
+        // Neighbours say all they know: mostly there is nothing to be done.
+        let heard = self.names.would_hear(naming);
         if heard != NamingReceipt::New {
             return heard;
         }
+        let classes: BTreeSet<ClassId> = self.classes_of_samples().collect();
+        let before: Vec<(ClassId, Option<ClassId>)> =
+            classes.into_iter().map(|class| (class, self.trained_as(class))).collect();
+        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
+        self.names.hear(naming);
         let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
         self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
         self.gestures = self.all_gestures();
@@ -99,14 +102,17 @@ impl Learning {
     /// The gestures that were named and are in use, for the status.
     pub(super) fn named_gestures(&self) -> Vec<NamedGesture> {
         let titles = self.names.titles(self.vocabulary.labels());
-        let samples = |gesture: ClassId| {
-            self.classes_of_samples().filter(|class| self.trained_as(*class) == Some(gesture)).count()
-        };
+        let mut samples: BTreeMap<ClassId, usize> = BTreeMap::new();
+        for class in self.classes_of_samples().filter(|class| class.is_named()) {
+            if let Some(gesture) = self.trained_as(class) {
+                *samples.entry(gesture).or_default() += 1;
+            }
+        }
         let in_use = self.names.in_use(self.room_for_names());
         let in_use = in_use.into_iter().map(|class| NamedGesture {
             class,
             label: titles.get(&class).cloned().unwrap_or_default(),
-            samples: samples(class),
+            samples: samples.get(&class).copied().unwrap_or(0),
         });
         in_use.collect()
     }
