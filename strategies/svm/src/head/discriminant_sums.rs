@@ -22,16 +22,21 @@ impl DiscriminantSums {
     /// Takes in a sample of a showing: coordinates in the space. One of that key is replaced.
     pub fn insert(&mut self, key: u64, class: usize, showing: u64, vector: &[f32]) {
         self.sums.insert(key, class, showing, vector);
+        self.sums.settle();
     }
 
     /// Takes out a sample; whether it was there.
     pub fn remove(&mut self, key: u64) -> bool {
-        self.sums.remove(key)
+        let was_there = self.sums.remove(key);
+        self.sums.settle();
+        was_there
     }
 
     /// Gives a sample another class; whether it was there.
     pub fn relabel(&mut self, key: u64, class: usize) -> bool {
-        self.sums.relabel(key, class)
+        let was_there = self.sums.relabel(key, class);
+        self.sums.settle();
+        was_there
     }
 
     /// The discriminant of what is there; `None` of nothing.

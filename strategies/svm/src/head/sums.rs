@@ -1,6 +1,6 @@
 //! What was shown, as sums that depend on no order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::scatter::{Covariance, entries, is_wide};
 
@@ -15,7 +15,8 @@ const FINER: i64 = 256;
 /// squares for all. A showing counts once, however many samples it has.
 ///
 /// Adding, taking out and merging commute, to the last bit: the sums are of integers, each showing's part in them follows from its samples alone.
-/// Coordinates are rounded to 2⁻¹⁶ of the greatest standard deviation of the space. A change costs a product of d² / 2 for each sample of its showing.
+/// Coordinates are rounded to 2⁻¹⁶ of the greatest standard deviation of the space. A showing that changed costs a product of d² / 2 for each of its
+/// samples, once for all changes between two times that the sums are [settled](Self::settle).
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sums<K> {
     spread: Vec<f32>,
@@ -26,6 +27,8 @@ pub(crate) struct Sums<K> {
     classes: BTreeMap<usize, OfClass<K>>,
     /// The lower triangle of Σ x·xᵀ, row by row, or its diagonal: of each showing the mean.
     squares: Vec<i64>,
+    /// The showings that changed, by class: what they were was taken off the sums, what they are was not added yet.
+    changed: BTreeSet<(usize, u64)>,
 }
 
 /// The samples of a showing, in steps.
@@ -54,7 +57,8 @@ impl<K: Copy + Ord> Sums<K> {
         // Where nothing varies any unit will do.
         let unit = if greatest > 0.0 { STEPS / f64::from(greatest) } else { STEPS };
         let squares = vec![0; entries(spread.len())];
-        Self { spread: spread.to_vec(), unit, places: BTreeMap::new(), classes: BTreeMap::new(), squares }
+        let (spread, changed) = (spread.to_vec(), BTreeSet::new());
+        Self { spread, unit, places: BTreeMap::new(), classes: BTreeMap::new(), squares, changed }
     }
 
     pub fn spread(&self) -> &[f32] {
@@ -96,25 +100,39 @@ impl<K: Copy + Ord> Sums<K> {
         self.classes.get(&class).map_or(0, |of_class| of_class.showings.len())
     }
 
-    /// Changes the samples of a showing, and what it adds.
+    /// Changes the samples of a showing. What it was is taken off the sums with the first change.
     fn change(&mut self, class: usize, showing: u64, change: impl FnOnce(&mut Samples<K>)) {
         let width = self.spread.len();
         let new = || OfClass { showings: BTreeMap::new(), sum: vec![0; width] };
         let of_class = self.classes.entry(class).or_insert_with(new);
         let samples = of_class.showings.entry(showing).or_default();
-        add(samples, &mut self.squares, &mut of_class.sum, -1);
+        if self.changed.insert((class, showing)) {
+            add(samples, &mut self.squares, &mut of_class.sum, -1);
+        }
         change(samples);
-        add(samples, &mut self.squares, &mut of_class.sum, 1);
         if samples.is_empty() {
             of_class.showings.remove(&showing);
+            self.changed.remove(&(class, showing));
         }
         if of_class.showings.is_empty() {
             self.classes.remove(&class);
         }
     }
 
-    /// Classes with a sample, in their order.
+    /// Adds what the showings that changed have become: before anybody reads the sums. A showing of which a hundred samples come one after the other is
+    /// so added up once, not a hundred times.
+    pub fn settle(&mut self) {
+        for (class, showing) in std::mem::take(&mut self.changed) {
+            let Some(of_class) = self.classes.get_mut(&class) else { continue };
+            if let Some(samples) = of_class.showings.get(&showing) {
+                add(samples, &mut self.squares, &mut of_class.sum, 1);
+            }
+        }
+    }
+
+    /// Classes with a sample, in their order, once all is settled.
     pub fn clouds(&self) -> Vec<Cloud> {
+        debug_assert!(self.changed.is_empty(), "sums are read once they are settled");
         let cloud = |(class, of_class): (&usize, &OfClass<K>)| {
             let showings = of_class.showings.len();
             let finer = self.unit * FINER as f64 * showings as f64;
@@ -124,8 +142,9 @@ impl<K: Copy + Ord> Sums<K> {
         self.classes.iter().map(cloud).collect()
     }
 
-    /// How showings scatter about their classes.
+    /// How showings scatter about their classes, once all is settled.
     pub fn covariance(&self, clouds: &[Cloud]) -> Covariance {
+        debug_assert!(self.changed.is_empty(), "sums are read once they are settled");
         let mut covariance = Covariance::new(&self.spread);
         let squared = self.unit * self.unit;
         covariance.add_squares(self.squares.iter().map(|sum| *sum as f64 / squared));

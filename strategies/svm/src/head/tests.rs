@@ -23,6 +23,8 @@ enum Change {
     Insert { key: u8, class: usize, showing: u64, vector: [f32; WIDTH] },
     Remove(u8),
     Relabel(u8, usize),
+    /// Somebody reads the sums.
+    Settle,
 }
 
 fn change() -> impl Strategy<Value = Change> {
@@ -32,6 +34,7 @@ fn change() -> impl Strategy<Value = Change> {
         6 => insert.prop_map(|(key, class, showing, vector)| Change::Insert { key, class, showing, vector }),
         2 => (0..24_u8).prop_map(Change::Remove),
         1 => (0..24_u8, 0..4_usize).prop_map(|(key, class)| Change::Relabel(key, class)),
+        1 => Just(Change::Settle),
     ]
 }
 
@@ -40,6 +43,7 @@ type Held = BTreeMap<u8, (usize, u64, [f32; WIDTH])>;
 fn sums<'a>(held: impl Iterator<Item = (&'a u8, &'a (usize, u64, [f32; WIDTH]))>) -> Sums<u8> {
     let mut sums = Sums::new(&SPREAD);
     held.for_each(|(key, (class, showing, vector))| sums.insert(*key, *class, *showing, vector));
+    sums.settle();
     sums
 }
 
@@ -64,8 +68,10 @@ proptest! {
                     prop_assert_eq!(taught.relabel(key, to), place.is_some());
                     if let Some((class, ..)) = place { *class = to; }
                 }
+                Change::Settle => taught.settle(),
             }
         }
+        taught.settle();
         prop_assert_eq!(&taught, &sums(held.iter()), "as if it alone had come");
         prop_assert_eq!(&taught, &sums(held.iter().rev()), "in another order");
         // Two robots that each know a part, and tell each other.
@@ -74,6 +80,7 @@ proptest! {
         let mut merged = [sums(one.iter()), sums(other.iter())];
         for (sums, part) in merged.iter_mut().zip([&other, &one]) {
             part.iter().for_each(|(key, (class, showing, vector))| sums.insert(*key, *class, *showing, vector));
+            sums.settle();
         }
         prop_assert_eq!(&merged[0], &merged[1]);
         prop_assert_eq!(&merged[0], &taught);
@@ -105,6 +112,7 @@ fn of(all: &[(usize, u64, [f32; WIDTH])]) -> Sums<usize> {
     for (key, (class, showing, vector)) in all.iter().enumerate() {
         sums.insert(key, *class, *showing, vector);
     }
+    sums.settle();
     sums
 }
 

@@ -234,6 +234,7 @@ impl Learner {
             }
         }
         let present = self.present();
+        self.few.sums.settle();
         let scatter = self.few.scatter(&self.samples);
         let familiarity = scatter.as_ref().map(|scatter| self.few.familiarity(scatter, self.touched.len()));
         // A head of the classes of these places.
