@@ -45,7 +45,7 @@ pub use gestalt_svm::{
 pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};
 pub use learning::{
     LearningConfig, LearningConfigError, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange,
-    RobotMemory, TrainingChange,
+    RobotMemory, Shelf, TrainingChange,
 };
 pub use lessons::{LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};

@@ -17,8 +17,8 @@ const LEAST: usize = 5;
 pub(crate) struct Shares {
     /// The other robots alive now.
     alive: BTreeSet<RobotId>,
-    /// Those that were alive at any time in this life: at most [`MAX_ROBOTS`], and those alive now.
-    met: BTreeSet<RobotId>,
+    /// Those that were alive at any time in this life and are not now: with those at most [`MAX_ROBOTS`].
+    gone: BTreeSet<RobotId>,
     /// How many samples of strangers are held; `None` before they are counted.
     strange: Option<usize>,
 }
@@ -27,12 +27,13 @@ impl Shares {
     /// These robots are alive now. Gives those that were not before.
     pub fn meet(&mut self, me: RobotId, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
         let new = alive.difference(&self.alive).copied().filter(|robot| *robot != me).collect();
-        self.alive.clone_from(alive);
-        self.alive.remove(&me);
+        let mut alive = alive.clone();
+        alive.remove(&me);
+        self.gone.append(&mut std::mem::replace(&mut self.alive, alive));
+        self.gone.retain(|robot| !self.alive.contains(robot));
         self.strange = None;
-        self.met.extend(&self.alive);
-        if self.met.len() > MAX_ROBOTS {
-            self.met.clone_from(&self.alive);
+        if self.alive.len() + self.gone.len() > MAX_ROBOTS {
+            self.gone.clear();
         }
         new
     }
@@ -58,7 +59,12 @@ impl Shares {
 
     fn is_strange(&self, sample: &HeldSample) -> bool {
         let author = sample.author().filter(|_| sample.part == SetPart::External);
-        author.is_some_and(|author| !self.met.contains(&author))
+        author.is_some_and(|author| !self.has_met(author))
+    }
+
+    /// Whether that robot was alive at any time in this life, as far as is kept.
+    fn has_met(&self, robot: RobotId) -> bool {
+        self.alive.contains(&robot) || self.gone.contains(&robot)
     }
 
     pub fn is_alive(&self, robot: RobotId) -> bool {
@@ -71,18 +77,18 @@ impl Shares {
         let n = self.robots()?;
         let each = LEAST.max((5 * capacity).div_ceil(4 * n));
         let strangers = LEAST.max(capacity.div_ceil(4));
-        let met = &self.met;
-        let of_strangers = *self.strange.get_or_insert_with(|| {
-            samples.authors().filter(|(author, _)| !met.contains(author)).map(|(_, held)| held).sum()
-        });
-        let most = samples.authors_of_most().find(|(author, _)| self.met.contains(author));
+        let count =
+            || samples.authors().filter(|(author, _)| !self.has_met(*author)).map(|(_, held)| held).sum();
+        let of_strangers = self.strange.unwrap_or_else(count);
+        self.strange = Some(of_strangers);
+        let most = samples.authors_of_most().find(|(author, _)| self.has_met(*author));
         let (author, excess) = most.map_or((None, 0), |(a, held)| (Some(a), held.saturating_sub(each)));
         let excess_of_strangers = of_strangers.saturating_sub(strangers);
         if excess == 0 && excess_of_strangers == 0 {
             return None;
         }
         if excess_of_strangers >= excess {
-            oldest_of_most(samples, |robot| !self.met.contains(&robot))
+            oldest_of_most(samples, |robot| !self.has_met(robot))
         } else {
             oldest_of_most(samples, |robot| Some(robot) == author)
         }

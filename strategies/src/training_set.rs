@@ -234,7 +234,7 @@ impl TrainingSet {
         id: SampleId,
         class: ClassId,
         round: RoundId,
-        vector: Vec<f32>,
+        vector: impl Into<Arc<[f32]>>,
         rng: &mut dyn Rng,
     ) -> SampleReceipt {
         if let Err(error) = self.may_receive(id) {

@@ -14,20 +14,22 @@ use crate::sample::{HeldSample, HeldSamples, draw};
 /// Of equally close pairs it is the one with the smaller keys.
 ///
 /// From the source research. Cost: a pass over K per sample that comes, one to find the closest pair, and one per sample whose nearest
-/// neighbour has gone once it may be of the closest pair. Plainly: all pairs of K each time.
+/// neighbour has gone once it may be of the closest pair; and all pairs of K when it is first asked for one of K, before which it keeps nothing. Plainly:
+/// all pairs of K each time.
 ///
 /// Forgetting after k-center greedy (Sener & Savarese 2018) comes to the same pair: the sample without which the
 /// others cover K best is the one that has another nearest.
 #[derive(Clone, Debug, Default)]
 pub struct Redundancy {
-    /// Per class: every sample seeks, and is every other's neighbour.
+    /// Per class of which one was to go: every sample seeks, and is every other's neighbour.
     classes: BTreeMap<ClassId, Neighbours>,
 }
 
 impl Forgetting for Redundancy {
     fn inserted(&mut self, sample: &HeldSample) {
-        let class = self.classes.entry(sample.class).or_insert_with(Neighbours::of_each_other);
-        class.add(sample.key, &sample.vector);
+        if let Some(class) = self.classes.get_mut(&sample.class) {
+            class.add(sample.key, &sample.vector);
+        }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
@@ -38,7 +40,13 @@ impl Forgetting for Redundancy {
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         let class = samples.draw_largest_class(rng)?;
-        let pair = self.classes.get_mut(&class)?.closest()?;
+        let of_class = || {
+            let mut all = Neighbours::of_each_other();
+            let held = samples.with_keys(samples.class_keys(class));
+            held.for_each(|sample| all.add(sample.key, &sample.vector));
+            all
+        };
+        let pair = self.classes.entry(class).or_insert_with(of_class).closest()?;
         match pair.neighbour {
             Some(neighbour) => draw(&[pair.seeker, neighbour], rng),
             None => Some(pair.seeker),

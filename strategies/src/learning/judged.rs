@@ -1,6 +1,7 @@
 //! What rounds were about that instructors have spoken of: from them it follows how alike the robots are.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, Pool, RoundId};
 use gestalt_rounds::{Testimony, Weights, fit};
@@ -20,14 +21,14 @@ pub(super) struct JudgedRounds {
 
 #[derive(Clone, Debug)]
 struct Judged {
-    testimony: Testimony,
+    testimony: Arc<Testimony>,
     /// What it says, by which verdict.
     weights: Option<(Verdict, Option<Weights>)>,
 }
 
 impl JudgedRounds {
     /// Notes the votes of a round as the decision held of it has them.
-    pub fn note(&mut self, round: RoundId, testimony: Testimony) {
+    pub fn note(&mut self, round: RoundId, testimony: Arc<Testimony>) {
         let known = self.rounds.get(&round).is_some_and(|judged| judged.testimony == testimony);
         if known {
             return;
@@ -77,7 +78,7 @@ mod tests {
     use super::*;
 
     /// Five robots that are all sure of that gesture.
-    fn testimony(class: usize) -> Testimony {
+    fn testimony(class: usize) -> Arc<Testimony> {
         let round = RoundId { counter: 1, opener: RobotId(0), life: 0 };
         let evidence: Vec<f32> = (0..3).map(|k| if k == class { 4.0 } else { -2.0 }).collect();
         let vocabulary = VocabularyId(1);
@@ -111,7 +112,7 @@ mod tests {
         };
         let author = RobotId(0);
         let decision = Decision { round, class: None, confidence: 0.0, author, is_final: false, certificate };
-        Testimony::of(&decision, 6.0).unwrap()
+        Testimony::of(&decision, 6.0).unwrap().into()
     }
 
     fn round(counter: u32) -> RoundId {

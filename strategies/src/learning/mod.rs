@@ -13,6 +13,7 @@ mod own_rules;
 mod recent_rounds;
 mod setup;
 mod sharing;
+mod shelf;
 mod state;
 mod unresolved;
 
@@ -21,6 +22,7 @@ pub use config::{LearningConfig, LearningConfigError};
 pub use memory::{MemoryError, RecordChange, RobotMemory};
 pub use own_rules::OwnRules;
 pub use setup::{LearningError, LearningSetup};
+pub use shelf::Shelf;
 pub(crate) use state::{Declined, Learning};
 #[cfg(test)]
 pub(crate) use unresolved::training_key;

@@ -125,7 +125,8 @@ impl Learning {
 
     /// Keeps a batch some of whose samples were news, while one of them is held.
     pub fn keep_batch(&mut self, batch: HeldBatch) {
-        if let Some(first) = self.batches.keep(batch) {
+        let Some(first) = batch.samples.first() else { return };
+        if let Some(first) = self.batches.keep(self.shelf.batch(first, batch)) {
             self.dirty.insert(Item::Batch(first));
             self.thinned.insert(first);
         }

@@ -23,6 +23,7 @@ use super::judged::JudgedRounds;
 use super::memory::{self, Counters, Item, Owner, RecordChange, RobotMemory};
 use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
+use super::shelf::Shelf;
 use super::unresolved::Unresolved;
 use crate::candidates::Candidates;
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
@@ -82,6 +83,8 @@ pub(crate) struct Learning {
     pub(super) gestures: Candidates,
     pub(super) recent: RecentRounds,
     pub(super) judged: JudgedRounds,
+    /// Of the robots that live with it in one process.
+    pub(crate) shelf: Arc<Shelf>,
     pub(super) aside: Unresolved,
     /// The highest counter of a round that this robot knows of.
     pub(super) newest: Option<u32>,
@@ -166,6 +169,7 @@ impl Learning {
             gestures,
             recent: RecentRounds::default(),
             judged: JudgedRounds::default(),
+            shelf: Arc::default(),
             newest,
             credit: 0.0,
             shared: SharedSoFar::default(),
@@ -280,6 +284,7 @@ impl Learning {
         }
         let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
         let SharedSample { id, round, .. } = *sample;
+        let vector = self.shelf.vector(id, vector);
         let verdict = self.verdict(round);
         let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
         match self.set.receive(id, class, round, vector, &mut *self.rng) {

@@ -14,7 +14,7 @@ use super::asks::Asks;
 use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
-use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory};
+use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory, Shelf};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
 ///
@@ -121,6 +121,15 @@ impl Mind {
         self.rounds = self.rounds.counting_from(counter).naming(vocabulary);
         self.call_by_names();
         Ok(self)
+    }
+
+    /// The same mind, which holds what other minds of this process hold as well in one place with them.
+    #[must_use]
+    pub fn with_shelf(mut self, shelf: Arc<Shelf>) -> Self {
+        if let Some(learning) = &mut self.learning {
+            learning.shelf = shelf;
+        }
+        self
     }
 
     /// Takes in one input at the time `now` and says what is to be done.

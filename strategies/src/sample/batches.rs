@@ -1,18 +1,20 @@
 //! The batches that the samples held were shared in, as their authors said them.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use gestalt_protocol::{HeldBatch, SampleId};
 
 /// Batches by the name of their first sample. They are kept as they came, since an author signs a batch as a whole, and for as
 /// long as one sample of them is held; so there are no more of them than shared samples.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Batches(BTreeMap<SampleId, HeldBatch>);
+pub(crate) struct Batches(BTreeMap<SampleId, Arc<HeldBatch>>);
 
 impl Batches {
     /// Keeps a batch, unless its numbers reach into those of another; says by which name. Honest authors number their samples one
     /// after the other, and of two batches by a liar that overlap the first is passed on.
-    pub fn keep(&mut self, batch: HeldBatch) -> Option<SampleId> {
+    pub fn keep(&mut self, batch: impl Into<Arc<HeldBatch>>) -> Option<SampleId> {
+        let batch = batch.into();
         let (first, last) = (batch.samples.first()?, batch.samples.samples.last()?.id);
         let before = self.0.range(..=first).next_back().and_then(|(_, before)| before.samples.samples.last());
         let overlaps =
@@ -26,7 +28,7 @@ impl Batches {
 
     /// The batch of that name.
     pub fn get(&self, first: SampleId) -> Option<&HeldBatch> {
-        self.0.get(&first)
+        self.0.get(&first).map(|batch| &**batch)
     }
 
     /// The name of the batch that a sample was shared in, if it is kept.
@@ -55,7 +57,7 @@ impl Batches {
     /// All of them.
     #[cfg(test)]
     pub fn iter(&self) -> impl Iterator<Item = &HeldBatch> {
-        self.0.values()
+        self.0.values().map(|batch| &**batch)
     }
 }
 

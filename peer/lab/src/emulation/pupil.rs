@@ -6,7 +6,7 @@ use std::sync::Arc;
 use gestalt_protocol::RobotId;
 use gestalt_strategies::{
     Classifier, Learner, LearningConfig, LearningSetup, Life, Mind, MindConfig, OwnRules, RecordChange,
-    RobotMemory, TrainingChange,
+    RobotMemory, Shelf, TrainingChange,
 };
 use rand_chacha::ChaCha8Rng;
 
@@ -46,7 +46,7 @@ impl Pupil {
         (me, life): (RobotId, Life),
         mind: MindConfig,
         school: &School,
-        (config, rules): (&LearningConfig, &OwnRules),
+        (config, rules, shelf): (&LearningConfig, &OwnRules, &Arc<Shelf>),
         rng: ChaCha8Rng,
     ) -> Mind {
         let records = self.disk.iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
@@ -67,6 +67,7 @@ impl Pupil {
             .expect("the scenario was validated")
             .learning(setup)
             .expect("the scenario was validated, and the memory is this robot's own")
+            .with_shelf(shelf.clone())
     }
 
     /// Loses what is on no disk.
@@ -95,7 +96,12 @@ impl Pupil {
     fn gather(&mut self, mind: Option<&Mind>, school: &School) {
         let samples = mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
         self.due = samples.map(TrainingChange::insert).chain(self.guesses.values().cloned()).collect();
-        self.learner = Some(new_learner(school));
+        let mut learner = new_learner(school);
+        learner.make_room(self.due.iter().filter_map(|change| match change {
+            TrainingChange::Insert { class, .. } => Some(*class),
+            TrainingChange::Remove(_) | TrainingChange::Relabel { .. } => None,
+        }));
+        self.learner = Some(learner);
     }
 
     pub fn remember(&mut self, revision: u64, changes: Vec<RecordChange>) {

@@ -20,7 +20,12 @@ fn normal(rng: &mut impl Rng) -> f64 {
 /// What may happen to samples.
 #[derive(Clone, Debug)]
 enum Change {
-    Insert { key: u8, class: usize, showing: u64, vector: [f32; WIDTH] },
+    Insert {
+        key: u8,
+        class: usize,
+        showing: u64,
+        vector: [f32; WIDTH],
+    },
     Remove(u8),
     Relabel(u8, usize),
     /// Somebody reads the sums.

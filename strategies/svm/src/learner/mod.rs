@@ -173,6 +173,15 @@ impl Learner {
         Ok(())
     }
 
+    /// Samples of these gestures are about to be inserted, one of each: the room for their kernel is made at once.
+    pub fn make_room(&mut self, classes: impl IntoIterator<Item = ClassId>) {
+        let mut more = vec![0; self.vocabulary.classes()];
+        for place in classes.into_iter().filter_map(|class| self.vocabulary.place(class)) {
+            more[place] += 1;
+        }
+        self.samples.make_room(&more);
+    }
+
     /// Takes out a sample; whether it was there.
     pub fn remove(&mut self, key: u64) -> bool {
         let place = self.samples.place(Key::Inserted(key));

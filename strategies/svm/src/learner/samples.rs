@@ -37,17 +37,28 @@ pub(super) struct KernelMatrix {
     gamma: f32,
     classes: Vec<Vec<KernelRow>>,
     places: BTreeMap<Key, Place>,
+    /// As many samples there will be at least, by class.
+    room: Vec<usize>,
 }
 
 impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
-        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places: BTreeMap::new() }
+        let (places, room) = (BTreeMap::new(), vec![0; classes]);
+        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places, room }
+    }
+
+    /// So many samples of each class are about to come: from now on rows are made as long as they will be.
+    pub fn make_room(&mut self, more: &[usize]) {
+        for ((room, samples), more) in self.room.iter_mut().zip(&self.classes).zip(more) {
+            *room = samples.len() + more;
+        }
     }
 
     /// Makes room for one more class.
     pub fn add_class(&mut self) {
         self.classes.iter_mut().flatten().for_each(|sample| sample.kernel.push(Vec::new()));
         self.classes.push(Vec::new());
+        self.room.push(0);
     }
 
     /// The samples of a class, in its order.
@@ -72,8 +83,9 @@ impl KernelMatrix {
     pub fn insert(&mut self, key: Key, class: usize, vector: &[f32]) -> Place {
         let gamma = self.gamma;
         let mut kernel: Vec<Vec<f32>> = Vec::with_capacity(self.classes.len());
-        for samples in &mut self.classes {
-            let mut row = Vec::with_capacity(roomy(samples.len() + 1));
+        for (samples, room) in self.classes.iter_mut().zip(&self.room) {
+            let least = samples.len() + 1;
+            let mut row = Vec::with_capacity(if least <= *room { *room } else { roomy(least) });
             for sample in samples {
                 let value = (-gamma * squared_distance(&sample.vector, vector)).exp();
                 row.push(value);

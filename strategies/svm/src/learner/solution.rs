@@ -40,6 +40,8 @@ pub(super) struct Solution {
     offset: f64,
     /// The length of all steps since the residuals were computed.
     blur: f64,
+    /// Whether any sample may have a weight.
+    is_loaded: bool,
 }
 
 /// The highest residual whose weight may rise, where it is, and the lowest whose weight may fall.
@@ -55,7 +57,8 @@ const LABELS: [f32; 2] = [1.0, -1.0];
 impl Solution {
     /// Takes in a sample at the end of a class, with weight 0.
     pub fn insert(&mut self, side: usize, row: [&[f32]; 2]) {
-        let residual = f64::from(LABELS[side]) - self.sum(row);
+        let sum = if self.is_loaded { self.sum(row) } else { 0.0 };
+        let residual = f64::from(LABELS[side]) - sum;
         let side = &mut self.sides[side];
         side.weights.push(0.0);
         side.residuals.push(residual as f32);
@@ -75,7 +78,7 @@ impl Solution {
             side.weights.fill(0.0);
             side.residuals.fill(label);
         }
-        (self.offset, self.blur) = (0.0, 0.0);
+        (self.offset, self.blur, self.is_loaded) = (0.0, 0.0, false);
     }
 
     pub fn weights(&self, side: usize) -> &[f64] {
@@ -274,6 +277,7 @@ impl Solution {
 
     fn set(&mut self, side: usize, position: usize, weight: f64, cost: f64) {
         let (may_rise, may_fall) = movable(side, weight, cost);
+        self.is_loaded = true;
         let side = &mut self.sides[side];
         side.weights[position] = weight;
         side.rise[position] = if may_rise { 0.0 } else { f32::NEG_INFINITY };

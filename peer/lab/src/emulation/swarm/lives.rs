@@ -26,7 +26,8 @@ impl Swarm<'_> {
                 (Some(pupil), Some(school), Some(teaching)) => {
                     let rng = stream(self.seed, learning(i, robot.boot));
                     let (me, robots) = ((robot.id, life), teaching.of_robots());
-                    robot.mind = Some(pupil.start(me, config, school, (&robots, &self.rules.learning), rng));
+                    let with = (&robots, &self.rules.learning, &self.shelf);
+                    robot.mind = Some(pupil.start(me, config, school, with, rng));
                     pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>)
                 }
                 _ => {

@@ -32,7 +32,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, RobotId};
-use gestalt_strategies::{Classifier, Input, Mind};
+use gestalt_strategies::{Classifier, Input, Mind, Shelf};
 use rand_chacha::ChaCha8Rng;
 
 use super::network::{Network, Traffic};
@@ -56,6 +56,8 @@ use seed::{ANSWERS, COURSE, NETWORK, stream};
 pub(super) struct Swarm<'a> {
     scenario: &'a Scenario,
     school: Option<Arc<School>>,
+    /// What robots hold alike.
+    shelf: Arc<Shelf>,
     rules: Rules,
     seed: u64,
     now: Duration,
@@ -99,6 +101,7 @@ impl<'a> Swarm<'a> {
         let mut swarm = Self {
             scenario,
             school,
+            shelf: Arc::default(),
             rules,
             seed,
             now: Duration::ZERO,

@@ -112,8 +112,12 @@ impl Plot {
             self.said.values().filter_map(|said| said.iter().find(|held| held.vote.evidence.is_empty()));
         // Whoever is not counted takes part at least, if it said so.
         let rest: Vec<HeldVote> = lies.chain(empty.cloned()).collect();
-        let reached = liars.len() + self.said.len();
-        let enough = |counted: &usize| config.suffice(reached, liars.len() + counted, robots as u32);
+        let counter = self.round?.counter;
+        let reached = || liars.iter().chain(self.said.keys()).copied();
+        let enough = |counted: &usize| {
+            let suiting = suiting[..*counted].iter().map(|(_, held)| held.robot);
+            config.suffice_of(counter, reached(), liars.iter().copied().chain(suiting), robots as u32)
+        };
         let least = (0..=suiting.len()).find(enough)?;
         // Beyond as many as are needed, none that speaks against it helps.
         let helps = |counted: &usize| *counted == least || suiting[counted - 1].0 > 0.0;
