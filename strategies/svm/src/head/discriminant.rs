@@ -43,6 +43,12 @@ struct Class {
     /// The mean of its showings along the directions, from the centre.
     mean: Vec<f64>,
     showings: f64,
+    /// Where the next view is expected along each direction, and how firmly.
+    next: Vec<(f64, f64)>,
+    /// How firmly it is expected at the centre in all other directions.
+    beside: f64,
+    /// The sum of the logarithms of the variances of all this.
+    logs: f64,
 }
 
 /// Where a view lies.
@@ -104,9 +110,10 @@ impl Discriminant {
             sharpness: 1.0,
         };
         for ((away, showings), class) in away.iter().zip(showings).zip(met) {
+            let known =
+                discriminant.class(along(&discriminant.directions, away).collect(), f64::from(*showings));
             if let Some(place) = discriminant.classes.get_mut(*class) {
-                let mean = along(&discriminant.directions, away).collect();
-                *place = Some(Class { mean, showings: f64::from(*showings) });
+                *place = Some(known);
             }
         }
         discriminant
@@ -129,28 +136,33 @@ impl Discriminant {
         Spot { along, beside }
     }
 
-    /// What a class says of a view there.
-    fn log(&self, spot: &Spot, mean: &[f64], showings: f64) -> f64 {
+    /// What is known of a class by the mean of so many showings.
+    fn class(&self, mean: Vec<f64>, showings: f64) -> Class {
         // The variance of the next view: within the class, and of its mean.
-        let next = |between: f64| 1.0 + between / (showings * between + 1.0);
+        let variance = |between: f64| 1.0 + between / (showings * between + 1.0);
         let others = self.width.saturating_sub(self.between.len()) as f64;
-        let (mut squared, mut logs) =
-            (spot.beside / next(self.elsewhere), others * next(self.elsewhere).ln());
-        for ((x, mean), between) in spot.along.iter().zip(mean).zip(&self.between) {
-            let shrunk = mean * showings * between / (showings * between + 1.0);
-            let variance = next(*between);
-            squared += (x - shrunk) * (x - shrunk) / variance;
-            logs += variance.ln();
-        }
+        let mut logs = others * variance(self.elsewhere).ln();
+        let next = mean.iter().zip(&self.between).map(|(mean, between)| {
+            logs += variance(*between).ln();
+            (mean * showings * between / (showings * between + 1.0), 1.0 / variance(*between))
+        });
+        let next = next.collect();
+        Class { mean, showings, next, beside: 1.0 / variance(self.elsewhere), logs }
+    }
+
+    /// What a class says of a view there.
+    fn log(&self, spot: &Spot, class: &Class) -> f64 {
+        let away = spot.along.iter().zip(&class.next);
+        let squared: f64 = away.map(|(x, (mean, firmness))| (x - mean) * (x - mean) * firmness).sum();
+        let squared = squared + spot.beside * class.beside;
         let tails = (self.freedom + self.width as f64) * (squared / self.freedom).ln_1p();
-        -0.5 * self.sharpness * (tails + logs)
+        -0.5 * self.sharpness * (tails + class.logs)
     }
 
     /// What each class says of a view there.
     pub(crate) fn logs_at(&self, spot: &Spot) -> Vec<f64> {
-        let log = |class: &Option<Class>| {
-            class.as_ref().map_or(f64::NEG_INFINITY, |class| self.log(spot, &class.mean, class.showings))
-        };
+        let log =
+            |class: &Option<Class>| class.as_ref().map_or(f64::NEG_INFINITY, |class| self.log(spot, class));
         self.classes.iter().map(log).collect()
     }
 
@@ -158,10 +170,10 @@ impl Discriminant {
     pub(crate) fn logs_without(&self, spot: &Spot, class: usize, showing: &Spot) -> Option<Vec<f64>> {
         let left = self.classes.get(class)?.as_ref().filter(|class| class.showings > 1.0)?;
         let n = left.showings;
-        let mean: Vec<f64> =
+        let mean =
             left.mean.iter().zip(&showing.along).map(|(mean, own)| (mean * n - own) / (n - 1.0)).collect();
         let mut logs = self.logs_at(spot);
-        logs[class] = self.log(spot, &mean, n - 1.0);
+        logs[class] = self.log(spot, &self.class(mean, n - 1.0));
         Some(logs)
     }
 }
