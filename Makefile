@@ -45,8 +45,9 @@ demo: packages
 # Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data,enki,valgrind,systemd,debian makes
 # failures of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
-	RUST_TEST_THREADS=$$((2 * $$(nproc))) \
-	cargo test --workspace --lib --bins --tests --examples --no-fail-fast 2>&1 | awk -f .ci/summary.awk
+	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
+	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \
+	  cargo test --workspace --doc --no-fail-fast || failed=1; exit $${failed:-0}; } 2>&1 | awk -f .ci/summary.awk
 
 # Plays every attack of SECURITY.md against emulated swarms and prints what comes of each; fails if one comes to something else
 # than its line says. Needs Rust alone. ATTACKS="A7 17 --seeds 5" plays some.

@@ -40,7 +40,7 @@ impl Trial {
 /// A table of [`Trial`]s, one a line: `[Load, needs…] module::function`, with `.await` after an asynchronous one. A trial is
 /// named by its path.
 ///
-/// ```ignore
+/// ```text
 /// trials![
 ///     [Waits, Namespaces] line::the_eighth_in_a_line_decides,
 ///     [Works] cameras::a_camera_that_hangs_keeps_nobody.await,

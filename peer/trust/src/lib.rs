@@ -38,7 +38,7 @@
 //!
 //! // Robot 0 signs a vote.
 //! let round = RoundId { counter: 1, opener: RobotId(0), life: 0xA1 };
-//! let vote = Vote { round, vocabulary: VocabularyId(9), evidence: vec![2.0, -1.0, -1.0], looks: 3.0, unknown: None };
+//! let vote = Vote { round, vocabulary: VocabularyId(9), evidence: vec![2.0, -1.0, -1.0], looks: 3.0, unknown: None, named: Vec::new() };
 //! let stamp = Stamp { boot: 1, sequence: 1 };
 //! let said = Envelope { author: RobotId(0), stamp, message: Message::Vote(vote), signature: None }.encode();
 //! let signature = statement::sign(&robots[0], &roster.swarm_id(), &said);

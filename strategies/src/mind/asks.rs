@@ -38,6 +38,15 @@ impl Asks {
         }
     }
 
+    /// Puts off by whole periods what was to be asked while the round was open still: several may have announced it, each in its turn, and
+    /// would now all ask at once.
+    pub fn put_off(&mut self, now: Duration, period: Duration) {
+        if let Some(due) = self.due.as_mut().filter(|due| **due <= now && !period.is_zero()) {
+            let missed = (now - *due).as_nanos() / period.as_nanos() + 1;
+            *due = due.saturating_add(period.saturating_mul(u32::try_from(missed).unwrap_or(u32::MAX)));
+        }
+    }
+
     /// That was asked, by this robot or another.
     pub fn note(&mut self, now: Duration, question: Question, config: &QuestionsConfig) {
         self.budget.spend(now);

@@ -34,6 +34,9 @@ impl Mind {
         if announced {
             self.asks.due.get_or_insert(now.saturating_add(learning.config().questions.after));
         }
+        if out.iter().any(|output| matches!(output, Output::Closed(_))) {
+            self.asks.put_off(now, learning.config().questions.after);
+        }
         // What is said of its round settles a question, by whomever and whichever way it was heard; silence does not answer it.
         let settled = |(question, until): &mut (Question, Duration)| {
             now >= *until || learning.verdict(question.round) != Verdict::Unsaid

@@ -45,6 +45,8 @@ impl Mind {
         if !same && !self.exchanges.is_at_rest(from, learning.digest(), theirs) && self.may_answer(from) {
             self.exchanges.spend(from, 1);
             self.tell_know(from, theirs, false, out);
+            // This and what comes of it may be lost.
+            self.rounds.hurry_repair();
         }
     }
 

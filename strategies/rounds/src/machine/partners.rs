@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use gestalt_protocol::{Rank, RobotId};
+use gestalt_protocol::{Rank, RobotId, RoundId};
 
 /// After a change of the neighbourhood, repair stays busy for this long.
 const UNREST: Duration = Duration::from_secs(5);
@@ -18,6 +18,10 @@ const SILENT_PERIODS: u32 = 6;
 /// So often a neighbour is given what it lacks by the same comparison before the pauses between grow: what is lost comes again, and who does
 /// not take it, for it knows more robots that a majority would need, or the round by another name, is reminded seldom.
 const AT_ONCE: u32 = 4;
+
+/// So often two that differ in the same way hurry to compare again. What they tell each other may be lost, a third of it many times over;
+/// who still differs then cannot or will not take what it lacks.
+const HURRIED: u32 = 16;
 
 /// The longest such pause, in idle periods.
 const LONGEST: u32 = 32;
@@ -35,6 +39,9 @@ pub(super) struct Partners {
 /// What a robot has of the newest round: its decision, and the digest of its words on who holds what.
 pub(super) type Possession = (Option<Rank>, u16);
 
+/// That of a robot's newest round.
+pub(super) type Standing = (Option<RoundId>, Possession);
+
 #[derive(Clone, Debug)]
 struct Given {
     compared: [Possession; 2],
@@ -51,6 +58,8 @@ struct Partner {
     told: Duration,
     /// By what comparison it was last given something.
     given: Option<Given>,
+    /// In what the two differed last, and how often they were found to.
+    differed: Option<([Standing; 2], u32)>,
 }
 
 impl Partners {
@@ -103,6 +112,17 @@ impl Partners {
             if given.times < AT_ONCE { Duration::ZERO } else { idle.saturating_mul(doubled.min(LONGEST)) };
         given.due = now.saturating_add(pause);
         true
+    }
+
+    /// Whether to compare again soon with a robot that has something that this one lacks, or lacks what this one has.
+    pub fn hurries(&mut self, robot: RobotId, compared: [Standing; 2]) -> bool {
+        let Some(partner) = self.neighbours.get_mut(&robot) else { return false };
+        let times = match partner.differed {
+            Some((before, times)) if before == compared => times.saturating_add(1),
+            _ => 1,
+        };
+        partner.differed = Some((compared, times));
+        times <= HURRIED
     }
 
     /// When the next repair is due; never for a robot that knows of no other.
@@ -169,6 +189,18 @@ mod tests {
         partners.change(at(40), &BTreeSet::new());
         partners.change(at(41), &[robot].into());
         assert!(partners.owes(at(42), robot, IDLE), "they have met again");
+    }
+
+    #[test]
+    fn two_that_differ_hurry_but_not_for_ever() {
+        let robot = RobotId(3);
+        let mut partners = Partners::new(at(0));
+        let standing = |holders| (None, (None, holders));
+        assert!(!partners.hurries(robot, [standing(1), standing(2)]), "it is no neighbour");
+        partners.change(at(1), &[robot].into());
+        let hurried = (0..99).filter(|_| partners.hurries(robot, [standing(1), standing(2)])).count();
+        assert_eq!(hurried, 16);
+        assert!(partners.hurries(robot, [standing(1), standing(3)]), "something has changed");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
 
 use super::hearing::Heard;
 use super::output::Output;
+use super::partners::Standing;
 use super::rounds::{Effects, Rounds};
 use crate::refusal::Refusal;
 
@@ -52,13 +53,26 @@ impl Rounds {
         }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
-        if let Some(give) = self.lacking_there(from, order, have) {
+        let (give, lacks) = (self.lacking_there(from, order, have), self.lacking_here(order, have));
+        // What is given or answered now may be lost.
+        if (give.is_some() || lacks)
+            && self.partners.hurries(from, [(have.round, (have.decision, have.holders)), self.standing()])
+        {
+            self.hurry_repair();
+        }
+        if let Some(give) = give {
             self.tell(from, Message::Give(give), effects);
         }
         let owes = self.partners.owes(self.now, from, self.config.repair_idle);
-        if !have.answer && (owes || self.lacking_here(order, have)) {
+        if !have.answer && (owes || lacks) {
             self.tell_have(from, true, effects);
         }
+    }
+
+    /// What this robot has of its newest round.
+    fn standing(&self) -> Standing {
+        let possession = self.round.as_ref().map(|round| (round.agreement.rank(), round.agreement.digest()));
+        (self.round(), possession.unwrap_or_default())
     }
 
     /// Takes in what this robot lacked, and passes on what was news: the other neighbours may lack it too.
