@@ -9,6 +9,7 @@ mod clients;
 mod cost;
 mod doctor;
 mod eyes;
+mod false_answers;
 mod field;
 mod in_process;
 mod knowledge;
@@ -97,7 +98,7 @@ fn main() -> std::process::ExitCode {
         [Waits] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
-        [Waits] siege::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
+        [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
         [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
