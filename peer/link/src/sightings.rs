@@ -132,7 +132,8 @@ mod tests {
             sightings.dialled(ROBOT, &next, false);
             tried.push(next);
         }
-        assert_eq!(tried, [place(1, 1), place(2, 2)].repeat(3));
+        let in_turn: Vec<Place> = (0..3).flat_map(|_| [place(1, 1), place(2, 2)]).collect();
+        assert_eq!(tried, in_turn);
         assert!(sightings.heard().is_empty());
         // Heard anew, it begins anew; and what stands is not counted against it.
         sightings.hear(second(3), ROBOT, place(1, 1));
