@@ -27,6 +27,7 @@ pub mod doctor;
 pub mod eye;
 #[cfg(feature = "opencv")]
 pub mod model;
+pub mod open_files;
 #[cfg(feature = "opencv")]
 pub mod opinion;
 #[cfg(feature = "opencv")]

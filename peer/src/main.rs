@@ -2,11 +2,12 @@
 
 use std::process::ExitCode;
 
-use gestalt_peer::cli;
+use gestalt_peer::{cli, open_files};
 
 fn main() -> ExitCode {
     let command = cli::Command::of_this_process();
     cli::start_log();
+    open_files::raise_limit();
     match command.run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -5,6 +5,8 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD as BASE64;
 use serde_json::{Value, json};
 
 /// How long the browser may take for anything it is told.
@@ -107,6 +109,24 @@ impl Browser {
         let can = format!("(it => !!it && !it.disabled)(document.querySelector({}))", json!(selector));
         self.wait(&can, PATIENCE);
         self.evaluate(&format!("document.querySelector({}).click()", json!(selector)));
+    }
+
+    /// What the page looks like in a window of that size, by day or by night, as a PNG; the whole of it, however long it is.
+    ///
+    /// # Panics
+    /// When the browser draws none.
+    pub fn picture(&mut self, (width, height): (u32, u32), dark: bool) -> Vec<u8> {
+        let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
+        self.call("Emulation.setDeviceMetricsOverride", size);
+        let scheme = json!([{"name": "prefers-color-scheme", "value": if dark { "dark" } else { "light" }}]);
+        self.call("Emulation.setEmulatedMedia", json!({"features": scheme}));
+        // Two frames later all of it stands where it will stay.
+        self.evaluate(
+            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))",
+        );
+        let whole = json!({"format": "png", "captureBeyondViewport": true});
+        let drawn = self.call("Page.captureScreenshot", whole);
+        BASE64.decode(drawn["data"].as_str().expect("a picture")).expect("base64")
     }
 
     /// Errors on the console, violations of the page's policy, dialogs, and requests to others, so far.

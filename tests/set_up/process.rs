@@ -112,6 +112,12 @@ impl Process {
         self.told()
     }
 
+    /// The number by which the system knows it.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends it a signal, such as `STOP` or `CONT`.
     ///
     /// # Panics

@@ -9,6 +9,7 @@ mod clients;
 mod cost;
 mod doctor;
 mod eyes;
+mod false_answers;
 mod field;
 mod in_process;
 mod knowledge;
@@ -26,8 +27,10 @@ mod recording;
 mod ring;
 mod ros;
 mod scouting;
+mod siege;
 mod stranger;
 mod stream;
+mod talking;
 mod trouble;
 mod wall;
 
@@ -91,8 +94,12 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
+        [Waits] siege::who_is_expelled_and_knocks_ten_times_a_second_is_not_heard_and_kept_waiting.await,
+        [Waits] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
+        [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
+        [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,

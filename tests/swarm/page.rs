@@ -61,7 +61,7 @@ impl School {
     }
 }
 
-async fn desk(swarm: &str, link: &LinkConfig, port: u16) -> Desk {
+pub async fn desk(swarm: &str, link: &LinkConfig, port: u16) -> Desk {
     let door = Door::at(port.to_string().parse::<Address>().unwrap());
     Desk::open(Client::open(swarm, link).await.unwrap(), swarm, door).await.unwrap()
 }

@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const EXPULSION: Duration = Duration::from_secs(2);
 
 /// How long a member may take to be linked, whoever else is at the door.
-const LINKING: Duration = Duration::from_secs(5);
+pub const LINKING: Duration = Duration::from_secs(5);
 
 /// A robot that is reached by TLS alone.
 fn walled(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
@@ -136,7 +136,7 @@ pub async fn a_stranger_in_any_mode_neither_reads_nor_changes_anything() {
     }
 }
 
-async fn client(swarm: &str, endpoint: &[String], credentials: Option<Credentials>) -> Client {
+pub async fn client(swarm: &str, endpoint: &[String], credentials: Option<Credentials>) -> Client {
     let link = LinkConfig { connect: endpoint.to_vec(), credentials, ..LinkConfig::default() };
     Client::open(swarm, &link).await.expect("it is let in")
 }
@@ -188,7 +188,7 @@ pub async fn clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more() {
 }
 
 /// The robots that each robot's decision of a round knows the votes of. Without a quorum each says for itself that there is none.
-async fn voters(robots: &mut [Watched], counter: u32) -> Vec<Vec<u32>> {
+pub async fn voters(robots: &mut [Watched], counter: u32) -> Vec<Vec<u32>> {
     let mut voters = Vec::new();
     for robot in robots {
         let decision = robot.decision(counter, PATIENCE).await;
@@ -197,6 +197,31 @@ async fn voters(robots: &mut [Watched], counter: u32) -> Vec<Vec<u32>> {
         voters.push(voted.chain(certificate.others.iter().map(|held| held.robot.0)).collect());
     }
     voters
+}
+
+/// Tells the robots of a roster that robot 3 is on no more, and waits until none sees it; who told them.
+pub async fn expel(next: &Membership, locators: &[String], robots: &[Watched]) -> Client {
+    let roster = next.clone().sign(&key(1000)).unwrap();
+    let of_authority = Credentials::of_authority(Arc::new(key(1000)), &roster).unwrap();
+    let authority = client(&next.swarm, locators, Some(of_authority)).await;
+    let began = Instant::now();
+    authority.tell_roster(&roster).await.unwrap();
+    for robot in robots {
+        loop {
+            let status = robot.robot.status();
+            let gone = |of: &[RobotId]| !of.contains(&RobotId(3));
+            if status.counters["roster_epoch"] == next.epoch
+                && gone(&status.alive)
+                && gone(&status.neighbours)
+            {
+                break;
+            }
+            assert!(began.elapsed() < EXPULSION, "robot 3 is still there: {status:?}");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+    eprintln!("expelled everywhere after {:?}", began.elapsed());
+    authority
 }
 
 pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key() {
@@ -221,23 +246,7 @@ pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_ba
     let mut next = members.clone();
     next.epoch = 2;
     next.expelled = [(RobotId(3), next.robots.remove(&RobotId(3)).unwrap())].into();
-    let roster = next.clone().sign(&key(1000)).unwrap();
-    let of_authority = Credentials::of_authority(Arc::new(key(1000)), &roster).unwrap();
-    let authority = client(&swarm, &by_tls(&locators), Some(of_authority)).await;
-    let began = Instant::now();
-    authority.tell_roster(&roster).await.unwrap();
-    for robot in &robots {
-        loop {
-            let status = robot.robot.status();
-            let gone = |of: &[RobotId]| !of.contains(&RobotId(3));
-            if status.counters["roster_epoch"] == 2 && gone(&status.alive) && gone(&status.neighbours) {
-                break;
-            }
-            assert!(began.elapsed() < EXPULSION, "robot 3 is still there: {status:?}");
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-    }
-    eprintln!("expelled everywhere after {:?}", began.elapsed());
+    let authority = expel(&next, &by_tls(&locators), &robots).await;
     let second = voters(&mut robots, 2).await;
     assert_eq!(second, [[0, 1, 2]; 3]);
     // It knocks again and again.

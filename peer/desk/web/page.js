@@ -2,7 +2,8 @@
 // What the robots say is written as text, never as HTML: see `textContent` throughout, and the page's security policy.
 
 const $ = (id) => document.getElementById(id);
-const percent = (p) => (p >= 0.9995 ? "100 %" : `${(100 * p).toFixed(1)} %`);
+// A number and its unit stay on one line.
+const percent = (p) => (p >= 0.9995 ? "100\u00a0%" : `${(100 * p).toFixed(1)}\u00a0%`);
 const counted = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
 const token = decodeURIComponent(location.hash.slice(1));
 const authority = token ? { Authorization: `Bearer ${token}` } : {};
@@ -99,7 +100,7 @@ function showDecision() {
   const sure = it.label === null ? "" : `${percent(it.confidence)} sure · ${it.final ? "final" : "not final yet"} · `;
   const there = state.swarm ? state.swarm.robots.length : it.robots;
   const why = it.label === null && it.why ? `${it.why} · ` : "";
-  text("facts", `${sure}${why}held by ${it.held} of ${there} · round ${it.round.counter}, ${it.elapsed_ms} ms`);
+  text("facts", `${sure}${why}held by ${it.held} of ${there} · round ${it.round.counter}, ${it.elapsed_ms}\u00a0ms`);
   const against = it.votes.filter((vote) => !vote.agrees);
   const dissent = it.label === null ? "" : against.length === 0 ? ", all agree" : `, ${against.length} for something else`;
   text("quorum", `${it.reached} of ${counted(it.robots, "robot")} took part, ${it.quorum} needed · ` +
@@ -289,7 +290,7 @@ function showCurve(curve) {
   const last = curve.at(-1);
   $("curve").toggleAttribute("hidden", curve.length < 2);
   text("curve-words", last
-    ? `Of the latest rounds that were judged, a single robot is right in ${Math.round(100 * last.single)} %, the swarm in ${Math.round(100 * last.swarm)} %.`
+    ? `Of the latest rounds that were judged, a single robot is right in ${Math.round(100 * last.single)}\u00a0%, the swarm in ${Math.round(100 * last.swarm)}\u00a0%.`
     : "It begins when somebody says which gesture was shown.");
   if (curve.length < 2) return;
   const [left, right, top, bottom] = [72, 530, 14, 200];

@@ -59,7 +59,11 @@ impl Account {
     }
 
     pub(super) fn count(&self, name: &str) {
-        add(&mut self.lock().counters, name.to_owned(), 1);
+        self.add(name, 1);
+    }
+
+    pub(super) fn add(&self, name: &str, amount: u64) {
+        add(&mut self.lock().counters, name.to_owned(), amount);
     }
 
     /// Counts something that was refused, by cause, and names it among the latest errors.

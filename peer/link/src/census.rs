@@ -4,10 +4,12 @@
 //! measured to be lost for good (a hundred robots linking up: 1 % of the pairs), while a query finds the token.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use gestalt_protocol::{Keys, RobotId, Topic};
+use gestalt_protocol::{Keys, MAX_ROBOTS, RobotId, Topic};
+use tokio::sync::oneshot;
+use zenoh::query::Reply;
 
 use crate::inbox::Inbox;
 use crate::session::Node;
@@ -30,7 +32,7 @@ pub(crate) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) -> Re
             let robots = u32::try_from(inbox.tokens().len()).unwrap_or(u32::MAX);
             tokio::time::sleep(pause + pause * (robots / FEW)).await;
             let before = inbox.tokens();
-            let Ok(present) = ask(&node, &keys).await else { continue };
+            let Ok(present) = ask(&node, &keys, &inbox).await else { continue };
             let missing: BTreeSet<_> = before.difference(&present).copied().collect();
             let twice = absent.map(|absent: BTreeSet<_>| &absent & &missing).unwrap_or_default();
             inbox.on_census(&present, &twice);
@@ -39,15 +41,33 @@ pub(crate) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) -> Re
     }
 }
 
-async fn ask(node: &Node, keys: &Keys) -> zenoh::Result<BTreeSet<RobotId>> {
-    let replies = node.session().liveliness().get(keys.every_robot("alive")).timeout(PATIENCE).await?;
-    let mut present = BTreeSet::new();
-    while let Ok(reply) = replies.recv_async().await {
+/// The robots that answer. They come by a call and not by a queue: what this session knows already, Zenoh hands over before it returns from
+/// asking, and more than a queue holds would block it for ever, with the session locked.
+async fn ask(node: &Node, keys: &Keys, inbox: &Arc<Inbox>) -> zenoh::Result<BTreeSet<RobotId>> {
+    let (present, known) = (Arc::new(Mutex::new(BTreeSet::new())), inbox.tokens());
+    // Dropped with the call, when all have answered or the time is up.
+    let (answering, all) = oneshot::channel::<()>();
+    let (found, keys_of, members) = (present.clone(), keys.clone(), inbox.clone());
+    let hear = move |reply: Reply| {
+        let _answering = &answering;
         if let Ok(sample) = reply.result()
-            && let Some(Topic::Alive(id)) = keys.parse(sample.key_expr().as_str())
+            && let Some(Topic::Alive(id)) = keys_of.parse(sample.key_expr().as_str())
+            && !members.is_stranger(id)
         {
-            present.insert(id);
+            let mut found = lock(&found);
+            if found.len() < MAX_ROBOTS || known.contains(&id) {
+                found.insert(id);
+            }
         }
-    }
+    };
+    let every = keys.every_robot("alive");
+    node.session().liveliness().get(every).timeout(PATIENCE).callback(hear).await?;
+    // An error says that nobody answers any more.
+    let _ = all.await;
+    let present = std::mem::take(&mut *lock(&present));
     Ok(present)
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

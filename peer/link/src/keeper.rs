@@ -14,6 +14,7 @@ use crate::identity::{robot_of, swarm_checksum};
 use crate::inbox::Inbox;
 use crate::neighbourhood::{Neighbourhood, View};
 use crate::session::Node;
+use crate::sightings::{Place, Sightings};
 
 /// How often links are looked after.
 const PERIOD: Duration = Duration::from_millis(500);
@@ -25,12 +26,6 @@ const UNREST: Duration = Duration::from_secs(10);
 /// How long answers to a call are waited for.
 const CALL: Duration = Duration::from_millis(700);
 
-/// The most robots kept in mind as heard.
-const MAX_HEARD: usize = 4096;
-
-/// A robot that could not be dialled so often in a row is gone, unless it is heard anew.
-const MAX_FAILURES: u32 = 3;
-
 /// The task that looks after the links of one robot.
 pub(super) struct Keeper {
     me: RobotId,
@@ -40,21 +35,15 @@ pub(super) struct Keeper {
     inbox: Arc<Inbox>,
     account: Arc<Account>,
     scouting: zenoh::Config,
-    heard: BTreeMap<RobotId, Sighting>,
+    heard: Sightings,
+    started: Instant,
     busy: BTreeSet<RobotId>,
     news: (mpsc::UnboundedSender<Sign>, mpsc::UnboundedReceiver<Sign>),
 }
 
-struct Sighting {
-    id: ZenohId,
-    locators: Vec<String>,
-    at: Instant,
-    failures: u32,
-}
-
 enum Sign {
     Heard(ZenohId, Vec<String>),
-    Dialled(RobotId, bool),
+    Dialled(RobotId, Place, bool),
 }
 
 impl Keeper {
@@ -75,7 +64,8 @@ impl Keeper {
             inbox,
             account,
             scouting,
-            heard: BTreeMap::new(),
+            heard: Sightings::default(),
+            started: Instant::now(),
             busy: BTreeSet::new(),
             news: mpsc::unbounded_channel(),
         }
@@ -83,8 +73,7 @@ impl Keeper {
 
     /// Never returns.
     pub(super) async fn run(mut self) -> Result<(), String> {
-        let started = Instant::now();
-        let mut busy_until = started + UNREST;
+        let mut busy_until = Instant::now() + UNREST;
         let mut before = BTreeMap::new();
         loop {
             let links = self.inbox.links();
@@ -101,28 +90,20 @@ impl Keeper {
                     () = &mut next => break,
                 }
             }
-            self.look_after(started).await;
+            self.look_after().await;
         }
     }
 
     fn on_sign(&mut self, sign: Sign) {
         match sign {
             Sign::Heard(id, locators) => self.on_heard(id, locators),
-            Sign::Dialled(robot, stands) => {
+            Sign::Dialled(robot, place, stands) => {
                 self.busy.remove(&robot);
+                self.heard.dialled(robot, &place, stands);
                 if !stands {
                     self.account.count("dial_failed");
-                    self.on_failure(robot);
                 }
             }
-        }
-    }
-
-    fn on_failure(&mut self, robot: RobotId) {
-        let Some(heard) = self.heard.get_mut(&robot) else { return };
-        heard.failures += 1;
-        if heard.failures >= MAX_FAILURES {
-            self.heard.remove(&robot);
         }
     }
 
@@ -138,9 +119,7 @@ impl Keeper {
             }
             return;
         }
-        if self.heard.len() < MAX_HEARD || self.heard.contains_key(&robot) {
-            self.heard.insert(robot, Sighting { id, locators, at: Instant::now(), failures: 0 });
-        }
+        self.heard.hear(self.started.elapsed(), robot, Place { id, locators });
     }
 
     /// Where a robot is dialled: in a sealed swarm by TLS alone.
@@ -150,18 +129,14 @@ impl Keeper {
         locators
     }
 
-    async fn look_after(&mut self, started: Instant) {
+    async fn look_after(&mut self) {
         let links = self.inbox.links();
         let view = View {
-            heard: self
-                .heard
-                .iter()
-                .map(|(robot, heard)| (*robot, heard.at.saturating_duration_since(started)))
-                .collect(),
+            heard: self.heard.heard(),
             linked: links.values().copied().collect(),
             alive: self.inbox.alive(),
         };
-        let plan = self.neighbourhood.plan(started.elapsed(), &view);
+        let plan = self.neighbourhood.plan(self.started.elapsed(), &view);
         for robot in plan.dial {
             self.dial(robot);
         }
@@ -177,19 +152,19 @@ impl Keeper {
     }
 
     fn dial(&mut self, robot: RobotId) {
-        let Some(heard) = self.heard.get(&robot) else { return };
+        let Some(place) = self.heard.next(robot) else { return };
         if !self.busy.insert(robot) {
             return;
         }
         self.account.count("links_dialled");
-        let (node, news, id, locators) =
-            (self.node.clone(), self.news.0.clone(), heard.id, heard.locators.clone());
+        let (node, news) = (self.node.clone(), self.news.0.clone());
         tokio::spawn(async move {
             // A panic inside Zenoh makes no link.
+            let Place { id, locators } = place.clone();
             let dialled = tokio::spawn(async move { node.dial(id, &locators).await });
             let stands = dialled.await.unwrap_or(false);
             // The keeper may be gone: then nobody needs to know.
-            let _ = news.send(Sign::Dialled(robot, stands));
+            let _ = news.send(Sign::Dialled(robot, place, stands));
         });
     }
 

@@ -44,6 +44,7 @@ mod roll;
 mod roll_call;
 mod seal;
 mod session;
+mod sightings;
 mod stage;
 mod subscriptions;
 mod supervisor;

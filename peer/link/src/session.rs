@@ -211,6 +211,8 @@ impl Links {
             return;
         }
         if self.waiting.fetch_add(1, Ordering::Relaxed) < MAX_WAITING {
+            guard.account.count("links_kept_waiting");
+            guard.account.add("links_kept_waiting_ms", u64::try_from(pause.as_millis()).unwrap_or(u64::MAX));
             tokio::task::block_in_place(|| std::thread::sleep(pause));
         }
         self.waiting.fetch_sub(1, Ordering::Relaxed);

@@ -1,6 +1,7 @@
 //! A camera of this machine, by Video4Linux.
 
 use std::fs;
+use std::os::fd::{AsRawFd, RawFd};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -11,6 +12,10 @@ use opencv::videoio::{self, VideoCapture};
 use super::{Frame, Scene, Source, SourceError};
 use crate::camera_model::CameraModel;
 use crate::config::DeviceSettings;
+
+/// OpenCV waits for cameras by select(2), which writes beyond its memory for descriptors from 1,024 on; some are left for what else is
+/// opened between the look and OpenCV's own.
+const HIGHEST: RawFd = 768;
 
 /// A V4L2 device, `/dev/videoN`. Reading waits for the camera's next frame, for ever if need be: read it in a thread of
 /// its own ([`Reader`](super::Reader)).
@@ -43,7 +48,11 @@ impl Device {
         if about.is_file() || about.is_dir() {
             return Err(SourceError::NotADevice(path.into()));
         }
-        fs::File::open(path).map_err(|cause| SourceError::io(path, cause))?;
+        let file = fs::File::open(path).map_err(|cause| SourceError::io(path, cause))?;
+        if file.as_raw_fd() >= HIGHEST {
+            return Err(SourceError::TooManyOpen(path.into()));
+        }
+        drop(file);
         let mut capture = VideoCapture::from_file(path, videoio::CAP_V4L2)?;
         if !capture.is_opened()? {
             return Err(SourceError::NotADevice(path.into()));
@@ -169,5 +178,10 @@ mod tests {
             assert!(matches!(error, SourceError::NotADevice(_)), "{error}");
             assert!(error.to_string().contains(&path.display().to_string()), "{error}");
         }
+        // Nor is one opened whose number OpenCV could not wait for.
+        let many: Vec<_> = (0..HIGHEST).map(|_| fs::File::open("/dev/null").unwrap()).collect();
+        assert!(matches!(open(Path::new("/dev/null")), SourceError::TooManyOpen(_)));
+        drop(many);
+        assert!(matches!(open(Path::new("/dev/null")), SourceError::NotADevice(_)));
     }
 }

@@ -131,6 +131,9 @@ pub enum SourceError {
     /// Not a camera that V4L2 can open, or one that is in use.
     #[error("{} is no camera that V4L2 can open: check with v4l2-ctl --list-devices that it is one and that no other program uses it", .0.display())]
     NotADevice(PathBuf),
+    /// OpenCV cannot wait for a file whose number is too high, and there are so many open that it would be.
+    #[error("this process has too many files and connections open to open {}: look who connects to it; the camera is opened again", .0.display())]
+    TooManyOpen(PathBuf),
     /// A camera that is there and gives no frame.
     #[error("{} delivers no frame: check its cable; it is opened again", .0.display())]
     NoFrame(PathBuf),
