@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::{Discriminant, Head, margin_of};
 use crate::machine::pairs;
 
-/// A class of fewer showings is answered for by the head for few alone: its machines have hardly begun to learn.
-pub(crate) const YOUNG: usize = 6;
+/// A class of fewer showings is answered for by the head for few alone: no showing can be held out to tell which head is better.
+pub(crate) const YOUNG: usize = 2;
 
 /// Odds are kept this far from certainty, so that coupling is well posed.
 const LEAST: f64 = 1e-7;

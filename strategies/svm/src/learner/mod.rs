@@ -33,7 +33,7 @@ use crate::machine::{MAX_COORDINATE, Machine, pairs};
 /// A soft-margin machine for each pair of classes, as the offline trainer makes them. It keeps the kernel of
 /// every two samples (n² · 4 bytes for n samples) and the last solution of each pair, from which a change sets out.
 ///
-/// Beside the machines stands a [`Head`](crate::Head) for few showings: it answers alone for pairs with a class of fewer than six showings, and for the
+/// Beside the machines stands a [`Head`](crate::Head) for few showings: it answers alone for pairs with a class that was shown once, and for the
 /// others together with the machine, in the part that loses least over showings that neither has met.
 ///
 /// Cross-validation holds out whole showings: samples of one repeat each other. Who does not say of which showing a sample is has each taken for a showing
