@@ -94,7 +94,6 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
-        [Waits] siege::who_is_expelled_and_knocks_ten_times_a_second_is_not_heard_and_kept_waiting.await,
         [Waits] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,

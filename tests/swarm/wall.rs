@@ -136,7 +136,7 @@ pub async fn a_stranger_in_any_mode_neither_reads_nor_changes_anything() {
     }
 }
 
-pub async fn client(swarm: &str, endpoint: &[String], credentials: Option<Credentials>) -> Client {
+async fn client(swarm: &str, endpoint: &[String], credentials: Option<Credentials>) -> Client {
     let link = LinkConfig { connect: endpoint.to_vec(), credentials, ..LinkConfig::default() };
     Client::open(swarm, &link).await.expect("it is let in")
 }
@@ -199,31 +199,6 @@ pub async fn voters(robots: &mut [Watched], counter: u32) -> Vec<Vec<u32>> {
     voters
 }
 
-/// Tells the robots of a roster that robot 3 is on no more, and waits until none sees it; who told them.
-pub async fn expel(next: &Membership, locators: &[String], robots: &[Watched]) -> Client {
-    let roster = next.clone().sign(&key(1000)).unwrap();
-    let of_authority = Credentials::of_authority(Arc::new(key(1000)), &roster).unwrap();
-    let authority = client(&next.swarm, locators, Some(of_authority)).await;
-    let began = Instant::now();
-    authority.tell_roster(&roster).await.unwrap();
-    for robot in robots {
-        loop {
-            let status = robot.robot.status();
-            let gone = |of: &[RobotId]| !of.contains(&RobotId(3));
-            if status.counters["roster_epoch"] == next.epoch
-                && gone(&status.alive)
-                && gone(&status.neighbours)
-            {
-                break;
-            }
-            assert!(began.elapsed() < EXPULSION, "robot 3 is still there: {status:?}");
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        }
-    }
-    eprintln!("expelled everywhere after {:?}", began.elapsed());
-    authority
-}
-
 pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key() {
     let swarm = unique("expelled");
     let members = with_eve(&swarm, 4);
@@ -246,7 +221,23 @@ pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_ba
     let mut next = members.clone();
     next.epoch = 2;
     next.expelled = [(RobotId(3), next.robots.remove(&RobotId(3)).unwrap())].into();
-    let authority = expel(&next, &by_tls(&locators), &robots).await;
+    let roster = next.clone().sign(&key(1000)).unwrap();
+    let of_authority = Credentials::of_authority(Arc::new(key(1000)), &roster).unwrap();
+    let authority = client(&swarm, &by_tls(&locators), Some(of_authority)).await;
+    let began = Instant::now();
+    authority.tell_roster(&roster).await.unwrap();
+    for robot in &robots {
+        loop {
+            let status = robot.robot.status();
+            let gone = |of: &[RobotId]| !of.contains(&RobotId(3));
+            if status.counters["roster_epoch"] == 2 && gone(&status.alive) && gone(&status.neighbours) {
+                break;
+            }
+            assert!(began.elapsed() < EXPULSION, "robot 3 is still there: {status:?}");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+    eprintln!("expelled everywhere after {:?}", began.elapsed());
     let second = voters(&mut robots, 2).await;
     assert_eq!(second, [[0, 1, 2]; 3]);
     // It knocks again and again.

@@ -12,8 +12,8 @@ impl Swarm {
 
     pub(super) fn check_rest(&mut self) {
         let mut told = self.told_within(Duration::from_secs(60));
-        // A robot that refuses a decision or a word is reminded of it now and then.
-        let reminders = self.minds.len() * (self.minds.len() - 1);
+        // A robot that refuses a decision or a word is reminded of it now and then, by pauses that double: twice in this time at most.
+        let reminders = 2 * self.minds.len() * (self.minds.len() - 1);
         if told.get("other").is_some_and(|(times, _)| *times <= reminders) {
             told.remove("other");
         }
