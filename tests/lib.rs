@@ -18,7 +18,7 @@ mod streaming;
 
 pub use browser::Browser;
 pub use classifier::{Fixed, look};
-pub use learning::{gesture, learning, short_rounds, space};
+pub use learning::{between, gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;
 pub use process::Process;
 pub use robots::{Watched, agreed, config, start, start_learning, start_looking, unique};

@@ -30,6 +30,15 @@ pub fn gesture(class: ClassId, rng: &mut impl Rng) -> Observation {
     Observation { features: features.collect(), quality: 1.0 }
 }
 
+/// What robot `id` sees of what lies between two gestures: each robot is nearer another one of them, and every third torn.
+#[must_use]
+pub fn between(id: u32, [one, other]: [ClassId; 2], rng: &mut impl Rng) -> Observation {
+    let share = [0.75, 0.25, 0.5][id as usize % 3];
+    let (one, other) = (gesture(one, rng), gesture(other, rng));
+    let mixed = one.features.iter().zip(&other.features).map(|(a, b)| share * a + (1.0 - share) * b);
+    Observation { features: mixed.collect(), quality: 1.0 }
+}
+
 /// The feature space of all learning robots here.
 ///
 /// # Panics

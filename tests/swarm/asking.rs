@@ -9,7 +9,9 @@ use gestalt_protocol::{
     Answer, Ask, ClassId, Gesture, Instruction, InstructorId, Outcome, Question, RobotId, RoundId,
 };
 use gestalt_strategies::Observation;
-use gestalt_tests::{Watched, agreed, config, gesture, learning, short_rounds, start_looking, unique};
+use gestalt_tests::{
+    Watched, agreed, between, config, gesture, learning, short_rounds, start_looking, unique,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use tokio::time::Instant;
@@ -26,15 +28,12 @@ const BETWEEN: u8 = 99;
 /// The least time between two questions here.
 const APART: Duration = Duration::from_secs(4);
 
-/// What robot `id` sees: a gesture, or what lies between two, to each robot nearer another one of them.
+/// What robot `id` sees: a gesture, or what lies between two.
 fn seen(id: u32, shown: u8, rng: &mut ChaCha8Rng) -> Observation {
-    if shown != BETWEEN {
-        return gesture(ClassId(shown.into()), rng);
+    match shown {
+        BETWEEN => between(id, [TWO, THREE], rng),
+        class => gesture(ClassId(class.into()), rng),
     }
-    let share = [0.75, 0.25, 0.5][id as usize % 3];
-    let (two, three) = (gesture(TWO, rng), gesture(THREE, rng));
-    let mixed = two.features.iter().zip(&three.features).map(|(a, b)| share * a + (1.0 - share) * b);
-    Observation { features: mixed.collect(), quality: 1.0 }
 }
 
 struct School {

@@ -8,7 +8,9 @@ use std::time::{Duration, Instant};
 use gestalt_link::{LinkConfig, RobotConfig};
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, ClassifyError, Observation, Vocabulary};
-use gestalt_tests::{Browser, Watched, config, gesture, learning, short_rounds, start_looking, unique};
+use gestalt_tests::{
+    Browser, Watched, between, config, gesture, learning, short_rounds, start_looking, unique,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
@@ -40,15 +42,12 @@ impl Classify for Taught {
     }
 }
 
-/// What robot `id` sees: a gesture, or what lies between two, to each robot nearer another one of them.
+/// What robot `id` sees: a gesture, or what lies between two.
 fn seen(id: u32, shown: u8, rng: &mut ChaCha8Rng) -> Observation {
-    if shown != BETWEEN {
-        return gesture(ClassId(shown.into()), rng);
+    match shown {
+        BETWEEN => between(id, [ClassId(2), ClassId(3)], rng),
+        class => gesture(ClassId(class.into()), rng),
     }
-    let share = [0.75, 0.25, 0.5][id as usize % 3];
-    let (two, three) = (gesture(ClassId(2), rng), gesture(ClassId(3), rng));
-    let mixed = two.features.iter().zip(&three.features).map(|(a, b)| share * a + (1.0 - share) * b);
-    Observation { features: mixed.collect(), quality: 1.0 }
 }
 
 /// Three robots in a line that know their gestures, and may ask soon.
