@@ -4,11 +4,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{MAX_ROBOTS, RobotId};
 use zenoh::session::ZenohId;
-
-/// The most robots kept in mind as heard.
-const MAX_ROBOTS: usize = 4096;
 
 /// The most places kept for one robot.
 const MAX_PLACES: usize = 8;

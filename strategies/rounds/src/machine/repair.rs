@@ -173,10 +173,11 @@ impl Rounds {
 
     pub(super) fn tell_have(&mut self, robot: RobotId, answer: bool, effects: &mut Effects<'_>) {
         self.partners.tell(self.now, robot);
+        let (round, (decision, holders)) = self.standing();
         let have = Have {
-            round: self.round(),
-            decision: self.round.as_ref().and_then(|round| round.agreement.rank()),
-            holders: self.round.as_ref().map_or(0, |round| round.agreement.digest()),
+            round,
+            decision,
+            holders,
             votes: match &self.round {
                 Some(round) if round.open => round.ballot.stamps().collect(),
                 _ => Vec::new(),
