@@ -1,4 +1,4 @@
-//! Why a page cannot be shown.
+//! Why nothing can be shown.
 
 use std::io;
 
@@ -11,12 +11,14 @@ use thiserror::Error;
 pub enum DeskError {
     /// A text that is no address.
     #[error(
-        "'{0}' is no address for the page: write a port (8420), or HOST:PORT (127.0.0.1:8420, robot1.local:8420, [::]:8420)"
+        "'{0}' is no address to serve on: write a port (8420), or HOST:PORT (127.0.0.1:8420, robot1.local:8420, [::]:8420)"
     )]
     Address(String),
     /// The address cannot be listened on.
-    #[error("cannot serve the page on {address}: {error}; choose another port, or port 0 for a free one")]
+    #[error("cannot serve {what} on {address}: {error}; choose another port, or port 0 for a free one")]
     Listen {
+        /// What.
+        what: &'static str,
         /// Where.
         address: String,
         /// What the system says.
@@ -24,11 +26,11 @@ pub enum DeskError {
     },
     /// A token that is too easily guessed.
     #[error(
-        "the page's token has {0} characters: use at least 16 of the characters A-Z a-z 0-9 _ -, or leave it to be drawn"
+        "the token has {0} characters: use at least 16 of the characters A-Z a-z 0-9 _ -, or leave it to be drawn"
     )]
     Token(usize),
     /// The system gives no random numbers to draw a token from.
-    #[error("cannot draw a token for the page: {0}; choose one yourself")]
+    #[error("cannot draw a token: {0}; choose one yourself")]
     Chance(String),
     /// The swarm cannot be listened to.
     #[error(transparent)]

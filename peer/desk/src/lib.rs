@@ -10,16 +10,22 @@
 //! what it can bear and whom it lets in is in [`Door`]. It is no member of the swarm: when it dies nobody notices, and a
 //! reader that is too slow costs the swarm nothing.
 
+mod asks;
 mod board;
 mod desk;
+mod door;
 mod error;
 mod follow;
 mod known;
 mod metrics;
 mod page;
+mod tap;
 pub mod view;
+mod word;
 
 pub use desk::Desk;
+pub use door::{Address, Door, Limits, Token};
 pub use error::DeskError;
-pub use page::{Address, Door, Limits, Token};
+pub use tap::Tap;
 pub use view::{Event, Input, SHOWN, View};
+pub use word::Word;

@@ -47,7 +47,6 @@ mod watch;
 mod web;
 #[cfg(not(feature = "opencv"))]
 mod without_eyes;
-mod word;
 
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
