@@ -11,6 +11,7 @@ mod doctor;
 mod eyes;
 mod false_answers;
 mod field;
+mod foxglove;
 mod in_process;
 mod knowledge;
 mod learning;
@@ -96,6 +97,8 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
         [Waits] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
+        [Waits, Websockets] foxglove::a_viewer_in_python_sees_what_zenoh_carries_teaches_and_sees_the_links.await,
+        [Waits] foxglove::viewers_that_never_read_are_dropped_and_rounds_stay_as_quick.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
         [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
         [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,

@@ -23,6 +23,8 @@ pub enum Need {
     Systemd,
     /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
     Debian,
+    /// A Python that has `websockets`.
+    Websockets,
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -32,8 +34,17 @@ pub fn data() -> PathBuf {
     std::env::var_os("GESTALT_DATA").map_or_else(beside, PathBuf::from)
 }
 
+/// A Python that has that module: the one that `GESTALT_PYTHON` names, the first of the path, or Debian's own.
+#[must_use]
+pub fn python(module: &str) -> Option<String> {
+    let named = std::env::var("GESTALT_PYTHON").ok();
+    let others = ["python3", "/usr/bin/python3"].map(str::to_owned);
+    let has = |python: &String| done(python, &["-c", &format!("import {module}")]);
+    named.into_iter().chain(others).find(has)
+}
+
 impl Need {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -42,6 +53,7 @@ impl Need {
         Self::Valgrind,
         Self::Systemd,
         Self::Debian,
+        Self::Websockets,
     ];
 
     /// Its name in `GESTALT_REQUIRE`.
@@ -56,6 +68,7 @@ impl Need {
             Self::Valgrind => "valgrind",
             Self::Systemd => "systemd",
             Self::Debian => "debian",
+            Self::Websockets => "websockets",
         }
     }
 
@@ -85,6 +98,11 @@ impl Need {
                 let tools = ["dpkg-deb", "dpkg-shlibdeps", "lintian", "strip"];
                 let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
                 missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
+            }
+            Self::Websockets if python("websockets").is_some() => Ok(()),
+            Self::Websockets => {
+                Err("needs a Python with websockets (python3-websockets, or pip install websockets)"
+                    .to_owned())
             }
         }
     }

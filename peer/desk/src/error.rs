@@ -3,6 +3,7 @@
 use std::io;
 
 use gestalt_link::LinkError;
+use gestalt_tape::WriteError;
 use thiserror::Error;
 
 /// What keeps a desk from opening. Nothing is left behind.
@@ -32,6 +33,11 @@ pub enum DeskError {
     /// The system gives no random numbers to draw a token from.
     #[error("cannot draw a token: {0}; choose one yourself")]
     Chance(String),
+    /// What passes cannot be handed on.
+    #[error(
+        "cannot hand on what passes in the swarm: {0}; see that this machine has room for another thread"
+    )]
+    Live(WriteError),
     /// The swarm cannot be listened to.
     #[error(transparent)]
     Link(#[from] LinkError),

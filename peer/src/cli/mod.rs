@@ -13,6 +13,7 @@ mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod explain;
+mod foxglove;
 #[cfg(feature = "opencv")]
 mod look;
 mod manual;

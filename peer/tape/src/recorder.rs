@@ -42,25 +42,27 @@ impl Default for Room {
 }
 
 /// Records into a file or another [`Sink`], in a thread of its own.
+#[derive(Debug)]
 pub struct Recorder {
     intake: Intake,
     thread: JoinHandle<Result<(), WriteError>>,
 }
 
 /// Where messages are handed in; a clone hands in to the same recording.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Intake {
     queue: SyncSender<Order>,
     shared: Arc<Shared>,
     room: Room,
 }
 
+#[derive(Debug)]
 enum Order {
     Take(Passing),
     Say(u64, Level, String),
 }
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Shared {
     ledger: Mutex<Ledger>,
     /// Bytes that wait, about.
