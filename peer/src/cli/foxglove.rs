@@ -1,6 +1,6 @@
 //! A swarm live in Foxglove, served by a verb.
 
-use gestalt_desk::{Address, Foxglove, Token};
+use gestalt_desk::{Address, Foxglove, Token, Viewing};
 use gestalt_link::{Client, LinkConfig};
 use serde_json::json;
 
@@ -35,12 +35,12 @@ impl FoxgloveArgs {
         as_json: bool,
     ) -> Result<Option<Foxglove>, Failure> {
         let Some(address) = &self.foxglove else { return Ok(None) };
-        let mut door = Foxglove::door(address.clone());
-        door.origins.extend(self.foxglove_origin.iter().cloned());
+        let mut viewing = Viewing { frames: self.frames, ..Viewing::at(address.clone()) };
+        viewing.origins.extend(self.foxglove_origin.iter().cloned());
         if let Ok(token) = std::env::var(TOKEN) {
-            door.token = Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?);
+            viewing.door.token = Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?);
         }
-        let server = Foxglove::open(Client::open(swarm, link).await?, swarm, door, self.frames).await?;
+        let server = Foxglove::open(Client::open(swarm, link).await?, swarm, viewing).await?;
         let url = server.url();
         let layout = url.replacen("ws://", "http://", 1);
         let layout = match layout.split_once('?') {

@@ -32,8 +32,6 @@ pub struct Door {
     pub token: Option<Token>,
     /// Who the readers' words to the swarm are from.
     pub instructor: InstructorId,
-    /// Other sites and programs whose pages may ask, as browsers name them: `https://example.org`.
-    pub origins: Vec<String>,
     /// What it bears.
     pub limits: Limits,
 }
@@ -57,7 +55,7 @@ impl Door {
     #[must_use]
     pub fn at(address: Address) -> Self {
         let instructor = "page".parse().expect("a name of letters");
-        Self { address, token: None, instructor, origins: Vec::new(), limits: Limits::default() }
+        Self { address, token: None, instructor, limits: Limits::default() }
     }
 
     /// The listener, where it listens, and the token that its readers need.

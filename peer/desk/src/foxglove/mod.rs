@@ -55,6 +55,31 @@ const ORIGINS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 /// How long the last messages may take when the server closes.
 const GOODBYE: Duration = Duration::from_millis(500);
 
+/// What is served to viewers, and to whom.
+#[derive(Clone, Debug)]
+pub struct Viewing {
+    /// Where, and to how many.
+    pub door: Door,
+    /// Whose pages may connect, as browsers name them, besides the server's own: `https://example.org`.
+    pub origins: Vec<String>,
+    /// Whether what cameras stream is served, too: it then travels to this program as well.
+    pub frames: bool,
+}
+
+impl Viewing {
+    /// At that address, elsewhere than on this machine with a token, for the viewers' own pages, and without pictures.
+    ///
+    /// # Panics
+    /// Never.
+    #[must_use]
+    pub fn at(address: Address) -> Self {
+        let instructor = "foxglove".parse().expect("a name of letters");
+        let limits = Limits { connections: 32, readers: 16, ..Limits::default() };
+        let door = Door { instructor, limits, ..Door::at(address) };
+        Self { door, origins: ORIGINS.map(str::to_owned).to_vec(), frames: false }
+    }
+}
+
 /// A running server for viewers. It closes when it is dropped.
 #[derive(Debug)]
 pub struct Foxglove {
@@ -75,23 +100,13 @@ impl Foxglove {
     /// The port unless told otherwise: the one that viewers offer.
     pub const PORT: u16 = 8765;
 
-    /// The door of such a server: elsewhere than on this machine with a token, and for the viewers' own pages.
-    ///
-    /// # Panics
-    /// Never.
-    #[must_use]
-    pub fn door(address: Address) -> Door {
-        let instructor = "foxglove".parse().expect("a name of letters");
-        let limits = Limits { connections: 32, readers: 16, ..Limits::default() };
-        Door { instructor, limits, origins: ORIGINS.map(str::to_owned).to_vec(), ..Door::at(address) }
-    }
-
-    /// Serves the swarm that the client is attached to; with `frames` also what its cameras stream.
+    /// Serves the swarm that the client is attached to.
     ///
     /// # Errors
     /// [`DeskError::Listen`] when the address is taken or none of this machine's; [`DeskError::Link`] when the client is closed;
     /// [`DeskError::Chance`] when there are no random numbers; [`DeskError::Live`] when there is no thread.
-    pub async fn open(client: Client, swarm: &str, door: Door, frames: bool) -> Result<Self, DeskError> {
+    pub async fn open(client: Client, swarm: &str, viewing: Viewing) -> Result<Self, DeskError> {
+        let Viewing { door, origins, frames } = viewing;
         let keys = Keys::new(swarm).map_err(LinkError::from)?;
         let (listener, address, token) = door.listen("Foxglove").await?;
         let host = door.address.at_port(address.port());
@@ -116,7 +131,7 @@ impl Foxglove {
             patience: door.limits.patience,
         };
         let places = Arc::new(Semaphore::new(door.limits.readers));
-        let guard = Guard::new(&door.address, address, token).for_viewers(door.origins);
+        let guard = Guard::new(&door.address, address, token).for_viewers(origins);
         let server = Server { guard, host, places: places.clone() };
         let (open, closed) = oneshot::channel::<()>();
         let (instructor, deaf) = (door.instructor, hub.clone());

@@ -20,8 +20,8 @@ use crate::door::{Gate, Guard, at_the_door, with_token};
 /// The layout that ships, for the swarm called `gestalt`.
 pub(super) const LAYOUT: &str = include_str!("../../web/foxglove.json");
 
-/// What a client may leave unread in this program, beside its own queue, before it is waited for.
-const MAX_UNSENT: usize = 4 << 20;
+/// The most that is written for a client at a time: the longest message has room.
+const MAX_UNSENT: usize = 64 << 20;
 
 /// What requests are answered from.
 #[derive(Clone, Debug)]

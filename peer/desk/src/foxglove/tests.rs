@@ -32,9 +32,9 @@ struct Stage {
 
 /// Serves a swarm that is not there; with a token it behaves as one that can be reached from elsewhere.
 async fn stage(token: Option<&str>, limits: Limits) -> Stage {
-    let mut door = Door { limits, ..Foxglove::door(Address::default()) };
-    door.address = "0".parse().unwrap();
-    door.origins.push("http://localhost:8080".to_owned());
+    let Viewing { door, mut origins, .. } = Viewing::at("0".parse().unwrap());
+    let door = Door { limits, ..door };
+    origins.push("http://localhost:8080".to_owned());
     let (listener, address, _) = door.listen("Foxglove").await.unwrap();
     let keys = Keys::new("gestalt").unwrap();
     let hub = Arc::new(Hub::new(keys.clone()));
@@ -51,7 +51,7 @@ async fn stage(token: Option<&str>, limits: Limits) -> Stage {
         patience: limits.patience,
     };
     let token = token.map(|token| Token::new(token).unwrap());
-    let guard = Guard::new(&door.address, address, token).for_viewers(door.origins);
+    let guard = Guard::new(&door.address, address, token).for_viewers(origins);
     let server = Server { guard, host, places: Arc::new(Semaphore::new(limits.readers)) };
     let gate = Gate::new(listener, limits.connections, limits.patience);
     tokio::spawn(serve(gate, server, std::future::pending()));
@@ -510,7 +510,7 @@ async fn all_are_told_when_it_closes() {
 async fn a_port_in_use_is_named_with_the_way_out() {
     let taken = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = taken.local_addr().unwrap().to_string();
-    let error = Foxglove::door(address.parse().unwrap()).listen("Foxglove").await.unwrap_err().to_string();
+    let error = Viewing::at(address.parse().unwrap()).door.listen("Foxglove").await.unwrap_err().to_string();
     assert!(error.contains(&address) && error.contains("Foxglove") && error.contains("port 0"), "{error}");
 }
 
