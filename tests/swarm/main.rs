@@ -36,7 +36,7 @@ mod trouble;
 mod wall;
 
 fn main() -> std::process::ExitCode {
-    gestalt_trials::run(gestalt_trials::trials![
+    gestalt_trials::run_in_real_time(gestalt_trials::trials![
         [Works] mixed::footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike,
         [Waits] in_process::twenty_robots_agree_in_each_of_fifty_rounds.await,
         [Waits, Namespaces] churn::a_grid_under_churn_never_ends_a_round_differently_and_agrees_in_calm,
