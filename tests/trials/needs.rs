@@ -23,8 +23,21 @@ pub enum Need {
     Systemd,
     /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
     Debian,
+    /// The accessibility checker axe-core, which judges a page in a browser: see [`axe`].
+    Axe,
+    /// What reads metrics: Python's `prometheus_client`, by its own parser of OpenMetrics, and Prometheus' `promtool`.
+    Prometheus,
     /// A Python that has `websockets`.
     Websockets,
+}
+
+/// The interpreter that Debian's Python packages are installed for.
+pub const SYSTEM_PYTHON: &str = "/usr/bin/python3";
+
+/// The checker's one file, `axe.min.js`, of the npm package axe-core: what `GESTALT_AXE` names.
+#[must_use]
+pub fn axe() -> Option<PathBuf> {
+    std::env::var_os("GESTALT_AXE").map(PathBuf::from)
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -38,13 +51,13 @@ pub fn data() -> PathBuf {
 #[must_use]
 pub fn python(module: &str) -> Option<String> {
     let named = std::env::var("GESTALT_PYTHON").ok();
-    let others = ["python3", "/usr/bin/python3"].map(str::to_owned);
+    let others = ["python3", SYSTEM_PYTHON].map(str::to_owned);
     let has = |python: &String| done(python, &["-c", &format!("import {module}")]);
     named.into_iter().chain(others).find(has)
 }
 
 impl Need {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 11] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -53,6 +66,8 @@ impl Need {
         Self::Valgrind,
         Self::Systemd,
         Self::Debian,
+        Self::Axe,
+        Self::Prometheus,
         Self::Websockets,
     ];
 
@@ -68,6 +83,8 @@ impl Need {
             Self::Valgrind => "valgrind",
             Self::Systemd => "systemd",
             Self::Debian => "debian",
+            Self::Axe => "axe",
+            Self::Prometheus => "prometheus",
             Self::Websockets => "websockets",
         }
     }
@@ -98,6 +115,19 @@ impl Need {
                 let tools = ["dpkg-deb", "dpkg-shlibdeps", "lintian", "strip"];
                 let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
                 missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
+            }
+            Self::Axe if !done("chromium", &["--version"]) => Err("needs a browser (chromium)".to_owned()),
+            Self::Axe if axe().is_some_and(|file| file.is_file()) => Ok(()),
+            Self::Axe => {
+                Err("needs axe-core (npm install axe-core; GESTALT_AXE names its axe.min.js)".to_owned())
+            }
+            Self::Prometheus => {
+                let parser = done(SYSTEM_PYTHON, &["-c", "import prometheus_client.openmetrics.parser"]);
+                if parser && done("promtool", &["--version"]) {
+                    Ok(())
+                } else {
+                    Err("needs promtool and a parser (prometheus, python3-prometheus-client)".to_owned())
+                }
             }
             Self::Websockets if python("websockets").is_some() => Ok(()),
             Self::Websockets => {
