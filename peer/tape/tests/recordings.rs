@@ -8,9 +8,10 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{Envelope, HeldVote, Message, RobotId, RoundId, Stamp, Topic, VocabularyId, Vote};
+use gestalt_tape::foxglove::Level;
 use gestalt_tape::{
-    Condition, Disk, Entry, Kind, Ledger, Line, ReadError, Recorded, Recorder, Room, TapeWriter, read,
-    schema, view, wire,
+    Condition, Disk, Entry, Kind, Ledger, Line, ReadError, Recorded, Recorder, Room, Sink, TapeWriter,
+    WriteError, read, schema, view, wire,
 };
 use made::{BEGIN, SECOND, keys, one_of_each, run, said};
 use proptest::prelude::*;
@@ -54,6 +55,54 @@ fn what_is_read_is_what_was_written() {
     assert_eq!((condition.messages, condition.torn, condition.damage.len()), (written.len() as u64, None, 0));
     assert_eq!(condition.about["swarm"], "demo");
     assert_eq!(condition.end.unwrap()["lost"], "0");
+}
+
+/// Keeps what a recorder makes.
+struct Kept(Arc<Mutex<Vec<Entry>>>);
+
+impl Sink for Kept {
+    fn write(&mut self, entry: &Entry) -> Result<bool, WriteError> {
+        self.0.lock().unwrap().push(entry.clone());
+        Ok(true)
+    }
+
+    fn pending(&self) -> usize {
+        0
+    }
+
+    fn flush(&mut self) -> Result<(), WriteError> {
+        Ok(())
+    }
+
+    fn finish(self, _: BTreeMap<String, String>) -> Result<(), WriteError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn another_sink_is_handed_what_a_file_holds() {
+    let (kept, disk) = (Arc::<Mutex<Vec<Entry>>>::default(), Small::new(usize::MAX, Duration::ZERO));
+    let onto = Recorder::onto(Kept(kept.clone()), keys(), Room::default()).unwrap();
+    let into = Recorder::start(disk.clone(), keys(), BTreeMap::new(), Room::default()).unwrap();
+    for recorder in [&onto, &into] {
+        for passing in one_of_each() {
+            recorder.intake().take(passing);
+        }
+        recorder.intake().say(BEGIN, Level::Error, "something failed");
+    }
+    let [(ledger, ended), (other, also_ended)] = [onto.finish(), into.finish()];
+    ended.and(also_ended).unwrap();
+    assert_eq!((&ledger.received, &ledger.written), (&other.received, &other.written));
+    let of_swarm = |entry: &Entry| entry.kind != Kind::Recorder;
+    let (mut handed, bytes) = (kept.lock().unwrap().clone(), disk.bytes.lock().unwrap().clone());
+    let (mut filed, _) = replayed(&bytes).unwrap();
+    assert!(handed.iter().any(|entry| entry.kind == Kind::Recorder), "it says what it received");
+    handed.retain(of_swarm);
+    filed.retain(of_swarm);
+    assert_eq!(handed, filed);
+    // The channels that are said to be there before anything is are those that messages then have.
+    let channels = Entry::channels(&keys(), None);
+    assert!(handed.iter().any(|entry| channels.contains(&(entry.kind, entry.channel.clone()))));
 }
 
 #[test]
