@@ -11,7 +11,7 @@ endif
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
             libclang1-14 clang pkg-config
 TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++ systemd \
-                 dpkg-dev lintian python3-numpy mypy
+                 dpkg-dev lintian python3-numpy python3-websockets mypy
 
 # $(call install,PACKAGES): those of them that are missing.
 define install
@@ -43,7 +43,7 @@ demo: packages
 	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
 # Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
-# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus. Many tests wait for rounds and deadlines: two threads a core.
+# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
 	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \

@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 
 use crate::stage::{Stage, root};
 
-const TEXTS: [&str; 11] = [
+const TEXTS: [&str; 12] = [
     "README.md",
     "CONTRIBUTING.md",
     "SECURITY.md",
     "docs/capture.md",
     "docs/doctor.md",
+    "docs/foxglove.md",
     "docs/install.md",
     "docs/recording.md",
     "docs/round.md",
@@ -19,7 +20,7 @@ const TEXTS: [&str; 11] = [
 ];
 
 /// Lines that cannot run here, by how they begin, and why.
-const APART: [(&str, &str); 17] = [
+const APART: [(&str, &str); 18] = [
     ("sudo ", "changes the system; packaging/installed.sh does it in one of its own"),
     ("gestalt config | sudo ", "likewise"),
     ("gestalt doctor /etc/gestalt/", "needs the line before"),
@@ -34,6 +35,7 @@ const APART: [(&str, &str); 17] = [
     ("pip install eclipse-zenoh", "needs PyPI"),
     ("gestalt capture --gesture", "needs a camera"),
     ("gestalt watch --web", "serves until it is stopped"),
+    ("gestalt watch --foxglove", "serves until it is stopped"),
     ("gestalt record run.mcap -e", "records the reader's own swarm until it is stopped"),
     ("gestalt replay run.mcap --play", "plays to the reader's own clients"),
     ("python3 examples/subscribe.py", "needs the package of the line before, and listens for ever"),

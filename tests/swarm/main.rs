@@ -11,6 +11,7 @@ mod doctor;
 mod eyes;
 mod false_answers;
 mod field;
+mod foxglove;
 mod in_process;
 mod knocking;
 mod knowledge;
@@ -99,6 +100,8 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
+        [Waits, Websockets] foxglove::a_viewer_in_python_sees_what_zenoh_carries_teaches_and_sees_the_links.await,
+        [Waits] foxglove::viewers_that_never_read_are_dropped_and_rounds_stay_as_quick.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
         [Works, Axe] page::axe_finds_nothing_serious_on_the_page.await,
         [Waits, Prometheus] page::metrics_are_read_by_promtool_and_by_python.await,

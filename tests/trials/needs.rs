@@ -27,10 +27,9 @@ pub enum Need {
     Axe,
     /// What reads metrics: Python's `prometheus_client`, by its own parser of OpenMetrics, and Prometheus' `promtool`.
     Prometheus,
+    /// A Python that has `websockets`.
+    Websockets,
 }
-
-/// The interpreter that Debian's Python packages are installed for.
-pub const SYSTEM_PYTHON: &str = "/usr/bin/python3";
 
 /// The checker's one file, `axe.min.js`, of the npm package axe-core: what `GESTALT_AXE` names.
 #[must_use]
@@ -45,8 +44,17 @@ pub fn data() -> PathBuf {
     std::env::var_os("GESTALT_DATA").map_or_else(beside, PathBuf::from)
 }
 
+/// A Python that has that module: the one that `GESTALT_PYTHON` names, the first of the path, or Debian's own.
+#[must_use]
+pub fn python(module: &str) -> Option<String> {
+    let named = std::env::var("GESTALT_PYTHON").ok();
+    let others = ["python3", "/usr/bin/python3"].map(str::to_owned);
+    let has = |python: &String| done(python, &["-c", &format!("import {module}")]);
+    named.into_iter().chain(others).find(has)
+}
+
 impl Need {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -57,6 +65,7 @@ impl Need {
         Self::Debian,
         Self::Axe,
         Self::Prometheus,
+        Self::Websockets,
     ];
 
     /// Its name in `GESTALT_REQUIRE`.
@@ -73,6 +82,7 @@ impl Need {
             Self::Debian => "debian",
             Self::Axe => "axe",
             Self::Prometheus => "prometheus",
+            Self::Websockets => "websockets",
         }
     }
 
@@ -109,12 +119,16 @@ impl Need {
                 Err("needs axe-core (npm install axe-core; GESTALT_AXE names its axe.min.js)".to_owned())
             }
             Self::Prometheus => {
-                let parser = done(SYSTEM_PYTHON, &["-c", "import prometheus_client.openmetrics.parser"]);
-                if parser && done("promtool", &["--version"]) {
+                if python("prometheus_client").is_some() && done("promtool", &["--version"]) {
                     Ok(())
                 } else {
                     Err("needs promtool and a parser (prometheus, python3-prometheus-client)".to_owned())
                 }
+            }
+            Self::Websockets if python("websockets").is_some() => Ok(()),
+            Self::Websockets => {
+                Err("needs a Python with websockets (python3-websockets, or pip install websockets)"
+                    .to_owned())
             }
         }
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::json;
 use tokio::sync::watch;
 
+use crate::follow::Show;
 use crate::view::View;
 
 /// The parts of the page, by the names of their events.
@@ -49,8 +50,24 @@ impl Board {
         Self { parts, announced: Mutex::default(), swarm: swarm.to_owned() }
     }
 
+    pub fn reader(&self) -> Reader {
+        Reader { parts: self.parts.subscribe(), seen: [0; NAMES.len()] }
+    }
+
+    /// How many readers there are.
+    pub fn readers(&self) -> usize {
+        self.parts.receiver_count()
+    }
+
+    /// The latest decision as it was announced: JSON.
+    pub fn announced(&self) -> Option<Bytes> {
+        self.announced.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Show for Board {
     /// Writes what has changed.
-    pub fn show(&self, view: &View, now: Duration) {
+    fn show(&self, view: &View, now: Duration) {
         let events = [
             event(NAMES[0], &view.swarm(now)),
             event(NAMES[1], &view.decision()),
@@ -67,24 +84,10 @@ impl Board {
     }
 
     /// Says that the page is live: readers that hear this no more have lost it.
-    pub fn beat(&self, now: Duration) {
+    fn beat(&self, now: Duration) {
         let at_ms = u64::try_from(now.as_millis()).unwrap_or(u64::MAX);
         let event = event(NAMES[4], &json!({"swarm": self.swarm, "at_ms": at_ms}));
         self.parts.send_modify(|parts| parts.0[4].write(event));
-    }
-
-    pub fn reader(&self) -> Reader {
-        Reader { parts: self.parts.subscribe(), seen: [0; NAMES.len()] }
-    }
-
-    /// How many readers there are.
-    pub fn readers(&self) -> usize {
-        self.parts.receiver_count()
-    }
-
-    /// The latest decision as it was announced: JSON.
-    pub fn announced(&self) -> Option<Bytes> {
-        self.announced.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 

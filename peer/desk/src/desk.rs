@@ -5,18 +5,16 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_link::Client;
-use tokio::net::TcpListener;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
+use crate::asks::Asks;
 use crate::board::Board;
+use crate::door::{Door, Gate, Token};
 use crate::error::DeskError;
 use crate::follow::Ears;
 use crate::known::Known;
-use crate::page::{Door, Gate, Server, Token, serve};
-
-/// How many words of readers wait to be said.
-const MAX_WAITING: usize = 8;
+use crate::page::{Server, serve};
 
 /// How long the last answers may take when the page closes.
 const GOODBYE: Duration = Duration::from_millis(500);
@@ -40,14 +38,14 @@ impl Desk {
     /// [`DeskError::Chance`] when no token can be drawn.
     pub async fn open(client: Client, swarm: &str, door: Door) -> Result<Self, DeskError> {
         let ears = Ears::new(client).await?;
-        let (listener, address, token) = listen(&door).await?;
+        let (listener, address, token) = door.listen("the page").await?;
         let url = url(&door, address, token.as_ref());
         let (board, known) = (Arc::new(Board::new(swarm)), Arc::new(Known::new()));
-        let (asks, asked) = mpsc::channel(MAX_WAITING);
+        let (asks, asked) = Asks::new();
         let server = Server::new(&door, address, token, &board, known.clone(), asks);
         let (open, closed) = oneshot::channel::<()>();
         let following =
-            tokio::spawn(async move { ears.follow(&known, &board, asked, door.instructor).await });
+            tokio::spawn(async move { ears.follow(&known, &*board, asked, door.instructor).await });
         let gate = Gate::new(listener, door.limits.connections, door.limits.patience);
         let serving = tokio::spawn(serve(gate, server, async { drop(closed.await) }));
         Ok(Self { address, url, following, serving, open: Some(open) })
@@ -84,19 +82,6 @@ impl Drop for Desk {
         self.following.abort();
         self.serving.abort();
     }
-}
-
-/// The listener, where it listens, and the token that its readers need.
-async fn listen(door: &Door) -> Result<(TcpListener, SocketAddr, Option<Token>), DeskError> {
-    let failed = |error| DeskError::Listen { address: door.address.to_string(), error };
-    let listener = TcpListener::bind(door.address.to_string()).await.map_err(failed)?;
-    let address = listener.local_addr().map_err(failed)?;
-    let token = match &door.token {
-        None if address.ip().is_loopback() => None,
-        None => Some(Token::draw()?),
-        given => given.clone(),
-    };
-    Ok((listener, address, token))
 }
 
 /// The token is in the fragment, which browsers send nowhere.

@@ -8,10 +8,9 @@ use gestalt_protocol::{Announcement, Answer, Instruction, InstructorId, Status};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 
-use crate::board::Board;
+use crate::asks::Ask;
 use crate::known::Known;
-use crate::page::Ask;
-use crate::view::Input;
+use crate::view::{Input, View};
 
 /// Robots are asked for their status this often; who takes longer to answer is asked again with the others.
 const ASKED: Duration = Duration::from_secs(1);
@@ -24,6 +23,15 @@ const TOGETHER: Duration = Duration::from_millis(60);
 
 /// How long the swarm has to answer an instructor.
 const ANSWER: Duration = Duration::from_secs(5);
+
+/// What is shown of a view, wherever that is.
+pub(crate) trait Show {
+    /// Something has changed.
+    fn show(&self, view: &View, now: Duration);
+
+    /// What is shown is live.
+    fn beat(&self, now: Duration);
+}
 
 /// The ears of a desk.
 pub(crate) struct Ears {
@@ -42,7 +50,7 @@ impl Ears {
     pub async fn follow(
         mut self,
         known: &Known,
-        board: &Board,
+        board: &(impl Show + Sync),
         mut asks: mpsc::Receiver<Ask>,
         instructor: InstructorId,
     ) {
@@ -94,7 +102,7 @@ impl Ears {
                 show_at.get_or_insert_with(|| Instant::now() + TOGETHER);
             }
         }
-        tracing::warn!("the page's Zenoh session has ended: what it shows is no longer live");
+        tracing::warn!("the Zenoh session has ended: what is shown is no longer live");
     }
 }
 

@@ -13,6 +13,7 @@ mod emulate;
 #[cfg(feature = "opencv")]
 mod evaluate;
 mod explain;
+mod foxglove;
 #[cfg(feature = "opencv")]
 mod look;
 mod manual;
@@ -47,7 +48,6 @@ mod watch;
 mod web;
 #[cfg(not(feature = "opencv"))]
 mod without_eyes;
-mod word;
 
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;

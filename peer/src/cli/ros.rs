@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use gestalt_desk::Word;
 use gestalt_link::{Client, Heard};
 use gestalt_protocol::{Announcement, CameraState, Instruction, InstructorId, MAX_ROBOTS, RobotId, Status};
 use gestalt_ros::message::{Diagnostic, Diagnostics, Header, Level, Text};
@@ -12,7 +13,6 @@ use tokio::time::MissedTickBehavior;
 
 use super::config_args::ConfigArgs;
 use super::show::{self, clean};
-use super::word::Word;
 use super::{Failure, interrupted};
 
 /// Show a swarm to a ROS 2 system that runs rmw_zenoh, and take an instructor's words from it

@@ -10,9 +10,8 @@ use tokio::sync::mpsc;
 
 use super::config_args::ConfigArgs;
 use super::show::{self, Names, line};
-use super::word::Word;
 use super::{Failure, interrupted};
-use gestalt_desk::SHOWN;
+use gestalt_desk::{SHOWN, Word};
 use gestalt_link::{Client, Heard, News};
 
 /// The time to hold the hand otherwise, and longer than robots take requests for copies of one.

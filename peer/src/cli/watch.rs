@@ -7,6 +7,7 @@ use serde_json::json;
 use tokio::time::MissedTickBehavior;
 
 use super::config_args::ConfigArgs;
+use super::foxglove::FoxgloveArgs;
 use super::robots::table;
 use super::show::{self, Names, clean, line};
 use super::web::WebArgs;
@@ -17,7 +18,7 @@ use gestalt_link::{Client, News};
 /// Attach to a swarm and print its decisions, and robots joining and leaving, until Ctrl-C
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  gestalt watch -e tcp/192.168.1.5:7447 --web
+  gestalt watch -e tcp/192.168.1.5:7447 --web --foxglove
   gestalt watch --robots")]
 pub struct Args {
     #[command(flatten)]
@@ -28,15 +29,18 @@ pub struct Args {
     count: Option<u64>,
 
     /// Print the status of each robot once and exit
-    #[arg(long, conflicts_with = "web")]
+    #[arg(long, conflicts_with_all = ["web", "foxglove"])]
     status: bool,
 
     /// Show a table of all robots, refreshed every second: source, frames per second, latency, motion, opinion
-    #[arg(long, conflicts_with_all = ["status", "count", "web"])]
+    #[arg(long, conflicts_with_all = ["status", "count", "web", "foxglove"])]
     robots: bool,
 
     #[command(flatten)]
     web: WebArgs,
+
+    #[command(flatten)]
+    foxglove: FoxgloveArgs,
 
     /// Print JSON Lines, one object per line
     #[arg(long)]
@@ -61,12 +65,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         } else {
             let mut news = client.news().await?;
             let page = args.web.open(&swarm, &link, args.json).await?;
+            let foxglove = args.foxglove.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}
                 watched = watch(args, &client, &mut news) => watched?,
             }
             if let Some(page) = page {
                 page.close().await;
+            }
+            if let Some(foxglove) = foxglove {
+                FoxgloveArgs::close(foxglove, args.json).await?;
             }
         }
         client.close().await;

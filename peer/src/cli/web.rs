@@ -8,7 +8,7 @@ use super::Failure;
 use super::show::line;
 
 /// What chooses the page's token; else one is drawn where one is needed.
-const TOKEN: &str = "GESTALT_WEB_TOKEN";
+pub(super) const TOKEN: &str = "GESTALT_WEB_TOKEN";
 
 /// Where a page is served; as flags of a verb.
 #[derive(Clone, Debug, Default, clap::Args)]

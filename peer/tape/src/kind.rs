@@ -113,6 +113,12 @@ impl Kind {
         self.schema().starts_with(OWN)
     }
 
+    /// How its messages are written: `json`, or `protobuf`.
+    #[must_use]
+    pub fn encoding(self) -> &'static str {
+        if self.is_json() { "json" } else { "protobuf" }
+    }
+
     /// Its name in tables and metadata.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -6,11 +6,12 @@
 //! No Zenoh, no camera: who listens hands in what it heard, with the time. Only the recorder has a thread and a file.
 //!
 //! ```text
-//! Passing ─► Recorder (queue, thread) ─► TapeWriter ─► file ─► read ─► Run ─► prove: was it decided so?
+//! Passing ─► Recorder (queue, thread) ─► Sink: TapeWriter ─► file ─► read ─► Run ─► prove: was it decided so?
 //!                                                                        └──► WhatIf ─► Score: what would have been?
 //! ```
 
 mod count;
+mod definition;
 mod disk;
 pub mod foxglove;
 mod kind;
@@ -23,10 +24,12 @@ mod recorder;
 mod run;
 mod schema;
 mod score;
+mod sink;
 mod view;
 mod what_if;
 mod writer;
 
+pub use definition::definition;
 pub use disk::Disk;
 pub use kind::Kind;
 pub use ledger::{Ledger, Tally};
@@ -38,6 +41,7 @@ pub use recorder::{Intake, Recorder, Room};
 pub use run::{ROUNDS, Run, SWARM, Showing, Truth, rounds_of};
 pub use schema::schema;
 pub use score::{PairedDifference, Score};
+pub use sink::{Sink, WriteError};
 pub use view::{Alive, unreadable, view, wire};
 pub use what_if::{Outcome, WhatIf, outcomes};
-pub use writer::{TapeWriter, WriteError};
+pub use writer::TapeWriter;

@@ -1,10 +1,11 @@
 //! What comes to a recorder, and what becomes of it in the file.
 
 use gestalt_protocol::{DecodeError, FrameHeader, ImageEncoding, Keys, MAX_FRAME, RobotId, Topic};
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::foxglove;
+use crate::foxglove::{self, Level};
 use crate::kind::Kind;
+use crate::ledger::Ledger;
 use crate::view::{self, Alive};
 
 /// One thing that was said in a swarm, as it travelled.
@@ -66,7 +67,7 @@ impl Passing {
             Err(cause) => Entry {
                 kind: Kind::Unreadable,
                 // One channel for all: whoever may say anything may say it under any key.
-                channel: beside(keys, "unreadable"),
+                channel: beside(keys, Kind::Unreadable.name()),
                 at,
                 published,
                 data: bytes(&view::unreadable(&key, &self.payload, &cause)),
@@ -91,13 +92,57 @@ impl Passing {
     }
 }
 
+impl Entry {
+    /// A line of the log of a recording, at that time in nanoseconds since 1970.
+    #[must_use]
+    pub fn log(keys: &Keys, at: u64, level: Level, words: &str) -> Self {
+        Self::own(keys, Kind::Log, at, foxglove::log(at, level, "recorder", words))
+    }
+
+    /// What was received, written and lost so far.
+    #[must_use]
+    pub fn report(keys: &Keys, at: u64, ledger: &Ledger) -> Self {
+        let Ledger { received, written, dropped, bytes: on_disk, unattached_ms, .. } = ledger;
+        let report = json!({
+            "received": received, "written": written, "dropped": dropped, "bytes": on_disk,
+            "unattached_ms": unattached_ms,
+        });
+        Self::own(keys, Kind::Recorder, at, bytes(&report))
+    }
+
+    /// The channels of the whole swarm that every recording may have, and those of a robot that is there.
+    #[must_use]
+    pub fn channels(keys: &Keys, robot: Option<RobotId>) -> Vec<(Kind, String)> {
+        let topics = match robot {
+            None => vec![Topic::Decision, Topic::Question],
+            Some(id) => {
+                vec![
+                    Topic::Alive(id),
+                    Topic::Status(id),
+                    Topic::Vote(id),
+                    Topic::RobotDecision(id),
+                    Topic::Sample(id),
+                ]
+            }
+        };
+        let of_swarm =
+            topics.iter().filter_map(|topic| Some((Kind::of(topic)?, format!("/{}", keys.key(topic)))));
+        let own = [Kind::Log, Kind::Recorder].into_iter().filter(|_| robot.is_none());
+        of_swarm.chain(own.map(|kind| (kind, beside(keys, kind.name())))).collect()
+    }
+
+    fn own(keys: &Keys, kind: Kind, at: u64, data: Vec<u8>) -> Self {
+        Self { kind, channel: beside(keys, kind.name()), at, published: at, data }
+    }
+}
+
 /// A channel of the recorder's own, beside those of the swarm.
-pub(crate) fn beside(keys: &Keys, name: &str) -> String {
+fn beside(keys: &Keys, name: &str) -> String {
     let decision = keys.key(&Topic::Decision);
     format!("/{}{name}", decision.trim_end_matches("decision"))
 }
 
 /// A JSON value has a text, always.
-pub(crate) fn bytes(value: &Value) -> Vec<u8> {
+fn bytes(value: &Value) -> Vec<u8> {
     value.to_string().into_bytes()
 }

@@ -1,4 +1,4 @@
-//! Records what passes, beside the swarm: whoever hands something in never waits for the disk.
+//! Records what passes, beside the swarm: whoever hands something in never waits for the disk, nor for those who look on.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -9,13 +9,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::Keys;
-use serde_json::json;
 
-use crate::foxglove::{self, Level};
+use crate::foxglove::Level;
 use crate::kind::Kind;
 use crate::ledger::{Ledger, Tally};
-use crate::passing::{Entry, Passing, beside, bytes};
-use crate::writer::{TapeWriter, WriteError};
+use crate::passing::{Entry, Passing};
+use crate::sink::{Sink, WriteError};
+use crate::writer::TapeWriter;
 
 /// A chunk is written after this long at the latest: a kill loses no more.
 const FLUSH: Duration = Duration::from_millis(250);
@@ -41,26 +41,28 @@ impl Default for Room {
     }
 }
 
-/// Records into a file, in a thread of its own.
+/// Records into a file or another [`Sink`], in a thread of its own.
+#[derive(Debug)]
 pub struct Recorder {
     intake: Intake,
     thread: JoinHandle<Result<(), WriteError>>,
 }
 
 /// Where messages are handed in; a clone hands in to the same recording.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Intake {
     queue: SyncSender<Order>,
     shared: Arc<Shared>,
     room: Room,
 }
 
+#[derive(Debug)]
 enum Order {
     Take(Passing),
     Say(u64, Level, String),
 }
 
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Shared {
     ledger: Mutex<Ledger>,
     /// Bytes that wait, about.
@@ -120,7 +122,7 @@ impl Intake {
 }
 
 impl Recorder {
-    /// Begins a recording of the swarm of these keys.
+    /// Begins a recording of the swarm of these keys, into a file.
     ///
     /// # Errors
     /// [`WriteError`] when nothing can be written, or there is no room for a thread.
@@ -132,10 +134,20 @@ impl Recorder {
     ) -> Result<Self, WriteError> {
         let shared = Arc::new(Shared::default());
         let writer = TapeWriter::new(Counting { out, shared: shared.clone() }, about)?;
+        Self::spawn(writer, shared, keys, room)
+    }
+
+    /// Hands the same messages to somebody else, from now on.
+    ///
+    /// # Errors
+    /// [`WriteError`] when there is no room for a thread.
+    pub fn onto(sink: impl Sink, keys: Keys, room: Room) -> Result<Self, WriteError> {
+        Self::spawn(sink, Arc::default(), keys, room)
+    }
+
+    fn spawn(sink: impl Sink, shared: Arc<Shared>, keys: Keys, room: Room) -> Result<Self, WriteError> {
         let (queue, orders) = sync_channel(room.messages);
-        let own = [beside(&keys, "log"), beside(&keys, "recorder")];
-        let desk =
-            Desk { writer, orders, keys, own, shared: shared.clone(), under_way: Tally::new(), latest: 0 };
+        let desk = Desk { sink, orders, keys, shared: shared.clone(), under_way: Tally::new(), latest: 0 };
         let thread = std::thread::Builder::new().name("recorder".to_owned()).spawn(move || desk.run())?;
         Ok(Self { intake: Intake { queue, shared, room }, thread })
     }
@@ -177,13 +189,11 @@ impl<W: Write> Write for Counting<W> {
     }
 }
 
-/// Where messages become entries of the file.
-struct Desk<W: Write> {
-    writer: TapeWriter<Counting<W>>,
+/// Where what passes becomes messages of the recording.
+struct Desk<S> {
+    sink: S,
     orders: Receiver<Order>,
     keys: Keys,
-    /// The channels of the log and of the reports.
-    own: [String; 2],
     shared: Arc<Shared>,
     /// Taken in, and not flushed yet.
     under_way: Tally,
@@ -191,7 +201,7 @@ struct Desk<W: Write> {
     latest: u64,
 }
 
-impl<W: Write> Desk<W> {
+impl<S: Sink> Desk<S> {
     fn run(mut self) -> Result<(), WriteError> {
         if let Err(error) = self.record() {
             self.shared.failed.store(true, Ordering::Release);
@@ -200,7 +210,7 @@ impl<W: Write> Desk<W> {
             return Err(error);
         }
         let end = self.shared.ledger().metadata();
-        self.writer.finish(end).map(drop)
+        self.sink.finish(end)
     }
 
     fn record(&mut self) -> Result<(), WriteError> {
@@ -221,7 +231,7 @@ impl<W: Write> Desk<W> {
             if closing && idle {
                 break;
             }
-            if Instant::now() >= flush || self.writer.pending() >= CHUNK {
+            if Instant::now() >= flush || self.sink.pending() >= CHUNK {
                 self.flush()?;
                 flush = Instant::now() + FLUSH;
             }
@@ -244,7 +254,7 @@ impl<W: Write> Desk<W> {
                     return Ok(());
                 };
                 Ledger::count(&mut self.under_way, kind);
-                if !self.writer.write(&entry)? {
+                if !self.sink.write(&entry)? {
                     self.under_way.entry(kind).and_modify(|count| *count -= 1);
                     Ledger::count(&mut self.shared.ledger().dropped, kind);
                 }
@@ -252,13 +262,13 @@ impl<W: Write> Desk<W> {
             }
             Order::Say(at, level, words) => {
                 self.latest = self.latest.max(at);
-                self.own_entry(Kind::Log, foxglove::log(at, level, "recorder", &words))
+                self.sink.write(&Entry::log(&self.keys, at, level, &words)).map(drop)
             }
         }
     }
 
     fn flush(&mut self) -> Result<(), WriteError> {
-        self.writer.flush()?;
+        self.sink.flush()?;
         Ledger::settle(&mut self.shared.ledger().written, &mut self.under_way);
         Ok(())
     }
@@ -268,19 +278,8 @@ impl<W: Write> Desk<W> {
         if self.latest == 0 {
             return Ok(());
         }
-        let Ledger { received, written, dropped, bytes: on_disk, unattached_ms, .. } =
-            self.shared.ledger().clone();
-        let report = json!({
-            "received": received, "written": written, "dropped": dropped, "bytes": on_disk,
-            "unattached_ms": unattached_ms,
-        });
-        self.own_entry(Kind::Recorder, bytes(&report))
-    }
-
-    fn own_entry(&mut self, kind: Kind, data: Vec<u8>) -> Result<(), WriteError> {
-        let channel = self.own[usize::from(kind == Kind::Recorder)].clone();
-        let entry = Entry { kind, channel, at: self.latest, published: self.latest, data };
-        self.writer.write(&entry).map(drop)
+        let report = Entry::report(&self.keys, self.latest, &self.shared.ledger());
+        self.sink.write(&report).map(drop)
     }
 
     /// Counts all that comes until the recorder is told to end.

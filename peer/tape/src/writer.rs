@@ -3,15 +3,14 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
+use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{McapError, WriteOptions};
-use thiserror::Error;
 
-use crate::foxglove;
+use crate::definition::definition;
 use crate::kind::Kind;
-use crate::passing::{Entry, bytes};
-use crate::schema;
+use crate::passing::Entry;
+use crate::sink::{Sink, WriteError};
 
 /// The name of the metadata that says what is recorded.
 pub const ABOUT: &str = "gestalt";
@@ -21,26 +20,6 @@ pub const END: &str = "gestalt.end";
 
 /// The most channels of a recording. Whoever may say anything may say it under the key of any robot.
 const MAX_CHANNELS: usize = 16_384;
-
-/// A recording that cannot be written on.
-#[derive(Debug, Error)]
-pub enum WriteError {
-    /// The disk is full, gone or forbids it.
-    #[error("cannot write the recording: {0}")]
-    Disk(#[from] std::io::Error),
-    /// What MCAP cannot hold.
-    #[error("cannot write the recording: {0}")]
-    Mcap(McapError),
-}
-
-impl From<McapError> for WriteError {
-    fn from(error: McapError) -> Self {
-        match error {
-            McapError::Io(error) => Self::Disk(error),
-            other => Self::Mcap(other),
-        }
-    }
-}
 
 /// Writes a recording. Messages collect in memory until [`flush`](TapeWriter::flush), which writes them as one chunk.
 pub struct TapeWriter<W: Write> {
@@ -124,8 +103,7 @@ impl<W: Write> TapeWriter<W> {
         if self.channels.len() >= MAX_CHANNELS {
             return Ok(None);
         }
-        let (schema, encoding) =
-            (self.schema(entry.kind)?, if entry.kind.is_json() { "json" } else { "protobuf" });
+        let (schema, encoding) = (self.schema(entry.kind)?, entry.kind.encoding());
         let id = self.mcap.add_channel(schema, &entry.channel, encoding, &BTreeMap::new())?;
         self.channels.insert(name, Channel { id, next: 1 });
         Ok(Some((id, 0)))
@@ -135,11 +113,27 @@ impl<W: Write> TapeWriter<W> {
         if let Some(id) = self.schemas.get(&kind) {
             return Ok(*id);
         }
-        let json = schema::schema(kind).map(|schema| ("jsonschema", bytes(&schema)));
-        let (encoding, data) =
-            json.unwrap_or_else(|| ("protobuf", foxglove::descriptor(kind).unwrap_or_default()));
+        let (encoding, data) = definition(kind);
         let id = self.mcap.add_schema(kind.schema(), encoding, &data)?;
         self.schemas.insert(kind, id);
         Ok(id)
+    }
+}
+
+impl<W: Write + Send + 'static> Sink for TapeWriter<W> {
+    fn write(&mut self, entry: &Entry) -> Result<bool, WriteError> {
+        Self::write(self, entry)
+    }
+
+    fn pending(&self) -> usize {
+        Self::pending(self)
+    }
+
+    fn flush(&mut self) -> Result<(), WriteError> {
+        Self::flush(self)
+    }
+
+    fn finish(self, end: BTreeMap<String, String>) -> Result<(), WriteError> {
+        Self::finish(self, end).map(drop)
     }
 }

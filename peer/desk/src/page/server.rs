@@ -6,38 +6,27 @@ use std::sync::{Arc, Weak};
 
 use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::extract::{DefaultBodyLimit, State};
 use axum::http::header::{ACCEPT, CACHE_CONTROL, CONNECTION, CONTENT_DISPOSITION, CONTENT_TYPE};
-use axum::http::{HeaderMap, HeaderValue, StatusCode};
-use axum::middleware::{Next, from_fn_with_state};
+use axum::http::{HeaderMap, StatusCode};
+use axum::middleware::from_fn_with_state;
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use futures_util::stream::unfold;
-use gestalt_protocol::{Answer, Instruction, decode_json};
+use gestalt_protocol::{Instruction, decode_json};
 use serde_json::json;
-use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio::sync::Semaphore;
 
-use super::connection::Gate;
 use super::files::{FILES, answer};
-use super::guard::{Guard, HEADERS};
-use super::{Door, Token};
+use crate::asks::{Asks, MAX_WORD, Unsaid};
 use crate::board::Board;
+use crate::door::{Door, Gate, Guard, Token, at_the_door, with_token};
 use crate::known::Known;
 use crate::metrics;
-
-/// The longest word to the swarm, in bytes, and how many may wait for their answers.
-const MAX_WORD: usize = 4096;
-const MAX_ASKING: usize = 8;
 
 /// The swarm's session has ended.
 const LOST: (StatusCode, &str) =
     (StatusCode::SERVICE_UNAVAILABLE, "The page has lost the swarm: start it again.\n");
-
-/// A word to the swarm, and where its answer goes: `None` when none came in time.
-pub(crate) struct Ask {
-    pub instruction: Instruction,
-    pub answer: oneshot::Sender<Result<Option<Answer>, String>>,
-}
 
 /// What requests are answered from.
 #[derive(Clone, Debug)]
@@ -46,9 +35,8 @@ pub(crate) struct Server {
     /// Its readers' streams end when the one that writes it does.
     board: Weak<Board>,
     known: Arc<Known>,
-    asks: mpsc::Sender<Ask>,
+    asks: Asks,
     readers: Arc<Semaphore>,
-    asking: Arc<Semaphore>,
 }
 
 impl Server {
@@ -58,18 +46,11 @@ impl Server {
         token: Option<Token>,
         board: &Arc<Board>,
         known: Arc<Known>,
-        asks: mpsc::Sender<Ask>,
+        asks: Asks,
     ) -> Self {
         let guard = Guard::new(&door.address, listens, token);
         let readers = Arc::new(Semaphore::new(door.limits.readers));
-        Self {
-            guard,
-            board: Arc::downgrade(board),
-            known,
-            asks,
-            readers,
-            asking: Arc::new(Semaphore::new(MAX_ASKING)),
-        }
+        Self { guard, board: Arc::downgrade(board), known, asks, readers }
     }
 }
 
@@ -80,7 +61,7 @@ pub(crate) async fn serve(gate: Gate, server: Server, ended: impl Future<Output 
         .route("/say", post(say))
         .route("/decision.json", get(decision))
         .route("/metrics", get(measured))
-        .layer(from_fn_with_state(server.clone(), with_token));
+        .layer(from_fn_with_state(server.guard.clone(), with_token));
     let open = FILES
         .into_iter()
         .fold(Router::new(), |router, file| router.route(file.0, get(move || async move { answer(file) })));
@@ -88,29 +69,10 @@ pub(crate) async fn serve(gate: Gate, server: Server, ended: impl Future<Output 
         .merge(guarded)
         .fallback(async || (StatusCode::NOT_FOUND, "There is no such page.\n"))
         .layer(DefaultBodyLimit::max(MAX_WORD))
-        .layer(from_fn_with_state(server.clone(), at_the_door))
+        .layer(from_fn_with_state(server.guard.clone(), at_the_door))
         .with_state(server);
     if let Err(error) = axum::serve(gate, all).with_graceful_shutdown(ended).await {
         tracing::warn!("the page: {error}");
-    }
-}
-
-/// Every request, and every answer.
-async fn at_the_door(State(server): State<Server>, request: Request, next: Next) -> Response {
-    let mut response = match server.guard.admits(request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
-    };
-    for (name, value) in HEADERS {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
-    }
-    response
-}
-
-async fn with_token(State(server): State<Server>, request: Request, next: Next) -> Response {
-    match server.guard.knows_token(request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refusal) => refusal.into_response(),
     }
 }
 
@@ -143,26 +105,18 @@ async fn say(State(server): State<Server>, headers: HeaderMap, body: Bytes) -> R
         Ok(instruction) => instruction,
         Err(error) => return fail(StatusCode::BAD_REQUEST, &error.to_string()),
     };
-    let Ok(_asking) = server.asking.try_acquire() else {
-        return fail(StatusCode::TOO_MANY_REQUESTS, "too much is being said at a time: wait for an answer");
-    };
-    let opens = instruction == Instruction::Open;
-    let (reply, answered) = oneshot::channel();
-    if server.asks.send(Ask { instruction, answer: reply }).await.is_err() {
-        return fail(StatusCode::SERVICE_UNAVAILABLE, "the page has lost the swarm: start it again");
+    match server.asks.say(instruction).await {
+        Ok(answer) => ([(CONTENT_TYPE, "application/json")], answer.to_string()).into_response(),
+        Err(unsaid) => {
+            let status = match &unsaid {
+                Unsaid::TooMuch => StatusCode::TOO_MANY_REQUESTS,
+                Unsaid::Lost => StatusCode::SERVICE_UNAVAILABLE,
+                Unsaid::Unanswered => StatusCode::GATEWAY_TIMEOUT,
+                Unsaid::Failed(_) => StatusCode::BAD_GATEWAY,
+            };
+            fail(status, &unsaid.to_string())
+        }
     }
-    let answer = match answered.await {
-        Ok(Ok(Some(answer))) => json!({"words": answer.outcome.describe(), "answer": answer}),
-        Ok(Ok(None)) if opens => json!({"words": "asked all robots to look"}),
-        Ok(Ok(None)) => {
-            return fail(StatusCode::GATEWAY_TIMEOUT, "no robot has answered: see that one is running");
-        }
-        Ok(Err(error)) => return fail(StatusCode::BAD_GATEWAY, &error),
-        Err(_) => {
-            return fail(StatusCode::SERVICE_UNAVAILABLE, "the page has lost the swarm: start it again");
-        }
-    };
-    ([(CONTENT_TYPE, "application/json")], answer.to_string()).into_response()
 }
 
 /// The latest decision with all its votes, as it was announced: what `gestalt verify` checks.

@@ -11,7 +11,10 @@ use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
 use super::*;
+use crate::asks::{Ask, Asks};
 use crate::board::Board;
+use crate::door::{Address, Door, Gate, Limits, Token};
+use crate::follow::Show;
 use crate::known::Known;
 use crate::view::Input;
 
@@ -31,7 +34,7 @@ async fn page(token: Option<&str>, limits: Limits) -> Page {
     let address = listener.local_addr().unwrap();
     let door = Door { limits, ..Door::at(Address::default()) };
     let (board, known) = (Arc::new(Board::new("test")), Arc::new(Known::new()));
-    let (sender, asks) = mpsc::channel(8);
+    let (sender, asks) = Asks::new();
     let token = token.map(|token| Token::new(token).unwrap());
     let server = Server::new(&door, address, token, &board, known.clone(), sender);
     tokio::spawn(serve(

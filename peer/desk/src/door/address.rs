@@ -1,4 +1,4 @@
-//! Where the page is served.
+//! Where something is served.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr};

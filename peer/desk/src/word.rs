@@ -4,16 +4,26 @@ use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
 
 /// What an instructor types or sends.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Word {
+pub enum Word {
+    /// "Look now."
     Open,
+    /// "It was this gesture."
     Was(Gesture),
+    /// "The decision was right."
     Right,
+    /// "The decision was wrong."
     Wrong,
+    /// "I said nothing of it."
     Undo,
+    /// "This is a new gesture", called so.
     New(String),
+    /// "The first is the second."
     Same(Gesture, Gesture),
+    /// "It is shown no more."
     Retire(Gesture),
+    /// "It is shown again."
     Restore(Gesture),
+    /// Nothing more will be said.
     Quit,
 }
 
@@ -22,12 +32,12 @@ impl Word {
     ///
     /// # Errors
     /// What there is to say instead.
-    pub(super) fn read(words: &[&str]) -> Result<Self, String> {
+    pub fn read(words: &[&str]) -> Result<Self, String> {
         match words {
-            ["open"] => Ok(Self::Open),
+            ["open" | "look"] => Ok(Self::Open),
             ["right"] => Ok(Self::Right),
             ["wrong"] => Ok(Self::Wrong),
-            ["undo"] => Ok(Self::Undo),
+            ["undo" | "retract"] => Ok(Self::Undo),
             ["quit" | "exit"] => Ok(Self::Quit),
             // A bare number may be the label of a gesture, and mostly is.
             ["was", gesture @ ..] if !gesture.is_empty() => Ok(Self::Was(called(gesture))),
@@ -56,7 +66,8 @@ impl Word {
     }
 
     /// The word about a gesture's name, which needs no round.
-    pub(super) fn of_names(&self, round: Option<RoundId>) -> Option<Instruction> {
+    #[must_use]
+    pub fn of_names(&self, round: Option<RoundId>) -> Option<Instruction> {
         match self.clone() {
             Self::New(label) => Some(Instruction::New { label, round }),
             Self::Same(class, of) => Some(Instruction::Same { class, of }),
@@ -70,11 +81,7 @@ impl Word {
     ///
     /// # Errors
     /// Why nothing can be said of it.
-    pub(super) fn about(
-        self,
-        round: RoundId,
-        decided: Option<ClassId>,
-    ) -> Result<Option<Instruction>, String> {
+    pub fn about(self, round: RoundId, decided: Option<ClassId>) -> Result<Option<Instruction>, String> {
         let of = || {
             decided.map(Gesture::Class).ok_or_else(|| {
                 format!("no decision of round {round} is known here to be right or wrong: say 'was GESTURE'")

@@ -1,16 +1,20 @@
 //! Who may ask: the name the page is asked under, the page that asks, and the token.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 
+use axum::extract::{Request, State};
 use axum::http::header::{AUTHORIZATION, HOST, ORIGIN};
 use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
 
 use super::address::{Address, Host};
 use super::token::Token;
 
 /// Headers of every answer. Nothing is loaded from elsewhere or written into the page as anything but text, nobody frames it,
 /// and no other page can read it.
-pub(super) const HEADERS: [(&str, &str); 5] = [
+const HEADERS: [(&str, &str); 5] = [
     (
         "content-security-policy",
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'; \
@@ -23,30 +27,60 @@ pub(super) const HEADERS: [(&str, &str); 5] = [
 ];
 
 /// What is refused, and how to be let in.
-pub(super) type Refusal = (StatusCode, &'static str);
+type Refusal = (StatusCode, &'static str);
 
 /// Judges requests.
 #[derive(Clone, Debug)]
-pub(super) struct Guard {
+pub(crate) struct Guard {
     is_loopback: bool,
     /// The name that was given as the address, if it was one.
     name: Option<String>,
     token: Option<Token>,
+    /// Whose pages may ask, besides this server's own.
+    origins: Arc<[String]>,
+    /// Whether the token may stand in the address, for programs that can send no header.
+    by_address: bool,
+}
+
+/// Every request, and every answer.
+pub(crate) async fn at_the_door(State(guard): State<Guard>, request: Request, next: Next) -> Response {
+    let mut response = match guard.admits(request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
+    };
+    for (name, value) in HEADERS {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// Every request for what is shown or done.
+pub(crate) async fn with_token(State(guard): State<Guard>, request: Request, next: Next) -> Response {
+    match guard.knows_token(request.headers(), request.uri().query()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
+    }
 }
 
 impl Guard {
-    /// Of a page that listens there, as asked for by `address`.
+    /// Of a server that listens there, as asked for by `address`.
     pub fn new(address: &Address, listens: SocketAddr, token: Option<Token>) -> Self {
         let name = match address.host() {
             Host::Name(name) => Some(name.clone()),
             Host::Ip(_) => None,
         };
-        Self { is_loopback: listens.ip().is_loopback(), name, token }
+        let is_loopback = listens.ip().is_loopback();
+        Self { is_loopback, name, token, origins: Arc::default(), by_address: false }
+    }
+
+    /// Lets in the pages of these origins too, and takes the token from the address as well: `?token=…`.
+    pub fn for_viewers(self, origins: Vec<String>) -> Self {
+        Self { origins: origins.into(), by_address: true, ..self }
     }
 
     /// Whether a request comes by a name that can only mean this server, and not from another site's page: such a page can
     /// make a browser ask here, under a name of its own that it points here, or across origins.
-    pub fn admits(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+    fn admits(&self, headers: &HeaderMap) -> Result<(), Refusal> {
         const NOT_HERE: Refusal = (
             StatusCode::FORBIDDEN,
             "This page is not served under that name: use the address that it was started with.\n",
@@ -58,21 +92,24 @@ impl Guard {
         }
         match headers.get(ORIGIN) {
             None => Ok(()),
-            Some(origin) if origin.to_str().ok().and_then(|o| o.strip_prefix("http://")) == Some(host) => {
-                Ok(())
+            Some(origin) => {
+                let origin = origin.to_str().map_err(|_| ELSEWHERE)?;
+                let is_own = origin.strip_prefix("http://") == Some(host);
+                if is_own || self.origins.iter().any(|it| it == origin) { Ok(()) } else { Err(ELSEWHERE) }
             }
-            Some(_) => Err(ELSEWHERE),
         }
     }
 
     /// Whether a request for what the page shows or does has the token.
-    pub fn knows_token(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+    fn knows_token(&self, headers: &HeaderMap, query: Option<&str>) -> Result<(), Refusal> {
         const UNKNOWN: Refusal = (
             StatusCode::UNAUTHORIZED,
             "A token is needed: open the address that was printed at the start, or send `Authorization: Bearer TOKEN`.\n",
         );
         let Some(token) = &self.token else { return Ok(()) };
-        let given = one(headers, AUTHORIZATION.as_str()).and_then(|given| given.strip_prefix("Bearer "));
+        let bearer = one(headers, AUTHORIZATION.as_str()).and_then(|given| given.strip_prefix("Bearer "));
+        let mut pairs = query.filter(|_| self.by_address).unwrap_or_default().split('&');
+        let given = bearer.or_else(|| pairs.find_map(|pair| pair.strip_prefix("token=")));
         if given.is_some_and(|given| token.is(given)) { Ok(()) } else { Err(UNKNOWN) }
     }
 
