@@ -19,7 +19,7 @@ use libtest_mimic::{Arguments, Conclusion, Failed};
 
 pub use load::Load;
 use load::Room;
-pub use needs::{Need, data};
+pub use needs::{Need, data, python};
 
 /// One test of the table.
 pub struct Trial {

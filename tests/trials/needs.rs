@@ -23,6 +23,10 @@ pub enum Need {
     Systemd,
     /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
     Debian,
+    /// ROS 1 for Python, its master, and Zenoh for Python.
+    Rospy,
+    /// ROS 2 for Python, and Zenoh for Python.
+    Rclpy,
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -33,7 +37,12 @@ pub fn data() -> PathBuf {
 }
 
 impl Need {
-    const ALL: [Self; 8] = [
+    /// What rospy's examples import.
+    pub const ROSPY: &[&str] = &["rospy", "std_msgs", "zenoh"];
+    /// What rclpy's examples import.
+    pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
+
+    const ALL: [Self; 10] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -42,6 +51,8 @@ impl Need {
         Self::Valgrind,
         Self::Systemd,
         Self::Debian,
+        Self::Rospy,
+        Self::Rclpy,
     ];
 
     /// Its name in `GESTALT_REQUIRE`.
@@ -56,6 +67,8 @@ impl Need {
             Self::Valgrind => "valgrind",
             Self::Systemd => "systemd",
             Self::Debian => "debian",
+            Self::Rospy => "rospy",
+            Self::Rclpy => "rclpy",
         }
     }
 
@@ -86,6 +99,9 @@ impl Need {
                 let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
                 missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
             }
+            Self::Rospy if done("rosmaster", &["--help"]) => imports(Self::ROSPY),
+            Self::Rospy => Err("needs rosmaster (python3-rosmaster)".to_owned()),
+            Self::Rclpy => imports(Self::RCLPY),
         }
     }
 }
@@ -104,6 +120,20 @@ pub(crate) fn required(text: Option<&str>) -> Result<Vec<Need>, String> {
 fn done(program: &str, words: &[&str]) -> bool {
     let done = Command::new(program).args(words).stdout(Stdio::null()).stderr(Stdio::null()).status();
     done.is_ok_and(|status| status.success())
+}
+
+/// A Python that can import all of these: what `GESTALT_PYTHON` names, `python3`, or the system's.
+#[must_use]
+pub fn python(modules: &[&str]) -> Option<String> {
+    let named = std::env::var("GESTALT_PYTHON").ok();
+    let known = named.into_iter().chain(["python3", "/usr/bin/python3"].map(str::to_owned));
+    let import = format!("import {}", modules.join(", "));
+    known.into_iter().find(|python| done(python, &["-c", &import]))
+}
+
+fn imports(modules: &[&str]) -> Result<(), String> {
+    let needs = || format!("needs a Python with {} (GESTALT_PYTHON names one)", modules.join(", "));
+    python(modules).map(drop).ok_or_else(needs)
 }
 
 /// The simulator, and what builds a program for it.

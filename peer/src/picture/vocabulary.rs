@@ -27,7 +27,7 @@ const PERSON: u64 = 5;
 /// # Errors
 /// [`SourceError`].
 pub fn hands(book: &GestureBook) -> Result<Vec<Mat>, SourceError> {
-    let camera = CameraModel { noise_sigma: 0.5, gain: 1.3, cast_bgr: [1.0; 3], ..CameraModel::laptop() };
+    let camera = CameraModel { noise_sigma: 0.0, gain: 1.3, cast_bgr: [1.0; 3], ..CameraModel::laptop() };
     let pose = Pose { distance_m: 0.5, ..Pose::FRONTAL };
     let source = RenderedSource::new(camera, pose, Glove::default(), PERSON)?;
     let mut source = source.showing(book.poses().into());
