@@ -17,6 +17,7 @@ use gestalt_tests::{Process, config, learning, model, short_rounds, start_learni
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
+use opencv::prelude::*;
 use serde_json::{Value, json};
 use tokio::time::timeout;
 use zenoh::Session;
@@ -338,16 +339,11 @@ async fn the_view_is_drawn_for_who_subscribes_alone(viewer: &Session, body: &Bod
 
 /// Pixels of the colour in which a hand is marked, or nearly so: JPEG blurs lines.
 fn marked(picture: &opencv::core::Mat) -> usize {
-    use opencv::prelude::MatTraitConst;
     let words = opencv::core::Rect::new(0, 0, picture.cols(), picture.rows() - 44);
     let frame = opencv::core::Mat::roi(picture, words).unwrap().try_clone().unwrap();
     let near = |pixel: &&opencv::core::Vec3b| {
         let [blue, green, red] = [pixel[0], pixel[1], pixel[2]].map(i32::from);
         (blue - 0x7f).abs() < 24 && (green - 0xb9).abs() < 24 && (red - 0x3f).abs() < 24
     };
-    opencv::prelude::MatTraitConstManual::data_typed::<opencv::core::Vec3b>(&frame)
-        .unwrap()
-        .iter()
-        .filter(near)
-        .count()
+    frame.data_typed::<opencv::core::Vec3b>().unwrap().iter().filter(near).count()
 }
