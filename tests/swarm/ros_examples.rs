@@ -1,9 +1,9 @@
 //! The examples for ROS 1 and for ROS 2 over DDS, each beside a node of theirs that asks for a round and hears what came of it.
 
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::ClassId;
 use gestalt_tests::{Process, Watched, config, start, unique};
@@ -106,6 +106,12 @@ pub async fn rospy_echoes_a_decision() {
         command
     };
     let _master = Program::start(ros("rosmaster").args(["--core", "-p", &port.to_string()]));
+    // A node that asks for a parameter before there is a master ends.
+    let began = Instant::now();
+    while TcpStream::connect(("127.0.0.1", port)).is_err() {
+        assert!(began.elapsed() < PATIENCE, "rosmaster listens");
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
     let connect = format!("_connect:={}", robots[0].robot.locators()[0]);
     let _node =
         Program::start(ros(&python).arg(example("ros1.py")).args([connect, format!("_swarm:={swarm}")]));

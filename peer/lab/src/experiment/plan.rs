@@ -281,8 +281,8 @@ mod tests {
             ("title: 't'", "titel: 't'", "titel"),
             ("title: 't'", "title: 't', hands: { vocabulary: 'semaphore' }", "spatial, rescue"),
             (
-                "rounds: 3",
-                "rounds: 3 }, hands: { vocabulary: 'rescue' }, base: { start: 'model'",
+                "title: 't', base: {",
+                "title: 't', hands: { vocabulary: 'rescue' }, base: { start: 'model',",
                 "from nothing",
             ),
         ] {
