@@ -42,8 +42,8 @@ demo: packages
 	  --learn nothing --web 0 --picture out/round.png --curve out/curve.png --record out/run.mcap $(SEAL)
 	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
-# Ends with the sum of all runners, and with what was skipped, and why. GESTALT_REQUIRE=namespaces,mount,browser,data,enki,valgrind,systemd,debian,rospy,rclpy makes
-# failures of what is skipped for want of them. Many tests wait for rounds and deadlines: two threads a core.
+# Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
+# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,rospy,rclpy. Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
 	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \

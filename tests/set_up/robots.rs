@@ -21,6 +21,10 @@ pub fn unique(what: &str) -> String {
     format!("{what}-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
+/// Robots in one process share its cores with other scenarios, and with whatever else runs here. One that was not scheduled for a
+/// second is not dead; scenarios about time on a link say another.
+const LEASE: Duration = Duration::from_secs(5);
+
 /// A robot on the loopback interface that dials `connect`.
 #[must_use]
 pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
@@ -34,6 +38,7 @@ pub fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         link: LinkConfig {
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             connect: connect.to_vec(),
+            lease: LEASE,
             ..LinkConfig::default()
         },
         vocabulary: Some(Fixed::default().vocabulary().clone()),

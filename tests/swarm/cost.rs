@@ -108,8 +108,10 @@ async fn bytes_of_a_round(is_sealed: bool) -> (f64, f64, f64) {
             _ => robots[ROBOTS as usize / 2].robot.locators().to_vec(),
         };
         let config = if is_sealed { sealed(id, &members, &connect) } else { config(id, &swarm, &connect) };
+        // The lease says how often a link says that it is alive.
+        let link = LinkConfig { lease: LinkConfig::default().lease, ..config.link };
         // Five samples of a round, as in the experiments.
-        let config = RobotConfig { learning: Some(learning(5, 1.0, None)), ..config };
+        let config = RobotConfig { learning: Some(learning(5, 1.0, None)), link, ..config };
         robots.push(start_learning(config, shown.clone()).await);
     }
     for robot in &robots {

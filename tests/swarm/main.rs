@@ -12,6 +12,7 @@ mod eyes;
 mod false_answers;
 mod field;
 mod in_process;
+mod knocking;
 mod knowledge;
 mod learning;
 mod liar;
@@ -36,7 +37,10 @@ mod trouble;
 mod wall;
 
 fn main() -> std::process::ExitCode {
-    gestalt_trials::run(gestalt_trials::trials![
+    if let Some(ended) = knocking::knocks_instead() {
+        return ended;
+    }
+    gestalt_trials::run_in_real_time(gestalt_trials::trials![
         [Works] mixed::footbots_on_board_and_parrots_of_a_centre_decide_twenty_gestures_alike,
         [Waits] in_process::twenty_robots_agree_in_each_of_fifty_rounds.await,
         [Waits, Namespaces] churn::a_grid_under_churn_never_ends_a_round_differently_and_agrees_in_calm,
@@ -97,9 +101,11 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
-        [Waits] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Works, Browser] page::a_browser_shows_teaches_and_says_when_it_is_no_longer_live.await,
+        [Works, Axe] page::axe_finds_nothing_serious_on_the_page.await,
+        [Waits, Prometheus] page::metrics_are_read_by_promtool_and_by_python.await,
+        [Waits] knocking::who_was_expelled_and_links_ten_times_a_second_changes_nothing_and_is_kept_waiting.await,
         [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
         [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
@@ -108,6 +114,7 @@ fn main() -> std::process::ExitCode {
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
         [Alone] stream::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
+        [Alone] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Alone] scouting::a_hundred_robots_in_hearing_keep_four_links_each_and_agree.await,
     ])
 }

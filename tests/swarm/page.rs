@@ -1,6 +1,7 @@
 //! The page of a swarm: what it shows and does is what the swarm says and hears.
 
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
@@ -12,6 +13,7 @@ use gestalt_tests::{Browser, Process, Watched, config, learning, short_rounds, s
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
+use tokio::task::block_in_place;
 use tokio::time::timeout;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -170,41 +172,40 @@ pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
     let mut decisions = client.decisions().await.unwrap();
     let url = school.desk.url().to_owned();
     let began = Instant::now();
-    let mut browser = tokio::task::block_in_place(|| Browser::open(&url));
-    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    let mut browser = block_in_place(|| Browser::open(&url));
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
     see(
         "document.querySelectorAll('#robots > details').length === 8 && document.querySelector('#live').textContent === 'Live'",
     );
     println!("eight robots shown {:?} after the browser began to start", began.elapsed());
     see(&format!("document.querySelector('#robots').textContent.includes({})", json!(EVIL)));
     school.shown.store(3, Ordering::Relaxed);
-    tokio::task::block_in_place(|| browser.press("#look"));
+    block_in_place(|| browser.press("#look"));
     let announced = timeout(PATIENCE, decisions.next()).await.unwrap().unwrap().unwrap();
     let label = announced.label.clone().unwrap_or_else(|| "undecided".to_owned());
     let shown = format!("document.querySelector('#gesture').textContent === {}", json!(label));
-    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
     see(&shown);
     see(&format!(
         "document.querySelector('#facts').textContent.includes('round {},')",
         announced.decision.round.counter
     ));
     tokio::time::sleep(Duration::from_millis(500)).await;
-    tokio::task::block_in_place(|| browser.press("#gestures [data-key='3']"));
-    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    block_in_place(|| browser.press("#gestures [data-key='3']"));
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
     let took = see("document.querySelector('#answer').textContent.includes('learned')");
     println!("learned {took:?} after the button");
     see("document.querySelector('#curve-words').textContent.includes('the swarm in')");
-    let markup = tokio::task::block_in_place(|| {
-        browser.evaluate("document.querySelectorAll('img, script:not([src])').length")
-    });
+    let markup =
+        block_in_place(|| browser.evaluate("document.querySelectorAll('img, script:not([src])').length"));
     assert_eq!(markup, 0, "a name became a part of the page");
-    let complaints = tokio::task::block_in_place(|| browser.complaints());
+    let complaints = block_in_place(|| browser.complaints());
     assert!(complaints.is_empty(), "{complaints:#?}");
     // The server goes, and comes back.
     let port = school.desk.address().port();
     school.desk.close().await;
     let began = Instant::now();
-    let mut see = |expression: &str| tokio::task::block_in_place(|| browser.wait(expression, PATIENCE));
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
     see(
         "document.querySelector('#live').textContent === 'Not live' && !document.querySelector('#lost').hidden",
     );
@@ -212,7 +213,88 @@ pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
     assert!(began.elapsed() < Duration::from_secs(6), "{:?}", began.elapsed());
     school.desk = desk(&school.swarm, &school.link, port).await;
     see("document.querySelector('#live').textContent === 'Live' && document.querySelector('#lost').hidden");
-    tokio::task::block_in_place(|| drop(browser));
+    block_in_place(|| drop(browser));
     client.close().await;
     school.end().await;
+}
+
+pub async fn axe_finds_nothing_serious_on_the_page() {
+    const SERIOUS: &str = "(async () => (await axe.run()).violations
+        .filter(found => ['serious', 'critical'].includes(found.impact))
+        .map(found => [found.id, found.help, found.nodes.map(node => node.html)]))()";
+    let axe = std::fs::read_to_string(gestalt_trials::axe().expect("a trial that needs it")).unwrap();
+    let school = School::start(4, |id| format!("robot {id}")).await;
+    let url = school.desk.url().to_owned();
+    let mut browser = block_in_place(|| Browser::open(&url));
+    let is_there = "document.querySelectorAll('#robots > details').length === 4";
+    block_in_place(|| browser.wait(is_there, PATIENCE));
+    block_in_place(|| browser.press("#look"));
+    let is_shown = "document.querySelector('#facts').textContent.includes('round 1,')";
+    block_in_place(|| browser.wait(is_shown, PATIENCE));
+    block_in_place(|| {
+        browser.evaluate(&format!("{axe}; 1"));
+        for (size, dark) in
+            [(1280, 900), (390, 844)].into_iter().flat_map(|size| [(size, false), (size, true)])
+        {
+            // So the page stands in that window, as it stays.
+            browser.picture(size, dark);
+            assert_eq!(browser.evaluate(SERIOUS), json!([]), "{size:?}, dark: {dark}");
+        }
+    });
+    block_in_place(|| drop(browser));
+    school.end().await;
+}
+
+pub async fn metrics_are_read_by_promtool_and_by_python() {
+    let school = School::start(3, |id| format!("robot {id}")).await;
+    let mut page = Reader::open(&school.desk).await;
+    page.say(&json!({"say": "open"})).await;
+    page.wait("decision", |shown| shown["round"]["counter"] == 1).await;
+    let get = async |accept: &str| {
+        let mut stream = TcpStream::connect(&page.host).await.unwrap();
+        let request = format!(
+            "GET /metrics HTTP/1.0\r\nHost: {}\r\nAccept: {accept}\r\nConnection: close\r\n\r\n",
+            page.host
+        );
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let mut answer = String::new();
+        timeout(PATIENCE, stream.read_to_string(&mut answer)).await.unwrap().unwrap();
+        answer.split_once("\r\n\r\n").unwrap().1.to_owned()
+    };
+    let said = piped("promtool", &["check", "metrics"], &get("text/plain").await);
+    assert_eq!(said, "", "promtool is content");
+    let read = "import sys\n\
+        from prometheus_client.openmetrics.parser import text_string_to_metric_families as read\n\
+        print(sum(sample.value for family in read(sys.stdin.read()) for sample in family.samples\n\
+        if sample.name == 'gestalt_robot_events_total' and sample.labels['event'] == 'sent_vote'))";
+    // What Python makes of them is what the robots count.
+    let votes = |robots: &[Watched]| -> u64 {
+        robots.iter().filter_map(|it| it.robot.status().counters.get("sent_vote").copied()).sum()
+    };
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let found =
+            piped(gestalt_trials::SYSTEM_PYTHON, &["-c", read], &get("application/openmetrics-text").await);
+        let counted = votes(&school.robots);
+        if counted > 0 && found.trim().parse::<f64>() == Ok(counted as f64) {
+            break;
+        }
+        assert!(Instant::now() < deadline, "Python reads {found}, robots count {counted}");
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    school.end().await;
+}
+
+/// What a program that is content says of what it reads.
+fn piped(program: &str, words: &[&str], text: &str) -> String {
+    let mut child = Command::new(program)
+        .args(words)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap_or_else(|error| panic!("{program}: {error}"));
+    std::io::Write::write_all(&mut child.stdin.take().expect("piped"), text.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{program}: {}", output.status);
+    String::from_utf8(output.stdout).unwrap()
 }

@@ -30,7 +30,9 @@ pub const LINKING: Duration = Duration::from_secs(5);
 fn walled(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
     let robot = sealed(id, members, connect);
     let listen = vec!["tls/127.0.0.1:0".to_owned()];
-    RobotConfig { link: LinkConfig { listen, ..robot.link }, ..robot }
+    // What is let in is timed by the lease.
+    let lease = LinkConfig::default().lease;
+    RobotConfig { link: LinkConfig { listen, lease, ..robot.link }, ..robot }
 }
 
 /// The zenoh configuration of a stranger in that mode, which will not wait for ever.

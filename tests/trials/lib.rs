@@ -4,9 +4,11 @@
 //! not wait one after the other. So such test binaries have `harness = false` and a table of [`Trial`]s as their `main`; they
 //! understand the arguments of any other test binary (`cargo test -p gestalt-tests --test swarm line`).
 //!
-//! - [`Need`]: what a trial needs of the machine. With `GESTALT_REQUIRE=namespaces,mount,browser,data,enki` a machine without it fails.
+//! - [`Need`]: what a trial needs of the machine. With `GESTALT_REQUIRE=namespaces,mount,browser,data` a machine without it fails.
 //! - [`Load`]: how much of the processor it takes, so that what waits runs side by side and what computes does not disturb it.
+//! - [`run_in_real_time`]: trials whose clock is the machine's. One that fails is tried once more, alone, and both are told.
 
+mod attempts;
 mod load;
 mod needs;
 
@@ -17,22 +19,23 @@ use std::time::{Duration, Instant};
 
 use libtest_mimic::{Arguments, Conclusion, Failed};
 
+use attempts::Attempts;
 pub use load::Load;
 use load::Room;
-pub use needs::{Need, data, python};
+pub use needs::{Need, SYSTEM_PYTHON, axe, data, python};
 
 /// One test of the table.
 pub struct Trial {
     name: String,
     load: Load,
     needs: Vec<Need>,
-    run: Box<dyn FnOnce() + Send>,
+    run: Box<dyn Fn() + Send>,
 }
 
 impl Trial {
     /// A test of that name, which passes unless it panics.
     #[must_use]
-    pub fn new(name: &str, load: Load, needs: &[Need], run: impl FnOnce() + Send + 'static) -> Self {
+    pub fn new(name: &str, load: Load, needs: &[Need], run: impl Fn() + Send + 'static) -> Self {
         Self { name: name.to_owned(), load, needs: needs.to_vec(), run: Box::new(run) }
     }
 }
@@ -76,16 +79,31 @@ const STUCK: Duration = Duration::from_secs(400);
 /// How many of the slowest trials are listed.
 const LISTED: usize = 10;
 
-/// When each trial that runs has begun, and how long each that ended has taken.
+/// When each trial that runs has begun, how long each that ended has taken, and what those that passed at a second attempt first
+/// failed with.
 #[derive(Default)]
 struct Clock {
     running: BTreeMap<String, Instant>,
     took: Vec<(Duration, String)>,
+    flaky: Vec<(String, String)>,
 }
 
 /// Runs the trials as the command line says, and says which were skipped, why, and which took longest.
 #[must_use]
 pub fn run(trials: Vec<Trial>) -> ExitCode {
+    run_with(trials, Attempts::One)
+}
+
+/// As [`run`], for trials with deadlines in real time. A machine that did not run a robot for seconds fails them as a fault of
+/// the robot does; so what fails beside others is tried once more with nothing beside it. What then passes is listed as
+/// `flaky`, with what it first failed with: it wants to be looked at. With `GESTALT_STRICT` set there is no second attempt.
+#[must_use]
+pub fn run_in_real_time(trials: Vec<Trial>) -> ExitCode {
+    let strict = std::env::var_os("GESTALT_STRICT").is_some();
+    run_with(trials, if strict { Attempts::One } else { Attempts::Two })
+}
+
+fn run_with(trials: Vec<Trial>, attempts: Attempts) -> ExitCode {
     let required = match needs::required(std::env::var("GESTALT_REQUIRE").ok().as_deref()) {
         Ok(required) => required,
         Err(error) => {
@@ -109,15 +127,15 @@ pub fn run(trials: Vec<Trial>) -> ExitCode {
             if let Some((need, reason)) = missing {
                 return Err(Failed::from(format!("GESTALT_REQUIRE names {}: {reason}", need.name())));
             }
-            let _place = room.take(trial.load);
-            let began = Instant::now();
-            lock(&clock).running.insert(name.clone(), began);
-            let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(trial.run));
-            let mut clock = lock(&clock);
-            clock.running.remove(&name);
-            clock.took.push((began.elapsed(), name));
-            drop(clock);
-            ended.map_err(|panic| Failed::from(words(&*panic)))
+            let flaky = attempts.make(|is_alone| {
+                if is_alone {
+                    eprintln!("second attempt, alone: {name}");
+                }
+                let load = if is_alone { Load::Alone } else { trial.load };
+                attempt(&trial.run, &name, &room, load, &clock)
+            })?;
+            lock(&clock).flaky.extend(flaky.map(|cause| (name.clone(), cause)));
+            Ok(())
         })
         .with_ignored_flag(ignored)
     });
@@ -128,9 +146,21 @@ pub fn run(trials: Vec<Trial>) -> ExitCode {
     }
     let conclusion = libtest_mimic::run(&arguments, listed);
     if !arguments.list {
-        report(&lock(&clock).took, &skipped, &conclusion);
+        report(&lock(&clock), &skipped, &conclusion);
     }
     conclusion.exit_code()
+}
+
+/// Runs a trial in its place; what it panicked with.
+fn attempt(run: &dyn Fn(), name: &str, room: &Room, load: Load, clock: &Mutex<Clock>) -> Result<(), String> {
+    let _place = room.take(load);
+    let began = Instant::now();
+    lock(clock).running.insert(name.to_owned(), began);
+    let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run));
+    let mut clock = lock(clock);
+    clock.running.remove(name);
+    clock.took.push((began.elapsed(), name.to_owned()));
+    ended.map_err(|panic| words(&*panic))
 }
 
 fn lock(clock: &Mutex<Clock>) -> std::sync::MutexGuard<'_, Clock> {
@@ -155,11 +185,15 @@ fn end_what_is_stuck(clock: &Mutex<Clock>) {
     }
 }
 
-fn report(took: &[(Duration, String)], skipped: &[String], conclusion: &Conclusion) {
-    let mut slowest: Vec<_> = took.iter().collect();
+fn report(clock: &Clock, skipped: &[String], conclusion: &Conclusion) {
+    let mut slowest: Vec<_> = clock.took.iter().collect();
     slowest.sort_by_key(|(took, _)| std::cmp::Reverse(*took));
     for (took, name) in slowest.into_iter().take(LISTED) {
         println!("{:7.1} s  {name}", took.as_secs_f64());
+    }
+    for (name, cause) in &clock.flaky {
+        let cause = cause.lines().next().unwrap_or_default();
+        println!("flaky: {name}: passed alone, after it failed with: {cause}");
     }
     if conclusion.num_ignored > 0 {
         skipped.iter().for_each(|line| println!("{line}"));

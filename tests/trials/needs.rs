@@ -27,6 +27,19 @@ pub enum Need {
     Rospy,
     /// ROS 2 for Python, and Zenoh for Python.
     Rclpy,
+    /// The accessibility checker axe-core, which judges a page in a browser: see [`axe`].
+    Axe,
+    /// What reads metrics: Python's `prometheus_client`, by its own parser of OpenMetrics, and Prometheus' `promtool`.
+    Prometheus,
+}
+
+/// The interpreter that Debian's Python packages are installed for.
+pub const SYSTEM_PYTHON: &str = "/usr/bin/python3";
+
+/// The checker's one file, `axe.min.js`, of the npm package axe-core: what `GESTALT_AXE` names.
+#[must_use]
+pub fn axe() -> Option<PathBuf> {
+    std::env::var_os("GESTALT_AXE").map(PathBuf::from)
 }
 
 /// The folder of real recordings: `GESTALT_DATA`, or `../shared/data` beside the workspace.
@@ -42,7 +55,7 @@ impl Need {
     /// What rclpy's examples import.
     pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
 
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 12] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -53,6 +66,8 @@ impl Need {
         Self::Debian,
         Self::Rospy,
         Self::Rclpy,
+        Self::Axe,
+        Self::Prometheus,
     ];
 
     /// Its name in `GESTALT_REQUIRE`.
@@ -69,6 +84,8 @@ impl Need {
             Self::Debian => "debian",
             Self::Rospy => "rospy",
             Self::Rclpy => "rclpy",
+            Self::Axe => "axe",
+            Self::Prometheus => "prometheus",
         }
     }
 
@@ -102,6 +119,19 @@ impl Need {
             Self::Rospy if done("rosmaster", &["--help"]) => imports(Self::ROSPY),
             Self::Rospy => Err("needs rosmaster (python3-rosmaster)".to_owned()),
             Self::Rclpy => imports(Self::RCLPY),
+            Self::Axe if !done("chromium", &["--version"]) => Err("needs a browser (chromium)".to_owned()),
+            Self::Axe if axe().is_some_and(|file| file.is_file()) => Ok(()),
+            Self::Axe => {
+                Err("needs axe-core (npm install axe-core; GESTALT_AXE names its axe.min.js)".to_owned())
+            }
+            Self::Prometheus => {
+                let parser = done(SYSTEM_PYTHON, &["-c", "import prometheus_client.openmetrics.parser"]);
+                if parser && done("promtool", &["--version"]) {
+                    Ok(())
+                } else {
+                    Err("needs promtool and a parser (prometheus, python3-prometheus-client)".to_owned())
+                }
+            }
         }
     }
 }
@@ -126,7 +156,7 @@ fn done(program: &str, words: &[&str]) -> bool {
 #[must_use]
 pub fn python(modules: &[&str]) -> Option<String> {
     let named = std::env::var("GESTALT_PYTHON").ok();
-    let known = named.into_iter().chain(["python3", "/usr/bin/python3"].map(str::to_owned));
+    let known = named.into_iter().chain(["python3", SYSTEM_PYTHON].map(str::to_owned));
     let import = format!("import {}", modules.join(", "));
     known.into_iter().find(|python| done(python, &["-c", &import]))
 }

@@ -72,6 +72,8 @@ fn config(id: u32, swarm: &str, connect: &[String]) -> RobotConfig {
         link: LinkConfig {
             listen: vec!["tcp/127.0.0.1:0".to_owned()],
             connect: connect.to_vec(),
+            // One that was not scheduled for a second, on a machine that compiles beside, is not dead.
+            lease: Duration::from_secs(5),
             ..LinkConfig::default()
         },
         vocabulary: None,
