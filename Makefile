@@ -5,7 +5,7 @@ SHELL := /bin/bash
 ifeq ($(shell cargo --version 2>/dev/null),)
 export RUSTUP_TOOLCHAIN := stable
 endif
-.PHONY: demo test attack fuzz bench lint eyes deb deb-test packages test-packages
+.PHONY: demo test attack fuzz miri bench lint eyes deb deb-test packages test-packages
 
 # OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
@@ -43,7 +43,8 @@ demo: packages
 	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
 # Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
-# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets. Many tests wait for rounds and deadlines: two threads a core.
+# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,rospy,rclpy.
+# Many tests wait for rounds and deadlines: two threads a core.
 test: test-packages
 	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
 	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \
@@ -92,6 +93,11 @@ fuzz: packages
 	  GESTALT_FUZZ=$$target target/$(HOST)/release/guided -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -timeout=10 \
 	    -artifact_prefix=out/fuzz/$$target- -print_final_stats=1 out/fuzz/$$target tests/fuzz/corpus/$$target || exit 1; \
 	done
+
+# The C interface under Miri, the interpreter that knows what unsafe code may not do. It needs a nightly toolchain:
+# rustup component add miri rust-src --toolchain nightly
+miri:
+	RUSTUP_TOOLCHAIN=nightly cargo miri test -p gestalt-c --lib --test calls
 
 lint: packages
 	cargo fmt --check

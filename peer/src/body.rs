@@ -10,7 +10,9 @@ use tokio::task::JoinHandle;
 
 use crate::config::{Config, LearnFrom, LearningSection};
 use crate::eye::{Eye, EyeError, Seen, look};
+use crate::ros_view::RosView;
 use gestalt_link::{LinkError, Robot, RobotConfig, RobotLearning, fresh_nonce};
+use gestalt_ros::NameError;
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::source::Opener;
 
@@ -23,6 +25,12 @@ pub enum BodyError {
     /// Its link.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// Its name in ROS.
+    #[error("ros.namespace: {0}")]
+    Ros(#[from] NameError),
+    /// No thread for what ROS sees of it.
+    #[error("no thread for the view that ROS is shown: {0}")]
+    Thread(#[from] std::io::Error),
 }
 
 /// A running robot with its eye. It looks while a round is open, at the rate of its camera.
@@ -30,6 +38,8 @@ pub enum BodyError {
 pub struct Body {
     robot: Arc<Robot>,
     looking: Option<JoinHandle<()>>,
+    /// What ROS sees of it.
+    shown: Option<RosView>,
     seen: Arc<Mutex<Option<Seen>>>,
 }
 
@@ -67,7 +77,7 @@ impl Body {
     }
 
     async fn looking_through(
-        eye: Option<Eye>,
+        mut eye: Option<Eye>,
         config: &Config,
         model: Option<RobotModel>,
         boot: u32,
@@ -97,6 +107,20 @@ impl Body {
         if let Some(inlet) = eye.as_ref().and_then(Eye::inlet) {
             inlet.open(&robot).await?;
         }
+        let shown = match &mut eye {
+            Some(eye) if config.ros.enabled => {
+                let title = format!("{} · {}", config.name(), config.camera.model.name());
+                let name = config.ros.node(config.robot.id)?;
+                Some(RosView::show(
+                    &config.ros,
+                    name,
+                    (config.robot.id, &robot),
+                    title,
+                    eye.window(config.ros.every()),
+                )?)
+            }
+            _ => None,
+        };
         let seen = Arc::new(Mutex::new(None));
         let looking = eye.map(|eye| {
             robot.update_camera(|camera| {
@@ -105,7 +129,7 @@ impl Body {
             });
             tokio::spawn(look(eye, Arc::downgrade(&robot), robot.events(), seen.clone()))
         });
-        Ok(Self { robot, looking, seen })
+        Ok(Self { robot, looking, shown, seen })
     }
 
     /// The robot's side towards the swarm.
@@ -122,6 +146,7 @@ impl Body {
 
     /// Closes its eye, leaves the swarm, and waits until that is done.
     pub async fn stop(self) {
+        drop(self.shown);
         if let Some(looking) = self.looking {
             looking.abort();
             // Aborted is what it was meant to become.

@@ -1,6 +1,7 @@
 //! A robot's eye: frames in, observations out, while a round is open; all the time where motion is watched.
 
 mod look;
+pub mod window;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,6 +21,7 @@ use crate::config::{CameraSection, SourceSection};
 use crate::stream::{Inlet, StreamSource};
 
 pub(crate) use look::look;
+use window::Window;
 
 /// Why an eye cannot open.
 #[derive(Debug, Error)]
@@ -51,6 +53,8 @@ pub struct Eye {
     inlet: Option<Arc<Inlet>>,
     /// The zero of its time.
     zero: Instant,
+    /// Where it leaves what it sees for whoever looks over its shoulder.
+    window: Option<Arc<Window>>,
 }
 
 /// A frame, and what perception made of it.
@@ -129,13 +133,32 @@ impl Eye {
         let sight = Sight::steady(camera.sight(), model.features)?;
         let (watches, human) = (camera.motion.enabled, human_before(camera));
         let zero = Instant::now();
-        Ok(Self { source, open, describe, watches, live, period, sight, human, inlet: None, zero })
+        Ok(Self {
+            source,
+            open,
+            describe,
+            watches,
+            live,
+            period,
+            sight,
+            human,
+            inlet: None,
+            zero,
+            window: None,
+        })
     }
 
     /// Where its frames come in, if they come from another machine: to be opened at the robot's session.
     #[must_use]
     pub fn inlet(&self) -> Option<Arc<Inlet>> {
         self.inlet.clone()
+    }
+
+    /// From now on it also leaves what it sees in a window, at most once in `every`, while somebody wants it.
+    pub fn window(&mut self, every: Duration) -> Arc<Window> {
+        let window = Arc::new(Window::new(self.zero, every));
+        self.window = Some(window.clone());
+        window
     }
 
     /// What it looks through, in words.

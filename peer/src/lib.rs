@@ -36,6 +36,8 @@ pub mod proof;
 pub mod recording;
 #[cfg(feature = "opencv")]
 mod ros_camera;
+#[cfg(feature = "opencv")]
+mod ros_view;
 pub mod service_manager;
 #[cfg(feature = "opencv")]
 pub mod stream;

@@ -1,10 +1,13 @@
-//! Pictures for people: of one round, with what every robot saw and what the swarm decided; and, in [`stages`], of
-//! one frame on its way through perception. Both are SVG, frames and all; [`gestalt_draw::write`] makes PNG of them.
+//! Pictures for people: of one round, with what every robot saw and what the swarm decided; in [`stages`], of one frame on
+//! its way through perception; in [`view`], of what one robot sees now; in [`vocabulary`], of gestures to show. All are SVG, frames and all; [`gestalt_draw::write`]
+//! makes PNG of them.
 
 mod frame;
 mod round;
 pub mod stages;
 mod tone;
+pub mod view;
+pub mod vocabulary;
 
 use thiserror::Error;
 

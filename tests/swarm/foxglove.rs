@@ -89,7 +89,7 @@ struct Viewer(Process);
 impl Viewer {
     fn open(url: &str) -> Self {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("swarm/viewer.py");
-        let python = python("websockets").expect("there is a Python with websockets");
+        let python = python(&["websockets"]).expect("there is a Python with websockets");
         let viewer = Self(Process::run(Command::new(python).arg(script).arg(url)));
         viewer.wait("services", |_| true);
         viewer

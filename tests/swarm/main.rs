@@ -28,6 +28,7 @@ mod pause;
 mod recording;
 mod ring;
 mod ros;
+mod ros_examples;
 mod scouting;
 mod siege;
 mod stranger;
@@ -89,6 +90,8 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::who_is_there_already_and_who_comes_too_many_is_refused_and_counted.await,
         [Waits] ros::a_ros_system_hears_what_a_swarm_decides_and_teaches_it.await,
         [Works] ros::a_robot_sees_through_a_camera_that_a_ros_driver_owns.await,
+        [Waits, Rospy] ros_examples::rospy_echoes_a_decision.await,
+        [Waits, Rclpy] ros_examples::rclpy_over_dds_echoes_a_decision.await,
         [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
         [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use gestalt_link::{Event, RobotConfig};
 use gestalt_peer::body::Body;
-use gestalt_peer::config::{CameraChoice, CameraSection, Config, RosSection, SourceSection};
+use gestalt_peer::config::{CameraChoice, CameraSection, Config, RosNodeSection, RosSection, SourceSection};
 use gestalt_protocol::{CameraState, ClassId, RobotId};
 use gestalt_ros::RosMessage;
 use gestalt_ros::message::{CompressedImage, Header};
@@ -17,6 +17,7 @@ use gestalt_tests::{Process, config, learning, model, short_rounds, start_learni
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source, encode_jpeg};
+use opencv::prelude::*;
 use serde_json::{Value, json};
 use tokio::time::timeout;
 use zenoh::Session;
@@ -213,7 +214,7 @@ fn drive(node: Session, topic: String, shown: Arc<AtomicU8>, stop: Arc<AtomicBoo
 pub async fn a_robot_sees_through_a_camera_that_a_ros_driver_owns() {
     let (_router, node, endpoint) = ros().await;
     let topic = "/camera/image_raw/compressed";
-    let source = RosSection { topic: topic.to_owned(), router: Some(endpoint), domain: DOMAIN };
+    let source = RosSection { topic: topic.to_owned(), router: Some(endpoint.clone()), domain: DOMAIN };
     let mut config = Config::default();
     config.robot.id = RobotId(1);
     config.swarm.0 = unique("driver");
@@ -222,10 +223,18 @@ pub async fn a_robot_sees_through_a_camera_that_a_ros_driver_owns() {
         source: SourceSection::Ros(source),
         ..CameraSection::default()
     };
+    config.ros = RosNodeSection {
+        enabled: true,
+        router: Some(endpoint),
+        domain: DOMAIN,
+        views_per_second: 5.0,
+        ..RosNodeSection::default()
+    };
     config.rounds.refractory = Duration::ZERO;
     config.learning.enabled = false;
     config.links.scouting.enabled = false;
     config.zenoh.insert("listen".to_owned(), json!({"endpoints": ["tcp/127.0.0.1:0"]}));
+    let viewer = node.clone();
     let body = Body::start(&config, Some(model()), 1).await.unwrap();
     let mut events = body.robot().events();
 
@@ -266,8 +275,75 @@ pub async fn a_robot_sees_through_a_camera_that_a_ros_driver_owns() {
         eprintln!("{gesture}: {:?} ({:.3})", decision.class, decision.confidence);
         right += u32::from(decision.class == Some(ClassId(gesture.into())));
     }
+    the_view_is_drawn_for_who_subscribes_alone(&viewer, &body).await;
     stop.store(true, Ordering::Relaxed);
     driver.join().unwrap();
     body.stop().await;
     assert_eq!(right, 10, "of ten gestures");
+}
+
+/// What the robot of id 1 shows of what it sees: it holds a hand of five fingers in view.
+async fn the_view_is_drawn_for_who_subscribes_alone(viewer: &Session, body: &Body) {
+    let shown = || body.robot().status().counters.get("views_shown").copied().unwrap_or(0);
+    assert_eq!(shown(), 0, "ten rounds, and nobody asked to see them");
+    let known = tokens(viewer).await;
+    let hash = CompressedImage::HASH;
+    // Reliable, volatile, the last one: as rmw_zenoh writes it.
+    let announced = format!(
+        "/MP/%/%gestalt/robot_1/%gestalt%robot_1%view%compressed/sensor_msgs::msg::dds_::CompressedImage_/{hash}/::,1:,:,:,,"
+    );
+    assert!(known.iter().any(|token| token.ends_with(&announced)), "{announced}: {known:#?}");
+
+    let topic =
+        format!("{DOMAIN}/gestalt/robot_1/view/compressed/sensor_msgs::msg::dds_::CompressedImage_/{hash}");
+    let views = viewer.declare_subscriber(topic).await.unwrap();
+    let view = async || {
+        let sample = timeout(PATIENCE, views.recv_async()).await.expect("a view comes").unwrap();
+        assert_eq!(sample.attachment().unwrap().len(), 33);
+        let message = CompressedImage::decode(&sample.payload().to_bytes()).unwrap();
+        assert_eq!((message.format.as_str(), message.header.frame.as_str()), ("jpeg", "gestalt_camera_1"));
+        let mut picture = opencv::core::Mat::default();
+        gestalt_vision::source::decode(&message.data, 2.0, &mut picture).unwrap();
+        (message.header, picture)
+    };
+    // Between rounds a robot that watches no motion looks at nothing, and shows what its camera sees.
+    let (first, picture) = view().await;
+    assert_eq!((picture.cols(), picture.rows()), (640, 480 + 44), "the frame, and a line of words below");
+    assert!(marked(&picture) < 50, "nothing is marked: {}", marked(&picture));
+    let clock = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap();
+    let age = clock.as_secs_f64() - f64::from(first.seconds) - f64::from(first.nanoseconds) / 1e9;
+    assert!((0.0..5.0).contains(&age), "it was taken {age} s ago");
+    body.robot().open_round();
+    let began = Instant::now();
+    loop {
+        let (_, picture) = view().await;
+        if marked(&picture) > 300 {
+            break;
+        }
+        assert!(began.elapsed() < PATIENCE, "the hand is marked");
+    }
+    // At most five a second.
+    while views.try_recv().unwrap().is_some() {}
+    let (before, began) = (shown(), Instant::now());
+    tokio::time::sleep(Duration::from_secs(3)).await;
+    let (more, seconds) = (shown() - before, began.elapsed().as_secs_f64());
+    eprintln!("{more} views in {seconds:.1} s");
+    assert!(more >= 2 && more as f64 <= 5.0 * seconds + 1.0, "{more} in {seconds} s");
+    // And none once nobody subscribes any more.
+    views.undeclare().await.unwrap();
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let before = shown();
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    assert_eq!(shown(), before);
+}
+
+/// Pixels of the colour in which a hand is marked, or nearly so: JPEG blurs lines.
+fn marked(picture: &opencv::core::Mat) -> usize {
+    let words = opencv::core::Rect::new(0, 0, picture.cols(), picture.rows() - 44);
+    let frame = opencv::core::Mat::roi(picture, words).unwrap().try_clone().unwrap();
+    let near = |pixel: &&opencv::core::Vec3b| {
+        let [blue, green, red] = [pixel[0], pixel[1], pixel[2]].map(i32::from);
+        (blue - 0x7f).abs() < 24 && (green - 0xb9).abs() < 24 && (red - 0x3f).abs() < 24
+    };
+    frame.data_typed::<opencv::core::Vec3b>().unwrap().iter().filter(near).count()
 }

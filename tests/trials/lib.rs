@@ -22,7 +22,7 @@ use libtest_mimic::{Arguments, Conclusion, Failed};
 use attempts::Attempts;
 pub use load::Load;
 use load::Room;
-pub use needs::{Need, SYSTEM_PYTHON, axe, data, python};
+pub use needs::{Need, axe, data, python};
 
 /// One test of the table.
 pub struct Trial {

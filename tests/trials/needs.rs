@@ -23,6 +23,10 @@ pub enum Need {
     Systemd,
     /// What makes and judges a Debian package: dpkg-dev, lintian, binutils.
     Debian,
+    /// ROS 1 for Python, its master, and Zenoh for Python.
+    Rospy,
+    /// ROS 2 for Python, and Zenoh for Python.
+    Rclpy,
     /// The accessibility checker axe-core, which judges a page in a browser: see [`axe`].
     Axe,
     /// What reads metrics: Python's `prometheus_client`, by its own parser of OpenMetrics, and Prometheus' `promtool`.
@@ -30,9 +34,6 @@ pub enum Need {
     /// A Python that has `websockets`.
     Websockets,
 }
-
-/// The interpreter that Debian's Python packages are installed for.
-pub const SYSTEM_PYTHON: &str = "/usr/bin/python3";
 
 /// The checker's one file, `axe.min.js`, of the npm package axe-core: what `GESTALT_AXE` names.
 #[must_use]
@@ -47,17 +48,13 @@ pub fn data() -> PathBuf {
     std::env::var_os("GESTALT_DATA").map_or_else(beside, PathBuf::from)
 }
 
-/// A Python that has that module: the one that `GESTALT_PYTHON` names, the first of the path, or Debian's own.
-#[must_use]
-pub fn python(module: &str) -> Option<String> {
-    let named = std::env::var("GESTALT_PYTHON").ok();
-    let others = ["python3", SYSTEM_PYTHON].map(str::to_owned);
-    let has = |python: &String| done(python, &["-c", &format!("import {module}")]);
-    named.into_iter().chain(others).find(has)
-}
-
 impl Need {
-    const ALL: [Self; 11] = [
+    /// What rospy's examples import.
+    pub const ROSPY: &[&str] = &["rospy", "std_msgs", "zenoh"];
+    /// What rclpy's examples import.
+    pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
+
+    const ALL: [Self; 13] = [
         Self::Namespaces,
         Self::Mount,
         Self::Browser,
@@ -66,6 +63,8 @@ impl Need {
         Self::Valgrind,
         Self::Systemd,
         Self::Debian,
+        Self::Rospy,
+        Self::Rclpy,
         Self::Axe,
         Self::Prometheus,
         Self::Websockets,
@@ -83,6 +82,8 @@ impl Need {
             Self::Valgrind => "valgrind",
             Self::Systemd => "systemd",
             Self::Debian => "debian",
+            Self::Rospy => "rospy",
+            Self::Rclpy => "rclpy",
             Self::Axe => "axe",
             Self::Prometheus => "prometheus",
             Self::Websockets => "websockets",
@@ -116,24 +117,22 @@ impl Need {
                 let missing = tools.into_iter().find(|tool| !done(tool, &["--version"]));
                 missing.map_or(Ok(()), |tool| Err(format!("needs {tool} (dpkg-dev, lintian, binutils)")))
             }
+            Self::Rospy if done("rosmaster", &["--help"]) => imports(Self::ROSPY),
+            Self::Rospy => Err("needs rosmaster (python3-rosmaster)".to_owned()),
+            Self::Rclpy => imports(Self::RCLPY),
             Self::Axe if !done("chromium", &["--version"]) => Err("needs a browser (chromium)".to_owned()),
             Self::Axe if axe().is_some_and(|file| file.is_file()) => Ok(()),
             Self::Axe => {
                 Err("needs axe-core (npm install axe-core; GESTALT_AXE names its axe.min.js)".to_owned())
             }
             Self::Prometheus => {
-                let parser = done(SYSTEM_PYTHON, &["-c", "import prometheus_client.openmetrics.parser"]);
-                if parser && done("promtool", &["--version"]) {
+                if python(&["prometheus_client"]).is_some() && done("promtool", &["--version"]) {
                     Ok(())
                 } else {
                     Err("needs promtool and a parser (prometheus, python3-prometheus-client)".to_owned())
                 }
             }
-            Self::Websockets if python("websockets").is_some() => Ok(()),
-            Self::Websockets => {
-                Err("needs a Python with websockets (python3-websockets, or pip install websockets)"
-                    .to_owned())
-            }
+            Self::Websockets => imports(&["websockets"]),
         }
     }
 }
@@ -152,6 +151,20 @@ pub(crate) fn required(text: Option<&str>) -> Result<Vec<Need>, String> {
 fn done(program: &str, words: &[&str]) -> bool {
     let done = Command::new(program).args(words).stdout(Stdio::null()).stderr(Stdio::null()).status();
     done.is_ok_and(|status| status.success())
+}
+
+/// A Python that can import all of these: what `GESTALT_PYTHON` names, `python3`, or the system's.
+#[must_use]
+pub fn python(modules: &[&str]) -> Option<String> {
+    let named = std::env::var("GESTALT_PYTHON").ok();
+    let known = named.into_iter().chain(["python3", "/usr/bin/python3"].map(str::to_owned));
+    let import = format!("import {}", modules.join(", "));
+    known.into_iter().find(|python| done(python, &["-c", &import]))
+}
+
+fn imports(modules: &[&str]) -> Result<(), String> {
+    let needs = || format!("needs a Python with {} (GESTALT_PYTHON names one)", modules.join(", "));
+    python(modules).map(drop).ok_or_else(needs)
 }
 
 /// The simulator, and what builds a program for it.

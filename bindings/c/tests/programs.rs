@@ -1,6 +1,6 @@
 //! Programs in C and C++, compiled against the header and run: by themselves, and under valgrind.
 //!
-//! What the machine lacks is skipped, by name and with the reason.
+//! What the machine lacks is skipped, by name and with the reason; `GESTALT_REQUIRE=valgrind` makes a failure of that.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Output};
@@ -34,10 +34,12 @@ fn main() -> ExitCode {
             Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
         (!found).then(|| format!("{program} is not installed"))
     };
+    let required = std::env::var("GESTALT_REQUIRE").unwrap_or_default();
     let mut trials = Vec::new();
     let mut skipped = Vec::new();
     let mut trial = |name: &str, needs: &[&str], run: fn()| {
-        let reason = needs.iter().find_map(|need| missing(need));
+        let is_required = |need: &&str| required.split(',').any(|name| name == *need);
+        let reason = needs.iter().filter(|need| !is_required(need)).find_map(|need| missing(need));
         if let Some(reason) = &reason {
             skipped.push(format!("skipped: {name}: {reason}"));
         }

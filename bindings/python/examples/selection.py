@@ -10,8 +10,8 @@ difference to sharing at random, within a run, with its 95 % interval.
 It depends on how far frames can be trusted, 40 runs each:
 
                      clean frames     40 % of them broken
-    k_center          +6.6 ± 1.7         -9.6 ± 2.5
-    representativity  +1.7 ± 2.5         +5.6 ± 2.6
+    k_center          +8.1 ± 1.9         -8.2 ± 2.6
+    representativity  +1.2 ± 2.5         +5.0 ± 2.4
 
 Whoever shares what is farthest from all that is known, shares what is broken; whoever shares what is in the middle of much, shares
 what the others know. The source's finding is that of unreliable frames; docs/results.md measures reliable ones, and finds k-center best.

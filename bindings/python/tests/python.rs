@@ -55,6 +55,13 @@ fn trials(package: &Arc<Package>) -> (Vec<Trial>, Vec<String>) {
         &["numpy"],
         words(&[&example, "--runs", "2", "--rounds", "6"]),
     );
+    let notebook = |options: &[&str]| {
+        let mut all = vec![here().join("tests/notebook.py").display().to_string()];
+        all.push(here().join("examples/selection.ipynb").display().to_string());
+        all.extend(words(options));
+        all
+    };
+    trial("the_notebook_runs_and_shows_what_it_kept".to_owned(), &["numpy"], notebook(&[]));
     let strict = ["-m", "mypy", "--strict", "--package", "gestalt_swarm"];
     trial("the_types_are_strict".to_owned(), &["numpy", "mypy"], words(&strict));
     let stubs = ["-m", "mypy.stubtest", "gestalt_swarm._native"];
@@ -126,6 +133,8 @@ impl Package {
             .env("PYTHONPATH", &paths)
             .env("MYPYPATH", &self.folder);
         python.env("GESTALT_EXPECTED", self.folder.join("expected.json"));
+        // Of the notebook, enough to see that it runs.
+        python.env("RUNS", "2").env("ROUNDS", "6");
         python.env("GESTALT_MODEL", here().join("../../peer/vision/models/rendered.gestalt"));
         let output = python.output().map_err(|error| error.to_string())?;
         if output.status.success() {

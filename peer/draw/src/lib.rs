@@ -13,6 +13,6 @@ mod text;
 
 pub use error::DrawError;
 pub use file::{Kind, check, save, write};
-pub use png::png;
+pub use png::{bgr, png};
 pub use sheet::{Anchor, Letters, Place, Sheet, Tone};
 pub use text::{escaped, fitting, text_width};

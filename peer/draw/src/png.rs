@@ -17,6 +17,23 @@ const MAX_SIDE: u32 = 16_384;
 /// # Errors
 /// [`DrawError::Svg`] for text that is no SVG, or larger than 16,384 pixels.
 pub fn png(svg: &str) -> Result<Vec<u8>, DrawError> {
+    render(svg)?.encode_png().map_err(|error| DrawError::Svg(error.to_string()))
+}
+
+/// The same as pixels, for who makes another file of them: width, height, and blue, green and red of each, row by row.
+///
+/// # Errors
+/// As [`png()`].
+pub fn bgr(svg: &str) -> Result<(u32, u32, Vec<u8>), DrawError> {
+    let pixels = render(svg)?;
+    let colours = pixels.pixels().iter().flat_map(|pixel| {
+        let colour = pixel.demultiply();
+        [colour.blue(), colour.green(), colour.red()]
+    });
+    Ok((pixels.width(), pixels.height(), colours.collect()))
+}
+
+fn render(svg: &str) -> Result<Pixmap, DrawError> {
     let options = Options {
         fontdb: font::embedded(),
         font_family: font::FAMILY.to_owned(),
@@ -32,7 +49,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>, DrawError> {
     let mut pixels = Pixmap::new(size.width(), size.height())
         .ok_or_else(|| DrawError::Svg("a drawing without a size".to_owned()))?;
     resvg::render(&tree, Transform::default(), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| DrawError::Svg(error.to_string()))
+    Ok(pixels)
 }
 
 #[cfg(test)]
@@ -74,6 +91,13 @@ mod tests {
         );
         let first = red.pixels()[0];
         assert_eq!((first.red(), first.green(), first.blue(), first.alpha()), (255, 0, 0, 255));
+    }
+
+    #[test]
+    fn pixels_are_blue_green_red_row_by_row() {
+        let drawing = "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='2'><rect width='1' height='1' fill='#123456'/>\
+                       <rect y='1' width='1' height='1' fill='#fff'/></svg>";
+        assert_eq!(bgr(drawing).unwrap(), (1, 2, vec![0x56, 0x34, 0x12, 255, 255, 255]));
     }
 
     #[test]

@@ -120,6 +120,21 @@ impl Sheet {
         }
     }
 
+    /// Draws a line through all points and back to the first, `pen` pixels thick.
+    pub fn contour(&mut self, points: impl IntoIterator<Item = (f64, f64)>, tone: Tone, pen: f64) {
+        let mut path = String::new();
+        for (x, y) in points {
+            let _ = write!(path, "{x:.1},{y:.1} ");
+        }
+        if !path.is_empty() {
+            let _ = writeln!(
+                self.body,
+                r##"<polygon points="{}" fill="none" stroke="#{tone:06x}" stroke-width="{pen:.2}"/>"##,
+                path.trim_end()
+            );
+        }
+    }
+
     /// Puts a picture (the bytes of a PNG file) into a place, which it fills.
     pub fn picture(&mut self, png: &[u8], place: Place) {
         if place.is_drawn() {
@@ -181,7 +196,15 @@ mod tests {
         let mut sheet = Sheet::new(20.0, 10.0, 0x112233);
         sheet.fill(Place::new(0.0, 0.0, 5.0, 5.0), 0xff0000);
         sheet.picture(&png(&inner.svg()).unwrap(), Place::new(10.0, 0.0, 10.0, 10.0));
+        sheet.contour([(6.5, 1.5), (9.5, 1.5), (9.5, 4.5), (6.5, 4.5)], 0x0000ff, 1.0);
+        sheet.contour([], 0x0000ff, 1.0);
         let picture = pixels(&sheet);
+        assert_eq!(tone(&picture, 7, 2), 0x112233, "a contour is not filled");
+        assert_eq!(
+            picture.pixels().iter().filter(|pixel| pixel.blue() > 200).count(),
+            12,
+            "its line is drawn"
+        );
         assert_eq!((picture.width(), picture.height()), (20, 10));
         assert_eq!(
             [tone(&picture, 2, 2), tone(&picture, 7, 7), tone(&picture, 15, 5)],

@@ -77,4 +77,15 @@ mod tests {
         other[16] = 15;
         assert!(Attachment::decode(&other).is_err());
     }
+
+    proptest::proptest! {
+        #[test]
+        fn no_bytes_make_the_reader_panic_and_what_is_read_is_what_was_written(bytes: Vec<u8>, length in 30_usize..36) {
+            let _ = Attachment::decode(&bytes);
+            let padded: Vec<u8> = bytes.iter().copied().chain(std::iter::repeat(16)).take(length).collect();
+            if let Ok(attachment) = Attachment::decode(&padded) {
+                assert_eq!(attachment.encode().as_slice(), padded);
+            }
+        }
+    }
 }

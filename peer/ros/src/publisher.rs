@@ -88,6 +88,18 @@ impl<M: RosMessage> Publisher<M> {
             .map_err(|cause| RosError::zenoh(format!("publish {}", self.endpoint.topic), cause))
     }
 
+    /// Whether anybody subscribes, as far as the router has said. What is dear to make need not be made for nobody.
+    ///
+    /// # Errors
+    /// [`RosError::Zenoh`] when the node is closed.
+    pub fn is_heard(&self) -> Result<bool, RosError> {
+        let matching = self.publisher.matching_status().wait();
+        let matching = matching.map_err(|cause| {
+            RosError::zenoh(format!("ask who subscribes to {}", self.endpoint.topic), cause)
+        })?;
+        Ok(matching.matching())
+    }
+
     /// What it publishes, and how.
     #[must_use]
     pub fn endpoint(&self) -> &Endpoint {

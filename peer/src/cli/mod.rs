@@ -44,6 +44,7 @@ mod trust;
 mod verify;
 #[cfg(feature = "opencv")]
 mod views;
+mod vocabulary;
 mod watch;
 mod web;
 #[cfg(not(feature = "opencv"))]
@@ -104,6 +105,8 @@ enum Verb {
     Teach(teach::Args),
     /// Show a swarm to a ROS 2 system, and take an instructor's words from it
     Ros(ros::Args),
+    /// Print a ready vocabulary of gestures and their meanings, draw it, or make training pictures of it
+    Vocabulary(vocabulary::Args),
     /// Take pictures of a gesture for training, each checked
     #[cfg(feature = "opencv")]
     Capture(Box<capture::Args>),
@@ -186,6 +189,7 @@ impl Command {
             Verb::Look(args) => look::run(&args),
             #[cfg(feature = "opencv")]
             Verb::Views(args) => views::run(&args),
+            Verb::Vocabulary(args) => vocabulary::run(&args),
             Verb::Emulate(args) => emulate::run(&args),
             Verb::Explain(args) => explain::run(&args),
             Verb::Trust(args) => trust::run(&args),

@@ -7,7 +7,7 @@ use gestalt_strategies::Classify;
 use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
-use super::config_args::ConfigArgs;
+use super::config_args::{ConfigArgs, Setting};
 use super::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
 use super::show::{self, Names, line};
 use super::web::WebArgs;
@@ -46,6 +46,11 @@ pub struct Args {
     #[command(flatten)]
     web: WebArgs,
 
+    /// Show what the robot sees to the ROS 2 system whose Zenoh router this is, as ~/view/compressed of the node
+    /// /gestalt/robot_N (ros.enabled, ros.router)
+    #[arg(long, value_name = "ROUTER")]
+    ros: Option<String>,
+
     /// Print events as JSON Lines, one object per line
     #[arg(long)]
     json: bool,
@@ -57,7 +62,11 @@ impl Args {
         settings.extend(self.camera.settings()?);
         settings.extend(self.model.settings());
         if self.motion {
-            settings.push(super::config_args::Setting::new(&["camera", "motion", "enabled"], json!(true)));
+            settings.push(Setting::new(&["camera", "motion", "enabled"], json!(true)));
+        }
+        if let Some(router) = &self.ros {
+            settings.push(Setting::new(&["ros", "enabled"], json!(true)));
+            settings.push(Setting::new(&["ros", "router"], json!(router)));
         }
         Ok(self.config.load_with(settings)?)
     }

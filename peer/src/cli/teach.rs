@@ -13,6 +13,7 @@ use super::show::{self, Names, line};
 use super::{Failure, interrupted};
 use gestalt_desk::{SHOWN, Word};
 use gestalt_link::{Client, Heard, News};
+use gestalt_vision::vocabulary::GestureBook;
 
 /// The time to hold the hand otherwise, and longer than robots take requests for copies of one.
 const BETWEEN_SHOWS: Duration = Duration::from_secs(1);
@@ -43,6 +44,10 @@ pub struct Args {
     #[arg(long, default_value_t = 0, value_name = "TIMES", value_parser = clap::value_parser!(u32).range(0..=100))]
     shows: u32,
 
+    /// After `new`, in place of a label: name each gesture of a ready vocabulary (spatial, rescue), or of one in a file
+    #[arg(long, value_name = "NAME|FILE")]
+    vocabulary: Option<String>,
+
     /// Instructor name
     #[arg(long, default_value = "console")]
     instructor: InstructorId,
@@ -62,8 +67,13 @@ pub struct Args {
 /// When no robot is reached, none answers, or a word means nothing.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let words: Vec<&str> = args.words.iter().map(String::as_str).collect();
-    let word = if words.is_empty() { None } else { Some(Word::read(&words)?) };
-    if args.shows > 0 && !matches!(word, Some(Word::New(_))) {
+    let book = match &args.vocabulary {
+        Some(name) if words == ["new"] => Some(GestureBook::find(name)?),
+        Some(_) => return Err("--vocabulary goes with 'new', and without a label".into()),
+        None => None,
+    };
+    let word = if words.is_empty() || book.is_some() { None } else { Some(Word::read(&words)?) };
+    if args.shows > 0 && book.is_none() && !matches!(word, Some(Word::New(_))) {
         return Err("--shows goes with 'new LABEL'".into());
     }
     let (swarm, link) = args.config.client()?;
@@ -77,10 +87,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             None => last,
         };
         let mut lesson = Lesson { args, client, news, last, asked: None, names: Names::default() };
-        let said = match word {
-            Some(Word::New(label)) => lesson.name(label).await,
-            Some(word) => lesson.say(word).await,
-            None => lesson.converse().await,
+        let said = match (word, book) {
+            (_, Some(book)) => lesson.name_all(book).await,
+            (Some(Word::New(label)), _) => lesson.name(label).await,
+            (Some(word), _) => lesson.say(word).await,
+            (None, None) => lesson.converse().await,
         };
         lesson.client.close().await;
         said
@@ -143,6 +154,19 @@ impl Lesson<'_> {
                 eprintln!("{}", show::clean(&error.to_string()));
             }
         }
+    }
+
+    /// Names the gestures of a vocabulary one by one.
+    async fn name_all(&mut self, book: GestureBook) -> Result<(), Failure> {
+        for gesture in book.gestures {
+            if !self.args.json {
+                let [name, meaning, show] =
+                    [&gesture.name, &gesture.meaning, &gesture.show].map(|words| show::clean(words));
+                eprintln!("{name}: {meaning} {show}");
+            }
+            self.name(gesture.name).await?;
+        }
+        Ok(())
     }
 
     /// Names a gesture, and has it shown as often as wished.

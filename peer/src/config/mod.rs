@@ -8,6 +8,7 @@ mod document;
 mod error;
 mod learning;
 mod links;
+mod ros;
 mod template;
 mod trust;
 mod web;
@@ -33,6 +34,7 @@ pub use error::ConfigError;
 pub use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, MotionConfigError, Schedule};
 pub use learning::{LearnFrom, LearningSection};
 pub use links::{LinksSection, ScoutingSection};
+pub use ros::RosNodeSection;
 pub use template::TEMPLATE;
 pub use trust::{ROSTER_FILE, TrustSection, certificate_file, client_key_file, key_file};
 pub use web::WebSection;
@@ -59,6 +61,8 @@ pub struct Config {
     pub trust: TrustSection,
     /// A page to watch and teach the swarm.
     pub web: WebSection,
+    /// What ROS sees of the robot.
+    pub ros: RosNodeSection,
     /// How the robot finds others, and how many it links to.
     pub links: LinksSection,
     /// Zenoh's own configuration, verbatim; it takes precedence over what Gestalt sets, key by key.
@@ -124,7 +128,8 @@ impl FromStr for ModelSection {
 impl Config {
     /// The names of the sections: what a `--cfg` path can begin with, besides Zenoh's own keys.
     pub const SECTIONS: &[&str] = &[
-        "robot", "swarm", "camera", "model", "learning", "rounds", "center", "trust", "web", "links", "zenoh",
+        "robot", "swarm", "camera", "model", "learning", "rounds", "center", "trust", "web", "ros", "links",
+        "zenoh",
     ];
 
     /// Reads and checks a configuration file.
@@ -205,6 +210,7 @@ impl Config {
         found.extend(self.camera.check());
         found.extend(self.check_model().err());
         found.extend(self.center.check());
+        found.extend(self.ros.check(self.robot.id, !matches!(self.camera.source, SourceSection::None)));
         // Too few links would be said again, in other words.
         if self.links.check().is_ok()
             && let Err(error) = self.link().check(self.robot.id, self.trust.keys.is_some())
@@ -308,6 +314,9 @@ mod tests {
             ("{center: {gone_after: '1s'}}", "center.gone_after", "frozen_after"),
             ("{center: {fuse: 'mean'}}", "center.fuse", "central"),
             ("{center: {robots: {'7': {camera: 'kite'}}}}", "center.robots.7.camera", "parrot"),
+            ("{ros: {enabled: true}}", "ros.enabled", "camera.source"),
+            ("{ros: {views_per_second: 90}}", "ros.views_per_second", "0.1..=30"),
+            ("{ros: {namespace: 'a b'}}", "ros.namespace", "letters"),
             ("{links: {max_links: 1}}", "links.max_links", "2..=16"),
             ("{camera: {source: {video: {path: 'x.mp4'}}}}", "model", "classifier"),
             (

@@ -13,6 +13,7 @@ use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::time::MissedTickBehavior;
 
+use super::window::{Found, Window};
 use super::{Eye, Seen};
 use crate::camera_report::{self, CameraReport};
 use crate::stream::Inlet;
@@ -27,7 +28,7 @@ pub(crate) async fn look(
     seen: Arc<Mutex<Option<Seen>>>,
 ) {
     let last_word = LastWord(robot.clone());
-    let Eye { source, open, describe, watches, live, period, sight, human, zero, inlet } = eye;
+    let Eye { source, open, describe, watches, live, period, sight, human, zero, inlet, window } = eye;
     let reader = match Reader::start(source, open, zero) {
         Ok(reader) => reader,
         Err(error) => return last_word.say(&format!("no thread for the camera: {error}")),
@@ -40,7 +41,8 @@ pub(crate) async fn look(
         report.expect(zero.elapsed());
     }
     let rounds = Rounds { now: None, reader, human, watches, live, inlet };
-    let mut eye = Looking { rounds, report, sight: Some(sight), describe, period, zero, seen, replaced: 0 };
+    let mut eye =
+        Looking { rounds, report, sight: Some(sight), describe, period, zero, seen, replaced: 0, window };
     let mut tick = tokio::time::interval(camera_report::INTERVAL);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -95,6 +97,7 @@ struct Looking {
     seen: Arc<Mutex<Option<Seen>>>,
     /// How many frames were replaced by newer ones, as far as its sight knows.
     replaced: u64,
+    window: Option<Arc<Window>>,
 }
 
 impl Looking {
@@ -128,8 +131,13 @@ impl Looking {
     }
 
     async fn on_frame(&mut self, frame: Frame, robot: &Robot) {
-        if !self.report.note_frame(&frame.image, frame.at) || !(self.rounds.watches || self.round().is_some())
-        {
+        if !self.report.note_frame(&frame.image, frame.at) {
+            return;
+        }
+        if !(self.rounds.watches || self.round().is_some()) {
+            if let Some(window) = &self.window {
+                window.offer(&frame.image, frame.at, || Found::NotLooked);
+            }
             return;
         }
         let Some(mut sight) = self.sight.take() else { unreachable!("frames are judged one by one") };
@@ -137,7 +145,7 @@ impl Looking {
         // take its next picture.
         let fresh = |(_, since): &(RoundId, Duration)| frame.at + self.period >= *since;
         let round = self.rounds.now.filter(fresh).map(|(round, _)| round);
-        let seen = self.seen.clone();
+        let (seen, window) = (self.seen.clone(), self.window.clone());
         let replaced = self.rounds.reader.dropped();
         let passed_over = replaced - std::mem::replace(&mut self.replaced, replaced);
         let stated = self.rounds.inlet.as_ref().and_then(|inlet| inlet.fps());
@@ -146,7 +154,7 @@ impl Looking {
                 Some(fps) => sight.rate_is(fps),
                 None => sight.passed_over(passed_over),
             };
-            let taken = judge(&mut sight, frame, round, rate, &seen);
+            let taken = judge(&mut sight, frame, round, rate, &seen, window.as_deref());
             (sight, taken)
         });
         // What panics there is caught there; it is cancelled only when the program ends.
@@ -178,18 +186,22 @@ impl Looking {
     }
 }
 
-/// Takes one look, after `rate` told the sight of the camera's. `seen` receives the frame of a round.
+/// Takes one look, after `rate` told the sight of the camera's. `seen` receives the frame of a round, `window` any.
 fn judge(
     sight: &mut Steady<Sight>,
     frame: Frame,
     round: Option<RoundId>,
     rate: impl FnOnce(&mut Sight),
     seen: &Mutex<Option<Seen>>,
+    window: Option<&Window>,
 ) -> Result<Taken, Broken> {
     let taken = sight.run(frame.at, |sight| {
         rate(sight);
         sight.take(&frame, round.is_some())
     })?;
+    if let (Some(window), Some(sight)) = (window, sight.get()) {
+        window.offer(&frame.image, frame.at, || Found::of(&taken, sight));
+    }
     if let (Some(round), Some(observation)) = (round, &taken.observation) {
         let features = observation.as_ref().ok().map(|observation| observation.features.clone());
         *seen.lock().unwrap_or_else(PoisonError::into_inner) =

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use gestalt_draw::{Place, Sheet};
-use opencv::core::{Mat, Size, Vector};
+use opencv::core::{Mat, Rect, Size, Vector};
 use opencv::prelude::*;
 use opencv::{imgcodecs, imgproc};
 
 use super::PictureError;
+use super::tone::AGREES;
 
 /// Writes a frame (BGR or grey, 8 bits) as it is to a PNG file.
 ///
@@ -32,6 +33,14 @@ pub(super) fn embed(sheet: &mut Sheet, image: &Mat, place: Place) -> opencv::Res
     };
     sheet.picture(png.as_slice(), shown);
     Ok(shown)
+}
+
+/// Marks a region of an image that is shown in a place.
+pub(super) fn mark(sheet: &mut Sheet, image: &Mat, region: Rect, shown: Place) {
+    let scale = shown.width / f64::from(image.cols().max(1));
+    let [x, y, width, height] =
+        [region.x, region.y, region.width, region.height].map(|pixels| f64::from(pixels) * scale);
+    sheet.outline(Place::new(shown.x + x, shown.y + y, width, height), AGREES, 2.5);
 }
 
 /// The fastest compression: a noisy frame becomes hardly smaller by the others.

@@ -6,7 +6,7 @@ use opencv::imgproc::{self, INTER_AREA, INTER_LINEAR};
 use opencv::prelude::*;
 
 use super::PictureError;
-use super::frame::embed;
+use super::frame::{embed, mark};
 use super::tone::{AGREES, BACKGROUND, CARD, DIFFERS, MUTED, TEXT, TRACK};
 
 /// Groups of features: each a name and its values.
@@ -120,14 +120,6 @@ fn card(sheet: &mut Sheet, place: Place, title: &str, words: &str, good: bool) {
     sheet.write(title, (place.x + INSET, place.y + 28.0), Letters::new(20.0, TEXT), width);
     let tone = if good { MUTED } else { DIFFERS };
     sheet.write(words, (place.x + INSET, place.y + 53.0), Letters::new(14.0, tone), width);
-}
-
-/// Marks a region of an image that is shown in a place.
-fn mark(sheet: &mut Sheet, image: &Mat, region: Rect, shown: Place) {
-    let scale = shown.width / f64::from(image.cols().max(1));
-    let [x, y, width, height] =
-        [region.x, region.y, region.width, region.height].map(|pixels| f64::from(pixels) * scale);
-    sheet.outline(Place::new(shown.x + x, shown.y + y, width, height), AGREES, 2.5);
 }
 
 /// The balanced pixels of the hand, and nothing else.

@@ -37,3 +37,4 @@ pub mod steady;
 pub mod survey;
 #[cfg(feature = "opencv")]
 pub mod variation;
+pub mod vocabulary;

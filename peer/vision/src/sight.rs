@@ -115,6 +115,12 @@ impl Sight {
         Taken { at: frame.at, change, observation, trouble }
     }
 
+    /// With what it looked last: where in the frame, and at which pixels, it found the hand of the last observation.
+    #[must_use]
+    pub fn perception(&self) -> &Perception {
+        &self.perception
+    }
+
     /// What moves, for the status; `None` when motion is not watched.
     #[must_use]
     pub fn motion(&self) -> Option<Motion> {

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::error::ExperimentError;
-use super::setting::{Drift, Setting};
+use super::setting::{Drift, Method, Setting, Start};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::pose::Placement;
 use gestalt_vision::source::Glove;
+use gestalt_vision::vocabulary::GestureBook;
 
 /// What is asked, and how: a commented JSON5 file. See `configs/experiments/`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +72,9 @@ pub struct Hands {
     pub camera: String,
     /// What the rendered hands wear.
     pub glove: Glove,
+    /// A ready vocabulary that rendered hands show, by name: `spatial`, `rescue`. `None`: they count 0 to 5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vocabulary: Option<String>,
     /// How many people show each gesture, of rendered hands.
     pub people: usize,
     /// The most pictures of a gesture that are used of a dataset.
@@ -85,6 +89,15 @@ impl Hands {
     fn photographed() -> Self {
         let placement = Placement { half_deg: 30.0, elevation_deg: [-15.0, 10.0], distance_m: [0.6, 0.9] };
         Self { placement, camera: "laptop".to_owned(), ..Self::default() }
+    }
+
+    /// The vocabulary that rendered hands show; `None` where they count.
+    ///
+    /// # Errors
+    /// When there is none of that name.
+    pub fn book(&self) -> Result<Option<GestureBook>, ExperimentError> {
+        let Some(name) = &self.vocabulary else { return Ok(None) };
+        GestureBook::find(name).map(Some).map_err(|error| ExperimentError::Setting(error.to_string()))
     }
 
     fn check(&self) -> Result<(), ExperimentError> {
@@ -109,6 +122,7 @@ impl Default for Hands {
             placement: Placement::default(),
             camera: "footbot".to_owned(),
             glove: Glove::Cyan,
+            vocabulary: None,
             people: 36,
             pictures: 60,
             picture_height_m: 0.5,
@@ -169,6 +183,15 @@ impl Experiment {
         let drifts = cells.iter().map(|cell| cell.setting.drift).filter(|drift| *drift != Drift::None);
         if drifts.collect::<Vec<_>>().windows(2).any(|pair| pair[0] != pair[1]) {
             return wrong("two kinds of drift in one experiment: make two of it");
+        }
+        if self.hands.book()?.is_some()
+            && cells
+                .iter()
+                .any(|cell| (cell.setting.start, cell.setting.reduction) != (Start::Nothing, Method::Pca))
+        {
+            return wrong(
+                "robots know fingers that count, and no ready vocabulary: let them start from nothing, with reduction pca",
+            );
         }
         cells.iter().try_for_each(|cell| cell.setting.scenario(2).map(drop))
     }
@@ -256,6 +279,12 @@ mod tests {
             ("robots: 2", "robots: 0", "robots"),
             ("name: '1'", "name: '0'", "same name"),
             ("title: 't'", "titel: 't'", "titel"),
+            ("title: 't'", "title: 't', hands: { vocabulary: 'semaphore' }", "spatial, rescue"),
+            (
+                "title: 't', base: {",
+                "title: 't', hands: { vocabulary: 'rescue' }, base: { start: 'model',",
+                "from nothing",
+            ),
         ] {
             let error = parse(&SHARING.replacen(from, to, 1)).unwrap_err().to_string();
             assert!(error.contains(named), "{error}");

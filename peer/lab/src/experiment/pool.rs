@@ -21,6 +21,7 @@ use gestalt_vision::dataset::Dataset;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{EmulatedView, RenderedSource, Scene, Source, read_image};
+use gestalt_vision::vocabulary::HandPose;
 
 /// The features robots learn from.
 pub const FEATURES: FeatureSet = FeatureSet::Shape;
@@ -67,7 +68,15 @@ struct Take {
 
 #[derive(Clone, Debug, Serialize)]
 enum Shown {
-    Rendered { fingers: u8, seed: u64, take: u64 },
+    Rendered {
+        /// How many, or which of a vocabulary.
+        fingers: u8,
+        seed: u64,
+        take: u64,
+        /// Where it is one of a vocabulary.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pose: Option<HandPose>,
+    },
     Picture(PathBuf, u64),
 }
 
@@ -87,7 +96,7 @@ impl Pool {
         let drift = experiment.drift();
         let hands = if dataset.is_some() { &experiment.photographs } else { &experiment.hands };
         let (gestures, takes) = match dataset {
-            None => rendered(hands, drift),
+            None => rendered(hands, drift)?,
             Some(folder) => pictured(hands, drift, folder)?,
         };
         let made_of = serde_json::to_string(&(FEATURES.name(), eyes, hands, drift, &gestures, &takes))
@@ -147,7 +156,11 @@ impl Pool {
     }
 }
 
-fn rendered(hands: &Hands, drift: Drift) -> (Vec<String>, Vec<Take>) {
+fn rendered(hands: &Hands, drift: Drift) -> Result<(Vec<String>, Vec<Take>), ExperimentError> {
+    let shown: Vec<(String, Option<HandPose>)> = match hands.book()? {
+        Some(book) => book.gestures.into_iter().map(|gesture| (gesture.name, Some(gesture.pose))).collect(),
+        None => (0..6).map(|n: u8| (n.to_string(), None)).collect(),
+    };
     let people = hands.people as u64;
     let (people, takes, shift) = match drift {
         Drift::None => (vec![(false, 0..people)], 1, 0),
@@ -160,19 +173,19 @@ fn rendered(hands: &Hands, drift: Drift) -> (Vec<String>, Vec<Take>) {
     let mut all = Vec::new();
     for (after, people) in people {
         for (person, take) in people.flat_map(|person| (0..takes).map(move |take| (person, take))) {
-            for fingers in 0..6 {
+            for (fingers, (_, pose)) in (0_u8..).zip(&shown) {
                 let moment =
                     Moment { class: ClassId(u32::from(fingers)), person: Some(person as u32), after };
                 let dim = after && drift == Drift::Light;
                 all.push(Take {
                     moment,
                     dim,
-                    shown: Shown::Rendered { fingers, seed: shift + person, take },
+                    shown: Shown::Rendered { fingers, seed: shift + person, take, pose: *pose },
                 });
             }
         }
     }
-    ((0..6).map(|n: u8| n.to_string()).collect(), all)
+    Ok((shown.into_iter().map(|(name, _)| name).collect(), all))
 }
 
 fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, Vec<Take>), ExperimentError> {
@@ -275,10 +288,13 @@ fn look_from_all(
             (Shown::Picture(..), Some(picture)) => {
                 EmulatedView::new(camera, *pose, hands.picture_height_m, seed)?.view(picture)?
             }
-            (Shown::Rendered { fingers, seed: person, take }, _) => {
+            (Shown::Rendered { fingers, seed: person, take, pose: held }, _) => {
                 // Aim and tilt differ from take to take.
                 let mut source = RenderedSource::new(camera, *pose, hands.glove, seed ^ take << 48)?;
-                let scene = Scene { gesture: Some(*fingers), seed: *person };
+                let mut scene = Scene { gesture: Some(*fingers), seed: *person };
+                if let Some(held) = held {
+                    (source, scene.gesture) = (source.showing([*held].into()), Some(0));
+                }
                 source.next_frame(Duration::ZERO, &scene)?.image
             }
             (Shown::Picture(..), None) => continue,

@@ -67,7 +67,8 @@ pub fn conduct_by(
     let looked = |done, total| progress(Progress::Looked(done, total));
     let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);
-    let mut schools = Schools::new(pool.vocabulary()?, materials.start.as_deref())?;
+    let ready = materials.dataset.is_none() && experiment.hands.vocabulary.is_some();
+    let mut schools = Schools::new(pool.vocabulary()?, ready, materials.start.as_deref())?;
     let taught: Vec<Taught<'_>> = cells
         .iter()
         .zip(rules)

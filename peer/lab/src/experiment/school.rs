@@ -42,12 +42,19 @@ pub struct Schools {
 
 impl Schools {
     /// Looks at rendered hands and, for the model that robots may start from, at the pictures of `dataset` if there is
-    /// one.
+    /// one. Where robots see a ready vocabulary (`ready`), their feature space is fitted on hands that count, of which no
+    /// gesture is theirs.
     ///
     /// # Errors
     /// A dataset that cannot be read, or has not all gestures of the vocabulary.
-    pub fn new(vocabulary: Vocabulary, dataset: Option<&Path>) -> Result<Self, ExperimentError> {
+    pub fn new(vocabulary: Vocabulary, ready: bool, dataset: Option<&Path>) -> Result<Self, ExperimentError> {
         let mut perception = Perception::new(FEATURES, HandConfig::default())?;
+        if ready {
+            let counts = Vocabulary::new((0..6).map(|n| n.to_string()));
+            let counts = counts.map_err(|error| ExperimentError::Setting(error.to_string()))?;
+            let nothing = rendered(&counts, PEOPLE, BEARING_DEG, &mut perception)?;
+            return Ok(Self { vocabulary, nothing, model: Vec::new(), made: BTreeMap::new() });
+        }
         let nothing = rendered(&vocabulary, PEOPLE, BEARING_DEG, &mut perception)?;
         let model = match dataset {
             None => rendered(&vocabulary, MODEL_PEOPLE, MODEL_BEARING_DEG, &mut perception)?,

@@ -164,6 +164,9 @@ pub enum SourceError {
     /// More fingers than a hand has.
     #[error("a hand cannot raise {0} fingers: 0 to 5")]
     Gesture(u8),
+    /// A gesture that is in no vocabulary.
+    #[error("there is no gesture {0} in a vocabulary of {1}: they count from 0")]
+    NotInVocabulary(u8, usize),
     /// A camera that cannot be.
     #[error(transparent)]
     Camera(#[from] CameraModelError),

@@ -5,6 +5,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::vocabulary::{Finger, HandPose, Thumb, Which};
+
 /// What covers the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -45,10 +47,10 @@ const SPLAY_DEG: [f32; 4] = [9.0, 1.5, -7.0, -17.0];
 /// Half the thickness of each long finger, in metres, glove included.
 const RADIUS: [f32; 4] = [0.0098, 0.0102, 0.0096, 0.0086];
 
-/// One person's hand showing one count: what a scene's seed decides.
+/// One person's hand held in one way: what a scene's seed decides.
 #[derive(Clone, Debug)]
 pub(super) struct Hand {
-    raised: [bool; FINGERS],
+    pose: HandPose,
     left: bool,
     size: f32,
     lengths: [f32; FINGERS],
@@ -73,12 +75,21 @@ pub(super) struct Hand {
 impl Hand {
     /// The hand of the person that `seed` stands for, raising `count` fingers (0 to 5).
     pub fn new(count: u8, seed: u64, glove: Glove) -> Self {
+        Self::of(seed, glove, |rng| counting(count, rng))
+    }
+
+    /// The same person's hand held in that way.
+    pub fn posed(pose: HandPose, seed: u64, glove: Glove) -> Self {
+        Self::of(seed, glove, |_| pose)
+    }
+
+    fn of(seed: u64, glove: Glove, pose: impl FnOnce(&mut ChaCha8Rng) -> HandPose) -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-        // The person first, then what they show: the same seed is the same person whatever the count.
+        // The person first, then what they show: the same seed is the same person whatever they show.
         let hand_colour = hand_colour(glove, rng);
         let sleeve_colour = sleeve_colour(rng);
         let mut between = |low: f32, high: f32| rng.random_range(low..high);
-        Self {
+        let mut hand = Self {
             left: between(0.0, 1.0) < 0.3,
             size: between(0.92, 1.1),
             lengths: std::array::from_fn(|_| between(0.94, 1.06)),
@@ -92,8 +103,18 @@ impl Hand {
             hand_colour,
             sleeve_colour,
             head: rng.random_range(60.0..170.0),
-            raised: raised(count, rng),
+            pose: pose(rng),
+        };
+        match hand.pose.hand {
+            Which::Either => {}
+            Which::Right => hand.left = false,
+            Which::Left => hand.left = true,
         }
+        hand.spread *= hand.pose.spread;
+        hand.roll += hand.pose.roll_deg.to_radians();
+        hand.tilt += hand.pose.tilt_deg.to_radians();
+        hand.turn += hand.pose.turn_deg.to_radians();
+        hand
     }
 
     /// The bones at `seconds` since the gesture began: a held hand trembles a little.
@@ -206,13 +227,22 @@ impl Hand {
     /// Forward kinematics: each joint bends further towards the palm (z).
     fn long_finger(&self, finger: usize, tremble: f32, bones: &mut Vec<Capsule>) {
         let i = finger - 1;
-        let (bends_deg, splay) = if self.raised[finger] {
-            ([3.0_f32, 6.0, 9.0], SPLAY_DEG[i].to_radians() * self.spread + self.lean[finger])
-        } else {
-            // Folded fingers close up beside each other.
-            ([76.0, 172.0, 238.0], SPLAY_DEG[i].to_radians() * 0.25)
+        let held = self.pose.fingers()[i];
+        // How far each phalanx is bent towards the palm, against the back of the hand.
+        let bends_deg: [f32; 3] = match held {
+            Finger::Straight => [3.0, 6.0, 9.0],
+            Finger::Folded => [76.0, 172.0, 238.0],
+            Finger::Hooked => [12.0, 100.0, 150.0],
+            Finger::Forward => [80.0, 88.0, 93.0],
+            Finger::Pinched => [52.0, 105.0, 150.0],
         };
-        let slack = if self.raised[finger] { self.slack[finger] } else { -self.slack[finger] };
+        let splay = if held == Finger::Folded {
+            // Folded fingers close up beside each other.
+            SPLAY_DEG[i].to_radians() * 0.25
+        } else {
+            SPLAY_DEG[i].to_radians() * self.spread + self.lean[finger]
+        };
+        let slack = if held == Finger::Folded { -self.slack[finger] } else { self.slack[finger] };
         let outward = Vector3::new(splay.sin(), splay.cos(), 0.0);
         let mut joint = Vector3::new(KNUCKLES[i].0, KNUCKLES[i].1, 0.0);
         for (phalanx, length) in PHALANGES[i].iter().enumerate() {
@@ -228,28 +258,38 @@ impl Hand {
     fn thumb(&self, bones: &mut Vec<Capsule>) {
         let root = Vector3::new(0.018, -0.050, 0.006);
         let length = self.lengths[THUMB];
-        let (knuckle, joint, tip) = if self.raised[THUMB] {
+        // The thumb stretched in the plane of the palm, at that angle from the index finger.
+        let stretched = |away: f32| {
             let knuckle = Vector3::new(0.042, -0.020, 0.012);
-            // Stretched sideways: 38° to 55° from the index finger.
-            let away = (38.0_f32 + 17.0 * (self.spread - 0.85) / 0.65).to_radians() + self.lean[THUMB];
             let joint = knuckle + Vector3::new(away.sin(), away.cos(), 0.12).normalize() * (0.036 * length);
             let tip = joint
                 + Vector3::new((away - 0.12).sin(), (away - 0.12).cos(), 0.06).normalize() * (0.029 * length);
             (knuckle, joint, tip)
-        } else if self.raised[1] && self.raised[2] {
+        };
+        let (knuckle, joint, tip) = match self.pose.thumb {
+            // 38° to 55° from the index finger.
+            Thumb::Out => {
+                stretched((38.0_f32 + 17.0 * (self.spread - 0.85) / 0.65).to_radians() + self.lean[THUMB])
+            }
+            Thumb::Wide => stretched(88.0_f32.to_radians() + self.lean[THUMB]),
+            Thumb::Beside => stretched(4.0_f32.to_radians() + self.lean[THUMB]),
+            Thumb::Pinched => (
+                Vector3::new(0.042, -0.020, 0.022),
+                Vector3::new(0.047, 0.008, 0.046),
+                Vector3::new(0.039, 0.026, 0.064),
+            ),
             // Laid across the open palm, its tip at the ring finger's root.
-            (
+            Thumb::Folded if self.pose.index != Finger::Folded && self.pose.middle != Finger::Folded => (
                 Vector3::new(0.031, -0.022, 0.020),
                 Vector3::new(0.009, -0.006, 0.026),
                 Vector3::new(-0.013, 0.001, 0.024),
-            )
-        } else {
+            ),
             // Across the folded fingers.
-            (
+            Thumb::Folded => (
                 Vector3::new(0.034, -0.020, 0.026),
                 Vector3::new(0.022, 0.002, 0.047),
                 Vector3::new(0.0, 0.010, 0.053),
-            )
+            ),
         };
         bones.push(self.bone(root, knuckle, 0.0185, 0.0135));
         bones.push(self.bone(knuckle, joint, 0.0118, 0.0108));
@@ -258,7 +298,7 @@ impl Hand {
 }
 
 /// Which fingers make up a count: most people begin with the index finger, some with the thumb.
-fn raised(count: u8, rng: &mut impl Rng) -> [bool; FINGERS] {
+fn counting(count: u8, rng: &mut impl Rng) -> HandPose {
     let from_thumb = rng.random_bool(0.2);
     let fingers: &[usize] = match (count, from_thumb) {
         (0, _) => &[],
@@ -270,7 +310,15 @@ fn raised(count: u8, rng: &mut impl Rng) -> [bool; FINGERS] {
         (4, _) => &[1, 2, 3, 4],
         _ => &[0, 1, 2, 3, 4],
     };
-    std::array::from_fn(|finger| fingers.contains(&finger))
+    let held = |finger| if fingers.contains(&finger) { Finger::Straight } else { Finger::Folded };
+    HandPose {
+        thumb: if fingers.contains(&THUMB) { Thumb::Out } else { Thumb::Folded },
+        index: held(1),
+        middle: held(2),
+        ring: held(3),
+        little: held(4),
+        ..HandPose::default()
+    }
 }
 
 fn hand_colour(glove: Glove, rng: &mut impl Rng) -> [f32; 3] {
@@ -302,7 +350,9 @@ mod tests {
         for seed in 0..50 {
             for count in 0..=5 {
                 let hand = Hand::new(count, seed, Glove::Cyan);
-                assert_eq!(hand.raised.iter().filter(|raised| **raised).count(), usize::from(count));
+                let fingers = hand.pose.fingers().into_iter().filter(|finger| *finger == Finger::Straight);
+                let thumb = usize::from(hand.pose.thumb == Thumb::Out);
+                assert_eq!(fingers.count() + thumb, usize::from(count));
             }
         }
     }
@@ -314,6 +364,33 @@ mod tests {
             hand.capsules(0.0).iter().map(|bone| bone.from.y.max(bone.to.y)).fold(f32::MIN, f32::max)
         };
         assert!(top(4) > top(0) + 0.04);
+    }
+
+    #[test]
+    fn a_hand_points_where_its_pose_says_whoever_it_belongs_to() {
+        // Where the tip of the index finger is, seen from the middle of the palm.
+        let tip = |pose: HandPose, seed| {
+            let hand = Hand { roll: pose.roll_deg.to_radians(), ..Hand::posed(pose, seed, Glove::Cyan) };
+            let bones = hand.capsules(0.0);
+            // After the palm's six bones come the index finger's three.
+            bones[8].to
+        };
+        let pointing = HandPose { index: Finger::Straight, ..HandPose::default() };
+        for seed in 0..20 {
+            let up = tip(pointing, seed);
+            assert!(up.y > 0.1 && up.x.abs() < 0.06, "{up}");
+            let left = tip(HandPose { roll_deg: 90.0, ..pointing }, seed);
+            assert!(left.x < -0.1 && left.y.abs() < 0.06, "{left}");
+            let down = tip(HandPose { roll_deg: 180.0, ..pointing }, seed);
+            assert!(down.y < -0.1, "{down}");
+            let you = tip(HandPose { index: Finger::Forward, ..pointing }, seed);
+            assert!(you.z > 0.07, "{you}");
+            // Its tip and the thumb's, the last bone of the hand, all but meet.
+            let ring = HandPose { thumb: Thumb::Pinched, index: Finger::Pinched, ..HandPose::default() };
+            let ring = Hand::posed(ring, seed, Glove::Cyan).capsules(0.0);
+            let gap = (ring[8].to - ring[20].to).norm();
+            assert!(gap < 0.028, "{gap}");
+        }
     }
 
     #[test]

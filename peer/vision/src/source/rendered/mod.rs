@@ -11,6 +11,7 @@ mod raster;
 mod scheduled;
 mod training;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
@@ -29,12 +30,15 @@ use raster::{Light, Rasterizer};
 use super::{Frame, Scene, Sensor, Source, SourceError};
 use crate::camera_model::CameraModel;
 use crate::pose::Pose;
+use crate::vocabulary::HandPose;
 
 /// A robot's camera in a drawn world. The same seed, scenes and frame numbers give the same frames, byte for byte.
 pub struct RenderedSource {
     camera: CameraModel,
     pose: Pose,
     glove: Glove,
+    /// The ways in which the human holds their hand, where they do not count fingers.
+    poses: Option<Arc<[HandPose]>>,
     seed: u64,
     /// What stands behind the human, as long as the robot stands still.
     room: Mat,
@@ -72,6 +76,7 @@ impl RenderedSource {
             camera,
             pose,
             glove,
+            poses: None,
             seed,
             sensor,
             rasterizer: Rasterizer::default(),
@@ -79,6 +84,12 @@ impl RenderedSource {
             frame: 0,
             away: Vector3::zeros(),
         })
+    }
+
+    /// Before a human who shows the gestures of a vocabulary: a [`Scene`]'s gesture is the number of one of these poses.
+    #[must_use]
+    pub fn showing(self, poses: Arc<[HandPose]>) -> Self {
+        Self { poses: Some(poses), stage: None, ..self }
     }
 
     /// Where the camera is.
@@ -116,17 +127,27 @@ impl RenderedSource {
         parts
     }
 
-    fn stage(&mut self, scene: &Scene) -> Result<Stage, SourceError> {
-        if let Some(count @ 6..) = scene.gesture {
-            return Err(SourceError::Gesture(count));
+    fn hand(&self, gesture: u8, person: u64) -> Result<Hand, SourceError> {
+        match &self.poses {
+            Some(poses) => {
+                let pose = poses
+                    .get(usize::from(gesture))
+                    .ok_or(SourceError::NotInVocabulary(gesture, poses.len()))?;
+                Ok(Hand::posed(*pose, person, self.glove))
+            }
+            None if gesture > 5 => Err(SourceError::Gesture(gesture)),
+            None => Ok(Hand::new(gesture, person, self.glove)),
         }
+    }
+
+    fn stage(&mut self, scene: &Scene) -> Result<Stage, SourceError> {
+        let hand = scene.gesture.map(|gesture| self.hand(gesture, scene.seed)).transpose()?;
         // The light belongs to the scene, the aim to the robot in it.
         let light = light(&mut stream(scene.seed, 1));
         let rng = &mut stream(self.seed ^ scene.seed.rotate_left(32), 2);
         let off = 0.09 * self.pose.distance_m as f32;
         let aim = Point3::new(rng.random_range(-off..off), rng.random_range(-off..off) + 0.02, 0.0);
         let roll = rng.random_range(-4.0_f32..4.0).to_radians();
-        let hand = scene.gesture.map(|count| Hand::new(count, scene.seed, self.glove));
         let mut backdrop = self.room.clone();
         if let Some(hand) = &hand {
             let pinhole = Pinhole::new(&self.pose, &self.camera, aim, roll);
@@ -274,5 +295,10 @@ mod tests {
         let mut source = RenderedSource::new(CameraModel::footbot(), Pose::FRONTAL, Glove::Cyan, 1).unwrap();
         let scene = Scene { gesture: Some(6), seed: 1 };
         assert!(matches!(source.next_frame(Duration::ZERO, &scene), Err(SourceError::Gesture(6))));
+        let mut source = source.showing(vec![HandPose::default(); 7].into());
+        assert!(source.next_frame(Duration::ZERO, &scene).is_ok());
+        let scene = Scene { gesture: Some(7), seed: 1 };
+        let refused = source.next_frame(Duration::ZERO, &scene);
+        assert!(matches!(refused, Err(SourceError::NotInVocabulary(7, 7))));
     }
 }

@@ -1,5 +1,6 @@
 //! Labelled frames without end, to train the embedded classifier.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use opencv::core::Mat;
@@ -10,13 +11,14 @@ use super::{Glove, RenderedSource};
 use crate::camera_model::CameraModel;
 use crate::pose::Pose;
 use crate::source::{Scene, Source, SourceError};
+use crate::vocabulary::HandPose;
 
 /// A frame whose gesture is known.
 #[derive(Clone, Debug)]
 pub struct LabelledFrame {
     /// The picture (BGR, 8 bits).
     pub image: Mat,
-    /// How many fingers are raised: 0 to 5.
+    /// How many fingers are raised, 0 to 5; or which pose is shown, where poses are.
     pub class: u8,
     /// The person: frames of one person belong to the same side of a train/test split.
     pub group: u32,
@@ -34,6 +36,8 @@ pub struct TrainingFrames {
     cameras: Vec<CameraModel>,
     glove: Glove,
     max_bearing_deg: f64,
+    /// What is shown, where it is not 0 to 5 fingers.
+    poses: Option<Arc<[HandPose]>>,
     seed: u64,
     rng: ChaCha8Rng,
     next: u64,
@@ -48,10 +52,17 @@ impl TrainingFrames {
             cameras,
             glove,
             max_bearing_deg: max_bearing_deg.clamp(1.0, 90.0),
+            poses: None,
             seed,
             rng: ChaCha8Rng::seed_from_u64(seed),
             next: 0,
         }
+    }
+
+    /// Each person shows these in turn, not 0 to 5; without any there is nothing to be seen.
+    #[must_use]
+    pub fn showing(self, poses: Vec<HandPose>) -> Self {
+        Self { poses: Some(poses.into()), ..self }
     }
 }
 
@@ -59,8 +70,10 @@ impl Iterator for TrainingFrames {
     type Item = Result<LabelledFrame, SourceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (person, class) = (self.next / 6, (self.next % 6) as u8);
-        let model = &self.cameras[(self.next / 6 % self.cameras.len() as u64) as usize];
+        let gestures = self.poses.as_ref().map_or(6, |poses| poses.len() as u64);
+        let person = self.next.checked_div(gestures)?;
+        let class = (self.next % gestures) as u8;
+        let model = &self.cameras[(person % self.cameras.len() as u64) as usize];
         self.next += 1;
         let rng = &mut self.rng;
         let camera = model.specimen(rng);
@@ -71,6 +84,10 @@ impl Iterator for TrainingFrames {
         };
         let scene = Scene { gesture: Some(class), seed: self.seed.rotate_left(24) ^ person };
         let taken = RenderedSource::new(camera, pose, self.glove, rng.random())
+            .map(|source| match &self.poses {
+                Some(poses) => source.showing(poses.clone()),
+                None => source,
+            })
             .and_then(|mut source| source.next_frame(Duration::ZERO, &scene));
         Some(taken.map(|frame| LabelledFrame {
             image: frame.image,
@@ -102,6 +119,16 @@ mod tests {
             assert!(frame.pose.bearing_deg.abs() <= 60.0);
         }
         assert_eq!((frames[0].image.cols(), frames[6].image.cols()), (384, 640));
+    }
+
+    #[test]
+    fn people_show_the_poses_of_a_vocabulary_in_turn() {
+        let training =
+            |poses| TrainingFrames::new(vec![CameraModel::footbot()], Glove::Cyan, 60.0, 1).showing(poses);
+        let shown: Vec<_> = training(vec![HandPose::default(); 7]).take(15).map(Result::unwrap).collect();
+        let seen: Vec<_> = shown.iter().map(|frame| (u32::from(frame.class), frame.group)).collect();
+        assert_eq!(seen, (0..15).map(|n| (n % 7, n / 7)).collect::<Vec<_>>());
+        assert!(training(Vec::new()).next().is_none());
     }
 
     #[test]
