@@ -9,6 +9,8 @@ if [[ -n ${DEBIAN_ROOT:-} ]]; then
   root=$DEBIAN_ROOT
 else
   root=$(mktemp -d)
+  # The root folder of that Debian: whoever runs the robots there must be able to enter it.
+  chmod 755 "$root"
   debootstrap --variant=minbase bookworm "$root" >"$root.log" 2>&1 || { tail "$root.log" >&2; exit 1; }
 fi
 cleanup() {
