@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::stage::{Stage, root};
 
-const TEXTS: [&str; 12] = [
+const TEXTS: [&str; 13] = [
     "README.md",
     "CONTRIBUTING.md",
     "SECURITY.md",
@@ -16,11 +16,12 @@ const TEXTS: [&str; 12] = [
     "docs/round.md",
     "docs/results.md",
     "docs/glossary.md",
+    "docs/vocabularies.md",
     "examples/simulator/README.md",
 ];
 
 /// Lines that cannot run here, by how they begin, and why.
-const APART: [(&str, &str); 18] = [
+const APART: [(&str, &str); 19] = [
     ("sudo ", "changes the system; packaging/installed.sh does it in one of its own"),
     ("gestalt config | sudo ", "likewise"),
     ("gestalt doctor /etc/gestalt/", "needs the line before"),
@@ -34,6 +35,7 @@ const APART: [(&str, &str); 18] = [
     ("make test ", "is what runs this"),
     ("pip install eclipse-zenoh", "needs PyPI"),
     ("gestalt capture --gesture", "needs a camera"),
+    ("gestalt teach new --vocabulary rescue --shows", "asks a person for forty rounds"),
     ("gestalt watch --web", "serves until it is stopped"),
     ("gestalt watch --foxglove", "serves until it is stopped"),
     ("gestalt record run.mcap -e", "records the reader's own swarm until it is stopped"),
