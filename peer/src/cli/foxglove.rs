@@ -1,12 +1,12 @@
 //! A swarm live in Foxglove, served by a verb.
 
-use gestalt_desk::{Address, Foxglove, Token, Viewing};
+use gestalt_desk::{Address, Foxglove, Viewing};
 use gestalt_link::{Client, LinkConfig};
 use serde_json::json;
 
 use super::Failure;
 use super::show::line;
-use super::web::TOKEN;
+use super::web::{chosen_token, from_elsewhere};
 
 /// Where viewers may connect; as flags of a verb.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -37,9 +37,7 @@ impl FoxgloveArgs {
         let Some(address) = &self.foxglove else { return Ok(None) };
         let mut viewing = Viewing { frames: self.frames, ..Viewing::at(address.clone()) };
         viewing.origins.extend(self.foxglove_origin.iter().cloned());
-        if let Ok(token) = std::env::var(TOKEN) {
-            viewing.door.token = Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?);
-        }
+        viewing.door.token = chosen_token()?;
         let server = Foxglove::open(Client::open(swarm, link).await?, swarm, viewing).await?;
         let url = server.url();
         let layout = url.replacen("ws://", "http://", 1);
@@ -47,15 +45,11 @@ impl FoxgloveArgs {
             Some((host, query)) => format!("{host}layout.json?{query}"),
             None => format!("{layout}layout.json"),
         };
-        let from_elsewhere = if server.address().ip().is_unspecified() {
-            " · from elsewhere with this machine's own address in it"
-        } else {
-            ""
-        };
+        let hint = from_elsewhere(server.address());
         line(
             as_json,
             &json!({"event": "foxglove", "url": url, "layout": layout}),
-            &format!("Foxglove: {url}{from_elsewhere}\nlayout:   {layout}"),
+            &format!("Foxglove: {url}{hint}\nlayout:   {layout}"),
         )?;
         Ok(Some(server))
     }

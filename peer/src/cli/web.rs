@@ -1,5 +1,7 @@
 //! The page of a swarm, served by a verb.
 
+use std::net::SocketAddr;
+
 use gestalt_desk::{Address, Desk, Door, Token};
 use gestalt_link::{Client, LinkConfig};
 use serde_json::json;
@@ -8,7 +10,7 @@ use super::Failure;
 use super::show::line;
 
 /// What chooses the page's token; else one is drawn where one is needed.
-pub(super) const TOKEN: &str = "GESTALT_WEB_TOKEN";
+const TOKEN: &str = "GESTALT_WEB_TOKEN";
 
 /// Where a page is served; as flags of a verb.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -35,18 +37,26 @@ impl WebArgs {
         as_json: bool,
     ) -> Result<Option<Desk>, Failure> {
         let Some(address) = &self.web else { return Ok(None) };
-        let mut door = Door::at(address.clone());
-        if let Ok(token) = std::env::var(TOKEN) {
-            door.token = Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?);
-        }
+        let door = Door { token: chosen_token()?, ..Door::at(address.clone()) };
         let desk = Desk::open(Client::open(swarm, link).await?, swarm, door).await?;
         let url = desk.url();
-        let from_elsewhere = if desk.address().ip().is_unspecified() {
-            " · from elsewhere with this machine's own address in it"
-        } else {
-            ""
-        };
-        line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{from_elsewhere}"))?;
+        let hint = from_elsewhere(desk.address());
+        line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{hint}"))?;
         Ok(Some(desk))
+    }
+}
+
+/// The token that the environment chooses, if it does.
+pub(super) fn chosen_token() -> Result<Option<Token>, Failure> {
+    let Ok(token) = std::env::var(TOKEN) else { return Ok(None) };
+    Ok(Some(Token::new(&token).map_err(|error| format!("{TOKEN}: {error}"))?))
+}
+
+/// What to say behind a URL that is listened to at all of this machine's addresses.
+pub(super) fn from_elsewhere(address: SocketAddr) -> &'static str {
+    if address.ip().is_unspecified() {
+        " · from elsewhere with this machine's own address in it"
+    } else {
+        ""
     }
 }
