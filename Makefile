@@ -44,11 +44,17 @@ demo: packages
 
 # Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
 # namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,rospy,rclpy.
-# Many tests wait for rounds and deadlines: two threads a core.
+# Many tests wait for rounds and deadlines: two threads a core. What they print goes to a file that one follows until they end: a
+# pipe ends only with the last process that a test that died may have left.
 test: test-packages
 	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
+	mkdir -p out; : >out/test.log; \
 	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \
-	  cargo test --workspace --doc --no-fail-fast || failed=1; exit $${failed:-0}; } 2>&1 | awk -f .ci/summary.awk
+	  cargo test --workspace --doc --no-fail-fast || failed=1; exit $${failed:-0}; } >out/test.log 2>&1 & \
+	tail --quiet --lines=+1 --sleep-interval=0.5 --follow --pid=$$! out/test.log; \
+	passed=0; wait $$! || passed=$$?; \
+	awk -f .ci/summary.awk out/test.log; \
+	exit $$passed
 
 # Plays every attack of SECURITY.md against emulated swarms and prints what comes of each; fails if one comes to something else
 # than its line says. Needs Rust alone. ATTACKS="A7 17 --seeds 5" plays some.

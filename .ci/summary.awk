@@ -1,10 +1,9 @@
-# Passes on what the test runners print, and ends with their sum, with what was skipped, and why, and with what passed only alone. A test binary of the
+# The sum of what the test runners printed, what was skipped, and why, and what passed only alone. A test binary of the
 # built-in harness and one with a table of trials both end with a line "test result: ok. 3 passed; 0 failed; 1 ignored; …".
-{ print; fflush() }
 /^test result:/ { passed += $4; failed += $6; skipped += $8 }
 /^skipped: / { skips[++n] = $0 }
 /^flaky: / { flaky[++f] = $0 }
-/^(error: |stuck: )/ { broken[++b] = $0 }
+/^(error: |stuck: |failed: |test .* FAILED$)/ { broken[++b] = $0 }
 END {
   print ""
   for (i = 1; i <= n; i++) print skips[i]

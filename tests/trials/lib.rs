@@ -6,8 +6,10 @@
 //!
 //! - [`Need`]: what a trial needs of the machine. With `GESTALT_REQUIRE=namespaces,mount,browser,data` a machine without it fails.
 //! - [`Load`]: how much of the processor it takes, so that what waits runs side by side and what computes does not disturb it.
-//! - [`run_in_real_time`]: trials whose clock is the machine's. One that fails is tried once more, alone, and both are told.
+//! - [`run_in_real_time`]: trials whose clock is the machine's, each in a process of its own. One that fails is tried once more,
+//!   alone, and both are told.
 
+mod apart;
 mod attempts;
 mod load;
 mod needs;
@@ -79,31 +81,42 @@ const STUCK: Duration = Duration::from_secs(400);
 /// How many of the slowest trials are listed.
 const LISTED: usize = 10;
 
-/// When each trial that runs has begun, how long each that ended has taken, and what those that passed at a second attempt first
-/// failed with.
+/// When each trial that runs has begun, how long each that ended has taken, what those failed with that failed, and what those that
+/// passed at a second attempt first failed with.
 #[derive(Default)]
 struct Clock {
     running: BTreeMap<String, Instant>,
     took: Vec<(Duration, String)>,
+    failed: Vec<(String, String)>,
     flaky: Vec<(String, String)>,
 }
 
 /// Runs the trials as the command line says, and says which were skipped, why, and which took longest.
 #[must_use]
 pub fn run(trials: Vec<Trial>) -> ExitCode {
-    run_with(trials, Attempts::One)
+    run_with(trials, false, Attempts::One)
 }
 
-/// As [`run`], for trials with deadlines in real time. A machine that did not run a robot for seconds fails them as a fault of
-/// the robot does; so what fails beside others is tried once more with nothing beside it. What then passes is listed as
-/// `flaky`, with what it first failed with: it wants to be looked at. With `GESTALT_STRICT` set there is no second attempt.
+/// As [`run`], for trials with deadlines in real time, robots and sessions of their own. Each runs in a process of its own
+/// (`--trial NAME` is that one alone, in this process), and what it prints is shown if it fails, or with `--nocapture`.
+///
+/// A machine that did not run a robot for seconds fails them as a fault of the robot does; so what fails beside others is tried
+/// once more with nothing beside it. What then passes is listed as `flaky`, with what it first failed with: it wants to be looked
+/// at. With `GESTALT_STRICT` set there is no second attempt.
 #[must_use]
 pub fn run_in_real_time(trials: Vec<Trial>) -> ExitCode {
+    if let Some(name) = apart::ordered() {
+        let Some(trial) = trials.into_iter().find(|trial| trial.name == name) else {
+            eprintln!("no trial is named {name}");
+            return ExitCode::FAILURE;
+        };
+        return apart::be(|| here(&trial.run));
+    }
     let strict = std::env::var_os("GESTALT_STRICT").is_some();
-    run_with(trials, if strict { Attempts::One } else { Attempts::Two })
+    run_with(trials, true, if strict { Attempts::One } else { Attempts::Two })
 }
 
-fn run_with(trials: Vec<Trial>, attempts: Attempts) -> ExitCode {
+fn run_with(trials: Vec<Trial>, apart: bool, attempts: Attempts) -> ExitCode {
     let required = match needs::required(std::env::var("GESTALT_REQUIRE").ok().as_deref()) {
         Ok(required) => required,
         Err(error) => {
@@ -115,6 +128,8 @@ fn run_with(trials: Vec<Trial>, attempts: Attempts) -> ExitCode {
     let room = Arc::new(Room::of_this_machine());
     arguments.test_threads.get_or_insert(room.places());
     let clock = Arc::new(Mutex::new(Clock::default()));
+    let patience = std::env::var_os("GESTALT_LONG").is_none().then_some(STUCK);
+    let shown = arguments.nocapture;
     let mut skipped = Vec::new();
     let listed = trials.into_iter().map(|trial| {
         let missing = trial.needs.iter().find_map(|need| Some((*need, need.missing()?)));
@@ -127,22 +142,31 @@ fn run_with(trials: Vec<Trial>, attempts: Attempts) -> ExitCode {
             if let Some((need, reason)) = missing {
                 return Err(Failed::from(format!("GESTALT_REQUIRE names {}: {reason}", need.name())));
             }
-            let flaky = attempts.make(|is_alone| {
+            let ended = attempts.make(|is_alone| {
                 if is_alone {
                     eprintln!("second attempt, alone: {name}");
                 }
                 let load = if is_alone { Load::Alone } else { trial.load };
-                attempt(&trial.run, &name, &room, load, &clock)
-            })?;
-            lock(&clock).flaky.extend(flaky.map(|cause| (name.clone(), cause)));
+                attempt(&name, &room, load, &clock, || {
+                    if apart { apart::run(&name, patience, shown) } else { here(&trial.run) }
+                })
+            });
+            let mut clock = lock(&clock);
+            match ended {
+                Ok(flaky) => clock.flaky.extend(flaky.map(|cause| (name.clone(), cause))),
+                Err(cause) => {
+                    clock.failed.push((name.clone(), cause.clone()));
+                    return Err(Failed::from(cause));
+                }
+            }
             Ok(())
         })
         .with_ignored_flag(ignored)
     });
     let listed = listed.collect();
-    if !arguments.list && std::env::var_os("GESTALT_LONG").is_none() {
+    if let (false, false, Some(patience)) = (arguments.list, apart, patience) {
         let clock = clock.clone();
-        std::thread::spawn(move || end_what_is_stuck(&clock));
+        std::thread::spawn(move || end_what_is_stuck(&clock, patience));
     }
     let conclusion = libtest_mimic::run(&arguments, listed);
     if !arguments.list {
@@ -151,16 +175,27 @@ fn run_with(trials: Vec<Trial>, attempts: Attempts) -> ExitCode {
     conclusion.exit_code()
 }
 
-/// Runs a trial in its place; what it panicked with.
-fn attempt(run: &dyn Fn(), name: &str, room: &Room, load: Load, clock: &Mutex<Clock>) -> Result<(), String> {
+/// Makes an attempt at a trial in its place, and writes down how long it took.
+fn attempt(
+    name: &str,
+    room: &Room,
+    load: Load,
+    clock: &Mutex<Clock>,
+    run: impl FnOnce() -> Result<(), String>,
+) -> Result<(), String> {
     let _place = room.take(load);
     let began = Instant::now();
     lock(clock).running.insert(name.to_owned(), began);
-    let ended = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run));
+    let ended = run();
     let mut clock = lock(clock);
     clock.running.remove(name);
     clock.took.push((began.elapsed(), name.to_owned()));
-    ended.map_err(|panic| words(&*panic))
+    ended
+}
+
+/// Runs a trial in this process; what it panicked with.
+fn here(run: &dyn Fn()) -> Result<(), String> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)).map_err(|panic| words(&*panic))
 }
 
 fn lock(clock: &Mutex<Clock>) -> std::sync::MutexGuard<'_, Clock> {
@@ -174,12 +209,12 @@ fn words(panic: &(dyn std::any::Any + Send)) -> String {
 }
 
 /// A test that hangs would keep all others from being told: it ends the process, by name.
-fn end_what_is_stuck(clock: &Mutex<Clock>) {
+fn end_what_is_stuck(clock: &Mutex<Clock>, patience: Duration) {
     loop {
         std::thread::sleep(Duration::from_secs(1));
-        let stuck = |(_, began): &(&String, &Instant)| began.elapsed() > STUCK;
+        let stuck = |(_, began): &(&String, &Instant)| began.elapsed() > patience;
         if let Some((name, _)) = lock(clock).running.iter().find(stuck) {
-            eprintln!("stuck: {name} has not ended within {STUCK:?}");
+            eprintln!("stuck: {name} has not ended within {patience:?}");
             std::process::exit(101);
         }
     }
@@ -191,9 +226,12 @@ fn report(clock: &Clock, skipped: &[String], conclusion: &Conclusion) {
     for (took, name) in slowest.into_iter().take(LISTED) {
         println!("{:7.1} s  {name}", took.as_secs_f64());
     }
+    let first = |cause: &str| cause.lines().next().unwrap_or_default().to_owned();
     for (name, cause) in &clock.flaky {
-        let cause = cause.lines().next().unwrap_or_default();
-        println!("flaky: {name}: passed alone, after it failed with: {cause}");
+        println!("flaky: {name}: passed alone, after it failed with: {}", first(cause));
+    }
+    for (name, cause) in &clock.failed {
+        println!("failed: {name}: {}", first(cause));
     }
     if conclusion.num_ignored > 0 {
         skipped.iter().for_each(|line| println!("{line}"));

@@ -49,6 +49,18 @@ fn the_mind_knows_no_host() {
     knows_none("gestalt-strategies", &["linfa", "zenoh", "tokio", "opencv", "clap"]);
 }
 
+/// Cargo leaves a patch out, with no more than a warning, when Zenoh asks for another version than the patched one.
+#[test]
+fn sealed_links_are_the_mended_ones() {
+    let text = std::fs::read_to_string(sources::root().join("Cargo.lock")).unwrap();
+    let mut packages =
+        text.split("[[package]]").filter(|package| package.contains("name = \"zenoh-link-tls\""));
+    let (Some(mended), None) = (packages.next(), packages.next()) else {
+        panic!("one zenoh-link-tls: else peer/link/zenoh-link-tls/README.md says what is to be done")
+    };
+    assert!(!mended.contains("source ="), "the published one races: {mended}");
+}
+
 #[test]
 fn trust_is_judged_without_a_network_and_without_a_mind() {
     let minds = ["gestalt-strategies", "gestalt-rounds", "gestalt-svm"];
