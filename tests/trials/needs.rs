@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 /// Something that not every machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
-    /// The right to make network namespaces and to enter them: root, and `ip` of iproute2.
+    /// The right to make network namespaces and to enter them: root, and `ip` and `tc` of iproute2.
     Namespaces,
     /// The right to mount a file system: root, outside most containers.
     Mount,
