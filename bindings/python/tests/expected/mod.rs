@@ -1,4 +1,6 @@
-//! What Rust finds, for Python to find as well: probabilities bit for bit, and what rules choose.
+//! What Rust finds, for Python to find as well: probabilities bit for bit, what rules choose, and what a swarm decides.
+
+mod emulated;
 
 use std::path::Path;
 
@@ -18,6 +20,7 @@ pub fn write(path: &Path) {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let expected = json!({
         "judged": (0..50).map(|_| judged(&mut rng)).collect::<Vec<_>>(),
+        "emulated": emulated::swarms(),
         "sets": (0..SETS).map(|n| set(n, &mut rng)).collect::<Vec<_>>(),
     });
     std::fs::write(path, expected.to_string()).expect("a file");
