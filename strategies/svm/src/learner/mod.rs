@@ -230,6 +230,7 @@ impl Learner {
         if let (Some(classifier), false) = (&self.classifier, self.touched.contains(&true)) {
             return Ok(classifier.clone());
         }
+        self.samples.fill();
         let (cost, count) = (self.options.cost, self.options.folds);
         for class in 0..self.touched.len() {
             if self.touched[class] {
@@ -355,6 +356,10 @@ impl Learner {
 
     fn put(&mut self, key: Key, class: usize, vector: &[f32]) {
         let place = self.samples.insert(key, class, vector);
+        // Who learns from nothing needs no kernel before all samples are there.
+        if self.pairs.iter().any(|pair| pair.solution.is_loaded()) {
+            self.samples.fill();
+        }
         self.few.sums.insert(key, class, self.few.showing(key), vector);
         self.join(place);
     }
@@ -373,6 +378,7 @@ impl Learner {
 
     /// Tells the pairs that the sample at `place` goes.
     fn leave(&mut self, place: Place) {
+        self.samples.fill();
         self.touched[place.class] = true;
         self.pairs.iter_mut().for_each(|pair| pair.remove(&self.samples, place));
     }

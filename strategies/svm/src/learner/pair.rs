@@ -172,6 +172,7 @@ mod tests {
             let place = samples.insert(Key::Inserted(key), class, &vector);
             pair.insert(&samples, place);
         }
+        samples.fill();
         pair.solve(&samples, COST);
         (samples, pair)
     }

@@ -32,10 +32,14 @@ pub(super) struct Place {
 }
 
 /// The samples by class. The kernel matrix costs n² · 4 bytes for n samples, and up to an eighth more to grow into.
+///
+/// The kernel of what comes is worked out when it is [asked for](Self::fill): of many samples at once it costs less than half of what it costs one by one.
 #[derive(Debug)]
 pub(super) struct KernelMatrix {
     gamma: f32,
     classes: Vec<Vec<KernelRow>>,
+    /// So many samples of each class have their kernel; those behind them came since.
+    filled: Vec<usize>,
     places: BTreeMap<Key, Place>,
     /// As many samples there will be at least, by class.
     room: Vec<usize>,
@@ -43,8 +47,8 @@ pub(super) struct KernelMatrix {
 
 impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
-        let (places, room) = (BTreeMap::new(), vec![0; classes]);
-        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places, room }
+        let (places, filled, room) = (BTreeMap::new(), vec![0; classes], vec![0; classes]);
+        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), filled, places, room }
     }
 
     /// So many samples of each class are about to come: from now on rows are made as long as they will be.
@@ -58,6 +62,7 @@ impl KernelMatrix {
     pub fn add_class(&mut self) {
         self.classes.iter_mut().flatten().for_each(|sample| sample.kernel.push(Vec::new()));
         self.classes.push(Vec::new());
+        self.filled.push(0);
         self.room.push(0);
     }
 
@@ -79,28 +84,56 @@ impl KernelMatrix {
         &self.places
     }
 
-    /// Puts a sample at the end of its class.
+    /// Puts a sample at the end of its class, without its kernel yet.
     pub fn insert(&mut self, key: Key, class: usize, vector: &[f32]) -> Place {
-        let gamma = self.gamma;
-        let mut kernel: Vec<Vec<f32>> = Vec::with_capacity(self.classes.len());
-        for (samples, room) in self.classes.iter_mut().zip(&self.room) {
-            let least = samples.len() + 1;
-            let mut row = Vec::with_capacity(if least <= *room { *room } else { roomy(least) });
-            for sample in samples {
-                let value = (-gamma * squared_distance(&sample.vector, vector)).exp();
-                row.push(value);
-                push(&mut sample.kernel[class], value);
-            }
-            kernel.push(row);
-        }
-        kernel[class].push(1.0);
+        let kernel = vec![Vec::new(); self.classes.len()];
         self.append(class, KernelRow { key, vector: vector.to_vec(), kernel })
+    }
+
+    /// Works out the kernel of all samples that came since with all others.
+    pub fn fill(&mut self) {
+        let counts: Vec<usize> = self.classes.iter().map(Vec::len).collect();
+        if self.filled == counts {
+            return;
+        }
+        for class in 0..counts.len() {
+            for position in 0..counts[class] {
+                for other in 0..counts.len() {
+                    self.fill_row(Place { class, position }, other);
+                }
+            }
+        }
+        self.filled = counts;
+    }
+
+    /// Works out what a sample lacks of its kernel with those of a class. The rows before its own have theirs.
+    fn fill_row(&mut self, Place { class, position }: Place, other: usize) {
+        let count = self.classes[other].len();
+        let from = if position < self.filled[class] { self.filled[other] } else { 0 };
+        if from == count {
+            return;
+        }
+        let mut row = std::mem::take(&mut self.classes[class][position].kernel[other]);
+        let room = if count <= self.room[other] { self.room[other] } else { roomy(count) };
+        if row.capacity() < count {
+            row.reserve_exact(room - row.len());
+        }
+        let (sample, others) = (&self.classes[class][position], &self.classes[other]);
+        // It is the same both ways: of a row that comes before it is there.
+        let known = if other < class { count } else { position.min(count) * usize::from(other == class) };
+        let known = known.max(from);
+        row.extend(others[from..known].iter().map(|other| other.kernel[class][position]));
+        let value = |other: &KernelRow| (-self.gamma * squared_distance(&other.vector, &sample.vector)).exp();
+        row.extend(others[known..].iter().map(value));
+        self.classes[class][position].kernel[other] = row;
     }
 
     /// Takes a sample out.
     pub fn remove(&mut self, place: Place) {
+        self.fill();
         let Place { class, position } = place;
         let gone = self.classes[class].swap_remove(position);
+        self.filled[class] -= 1;
         for sample in self.classes.iter_mut().flatten() {
             sample.kernel[class].swap_remove(position);
         }
@@ -110,11 +143,14 @@ impl KernelMatrix {
 
     /// Moves a sample to the end of another class.
     pub fn relabel(&mut self, place: Place, class: usize) -> Place {
+        self.fill();
         for sample in self.classes.iter_mut().flatten() {
             let value = sample.kernel[place.class].swap_remove(place.position);
             push(&mut sample.kernel[class], value);
         }
         let sample = self.classes[place.class].swap_remove(place.position);
+        self.filled[place.class] -= 1;
+        self.filled[class] += 1;
         self.moved(place);
         self.append(class, sample)
     }
@@ -169,6 +205,7 @@ mod tests {
             }
             peak = peak.max(samples.places().len());
         }
+        samples.fill();
         assert!(peak > 30);
         let mut held = 0;
         for (key, place) in samples.places() {

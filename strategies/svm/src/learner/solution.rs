@@ -55,6 +55,11 @@ struct Extremes {
 const LABELS: [f32; 2] = [1.0, -1.0];
 
 impl Solution {
+    /// Whether any sample may have a weight: only then what comes needs its kernel.
+    pub fn is_loaded(&self) -> bool {
+        self.is_loaded
+    }
+
     /// Takes in a sample at the end of a class, with weight 0.
     pub fn insert(&mut self, side: usize, row: [&[f32]; 2]) {
         let sum = if self.is_loaded { self.sum(row) } else { 0.0 };
@@ -376,6 +381,7 @@ mod tests {
                         // Some are in one place, with different classes.
                         let x = if next % 5 == 4 { vec![0.5; 5] } else { vector(side, &mut rng) };
                         let place = samples.insert(Key::Inserted(next), side, &x);
+                        samples.fill();
                         let kernel = &samples.at(place).kernel;
                         solution.insert(side, [&kernel[0], &kernel[1]]);
                         next += 1;
