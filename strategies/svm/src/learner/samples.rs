@@ -33,7 +33,7 @@ pub(super) struct Place {
 
 /// The samples by class. The kernel matrix costs n² · 4 bytes for n samples, and up to an eighth more to grow into.
 ///
-/// The kernel of what comes is worked out when it is [asked for](Self::fill): of many samples at once it costs less than half of what it costs one by one.
+/// The kernel of what comes is worked out when it is [asked for](Self::fill): of many samples at once, row by row.
 #[derive(Debug)]
 pub(super) struct KernelMatrix {
     gamma: f32,
