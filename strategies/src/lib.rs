@@ -26,6 +26,7 @@ mod names;
 pub mod sample;
 pub mod selection;
 mod shares;
+pub mod streams;
 mod training_set;
 mod vector_codec;
 

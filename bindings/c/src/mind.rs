@@ -160,7 +160,10 @@ pub unsafe extern "C" fn gestalt_mind_observe(
 ) -> Status {
     // SAFETY: the caller's promises are passed on.
     unsafe {
-        with(mind, |mind| done(mind.observe(Duration::from_nanos(now_ns), slice(values, length)?, quality)))
+        with(mind, |mind| {
+            let values: Vec<f64> = slice(values, length)?.iter().copied().map(f64::from).collect();
+            done(mind.observe(Duration::from_nanos(now_ns), &values, quality))
+        })
     }
 }
 

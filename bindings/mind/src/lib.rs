@@ -14,7 +14,7 @@ mod model_file;
 mod outbox;
 mod portable;
 mod settings;
-mod verbatim;
+mod sight;
 
 pub use error::MindError;
 pub use model_file::{MAX_MODEL_FILE, ModelFile, ModelFileError, Origin};

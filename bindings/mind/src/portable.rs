@@ -9,8 +9,8 @@ use gestalt_protocol::{
     RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{
-    Classifier, Classify, ClassifyError, Input, Instructed, LearnError, Learner, LearningSetup, Mind,
-    Observation, Output, OwnRules, TrainingChange, Vocabulary, outcome,
+    Classifier, Classify, Input, Instructed, LearnError, Learner, LearningSetup, Mind, Output, OwnRules,
+    TrainingChange, Vocabulary, outcome,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -19,7 +19,7 @@ use crate::error::MindError;
 use crate::model_file::ModelFile;
 use crate::outbox::{Outbox, OutgoingMessage};
 use crate::settings::Settings;
-use crate::verbatim::{self, Verbatim};
+use crate::sight::{Sight, Verbatim};
 
 /// A robot's mind behind numbers, JSON and bytes.
 ///
@@ -58,14 +58,6 @@ pub struct PortableMind {
     begun: bool,
 }
 
-/// What observed numbers mean.
-#[derive(Clone, Copy, Debug)]
-enum Sight {
-    Nothing,
-    Probabilities(usize),
-    Features(usize),
-}
-
 impl PortableMind {
     /// The mind of a robot that starts.
     ///
@@ -91,9 +83,8 @@ impl PortableMind {
             rules,
             settings,
         };
-        if let Some(vocabulary) = mind.settings.vocabulary.clone() {
+        if let Some(vocabulary) = &mind.settings.vocabulary {
             mind.sight = Sight::Probabilities(vocabulary.classes());
-            mind.judge_by(Duration::ZERO, Arc::new(Verbatim(vocabulary)));
         }
         Ok(mind)
     }
@@ -144,26 +135,15 @@ impl PortableMind {
     /// # Errors
     /// [`MindError::Sightless`], [`MindError::Spaceless`], [`MindError::Features`], [`MindError::Probabilities`] and
     /// [`MindError::Quality`].
-    pub fn observe(&mut self, now: Duration, values: &[f32], quality: f32) -> Result<(), MindError> {
+    pub fn observe(&mut self, now: Duration, values: &[f64], quality: f32) -> Result<(), MindError> {
         if !(0.0..=1.0).contains(&quality) {
             return Err(MindError::Quality(quality));
         }
         if self.settings.learning.is_some() && self.learner.is_none() {
             return Err(MindError::Spaceless);
         }
-        match self.sight {
-            Sight::Nothing => return Err(MindError::Sightless),
-            Sight::Probabilities(classes) => verbatim::check(values, classes)?,
-            Sight::Features(expected) if values.len() != expected => {
-                return Err(ClassifyError::Length { found: values.len(), expected }.into());
-            }
-            Sight::Features(_) => {
-                if let Some(place) = values.iter().position(|x| !x.is_finite()) {
-                    return Err(ClassifyError::NotFinite(place).into());
-                }
-            }
-        }
-        self.tell(now, Input::Observed(Observation { features: values.to_vec(), quality }));
+        let input = self.sight.input(values, quality)?;
+        self.tell(now, input);
         Ok(())
     }
 
@@ -311,7 +291,13 @@ impl PortableMind {
     }
 
     fn tell(&mut self, now: Duration, input: Input) {
-        self.begun = true;
+        // Its life begins with the first that it is told, whatever the host's clock shows then.
+        if !std::mem::replace(&mut self.begun, true)
+            && let (Sight::Probabilities(_), Some(vocabulary)) =
+                (self.sight, self.settings.vocabulary.clone())
+        {
+            self.judge_by(now, Arc::new(Verbatim(vocabulary)));
+        }
         let outputs = self.mind.handle(now, input);
         outputs.into_iter().for_each(|output| self.carry_out(output));
     }
@@ -420,7 +406,7 @@ impl PortableMind {
             "round": self.mind.round(),
             "open": self.mind.is_open(),
             "class": self.mind.held().and_then(|held| held.class),
-            "vocabulary": self.mind.vocabulary().map(Vocabulary::labels),
+            "vocabulary": self.mind.vocabulary().or(self.settings.vocabulary.as_ref()).map(Vocabulary::labels),
             "learning": self.mind.learned(),
             "refused": refused,
             "untaken": self.outbox.dropped(),

@@ -1,8 +1,7 @@
 //! What a mind is told at its start.
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::{LearningConfig, Life, MindConfig, Vocabulary};
-use rand::{RngExt, SeedableRng};
+use gestalt_strategies::{LearningConfig, Life, MindConfig, Vocabulary, streams};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
 
@@ -68,16 +67,14 @@ impl Settings {
         serde_json::from_slice(json).map_err(|error| MindError::Settings(error.to_string()))
     }
 
-    /// The generator of this robot's chance in this life: no other robot, and no other start, has its stream.
+    /// The generator by which this robot shares and forgets in this life: no other robot, and no other start, has its stream.
     pub(crate) fn rng(&self) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        rng.set_stream(u64::from(self.robot.0) << 32 | u64::from(self.boot));
-        rng
+        streams::learning(self.seed, self.robot, self.boot)
     }
 
     /// The robot's life.
     pub(crate) fn life(&self) -> Life {
-        Life { boot: self.boot, nonce: self.rng().random() }
+        streams::life(self.seed, self.robot, self.boot)
     }
 }
 

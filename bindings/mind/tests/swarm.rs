@@ -91,7 +91,7 @@ fn what_is_no_observation_is_refused_by_its_reason_and_changes_nothing() {
     mind.open(now);
     for (seen, quality, named) in [
         (&[0.5, 0.5][..], 1.0, "2 values"),
-        (&[0.5, 0.5, f32::NAN], 1.0, "value 2 is NaN"),
+        (&[0.5, 0.5, f64::NAN], 1.0, "value 2 is NaN"),
         (&[0.5, 0.6, -0.1], 1.0, "value 2"),
         (&[0.5, 0.5, 0.5], 1.0, "1.5"),
         (&[0.0, 0.0, 0.0], 1.0, "sum to 0"),
@@ -143,7 +143,7 @@ fn a_mind_learns_what_it_is_told_and_judges_by_it() {
     let features = gestalt_mind::ModelFile::decode(MODEL).unwrap().classifier.space().features();
     mind.open(Duration::from_secs(1));
     for n in 0..8_u64 {
-        let seen: Vec<f32> = (0..features).map(|i| ((i as u64 * 7 + n) % 11) as f32 / 11.0).collect();
+        let seen: Vec<f64> = (0..features).map(|i| ((i as u64 * 7 + n) % 11) as f64 / 11.0).collect();
         mind.observe(Duration::from_millis(1000 + 600 * n), &seen, 1.0).unwrap();
     }
     let status: serde_json::Value = serde_json::from_str(&mind.status()).unwrap();

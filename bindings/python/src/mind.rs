@@ -61,7 +61,7 @@ impl Mind {
         self.with(py, |mind| mind.use_classifier(Duration::from_nanos(now_ns), classifier))
     }
 
-    fn observe(&mut self, py: Python<'_>, now_ns: u64, values: Vec<f32>, quality: f32) -> PyResult<()> {
+    fn observe(&mut self, py: Python<'_>, now_ns: u64, values: Vec<f64>, quality: f32) -> PyResult<()> {
         self.with(py, |mind| mind.observe(Duration::from_nanos(now_ns), &values, quality))
     }
 

@@ -125,20 +125,29 @@ impl Round {
         config: &RoundsConfig,
     ) -> bool {
         let classes = classifier.vocabulary().classes();
-        match classifier.judge(&observation.features) {
-            Ok(Judgement { probabilities, unknown, view })
-                if probabilities.len() == classes
-                    && probabilities.iter().all(|p| (0.0..=1.0).contains(p)) =>
-            {
-                let quality = f64::from(observation.quality.clamp(0.0, 1.0));
-                let view = view.filter(|_| config.discount_repeats).unwrap_or_default();
-                let unknown = unknown.filter(|p| p.is_finite() && *p >= 0.0);
-                let probabilities = probabilities.as_slice();
-                self.add(JudgedFrame { at: now, probabilities, unknown, quality, view: &view }, config);
-                true
-            }
-            Ok(_) | Err(_) => false,
+        classifier
+            .judge(&observation.features)
+            .is_ok_and(|judgement| self.take_in(now, judgement, observation.quality, classes, config))
+    }
+
+    /// Counts what was made of a frame; `false` when that is no distribution over so many classes.
+    pub fn take_in(
+        &mut self,
+        now: Duration,
+        Judgement { probabilities, unknown, view }: Judgement,
+        quality: f32,
+        classes: usize,
+        config: &RoundsConfig,
+    ) -> bool {
+        if probabilities.len() != classes || !probabilities.iter().all(|p| (0.0..=1.0).contains(p)) {
+            return false;
         }
+        let quality = f64::from(quality.clamp(0.0, 1.0));
+        let view = view.filter(|_| config.discount_repeats).unwrap_or_default();
+        let unknown = unknown.filter(|p| p.is_finite() && *p >= 0.0);
+        let probabilities = probabilities.as_slice();
+        self.add(JudgedFrame { at: now, probabilities, unknown, quality, view: &view }, config);
+        true
     }
 
     /// Counts a frame.

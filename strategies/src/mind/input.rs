@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, Question, RobotId};
-use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
+use gestalt_rounds::{Classify, Input as AboutRounds, Judgement, Observation};
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -31,6 +31,9 @@ pub enum Input {
     Answered(InstructorId, u64, RobotId),
     /// A frame showed a hand.
     Observed(Observation),
+    /// A frame showed a hand, and the host judged it itself; the number is the quality of [`Observation`]. The classifier only says which
+    /// gestures there are, and nothing is learned of it.
+    Judged(Judgement, f32),
     /// A robot's message arrived, by whichever way.
     Received(Envelope),
     /// This decision was announced for the swarm (`decision`).
@@ -89,6 +92,7 @@ impl Input {
             Self::Left => AboutRounds::Left,
             Self::Blind(blind) => AboutRounds::Blind(blind),
             Self::Observed(observation) => AboutRounds::Observed(observation),
+            Self::Judged(judgement, quality) => AboutRounds::Judged(judgement, quality),
             Self::Received(envelope) => AboutRounds::Received(envelope),
             Self::Announced(announcement) => AboutRounds::Announced(announcement),
             Self::Alive(robots) => AboutRounds::Alive(robots),

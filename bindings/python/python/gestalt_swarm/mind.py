@@ -33,7 +33,8 @@ class Mind:
     Parameters
     ----------
     robot : its number, unique in the swarm.
-    seed : where chance comes from. In the field a number drawn at every start; in a simulator the run's, the same for all.
+    seed : where chance comes from. In the field a number drawn at every start; in a simulator the run's, the same for all: with one seed
+        this is the robot of that number in `gestalt emulate`.
     boot : grows at every start of this robot, or its votes are taken for old ones.
     vocabulary : the gestures, if you observe probabilities; with a classifier, that one says them.
     swarm : the name that all keys begin with.
@@ -71,7 +72,7 @@ class Mind:
         self._native.use_model(now, classifier.model)
 
     def observe(self, now: int, values: Sequence[float], quality: float = 1.0) -> None:
-        """A frame showed a hand: its features or, without a classifier, the probability of each gesture; `quality` 0 to 1."""
+        """A frame showed a hand: its features or, without a classifier, the probability of each gesture, in double precision; `quality` 0 to 1."""
         self._native.observe(now, [float(x) for x in values], quality)
 
     def received(self, now: int, key: Optional[str], payload: bytes) -> None:

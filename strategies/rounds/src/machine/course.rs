@@ -9,7 +9,7 @@ use gestalt_protocol::RoundId;
 use super::follow::Follow;
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
-use crate::classify::Classify;
+use crate::classify::{Classify, Judgement};
 use crate::observation::Observation;
 use crate::refusal::Refusal;
 use crate::round::Round;
@@ -73,6 +73,18 @@ impl Rounds {
             return;
         };
         if !round.observe(self.now, observation, &**classifier, &self.config) {
+            self.refusals.add(Refusal::Unclassified);
+        }
+    }
+
+    pub(super) fn on_judged(&mut self, judgement: Judgement, quality: f32) {
+        if !self.votes() {
+            return;
+        }
+        let Some(round) = self.round.as_mut().filter(|round| round.open) else { return };
+        let Some(classifier) = &self.classifier else { return self.refusals.add(Refusal::NoClassifier) };
+        let classes = classifier.vocabulary().classes();
+        if !round.take_in(self.now, judgement, quality, classes, &self.config) {
             self.refusals.add(Refusal::Unclassified);
         }
     }

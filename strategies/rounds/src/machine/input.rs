@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Announcement, Envelope, RobotId};
 
-use crate::classify::Classify;
+use crate::classify::{Classify, Judgement};
 use crate::observation::Observation;
 
 /// What the world tells [`Rounds`](crate::Rounds).
@@ -27,6 +27,9 @@ pub enum Input {
     Blind(bool),
     /// A frame showed a hand.
     Observed(Observation),
+    /// A frame showed a hand, and the host judged it itself; the number is the quality of [`Observation`]. The classifier only says which
+    /// gestures there are.
+    Judged(Judgement, f32),
     /// A robot's message arrived, by whichever way. One that is not about rounds changes nothing.
     Received(Envelope),
     /// This was announced for the swarm (`decision`).

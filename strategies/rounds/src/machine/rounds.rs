@@ -251,6 +251,7 @@ impl Rounds {
             Input::Observed(observation) => {
                 self.on_observed(&observation, effects.follower.learns());
             }
+            Input::Judged(judgement, quality) => self.on_judged(judgement, quality),
             Input::Received(envelope) => self.on_received(envelope, &mut effects),
             Input::Announced(announcement) => self.on_announced(announcement, &mut effects),
             Input::Alive(robots) => self.on_alive(robots),

@@ -3,10 +3,9 @@
 use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
-use gestalt_strategies::{Classify, Input, Mind, MindConfig};
+use gestalt_strategies::{Classify, Input, Mind, MindConfig, streams};
 
 use super::Swarm;
-use super::seed::{learning, life, stream};
 use crate::emulation::network::Presence;
 
 impl Swarm<'_> {
@@ -18,13 +17,13 @@ impl Swarm<'_> {
         }
         robot.boot += 1;
         robot.looking = false;
-        let life = life(self.seed, i, robot.boot);
+        let life = streams::life(self.seed, robot.id, robot.boot);
         robot.knows = Default::default();
         let config: MindConfig = self.scenario.mind.clone();
         let classifier: Option<Arc<dyn Classify>> =
             match (&mut robot.pupil, &self.school, &self.scenario.learning) {
                 (Some(pupil), Some(school), Some(teaching)) => {
-                    let rng = stream(self.seed, learning(i, robot.boot));
+                    let rng = streams::learning(self.seed, robot.id, robot.boot);
                     let (me, robots) = ((robot.id, life), teaching.of_robots());
                     let with = (&robots, &self.rules.learning, &self.shelf);
                     robot.mind = Some(pupil.start(me, config, school, with, rng));

@@ -75,6 +75,33 @@ fn a_frame_is_judged_once_and_for_all_that_is_said_of_it() {
 }
 
 #[test]
+fn a_frame_that_the_host_judged_counts_as_one_that_the_classifier_judged_does() {
+    let judged = |probabilities: &[f64]| {
+        let judgement = Judgement { probabilities: probabilities.to_vec(), unknown: None, view: None };
+        Input::Judged(judgement, 1.0)
+    };
+    let run = |input: Input| {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Open);
+        mind.handle(ms(300), input);
+        let out = mind.handle(ms(1000), Input::Tick);
+        (broadcast(&out)[0].clone(), mind.refusals().clone())
+    };
+    let singles = [0.9_f32, 0.05, 0.05];
+    assert_eq!(run(judged(&singles.map(f64::from))), run(saw(singles)));
+    assert!(!run(saw(singles)).0.evidence.is_empty());
+    for wrong in [&[0.5, 0.5][..], &[f64::NAN, 0.5, 0.5], &[7.0, 0.0, 0.0]] {
+        let (vote, refusals) = run(judged(wrong));
+        assert!(vote.evidence.is_empty());
+        assert_eq!(refusals.count(Refusal::Unclassified), 1);
+    }
+    let mut blind = blind(8);
+    blind.handle(ms(0), Input::Open);
+    blind.handle(ms(300), judged(&[0.9, 0.05, 0.05]));
+    assert_eq!(blind.refusals().count(Refusal::NoClassifier), 1);
+}
+
+#[test]
 fn a_vote_of_another_vocabulary_or_length_or_with_impossible_values_is_refused_and_counted() {
     let mut mind = mind(7);
     mind.handle(ms(0), votes(1, 1, Vote { vocabulary: VocabularyId(1), ..vote(1, 0, SURE) }));
