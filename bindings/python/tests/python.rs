@@ -3,6 +3,7 @@
 //! `GESTALT_PYTHON` names another interpreter than `python3` and the system's, such as that of a virtual environment with scikit-learn.
 //! What the interpreter lacks is skipped, by name and with the reason.
 
+mod emulated;
 mod expected;
 
 use std::path::{Path, PathBuf};
@@ -12,11 +13,12 @@ use std::sync::{Arc, OnceLock};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 /// Each file of tests, and the packages that it needs.
-const FILES: [(&str, &[&str]); 6] = [
+const FILES: [(&str, &[&str]); 7] = [
     ("test_native", &[]),
     ("test_wire", &[]),
     ("test_training_set", &[]),
     ("test_mind", &[]),
+    ("test_emulated", &[]),
     ("test_classifier", &["numpy"]),
     ("test_sklearn", &["numpy", "sklearn"]),
 ];
@@ -121,11 +123,13 @@ impl Package {
         }
         std::fs::copy(extension(), package.join("_native.abi3.so")).expect("a copy of the extension");
         expected::write(&folder.join("expected.json"));
+        emulated::write(&folder);
         Self { folder }
     }
 
     fn run(&self, arguments: &[String]) -> Result<(), String> {
-        let paths = std::env::join_paths([self.folder.clone(), here().join("tests")]).expect("plain paths");
+        let folders = [self.folder.clone(), here().join("tests"), here().join("examples")];
+        let paths = std::env::join_paths(folders).expect("plain paths");
         let mut python = python();
         python
             .args(arguments)
@@ -133,6 +137,7 @@ impl Package {
             .env("PYTHONPATH", &paths)
             .env("MYPYPATH", &self.folder);
         python.env("GESTALT_EXPECTED", self.folder.join("expected.json"));
+        python.env("GESTALT_EMULATED", &self.folder);
         // Of the notebook, enough to see that it runs.
         python.env("RUNS", "2").env("ROUNDS", "6");
         python.env("GESTALT_MODEL", here().join("../../peer/vision/models/rendered.gestalt"));

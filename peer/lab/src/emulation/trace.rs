@@ -1,17 +1,72 @@
 //! What happened in a run, line by line: the same seed writes the same bytes.
+//!
+//! Of robots that do not learn it holds all that their minds are told, and when: minds elsewhere that are told the same, in the same
+//! order, say and hold the same, byte for byte (`bindings/python/examples/emulated.py`).
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, Instruction, Outcome, Question, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Decision, Instruction, Outcome, Question, RobotId, RoundId, Stamp};
 use serde::Serialize;
 
-use super::scenario::Event;
+use super::scenario::{Event, Scenario};
 
 /// One thing that happened, one JSON object on a line.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "what", rename_all = "snake_case")]
 pub enum Happening<'a> {
+    /// What is run: the first line.
+    Run {
+        /// From which all chance follows.
+        seed: u64,
+        /// What is emulated, with all that its file left out.
+        scenario: &'a Scenario,
+    },
+    /// A robot starts, for the first time or again.
+    Start {
+        /// Who.
+        robot: RobotId,
+        /// For the how-manyth time.
+        boot: u32,
+    },
+    /// A robot is told who is alive.
+    Alive {
+        /// Who is told.
+        robot: RobotId,
+        /// Who is alive, itself included.
+        robots: &'a BTreeSet<RobotId>,
+    },
+    /// A robot is told whom it is linked to.
+    Neighbours {
+        /// Who is told.
+        robot: RobotId,
+        /// To whom.
+        robots: &'a BTreeSet<RobotId>,
+    },
+    /// A robot sees a hand.
+    See {
+        /// Who.
+        robot: RobotId,
+        /// What its classifier makes of it; none of a robot that has no classifier yet.
+        probabilities: Option<&'a [f64]>,
+        /// How far that is to be trusted.
+        quality: f32,
+    },
+    /// A robot is told that time has passed, as it wanted.
+    Tick {
+        /// Who.
+        robot: RobotId,
+    },
+    /// A robot's message reaches another.
+    Hear {
+        /// Whom.
+        robot: RobotId,
+        /// Whose.
+        from: RobotId,
+        /// Which: what a robot says under one stamp is one message, also where it is said again.
+        stamp: Stamp,
+    },
     /// A gesture is shown to all robots.
     Shown {
         /// Which.
@@ -42,6 +97,8 @@ pub enum Happening<'a> {
     Broadcast {
         /// Who.
         robot: RobotId,
+        /// Which of its messages it is.
+        stamp: Stamp,
         /// How long the message is.
         bytes: usize,
         /// How many robots it reaches.
@@ -53,6 +110,8 @@ pub enum Happening<'a> {
         robot: RobotId,
         /// Whom.
         to: RobotId,
+        /// Which of its messages it is.
+        stamp: Stamp,
         /// How long the message is.
         bytes: usize,
         /// Whether it arrives.
@@ -99,19 +158,21 @@ pub enum Happening<'a> {
     Announce {
         /// By whom.
         robot: RobotId,
+        /// Which of its messages it is.
+        stamp: Stamp,
         /// What, in short.
         decision: Brief,
     },
 }
 
 /// A decision in short.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Brief {
     round: RoundId,
     class: Option<ClassId>,
     confidence: f64,
     author: RobotId,
-    robots: usize,
+    voters: Vec<RobotId>,
 }
 
 impl From<&Decision> for Brief {
@@ -121,7 +182,7 @@ impl From<&Decision> for Brief {
             class: decision.class,
             confidence: decision.confidence,
             author: decision.author,
-            robots: decision.certificate.votes.len(),
+            voters: decision.certificate.votes.iter().map(|vote| vote.robot).collect(),
         }
     }
 }
@@ -144,17 +205,22 @@ impl<'a> Trace<'a> {
         Self { sink: Some(sink), failed: None }
     }
 
+    /// Whether anybody reads it.
+    pub(super) fn is_read(&self) -> bool {
+        self.sink.is_some()
+    }
+
     /// Writes a line. After the first failure nothing more is written; [`Trace::finish`] reports it.
     pub(super) fn write(&mut self, at: Duration, happening: &Happening<'_>) {
         #[derive(Serialize)]
         struct Line<'a> {
-            at_us: u64,
+            at_ns: u64,
             #[serde(flatten)]
             happening: &'a Happening<'a>,
         }
         let Some(sink) = &mut self.sink else { return };
-        let at_us = u64::try_from(at.as_micros()).unwrap_or(u64::MAX);
-        let written = serde_json::to_writer(&mut *sink, &Line { at_us, happening })
+        let at_ns = u64::try_from(at.as_nanos()).unwrap_or(u64::MAX);
+        let written = serde_json::to_writer(&mut *sink, &Line { at_ns, happening })
             .map_err(io::Error::from)
             .and_then(|()| sink.write_all(b"\n"));
         if let Err(error) = written {

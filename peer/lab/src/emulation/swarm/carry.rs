@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use gestalt_protocol::{Answer, Message};
+use gestalt_protocol::{Announcement, Answer, Envelope, Message, Question};
 use gestalt_strategies::{Input, Output};
 use rand::RngExt;
 
@@ -22,6 +22,9 @@ impl Swarm<'_> {
         if self.network.presence(i) != Presence::Up {
             return;
         }
+        if self.trace.is_read() && self.robots[i].mind.is_some() {
+            self.note_told(i, &input);
+        }
         let Some(mind) = &mut self.robots[i].mind else { return };
         let outputs = mind.handle(self.now, input);
         let wake = mind.next_wake();
@@ -36,6 +39,27 @@ impl Swarm<'_> {
         }
     }
 
+    /// Notes what a mind is told, where no line of its own says so.
+    fn note_told(&mut self, i: usize, input: &Input) {
+        let robot = self.robots[i].id;
+        let happening = match input {
+            Input::Tick => Happening::Tick { robot },
+            Input::Alive(robots) => Happening::Alive { robot, robots },
+            Input::Neighbours(robots) => Happening::Neighbours { robot, robots },
+            Input::Received(Envelope { author, stamp, .. }) => {
+                Happening::Hear { robot, from: *author, stamp: *stamp }
+            }
+            Input::Announced(Announcement { announcer, stamp, .. }) => {
+                Happening::Hear { robot, from: *announcer, stamp: *stamp }
+            }
+            Input::Asked(Question { robot: from, stamp, .. }) => {
+                Happening::Hear { robot, from: *from, stamp: *stamp }
+            }
+            _ => return,
+        };
+        self.note(&happening);
+    }
+
     fn carry_out(&mut self, i: usize, output: Output) {
         let robot = self.robots[i].id;
         match output {
@@ -47,8 +71,8 @@ impl Swarm<'_> {
                         Message::Holding(_) => Kind::Decision,
                         _ => Kind::Vote,
                     };
-                    let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope));
-                    self.note(&Happening::Broadcast { robot, bytes, reaches });
+                    let reaches = self.broadcast(i, bytes, kind, &Parcel::Said(envelope.clone()));
+                    self.note(&Happening::Broadcast { robot, stamp: envelope.stamp, bytes, reaches });
                 }
             }
             Output::Tell(to, envelope) => {
@@ -57,7 +81,8 @@ impl Swarm<'_> {
                     let target = to.0 as usize - 1;
                     let samples = matches!(envelope.message, Message::Batches(_));
                     let taken = self.network.tell(i, target, bytes, samples);
-                    self.note(&Happening::Tell { robot, to, bytes, arrives: taken.is_some() });
+                    let arrives = taken.is_some();
+                    self.note(&Happening::Tell { robot, to, stamp: envelope.stamp, bytes, arrives });
                     if let Some(taken) = taken {
                         self.at(self.now + taken, Due::Arrive(target, Parcel::Said(envelope)));
                     }
@@ -68,7 +93,8 @@ impl Swarm<'_> {
                 self.record.hold(self.now, i, &decision);
             }
             Output::Announce(announcement) => {
-                self.note(&Happening::Announce { robot, decision: (&announcement.decision).into() });
+                let (stamp, decision) = (announcement.stamp, (&announcement.decision).into());
+                self.note(&Happening::Announce { robot, stamp, decision });
                 self.record.announce(&announcement.decision);
                 let (announcement, bytes) = as_json(&announcement);
                 self.broadcast(i, bytes, Kind::Decision, &Parcel::Announced(announcement));

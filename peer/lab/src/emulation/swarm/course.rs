@@ -88,10 +88,13 @@ impl Swarm<'_> {
                 Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
                 None => robot.observer.classifier(),
             };
-            let classifier = classifier.filter(|_| judges);
-            if let Some(p) = classifier.and_then(|c| c.probabilities(&observation.features).ok()) {
-                self.record.frame(&p, self.shown);
+            let classifier = classifier.filter(|_| judges || self.trace.is_read());
+            let judged = classifier.and_then(|c| c.probabilities(&observation.features).ok());
+            if let Some(p) = judged.as_ref().filter(|_| judges) {
+                self.record.frame(p, self.shown);
             }
+            let (robot, probabilities) = (robot.id, judged.as_deref());
+            self.note(&Happening::See { robot, probabilities, quality: observation.quality });
             self.tell_mind(i, Input::Observed(observation));
         }
         self.at(next, Due::Frame(i, looks));

@@ -7,6 +7,7 @@ use gestalt_strategies::{Classify, Input, Mind, MindConfig, streams};
 
 use super::Swarm;
 use crate::emulation::network::Presence;
+use crate::emulation::trace::Happening;
 
 impl Swarm<'_> {
     /// A robot starts, for the first time or again: with what is on its disk, if it learns.
@@ -17,6 +18,8 @@ impl Swarm<'_> {
         }
         robot.boot += 1;
         robot.looking = false;
+        let happening = Happening::Start { robot: robot.id, boot: robot.boot };
+        self.trace.write(self.now, &happening);
         let life = streams::life(self.seed, robot.id, robot.boot);
         robot.knows = Default::default();
         let config: MindConfig = self.scenario.mind.clone();

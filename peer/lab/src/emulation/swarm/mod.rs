@@ -117,6 +117,7 @@ impl<'a> Swarm<'a> {
             trace,
             threads: std::thread::available_parallelism().map_or(1, NonZero::get),
         };
+        swarm.note(&Happening::Run { seed, scenario });
         if scenario.mind.committee_of(size).is_some() {
             swarm.robots.iter_mut().filter_map(|robot| robot.pupil.as_mut()).for_each(Pupil::start_over);
         }
