@@ -43,16 +43,21 @@ demo: packages
 	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
 # Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
-# namespaces,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,rospy,rclpy.
+# namespaces,queues,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,rospy,rclpy.
 # Many tests wait for rounds and deadlines: two threads a core. What they print goes to a file that one follows until they end: a
-# pipe ends only with the last process that a test that died may have left.
+# pipe ends only with the last process that a test that died may have left. They are a job (-m) that ends when one interrupts.
 test: test-packages
-	export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
+	@export RUST_TEST_THREADS=$$((2 * $$(nproc))); \
 	mkdir -p out; : >out/test.log; \
+	set -m; \
 	{ cargo test --workspace --lib --bins --tests --examples --no-fail-fast || failed=1; \
 	  cargo test --workspace --doc --no-fail-fast || failed=1; exit $${failed:-0}; } >out/test.log 2>&1 & \
-	tail --quiet --lines=+1 --sleep-interval=0.5 --follow --pid=$$! out/test.log; \
-	passed=0; wait $$! || passed=$$?; \
+	tests=$$!; \
+	set +m; \
+	trap 'kill -- -$$tests; exit 1' INT TERM; \
+	tail --quiet --lines=+1 --sleep-interval=0.5 --follow --pid=$$tests out/test.log & \
+	passed=0; wait $$tests || passed=$$?; \
+	wait $$!; \
 	awk -f .ci/summary.awk out/test.log; \
 	exit $$passed
 

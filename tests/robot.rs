@@ -61,7 +61,12 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
         let share = orders["learn"]["share"].as_f64().expect("\"share\": a part");
         learning(keep, share, orders["learn"]["memory"].as_str().map(PathBuf::from))
     });
-    let rounds = if learning.is_some() { short_rounds() } else { MindConfig::default() };
+    // {"rounds": {"deadline": "2s"}}: otherwise as by the default configuration, whether or not it learns.
+    let rounds = match serde_json::from_value(orders["rounds"].clone()) {
+        Ok(rounds) => rounds,
+        Err(_) if learning.is_some() => short_rounds(),
+        Err(_) => MindConfig::default(),
+    };
     let mind = MindConfig { quorum, ..rounds };
     let learns = learning.is_some();
     let robot = match Robot::start(RobotConfig { link, boot, mind, learning, ..config(id, swarm, &[]) }).await

@@ -1,4 +1,4 @@
-//! Network namespaces: one per robot, joined by links that can be cut without a trace.
+//! Network namespaces: one per robot, joined by links that can be cut, made deaf at one end, or made slow, without a trace.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -95,7 +95,47 @@ impl Namespaces {
         let k = self.links[&link];
         ip(Some(&self.hub()), &format!("link set h{k}a master br{k}\n"));
     }
+
+    /// Nothing that is sent over that link reaches `node`, at one of its ends, any more; what it says itself arrives.
+    ///
+    /// # Panics
+    /// When there is no such link.
+    pub fn deafen(&self, link: (u32, u32), node: u32) {
+        // A queue that no packet fits into.
+        self.queue(link, node, "bfifo limit 1");
+    }
+
+    /// So many bytes a second go over that link each way, and no more: what is beyond waits, up to a second's worth.
+    ///
+    /// # Panics
+    /// When there is no such link.
+    pub fn narrow(&self, link: (u32, u32), bytes_per_second: u32) {
+        let (rate, limit) = (8 * u64::from(bytes_per_second), bytes_per_second.max(2 * BURST));
+        for node in [link.0, link.1] {
+            self.queue(link, node, &format!("tbf rate {rate}bit burst {BURST} limit {limit}"));
+        }
+    }
+
+    /// Takes back what [`Self::deafen`] and [`Self::narrow`] did to a link.
+    ///
+    /// # Panics
+    /// When there is no such link.
+    pub fn widen(&self, link: (u32, u32)) {
+        for node in [link.0, link.1] {
+            self.queue(link, node, "pfifo limit 1000");
+        }
+    }
+
+    /// What becomes of the packets of a link that are on their way to `node`.
+    fn queue(&self, link: (u32, u32), node: u32, discipline: &str) {
+        let (k, end) = (self.links[&link], if node == link.0 { 'a' } else { 'b' });
+        let command = format!("qdisc replace dev h{k}{end} root {discipline}\n");
+        batch("tc", Some(&self.hub()), &command);
+    }
 }
+
+/// What may go at once over a link that is narrow, in bytes: more than the largest packet of an Ethernet.
+const BURST: u32 = 2000;
 
 impl Drop for Namespaces {
     fn drop(&mut self) {
@@ -110,12 +150,20 @@ fn address(link: usize, host: usize) -> String {
 }
 
 fn ip(namespace: Option<&str>, commands: &str) {
-    let mut command = Command::new("ip");
+    batch("ip", namespace, commands);
+}
+
+/// Gives commands to a program of iproute2.
+fn batch(program: &str, namespace: Option<&str>, commands: &str) {
+    let mut command = Command::new(program);
     if let Some(namespace) = namespace {
         command.args(["-n", namespace]);
     }
-    let mut child = command.args(["-batch", "-"]).stdin(Stdio::piped()).spawn().expect("ip of iproute2 runs");
+    let mut child = command.args(["-batch", "-"]).stdin(Stdio::piped()).spawn().expect("iproute2 is here");
     let written = child.stdin.take().expect("stdin is piped").write_all(commands.as_bytes());
     let ended = child.wait();
-    assert!(written.is_ok() && ended.is_ok_and(|status| status.success()), "ip {namespace:?} {commands}");
+    assert!(
+        written.is_ok() && ended.is_ok_and(|status| status.success()),
+        "{program} {namespace:?} {commands}"
+    );
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use gestalt_strategies::Quorum;
+use gestalt_strategies::{MindConfig, Quorum};
 use gestalt_tests::{Namespaces, Process, unique};
 use serde_json::{Value, json};
 
@@ -18,6 +18,8 @@ pub struct Field {
     swarm: String,
     sees: Vec<Sees>,
     quorum: Quorum,
+    /// The rounds of robots that learn.
+    learns: Option<MindConfig>,
 }
 
 /// The class that a robot sees, and how sure of it it is; `None` for one that cannot see.
@@ -27,9 +29,18 @@ impl Field {
     /// Starts a robot in each of `nodes` namespaces and waits until all know of all. They decide by that
     /// quorum.
     pub fn new(nodes: u32, links: &[(u32, u32)], quorum: Quorum, sees: impl Fn(u32) -> Sees) -> Self {
+        Self::start(links, (0..nodes).map(sees).collect(), quorum, None)
+    }
+
+    /// The same of robots that learn what they are shown and told, with such rounds.
+    pub fn learning(nodes: u32, links: &[(u32, u32)], rounds: &MindConfig) -> Self {
+        Self::start(links, vec![Some((0, 1.0)); nodes as usize], rounds.quorum, Some(rounds.clone()))
+    }
+
+    fn start(links: &[(u32, u32)], sees: Vec<Sees>, quorum: Quorum, learns: Option<MindConfig>) -> Self {
+        let nodes = u32::try_from(sees.len()).expect("a few robots");
         let namespaces = Namespaces::new(nodes, links);
-        let sees = (0..nodes).map(sees).collect();
-        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, quorum };
+        let mut field = Self { robots: Vec::new(), namespaces, swarm: unique("field"), sees, quorum, learns };
         for node in 0..nodes {
             let robot = field.process(node);
             field.robots.push(robot);
@@ -46,6 +57,8 @@ impl Field {
             "sees": sees.map(|(class, _)| class),
             "p": sees.map(|(_, p)| p),
             "quorum": self.quorum,
+            "rounds": self.learns,
+            "learn": self.learns.as_ref().map(|_| json!({"keep": 10, "share": 0.5})),
             "link": {
                 "listen": [format!("tcp/0.0.0.0:{PORT}")],
                 "insecure": true,
@@ -54,6 +67,11 @@ impl Field {
         });
         let binary = Path::new(env!("CARGO_BIN_EXE_test-robot"));
         Process::start(binary, Some(&self.namespaces.name(node)), &orders)
+    }
+
+    /// What is in front of all cameras from now on.
+    pub fn show(&mut self, class: u32) {
+        self.robots.iter_mut().for_each(|robot| robot.order(&format!("shown {class}")));
     }
 
     /// Waits until every robot knows all others to be alive.

@@ -4,7 +4,7 @@
 //! not wait one after the other. So such test binaries have `harness = false` and a table of [`Trial`]s as their `main`; they
 //! understand the arguments of any other test binary (`cargo test -p gestalt-tests --test swarm line`).
 //!
-//! - [`Need`]: what a trial needs of the machine. With `GESTALT_REQUIRE=namespaces,mount,browser,data` a machine without it fails.
+//! - [`Need`]: what a trial needs of the machine. With `GESTALT_REQUIRE=namespaces,queues,mount,browser,data` a machine without it fails.
 //! - [`Load`]: how much of the processor it takes, so that what waits runs side by side and what computes does not disturb it.
 //! - [`run_in_real_time`]: trials whose clock is the machine's, each in a process of its own. One that fails is tried once more,
 //!   alone, and both are told.

@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Something that not every machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// The right to make network namespaces and to enter them: root, and `ip` of iproute2.
     Namespaces,
+    /// A kernel whose links can be made slow or deaf: `tc` of iproute2 with `tbf` and `bfifo`, in a namespace.
+    Queues,
     /// The right to mount a file system: root, outside most containers.
     Mount,
     /// Chromium, to see a page as people do.
@@ -54,8 +57,9 @@ impl Need {
     /// What rclpy's examples import.
     pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
 
-    const ALL: [Self; 13] = [
+    const ALL: [Self; 14] = [
         Self::Namespaces,
+        Self::Queues,
         Self::Mount,
         Self::Browser,
         Self::Data,
@@ -75,6 +79,7 @@ impl Need {
     pub fn name(self) -> &'static str {
         match self {
             Self::Namespaces => "namespaces",
+            Self::Queues => "queues",
             Self::Mount => "mount",
             Self::Browser => "browser",
             Self::Data => "data",
@@ -99,7 +104,16 @@ impl Need {
 
     fn attempt(self) -> Result<(), String> {
         match self {
-            Self::Namespaces => namespaces(),
+            Self::Namespaces => in_a_namespace(&["true"], "network namespaces (root and iproute2)"),
+            Self::Queues => {
+                let queue = "tc qdisc replace dev lo root";
+                let slow = format!("{queue} tbf rate 64000bit burst 2000 limit 8000");
+                let deaf = format!("{queue} bfifo limit 1");
+                in_a_namespace(
+                    &[&slow, &deaf],
+                    "tc of iproute2, tbf and bfifo in the kernel, and network namespaces",
+                )
+            }
             Self::Mount => mount(),
             Self::Browser if done("chromium", &["--version"]) => Ok(()),
             Self::Browser => Err("needs a browser (chromium)".to_owned()),
@@ -179,15 +193,20 @@ fn enki() -> Result<(), String> {
     }
 }
 
-/// A chroot may let a process make namespaces, and not enter them.
-fn namespaces() -> Result<(), String> {
-    let name = format!("gt{}", std::process::id());
+/// Whether those commands can be run in a network namespace: a chroot may let a process make one, and not enter it.
+fn in_a_namespace(commands: &[&str], what: &str) -> Result<(), String> {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let name = format!("gt{}n{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
     let made = done("ip", &["netns", "add", &name]);
-    let entered = made && done("ip", &["netns", "exec", &name, "true"]);
+    let run = |command: &&str| {
+        let words: Vec<&str> = ["netns", "exec", &name].into_iter().chain(command.split(' ')).collect();
+        done("ip", &words)
+    };
+    let all_run = made && commands.iter().all(run);
     if made {
         done("ip", &["netns", "del", &name]);
     }
-    if entered { Ok(()) } else { Err("needs network namespaces (root and iproute2)".to_owned()) }
+    if all_run { Ok(()) } else { Err(format!("needs {what}")) }
 }
 
 fn mount() -> Result<(), String> {

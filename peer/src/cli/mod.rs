@@ -206,7 +206,11 @@ impl Command {
 /// else concerns the user is said in Gestalt's own words.
 pub fn start_log() {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| {
-        EnvFilter::new("error,gestalt_peer=warn,gestalt_link=warn,gestalt_vision=warn,gestalt_lab=warn")
+        // Zenoh's routing complains of each link that ends while it is shut down.
+        let zenoh = "error,zenoh::net::routing=off";
+        EnvFilter::new(format!(
+            "{zenoh},gestalt_peer=warn,gestalt_link=warn,gestalt_vision=warn,gestalt_lab=warn"
+        ))
     });
     // Colours are for a terminal alone.
     let colours = io::stderr().is_terminal();

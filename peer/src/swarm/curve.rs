@@ -10,11 +10,12 @@ pub const WINDOW: usize = 6;
 const SIZE: (u32, u32) = (960, 540);
 const SINGLE: RGBColor = RGBColor(213, 94, 0);
 const SWARM: RGBColor = RGBColor(0, 114, 178);
+const WRONG: RGBColor = RGBColor(120, 120, 120);
 
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
-/// The curve of a tally as SVG: the accuracy of single robots and of the swarm, each as the mean over the last
-/// [`WINDOW`] rounds, and each round by itself as a dot.
+/// The curve of a tally as SVG: the accuracy of single robots and of the swarm, and how often the swarm decided for another gesture
+/// rather than not at all, each as the mean over the last [`WINDOW`] rounds, and each round by itself as a dot.
 ///
 /// # Errors
 /// What plotters says.
@@ -28,6 +29,7 @@ fn draw(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, tally: &Tall
     area.fill(&WHITE)?;
     let single: Vec<f64> = tally.history().iter().map(|round| 100.0 * round.single).collect();
     let swarm: Vec<f64> = tally.history().iter().map(|round| if round.right { 100.0 } else { 0.0 }).collect();
+    let wrong: Vec<f64> = tally.history().iter().map(|round| if round.wrong { 100.0 } else { 0.0 }).collect();
     let last = single.len().max(2) as f64;
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 22))
@@ -46,19 +48,26 @@ fn draw(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, tally: &Tall
         .x_label_formatter(&|x| format!("{x:.0}"))
         .y_label_formatter(&|y| format!("{y:.0}"))
         .draw()?;
+    let means = |values: &[f64]| -> Vec<(f64, f64)> {
+        let mean_of = |n: usize| mean(&values[(n + 1).saturating_sub(WINDOW)..=n]);
+        (0..values.len()).map(|n| ((n + 1) as f64, mean_of(n))).collect()
+    };
     for (values, colour, name) in [(&single, SINGLE, "a single robot"), (&swarm, SWARM, "the swarm")] {
-        let rounds = || (1..).map(f64::from);
-        let points = rounds().zip(values.iter().copied());
+        let points = (1..).map(f64::from).zip(values.iter().copied());
         chart.draw_series(points.map(|point| Circle::new(point, 4, colour.mix(0.35).filled())))?;
-        let means = (0..values.len()).map(|n| mean(&values[(n + 1).saturating_sub(WINDOW)..=n]));
         chart
-            .draw_series(LineSeries::new(rounds().zip(means), colour.stroke_width(3)))?
+            .draw_series(LineSeries::new(means(values), colour.stroke_width(3)))?
             .label(name)
             .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 26, y)], colour.stroke_width(3)));
     }
     chart
+        .draw_series(LineSeries::new(means(&wrong), WRONG.stroke_width(1)))?
+        .label("the swarm, wrong rather than undecided")
+        .legend(|(x, y)| PathElement::new(vec![(x, y), (x + 26, y)], WRONG.stroke_width(1)));
+    chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
+        // Where neither those who learn nor those who are seldom wrong draw a line.
+        .position(SeriesLabelPosition::Coordinate(500, 245))
         .legend_area_size(34)
         .background_style(WHITE)
         .border_style(RGBColor(200, 200, 200))

@@ -24,6 +24,8 @@ pub struct Round {
     pub single: f64,
     /// Whether the swarm was.
     pub right: bool,
+    /// Whether the swarm decided for another gesture. If it was neither, it was undecided.
+    pub wrong: bool,
 }
 
 /// How often the robots were right.
@@ -37,6 +39,8 @@ pub struct Score {
     pub missed: u64,
     /// The swarm's accuracy with its 95 % interval (Wilson).
     pub swarm: Option<Proportion>,
+    /// The swarm's accuracy in those rounds that it decided.
+    pub decided: Option<Proportion>,
     /// The accuracy of single robots, over all robots and rounds. A robot that saw no hand was not right.
     pub single: Option<Proportion>,
     /// The accuracy of each robot.
@@ -65,7 +69,8 @@ impl Tally {
             }
         }
         let single = f64::from(alone) / self.robots.len().max(1) as f64;
-        self.history.push(Round { single, right: decision.class == Some(truth) });
+        let right = decision.class == Some(truth);
+        self.history.push(Round { single, right, wrong: decision.class.is_some() && !right });
     }
 
     /// Takes a gesture into account that led to no round.
@@ -88,6 +93,7 @@ impl Tally {
             undecided: self.undecided,
             missed: self.missed,
             swarm: Proportion::wilson(self.right, self.rounds),
+            decided: Proportion::wilson(self.right, self.rounds - self.undecided),
             single: Proportion::wilson(self.robots.values().sum(), opinions),
             robots: self
                 .robots

@@ -61,11 +61,12 @@ fn say_score(args: &Args, configs: &[Config], score: &Score) -> Result<(), Failu
         args.json,
         &json!({"event": "score", "score": score}),
         &format!(
-            "accuracy over {}: single robot {} · swarm {} · undecided {}{missed}\nper robot: {}",
+            "accuracy over {}: single robot {} · swarm {}\nthe swarm decided {} of them{missed}, rightly {}\nper robot: {}",
             counted(score.rounds as usize, "round"),
             percent(&score.single),
             percent(&score.swarm),
-            score.undecided,
+            score.rounds - score.undecided,
+            percent(&score.decided),
             each.join(", ")
         ),
     )

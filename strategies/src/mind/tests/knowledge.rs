@@ -48,8 +48,9 @@ fn check_labels(swarm: &Swarm, told: &BTreeMap<RoundId, ClassId>) {
 }
 
 #[test]
-fn what_was_said_in_another_life_labels_nothing_whoever_forgot_what() {
+fn what_was_said_in_another_life_labels_nothing_whoever_forgot_what_and_whatever_clocks_show() {
     let mut swarm = Swarm::new(3, config(2, 1.0), 11);
+    let mut copies = vec![swarm.disks.clone()];
     let mut told = BTreeMap::new();
     let mut shown = BTreeSet::new();
     for life in 0..100 {
@@ -71,11 +72,21 @@ fn what_was_said_in_another_life_labels_nothing_whoever_forgot_what() {
                 );
             }
         }
-        match life % 10 {
-            3 => swarm.disks[life / 10 % 3].clear(),
+        copies.push(swarm.disks.clone());
+        let old = |swarm: &mut Swarm| copies[swarm.rng.random_range(0..copies.len())].clone();
+        match life % 20 {
+            3 => swarm.disks[life / 20 % 3].clear(),
             7 => swarm.disks.iter_mut().for_each(BTreeMap::clear),
+            11 => swarm.disks[life / 20 % 3] = old(&mut swarm)[life / 20 % 3].clone(),
+            // Each from another day.
+            15 => (0..3).for_each(|i| swarm.disks[i] = old(&mut swarm)[i].clone()),
             _ => {}
         }
+        // Clocks an hour ahead, an hour behind, and at 1970, where the number of a start is drawn.
+        let drawn = swarm.rng.random_range(1..1 << 24);
+        let right = swarm.started;
+        swarm.boot =
+            [None, Some(right + 3600), Some(right.saturating_sub(3600).max(1)), Some(drawn)][life / 2 % 4];
         swarm.restart_all();
         check_labels(&swarm, &told);
     }

@@ -81,10 +81,55 @@ pub const ALL: &[Attack] = &[
             "rounds of one counter merge while they are open, and the votes of an earlier life with them",
         ),
         gap: Some(
-            "a vote is bound to its round by the counter; robots whose memories hold a taught round count on, \
+            "a vote is bound to its round by the counter; robots whose memories hold a taught round open rounds beyond it, \
                    others can be told old votes as new",
         ),
-        play: |seed| beside(&Plan::sealed(), seed, after_all_forgot, off_are_not_counted),
+        play: |seed| {
+            beside(
+                &Plan::sealed(),
+                seed,
+                |swarm| after_they_forgot(swarm, &[1, 2, 3, 4, 5]),
+                off_are_not_counted,
+            )
+        },
+    },
+    Attack {
+        number: "7",
+        what: "the same where one robot, which opens rounds, kept its memory",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "no vote of a robot that is off is counted",
+        counted: Counted::None(NO_REFUSAL),
+        gap: None,
+        play: |seed| {
+            beside(
+                &Plan::sealed(),
+                seed,
+                |swarm| after_they_forgot(swarm, &[2, 3, 4, 5]),
+                off_are_not_counted,
+            )
+        },
+    },
+    Attack {
+        number: "7",
+        what: "the same where one robot kept its memory, and one that did not opens rounds",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "no vote of a robot that is off is counted",
+        counted: Counted::None(
+            "rounds of one counter merge while they are open, and the votes of an earlier life with them",
+        ),
+        gap: Some(
+            "who kept its memory takes part in rounds under old counts, too: others may have lost theirs",
+        ),
+        play: |seed| {
+            beside(
+                &Plan::sealed(),
+                seed,
+                |swarm| after_they_forgot(swarm, &[1, 2, 4, 5]),
+                off_are_not_counted,
+            )
+        },
     },
     Attack {
         number: "8",
@@ -186,11 +231,13 @@ fn under_other_keys(swarm: &mut Swarm) {
     swarm.end(began);
 }
 
-fn after_all_forgot(swarm: &mut Swarm) {
-    swarm.show(4);
+/// All start again, these without their memories; two of them stay off.
+fn after_they_forgot(swarm: &mut Swarm, forget: &[u32]) {
+    let round = swarm.show(4);
+    swarm.teach(round, 4);
     let old: Vec<_> = swarm.votes().into_iter().filter(|held| matches!(held.robot.0, 4 | 5)).collect();
     swarm.pass(10_000 * MS);
-    swarm.restart_all(None, true);
+    swarm.restart_all(None, |robot| forget.contains(&robot));
     swarm.stop([4, 5]);
     let began = swarm.now();
     swarm.begin(1);
@@ -235,7 +282,7 @@ fn second_epoch() -> Membership {
 
 fn stolen(swarm: &mut Swarm) {
     steal(swarm, 1);
-    swarm.restart_all(second_epoch().sign(&authority()).ok(), false);
+    swarm.restart_all(second_epoch().sign(&authority()).ok(), |_| false);
     let began = swarm.now();
     swarm.begin(2);
     swarm.pass(50 * MS);

@@ -121,12 +121,12 @@ impl Swarm {
         self.introduce(i);
     }
 
-    /// All robots end, and start again under that roster.
-    pub fn restart_all(&mut self, roster: Option<Roster>, forgets: bool) {
+    /// All robots end, and start again under that roster, some without their memories.
+    pub fn restart_all(&mut self, roster: Option<Roster>, forgets: impl Fn(u32) -> bool) {
         self.roster = roster.unwrap_or_else(|| self.roster.clone());
         let sealed = (self.plan.setting == Setting::Sealed).then_some(&self.roster);
         for robot in &mut self.robots {
-            robot.restart(&self.plan, sealed, forgets);
+            robot.restart(&self.plan, sealed, forgets(robot.id.0));
         }
         (0..self.robots.len()).for_each(|i| self.introduce(i));
         self.pass(Duration::from_millis(100));
