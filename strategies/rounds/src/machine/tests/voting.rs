@@ -83,8 +83,8 @@ fn a_frame_that_the_host_judged_counts_as_one_that_the_classifier_judged_does() 
     let run = |input: Input| {
         let mut mind = mind(7);
         mind.handle(ms(0), Input::Open);
-        mind.handle(ms(300), input);
-        let out = mind.handle(ms(1000), Input::Tick);
+        let mut out = mind.handle(ms(300), input);
+        out.extend(mind.handle(ms(1000), Input::Tick));
         (broadcast(&out)[0].clone(), mind.refusals().clone())
     };
     let singles = [0.9_f32, 0.05, 0.05];
