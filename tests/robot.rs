@@ -62,10 +62,10 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
         learning(keep, share, orders["learn"]["memory"].as_str().map(PathBuf::from))
     });
     // {"rounds": {"deadline": "2s"}}: otherwise as by the default configuration, whether or not it learns.
-    let rounds = match serde_json::from_value(orders["rounds"].clone()) {
-        Ok(rounds) => rounds,
-        Err(_) if learning.is_some() => short_rounds(),
-        Err(_) => MindConfig::default(),
+    let rounds = match &orders["rounds"] {
+        Value::Null if learning.is_some() => short_rounds(),
+        Value::Null => MindConfig::default(),
+        rounds => serde_json::from_value(rounds.clone()).expect("\"rounds\": how it takes part"),
     };
     let mind = MindConfig { quorum, ..rounds };
     let learns = learning.is_some();

@@ -10,7 +10,7 @@ use crate::swarm::{Plan, Swarm};
 pub type Judge = fn(&Swarm, &Swarm) -> Result<(), String>;
 
 /// Plays it twice, the first time with an adversary that keeps silent.
-pub fn beside(plan: &Plan, seed: u64, play: fn(&mut Swarm), judge: Judge) -> Played {
+pub fn beside(plan: &Plan, seed: u64, play: impl Fn(&mut Swarm), judge: Judge) -> Played {
     let run = |peace| {
         let mut swarm = Swarm::new(plan, seed, peace);
         play(&mut swarm);

@@ -9,10 +9,6 @@ use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, Observation, Vocabulary};
 use serde_json::{Value, json};
 
-const ROBOTS: usize = 20;
-const CLASSES: usize = 6;
-const SHOWINGS: usize = 8;
-
 /// Robots whose mistakes last, and are much alike: what they decide is not always what is shown. A third of all messages is lost.
 const SCENARIO: &str = r#"{
     robots: [{ name: "robot", count: 20, view: { fps: 5, signal: 1.2, persistence: 0.8, likeness: 0.7 } }],
@@ -63,10 +59,11 @@ pub fn swarms() -> Vec<Value> {
 
 fn swarm(seed: u64) -> Value {
     let scenario: Scenario = json5::from_str(SCENARIO).expect("a scenario");
-    let labels: Vec<String> = (0..CLASSES).map(|class| format!("gesture {class}")).collect();
+    let robots = scenario.swarm_size();
+    let labels: Vec<String> = (0..scenario.classes).map(|class| format!("gesture {class}")).collect();
     let vocabulary = Vocabulary::new(labels.clone()).expect("different labels");
     let view: View = scenario.robots[0].view.expect("robots that see");
-    let seen: Vec<Seen> = (0..ROBOTS).map(|_| Seen::default()).collect();
+    let seen: Vec<Seen> = (0..robots).map(|_| Seen::default()).collect();
     let eyes = |seen: &Seen| -> Box<dyn Observer> {
         Box::new(Noted { eyes: StatisticalObserver::new(view, vocabulary.clone()), seen: seen.clone() })
     };
@@ -82,7 +79,7 @@ fn swarm(seed: u64) -> Value {
                 let n = showings.len();
                 let looks: Vec<Vec<Vec<f64>>> = seen.iter().map(|seen| seen.borrow()[n].clone()).collect();
                 showings.push(json!({
-                    "shown": line["class"], "opener": line["opener"], "looks": looks, "held": vec![Value::Null; ROBOTS],
+                    "shown": line["class"], "opener": line["opener"], "looks": looks, "held": vec![Value::Null; robots],
                 }));
             }
             (Some("hold"), Some(showing)) => {
@@ -92,6 +89,6 @@ fn swarm(seed: u64) -> Value {
             _ => {}
         }
     }
-    assert_eq!(showings.len(), SHOWINGS, "a line for each");
+    assert_eq!(showings.len(), scenario.rounds as usize, "a line for each");
     json!({"seed": seed, "labels": labels, "period": 1.0 / view.fps, "showings": showings})
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
 use gestalt_trust::{Membership, SwarmId, statement};
 
-use crate::attack::{Attack, Counted, Setting, Tier};
+use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::beside::{beside, decided_in_time, unmoved};
 use crate::forged;
 use crate::swarm::world::{authority, key, members};
@@ -84,14 +84,7 @@ pub const ALL: &[Attack] = &[
             "a vote is bound to its round by the counter; robots whose memories hold a taught round open rounds beyond it, \
                    others can be told old votes as new",
         ),
-        play: |seed| {
-            beside(
-                &Plan::sealed(),
-                seed,
-                |swarm| after_they_forgot(swarm, &[1, 2, 3, 4, 5]),
-                off_are_not_counted,
-            )
-        },
+        play: |seed| old_votes_again(seed, &[1, 2, 3, 4, 5]),
     },
     Attack {
         number: "7",
@@ -101,14 +94,7 @@ pub const ALL: &[Attack] = &[
         expected: "no vote of a robot that is off is counted",
         counted: Counted::None(NO_REFUSAL),
         gap: None,
-        play: |seed| {
-            beside(
-                &Plan::sealed(),
-                seed,
-                |swarm| after_they_forgot(swarm, &[2, 3, 4, 5]),
-                off_are_not_counted,
-            )
-        },
+        play: |seed| old_votes_again(seed, &[2, 3, 4, 5]),
     },
     Attack {
         number: "7",
@@ -122,14 +108,7 @@ pub const ALL: &[Attack] = &[
         gap: Some(
             "who kept its memory takes part in rounds under old counts, too: others may have lost theirs",
         ),
-        play: |seed| {
-            beside(
-                &Plan::sealed(),
-                seed,
-                |swarm| after_they_forgot(swarm, &[1, 2, 4, 5]),
-                off_are_not_counted,
-            )
-        },
+        play: |seed| old_votes_again(seed, &[1, 2, 4, 5]),
     },
     Attack {
         number: "8",
@@ -231,7 +210,11 @@ fn under_other_keys(swarm: &mut Swarm) {
     swarm.end(began);
 }
 
-/// All start again, these without their memories; two of them stay off.
+/// All start again, these without their memories, and are told the votes of two that stay off.
+fn old_votes_again(seed: u64, forget: &[u32]) -> Played {
+    beside(&Plan::sealed(), seed, |swarm| after_they_forgot(swarm, forget), off_are_not_counted)
+}
+
 fn after_they_forgot(swarm: &mut Swarm, forget: &[u32]) {
     let round = swarm.show(4);
     swarm.teach(round, 4);
