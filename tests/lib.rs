@@ -13,6 +13,8 @@ mod namespaces;
 mod process;
 #[path = "set_up/robots.rs"]
 mod robots;
+#[path = "set_up/sealed.rs"]
+mod sealed;
 #[path = "set_up/streaming.rs"]
 mod streaming;
 
@@ -22,4 +24,5 @@ pub use learning::{between, gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;
 pub use process::Process;
 pub use robots::{Watched, agreed, config, start, start_learning, start_looking, unique};
+pub use sealed::{by_tls, credentials, key, seal, sealed, with_eve};
 pub use streaming::{Hands, center_config, model, sender_config};

@@ -1,6 +1,8 @@
 //! A robot as a process, for the scenarios: it reads orders on stdin and prints what happens as a line of JSON
 //! each. Its argument is one JSON object.
 
+mod lies;
+
 use std::io::{BufRead, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +15,9 @@ use gestalt_peer::config::ModelSection;
 use gestalt_peer::stream::{Sender, StreamEvent};
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RobotId};
 use gestalt_strategies::MindConfig;
-use gestalt_tests::{Fixed, center_config, config, gesture, learning, look, sender_config, short_rounds};
+use gestalt_tests::{
+    Fixed, center_config, config, gesture, learning, look, seal, sender_config, short_rounds, with_eve,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
@@ -48,6 +52,10 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     if orders["stream"].is_object() {
         return stream(orders, stdin).await;
     }
+    // {"lies": true, "members": 20}: one of a sealed swarm, and what it says is not true.
+    if orders["lies"] == json!(true) {
+        return lies::run(orders, stdin).await;
+    }
     let id = orders["id"].as_u64().and_then(|id| u32::try_from(id).ok()).expect("\"id\": a number");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name");
     let link: LinkConfig = serde_json::from_value(orders["link"].clone()).expect("\"link\": a LinkConfig");
@@ -69,7 +77,11 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     };
     let mind = MindConfig { quorum, ..rounds };
     let learns = learning.is_some();
-    let robot = match Robot::start(RobotConfig { link, boot, mind, learning, ..config(id, swarm, &[]) }).await
+    // {"members": 20}: of a sealed swarm of so many.
+    let members = orders["members"].as_u64().and_then(|members| u32::try_from(members).ok());
+    let seal = members.map(|members| seal(id, &with_eve(swarm, members)));
+    let robot = match Robot::start(RobotConfig { link, boot, mind, learning, seal, ..config(id, swarm, &[]) })
+        .await
     {
         Ok(robot) => robot,
         Err(error) => {
@@ -188,6 +200,8 @@ async fn stream(orders: &Value, mut stdin: mpsc::Receiver<String>) {
 /// Attaches a client to this robot for as long as it takes to say what the gesture of a round was.
 fn teach(id: u32, swarm: String, connect: Vec<String>, by: &str, word: Instruction) {
     let by = by.parse().expect("a name");
+    // Who has no key is let in by TCP alone, on the robot's own computer.
+    let connect = connect.into_iter().filter(|locator| locator.starts_with("tcp/")).collect();
     tokio::spawn(async move {
         let link = LinkConfig { connect, ..LinkConfig::default() };
         let client = Client::open(&swarm, &link).await.expect("the robot listens");

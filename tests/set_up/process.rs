@@ -76,6 +76,11 @@ impl Process {
         self.told.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
+    /// The same, and forgets it: of what is told for hours somebody has to keep no more than needed.
+    pub fn take_told(&self) -> Vec<Value> {
+        std::mem::take(&mut self.told.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Waits until what it has told, all of it, gives `pick` a value.
     pub fn wait<T>(&self, patience: Duration, mut pick: impl FnMut(&[Value]) -> Option<T>) -> Option<T> {
         let deadline = Instant::now() + patience;

@@ -6,11 +6,9 @@ use std::time::Duration;
 
 use gestalt_link::{Client, LinkConfig, RobotConfig};
 use gestalt_protocol::{Gesture, Instruction, Outcome};
-use gestalt_tests::{Watched, config, learning, start_learning, unique};
+use gestalt_tests::{Watched, config, learning, sealed, start_learning, unique, with_eve};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-
-use crate::stranger::{sealed, with_eve};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 const ROBOTS: u32 = 6;

@@ -7,10 +7,9 @@ use std::time::{Duration, Instant};
 
 use gestalt_link::{LinkConfig, RobotConfig, Scouting};
 use gestalt_protocol::ClassId;
-use gestalt_tests::{start, unique};
+use gestalt_tests::{sealed, start, unique, with_eve};
 
 use crate::siege::REFRACTORY;
-use crate::stranger::{sealed, with_eve};
 use crate::trouble::counted;
 use crate::wall::voters;
 

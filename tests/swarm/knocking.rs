@@ -7,17 +7,17 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Bearer, Certificate, Credentials, Robot};
+use gestalt_link::{Bearer, Robot};
 use gestalt_protocol::{Envelope, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote};
 use gestalt_strategies::Classify;
-use gestalt_tests::{Fixed, Process, unique};
+use gestalt_tests::{Fixed, Process, by_tls, credentials, key, sealed, unique, with_eve};
 use gestalt_trust::{Membership, SwarmId, statement};
 use serde_json::{Value, json};
 use tokio::task::JoinSet;
 use zenoh::qos::CongestionControl;
 
 use crate::siege::REFRACTORY;
-use crate::stranger::{by_tls, enter, key, sealed, star, with_eve};
+use crate::stranger::{enter, star};
 use crate::wall::voters;
 
 /// The robot that is expelled.
@@ -26,17 +26,18 @@ const THIEF: RobotId = RobotId(3);
 /// How often it links anew.
 const KNOCK: Duration = Duration::from_millis(100);
 
-/// Names, in the environment, the swarm that this process is to knock at, and its endpoints: the scenarios' own program is the thief's.
+/// Names, in the environment, the swarm that this process is to knock at, its endpoints, and the robot that it was: the scenarios' own program
+/// is the thief's.
 const ORDERS: &str = "GESTALT_KNOCK";
 
-/// The members when it was one.
-fn members_before(swarm: &str) -> Membership {
-    with_eve(swarm, 4)
+/// The members when it was one, the last.
+fn members_before(swarm: &str, thief: RobotId) -> Membership {
+    with_eve(swarm, thief.0 + 1)
 }
 
 /// The members without it.
 fn members(swarm: &str) -> Membership {
-    let mut members = members_before(swarm);
+    let mut members = members_before(swarm, THIEF);
     members.epoch = 2;
     members.expelled = [(THIEF, members.robots.remove(&THIEF).unwrap())].into();
     members
@@ -44,15 +45,16 @@ fn members(swarm: &str) -> Membership {
 
 /// Votes in the name of the robot that was expelled, under its own signature and with ever newer stamps.
 struct Spoils {
+    thief: RobotId,
     swarm: SwarmId,
     keys: Keys,
     said: AtomicU32,
 }
 
 impl Spoils {
-    fn new(swarm: &str) -> Self {
-        let roster = members(swarm).sign(&key(1000)).unwrap();
-        Self { swarm: roster.swarm_id(), keys: Keys::new(swarm).unwrap(), said: AtomicU32::new(1) }
+    fn new(swarm: &str, thief: RobotId) -> Self {
+        let roster = members_before(swarm, thief).sign(&key(1000)).unwrap();
+        Self { thief, swarm: roster.swarm_id(), keys: Keys::new(swarm).unwrap(), said: AtomicU32::new(1) }
     }
 
     fn vote(&self, round: RoundId) -> Vec<u8> {
@@ -60,15 +62,15 @@ impl Spoils {
         let vocabulary = Fixed::default().vocabulary().id();
         let vote = Vote { round, vocabulary, evidence, looks: 16.0, unknown: None, named: vec![] };
         let stamp = Stamp { boot: u32::MAX, sequence: self.said.fetch_add(1, Ordering::Relaxed) };
-        let unsigned = Envelope { author: THIEF, stamp, message: Message::Vote(vote), signature: None };
-        let signature = Some(statement::sign(&key(THIEF.0), &self.swarm, &unsigned.statement()));
+        let unsigned = Envelope { author: self.thief, stamp, message: Message::Vote(vote), signature: None };
+        let signature = Some(statement::sign(&key(self.thief.0), &self.swarm, &unsigned.statement()));
         Envelope { signature, ..unsigned }.encode()
     }
 
     /// Says one in that round, and one in a round that would be the next but one.
     async fn say(&self, session: &zenoh::Session, open: RoundId) {
-        for round in [open, RoundId { counter: open.counter + 2, opener: THIEF, ..open }] {
-            let put = session.put(self.keys.key(&Topic::Vote(THIEF)), self.vote(round));
+        for round in [open, RoundId { counter: open.counter + 2, opener: self.thief, ..open }] {
+            let put = session.put(self.keys.key(&Topic::Vote(self.thief)), self.vote(round));
             // The link may be ended at any moment.
             let _ = put.congestion_control(CongestionControl::Drop).await;
         }
@@ -76,14 +78,10 @@ impl Spoils {
 }
 
 /// The Zenoh configuration of that robot, as it was enrolled once.
-fn stolen(swarm: &str, nonce: u64, endpoint: &str) -> zenoh::Config {
-    let roster = members_before(swarm).sign(&key(1000)).unwrap();
-    let holder = Bearer::Robot(THIEF);
-    let certificate =
-        Certificate::issue(&key(1000), swarm, holder.clone(), &key(THIEF.0).public_key()).unwrap();
-    let credentials = Credentials::new(&roster, holder, Arc::new(key(THIEF.0)), certificate).unwrap();
+fn stolen(swarm: &str, thief: RobotId, nonce: u64, endpoint: &str) -> zenoh::Config {
+    let credentials = credentials(&members_before(swarm, thief), Bearer::Robot(thief), key(thief.0));
     // As robots name their sessions: nonce, swarm, robot.
-    let id = format!("{:016x}{:08x}{:08x}", nonce | 1 << 63, crc32fast::hash(swarm.as_bytes()), THIEF.0);
+    let id = format!("{:016x}{:08x}{:08x}", nonce | 1 << 63, crc32fast::hash(swarm.as_bytes()), thief.0);
     let mut zenoh = zenoh::Config::default();
     for (key, value) in [
         ("id", json!(id)),
@@ -126,7 +124,8 @@ pub fn knocks_instead() -> Option<ExitCode> {
 async fn knock(orders: &Value, round: &Arc<Mutex<Option<RoundId>>>, ended: &AtomicBool) {
     let swarm = orders["swarm"].as_str().unwrap();
     let endpoints: Vec<String> = serde_json::from_value(orders["endpoints"].clone()).unwrap();
-    let spoils = Arc::new(Spoils::new(swarm));
+    let thief: RobotId = serde_json::from_value(orders["thief"].clone()).unwrap();
+    let spoils = Arc::new(Spoils::new(swarm, thief));
     let mut knocks = JoinSet::new();
     let mut turns = tokio::time::interval(KNOCK);
     turns.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -137,7 +136,8 @@ async fn knock(orders: &Value, round: &Arc<Mutex<Option<RoundId>>>, ended: &Atom
         }
         turns.tick().await;
         let endpoint = &endpoints[number as usize % endpoints.len()];
-        let (zenoh, spoils, round) = (stolen(swarm, first | number, endpoint), spoils.clone(), round.clone());
+        let (zenoh, spoils, round) =
+            (stolen(swarm, thief, first | number, endpoint), spoils.clone(), round.clone());
         knocks.spawn(async move {
             let Ok(session) = zenoh::open(zenoh).await else { return };
             for _ in 0..5 {
@@ -156,15 +156,24 @@ async fn knock(orders: &Value, round: &Arc<Mutex<Option<RoundId>>>, ended: &Atom
 }
 
 /// The thief's process: Zenoh's threads are one pool for all sessions of a process, and the robots need theirs.
-struct Thief(Process);
+pub struct Thief(pub Process);
 
 impl Thief {
-    fn start(orders: &Value) -> Self {
-        let mut command = Command::new(std::env::current_exe().unwrap());
+    /// Starts it, in a network namespace if one is named.
+    pub fn start(namespace: Option<&str>, orders: &Value) -> Self {
+        let program = std::env::current_exe().unwrap();
+        let mut command = match namespace {
+            None => Command::new(program),
+            Some(namespace) => {
+                let mut command = Command::new("ip");
+                command.args(["netns", "exec", namespace]).arg(program);
+                command
+            }
+        };
         Self(Process::run(command.env(ORDERS, orders.to_string())))
     }
 
-    fn is_told(&mut self, round: RoundId) {
+    pub fn is_told(&mut self, round: RoundId) {
         self.0.order(&serde_json::to_string(&round).unwrap());
     }
 }
@@ -192,12 +201,12 @@ pub async fn who_was_expelled_and_links_ten_times_a_second_changes_nothing_and_i
     let members = members(&swarm);
     let (mut robots, locators) = star(3, |id, connect| sealed(id, &members, connect)).await;
     let endpoints: Vec<_> = robots.iter().map(|it| by_tls(it.robot.locators())[0].clone()).collect();
-    let mut thief = Thief::start(&json!({"swarm": swarm, "endpoints": endpoints}));
+    let mut thief = Thief::start(None, &json!({"swarm": swarm, "endpoints": endpoints, "thief": THIEF}));
     let on = Arc::new(AtomicBool::new(true));
     let watching = tokio::spawn(watch(robots.iter().map(|it| it.robot.clone()).collect(), on.clone()));
     // A member that passes its votes on.
     let eve = enter(&members, &locators).await;
-    let spoils = Spoils::new(&swarm);
+    let spoils = Spoils::new(&swarm, THIEF);
     let (began, mut rounds, mut whole, mut slowest) = (Instant::now(), 0, 0, Duration::ZERO);
     while began.elapsed() < siege {
         rounds += 1;

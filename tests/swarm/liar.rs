@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use gestalt_link::Event;
 use gestalt_protocol::{Envelope, Give, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote};
 use gestalt_strategies::Classify;
-use gestalt_tests::{Fixed, Watched, agreed, start, unique};
+use gestalt_tests::{Fixed, Watched, agreed, key, sealed, start, unique, with_eve};
 use gestalt_trust::statement;
 use zenoh::qos::CongestionControl;
 
-use crate::stranger::{enter, key, sealed, star, with_eve};
+use crate::stranger::{enter, star};
 use crate::trouble::counted;
 
 const PATIENCE: Duration = Duration::from_secs(30);

@@ -32,6 +32,7 @@ mod ros;
 mod ros_examples;
 mod scouting;
 mod siege;
+mod soak;
 mod stranger;
 mod stream;
 mod talking;
@@ -51,6 +52,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Namespaces] knowledge::under_loss_cuts_a_death_and_a_late_joiner_all_end_with_the_same_knowledge,
         [Waits] memory::killed_at_any_moment_it_remembers_and_shares_nothing_twice.await,
         [Waits] restarts::no_sample_has_a_label_that_nobody_gave_it_after_all_were_killed,
+        [Works, Namespaces] soak::liars_and_a_stranger_change_nothing_for_hours,
         [Works, Namespaces] center::a_stream_cut_and_a_centre_killed_come_back_to_a_centre_that_decides,
         [Waits] learning::ten_robots_on_a_ring_hold_what_the_source_says_and_tell_the_gestures_apart.await,
         [Waits] learning::the_size_follows_the_formula_over_real_links.await,

@@ -12,6 +12,8 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use redb::{ReadableDatabase, ReadableTable, TableDefinition};
 use serde_json::{Value, json};
 
+use crate::siege::REFRACTORY;
+
 const PATIENCE: Duration = Duration::from_secs(30);
 const HOUR: Duration = Duration::from_secs(3600);
 const CLASSES: u64 = 6;
@@ -63,14 +65,21 @@ impl Swarm {
         self.robots[opener].order("open");
     }
 
-    /// The round that the robot has just opened, once it is over there.
+    /// The round that the robot has just opened, once it is over for all.
     fn over(&self, opener: usize, before: usize) -> RoundId {
         let over = |told: &[Value]| {
             let of = |event| told[before..].iter().rfind(|told| told["event"] == event);
             let (closed, held) = (of("closed")?, of("held")?);
             (closed["round"] == held["round"]).then(|| held["decision"]["round"].clone())
         };
-        let round = self.robots[opener].wait(PATIENCE, over).expect("the round ends");
+        let round = self.robots[opener].wait(PATIENCE, over);
+        let round =
+            round.unwrap_or_else(|| panic!("robot {opener}: {:#?}", &self.robots[opener].told()[before..]));
+        for robot in &self.robots {
+            let times = |told: &[Value], event| told.iter().filter(|told| told["event"] == event).count();
+            let over = |told: &[Value]| (times(told, "opened") == times(told, "closed")).then_some(());
+            robot.wait(PATIENCE, over).expect("the round ends everywhere");
+        }
         serde_json::from_value(round).expect("the name of a round")
     }
 
@@ -154,6 +163,7 @@ pub fn no_sample_has_a_label_that_nobody_gave_it_after_all_were_killed() {
         swarm.start([now, now + HOUR, now - HOUR, SystemTime::UNIX_EPOCH][below(4)]);
         // Not all of what is shown is named; in the last round of a life all die, before, amid or after the word.
         for showing in 0..3_usize {
+            std::thread::sleep(REFRACTORY);
             let (opener, class) = (below(3), (life * 5 + life / 6 + 2 * showing) as u64 % CLASSES);
             let before = swarm.robots[opener].told().len();
             swarm.open(opener, class);

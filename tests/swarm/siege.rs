@@ -2,19 +2,18 @@
 
 use std::path::Path;
 use std::process::Command;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use gestalt_link::{RobotConfig, Seal};
+use gestalt_link::RobotConfig;
 use gestalt_protocol::{ClassId, Keys, RobotId, Topic};
-use gestalt_tests::{Process, Watched, start, unique};
+use gestalt_tests::{Process, Watched, seal, sealed, start, unique, with_eve};
 use gestalt_trust::Membership;
 use serde_json::json;
 use tokio::io::AsyncReadExt;
 use tokio::net::TcpStream;
 use tokio::task::JoinSet;
 
-use crate::stranger::{enter, key, sealed, with_eve};
+use crate::stranger::enter;
 use crate::wall::LINKING;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -36,8 +35,7 @@ impl Hub {
     fn start(members: &Membership) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let keys = folder.path();
-        let roster = members.clone().sign(&key(1000)).unwrap();
-        let seal = Seal::issue(&key(1000), roster, RobotId(0), Arc::new(key(0))).unwrap();
+        let seal = seal(0, members);
         seal.roster.write(&keys.join("roster.json")).unwrap();
         seal.identity.write(&keys.join("robot-0.key")).unwrap();
         seal.certificate.write(&keys.join("robot-0.crt")).unwrap();

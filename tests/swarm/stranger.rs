@@ -6,36 +6,24 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU8;
 use std::time::Duration;
 
-use gestalt_link::{Bearer, Certificate, Client, Credentials, LinkConfig, RobotConfig, Seal};
+use gestalt_link::{Bearer, Client, LinkConfig, RobotConfig};
 use gestalt_protocol::{
     Announcement, Ask, Batches, ClassId, Envelope, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
     Instruction, Keys, Lesson, Lessons, Message, Outcome, Question, RobotId, RoundId, Stamp, Topic, Vote,
     Word,
 };
 use gestalt_strategies::Classify;
-use gestalt_tests::{Fixed, Watched, agreed, config, learning, short_rounds, start, start_learning, unique};
-use gestalt_trust::{Identity, Instructor, Membership, Role, Roles, statement};
+use gestalt_tests::{
+    Fixed, Watched, agreed, by_tls, credentials, key, learning, sealed, short_rounds, start, start_learning,
+    unique, with_eve,
+};
+use gestalt_trust::{Membership, statement};
 use serde_json::Value;
 use zenoh::qos::CongestionControl;
 
 use crate::trouble::{announcing, counted, invented};
 
 const PATIENCE: Duration = Duration::from_secs(30);
-
-/// The key of robot `id`; any other number is somebody's too.
-pub fn key(id: u32) -> Identity {
-    let mut secret = [7; 32];
-    secret[..4].copy_from_slice(&id.to_le_bytes());
-    Identity::from_bytes(&secret)
-}
-
-pub fn sealed(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
-    let roster = members.clone().sign(&key(1000)).expect("a roster");
-    let seal = Seal::issue(&key(1000), roster, RobotId(id), Arc::new(key(id))).expect("a certificate");
-    let plain = config(id, &members.swarm, &by_tls(connect));
-    let listen = ["tls/127.0.0.1:0", "tcp/127.0.0.1:0"].map(str::to_owned).to_vec();
-    RobotConfig { seal: Some(seal), link: LinkConfig { listen, ..plain.link }, ..plain }
-}
 
 /// So many robots that are shown one gesture, each but the first linked to the first, once all know of all; and where the first is reached.
 pub async fn star(n: u32, config: impl Fn(u32, &[String]) -> RobotConfig) -> (Vec<Watched>, Vec<String>) {
@@ -50,41 +38,13 @@ pub async fn star(n: u32, config: impl Fn(u32, &[String]) -> RobotConfig) -> (Ve
     (robots, locators)
 }
 
-/// The endpoints at which a sealed robot is dialled.
-pub fn by_tls(locators: &[String]) -> Vec<String> {
-    locators.iter().filter(|locator| locator.starts_with("tls/")).cloned().collect()
-}
-
-/// The members `robots` of a swarm, and eve, who may listen and nothing else. Whoever is local may teach.
-pub fn with_eve(swarm: &str, robots: u32) -> Membership {
-    let robots = (0..robots).map(|id| (RobotId(id), key(id).public_key())).collect();
-    let eve = Instructor { key: key(666).public_key(), roles: Roles::NONE };
-    Membership {
-        swarm: swarm.to_owned(),
-        epoch: 1,
-        robots,
-        instructors: [("eve".parse().unwrap(), eve)].into(),
-        local: Roles::up_to(Role::Teach),
-        ..Membership::default()
-    }
-}
-
-/// What a client with that key shows.
-pub fn credentials(members: &Membership, name: &str, identity: Identity) -> Credentials {
-    let roster = members.clone().sign(&key(1000)).expect("a roster");
-    let holder = || Bearer::Client(name.parse().unwrap());
-    let certificate =
-        Certificate::issue(&key(1000), &members.swarm, holder(), &identity.public_key()).unwrap();
-    Credentials::new(&roster, holder(), Arc::new(identity), certificate).expect("its own certificate")
-}
-
 /// A Zenoh client that is let in, as eve, and then says what it likes.
 pub async fn enter(members: &Membership, locators: &[String]) -> zenoh::Session {
     let mut zenoh = zenoh::Config::default();
     zenoh.insert_json5("mode", "\"client\"").unwrap();
     zenoh.insert_json5("connect/endpoints", &serde_json::json!(by_tls(locators)).to_string()).unwrap();
     zenoh.insert_json5("scouting/multicast/enabled", "false").unwrap();
-    let tls = credentials(members, "eve", key(666)).tls();
+    let tls = credentials(members, Bearer::Client("eve".parse().unwrap()), key(666)).tls();
     zenoh.insert_json5("transport/link/tls", &tls.to_string()).unwrap();
     zenoh::open(zenoh).await.unwrap()
 }

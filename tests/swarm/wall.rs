@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use gestalt_link::{Bearer, Certificate, Client, Credentials, LinkConfig, RobotConfig};
 use gestalt_protocol::{ClassId, Gesture, Instruction, Keys, Outcome, RobotId, RoundId, Topic};
 use gestalt_strategies::{MindConfig, Quorum};
-use gestalt_tests::{Watched, agreed, config, start, unique};
+use gestalt_tests::{Watched, agreed, by_tls, config, credentials, key, sealed, start, unique, with_eve};
 use gestalt_trust::{Instructor, Membership, Role, Roles};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -15,7 +15,7 @@ use tokio::net::TcpStream;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
-use crate::stranger::{by_tls, credentials, key, sealed, star, with_eve};
+use crate::stranger::star;
 use crate::trouble::{counted, invented};
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -76,7 +76,7 @@ pub async fn a_stranger_in_any_mode_neither_reads_nor_changes_anything() {
     let before = standing(&robots);
 
     // The authority's certificate is no secret: with it, a stranger finds the robots' true.
-    let of_eve = credentials(&members, "eve", key(666)).tls();
+    let of_eve = credentials(&members, Bearer::Client("eve".parse().unwrap()), key(666)).tls();
     let nothing = json!({
         "root_ca_certificate_base64": of_eve["root_ca_certificate_base64"],
         "enable_mtls": false,
@@ -151,8 +151,12 @@ pub async fn clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more() {
     members.local = Roles::up_to(Role::Open);
     let (mut robots, locators) = star(3, |id, connect| sealed(id, &members, connect)).await;
     let (tls, here) = (by_tls(&locators), vec![robots[0].robot.for_clients().unwrap().to_owned()]);
-    let ada = client(&swarm, &tls, Some(credentials(&members, "ada", key(90)))).await;
-    let eve = client(&swarm, &tls, Some(credentials(&members, "eve", key(666)))).await;
+    let ada =
+        client(&swarm, &tls, Some(credentials(&members, Bearer::Client("ada".parse().unwrap()), key(90))))
+            .await;
+    let eve =
+        client(&swarm, &tls, Some(credentials(&members, Bearer::Client("eve".parse().unwrap()), key(666))))
+            .await;
     let local = client(&swarm, &here, None).await;
     let mut heard = eve.decisions().await.unwrap();
     let name = |name: &str| name.parse().unwrap();
