@@ -81,6 +81,8 @@ struct Soak {
     folder: tempfile::TempDir,
     cut: Vec<(u32, u32)>,
     rng: ChaCha8Rng,
+    /// What is shown.
+    showing: usize,
     /// By the name of a round, what was shown in it.
     shown: BTreeMap<String, usize>,
     acknowledged: Vec<Acknowledged>,
@@ -110,6 +112,7 @@ impl Soak {
             folder: tempfile::tempdir().unwrap(),
             cut: Vec::new(),
             rng: ChaCha8Rng::seed_from_u64(13),
+            showing: 0,
             shown: BTreeMap::new(),
             acknowledged: vec![Acknowledged::new(); extent.honest],
             rounds: Rounds::default(),
@@ -206,6 +209,7 @@ impl Soak {
     /// Shows a gesture to all, and lets a robot open a round. The name of the round, and whether it was decided there.
     fn round(&mut self, class: usize) -> Option<(usize, Value, bool)> {
         self.rounds.opened += 1;
+        self.showing = class;
         let shown = format!("shown {class}");
         self.robots.iter_mut().flatten().for_each(|robot| robot.order(&shown));
         self.liars.iter_mut().for_each(|liar| liar.order(&shown));

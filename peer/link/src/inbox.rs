@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
-    Announcement, Answer, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
-    Message, RobotId, Topic, decode_json,
+    Announcement, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message,
+    RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Distrust, Evidence, Judge};
@@ -322,11 +322,6 @@ impl Inbox {
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
         self.queue(Input::Instructed(Instructed { by, at, instruction }))
-    }
-
-    fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {
-        let answer: Answer = decode_json(&payload(sample, MAX_JSON)?)?;
-        self.queue(Input::Answered(to, answer.at, answer.robot))
     }
 
     /// Hands over what this robot's own threads have done. Never refused: they do one thing at a time.

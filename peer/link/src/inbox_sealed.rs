@@ -1,8 +1,8 @@
-//! What arrives in a sealed swarm alone: words with a signature, words of those on this computer, and rosters.
+//! What arrives signed in a sealed swarm alone: words and answers, words of those on this computer, and rosters.
 
 use std::sync::PoisonError;
 
-use gestalt_protocol::{Instruction, InstructorId, MAX_JSON, RobotId, decode_json};
+use gestalt_protocol::{Answer, Instruction, InstructorId, MAX_JSON, RobotId, Signature, decode_json};
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::MAX_ROSTER;
 use gestalt_trust::word::MAX_WORD_ATTACHMENT;
@@ -47,6 +47,22 @@ impl Inbox {
     /// Words that this robot signed for those on its own computer, and that are to be said to all.
     pub(super) fn unsaid(&self) -> Vec<Vouched> {
         std::mem::take(&mut self.lock().vouched)
+    }
+
+    /// This robot's signature under its answer, in a sealed swarm.
+    pub(super) fn sign_answer(&self, to: &InstructorId, answer: &[u8]) -> Option<Signature> {
+        let words = self.sealed.as_ref()?.words.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(words.answer(to, answer))
+    }
+
+    pub(super) fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {
+        let json = payload(sample, MAX_JSON)?;
+        let answer: Answer = decode_json(&json)?;
+        let attachment =
+            sample.attachment().filter(|it| it.len() <= Signature::LENGTH).map(|it| it.to_bytes());
+        self.judged(|judge, now| judge.answer(now, answer.robot, &to, &json, attachment.as_deref()))
+            .unwrap_or(Ok(()))?;
+        self.queue(Input::Answered(to, answer.at, answer.robot))
     }
 
     pub(super) fn on_word(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{
-    Announcement, Answer, Envelope, InstructorId, Keys, Message, Question, RobotId, RoundId, Topic,
+    Announcement, Answer, Envelope, InstructorId, Keys, Message, Question, RobotId, RoundId, Signature, Topic,
 };
 use gestalt_strategies::Mind;
 use serde::Serialize;
@@ -120,14 +120,18 @@ impl Voice {
     /// Answers an instructor.
     pub fn answer(&self, instructor: &InstructorId, answer: &Answer) {
         let json = as_json(answer);
-        self.account.sent("answer", json.len());
+        let signature = self.inbox.sign_answer(instructor, json.as_bytes());
+        self.account.sent("answer", json.len() + signature.map_or(0, |_| Signature::LENGTH));
         let put = self
             .session
             .put(self.keys.key(&Topic::Answer(instructor.clone())), json)
             .encoding(Encoding::APPLICATION_JSON)
             .priority(Priority::InteractiveHigh)
-            .congestion_control(CongestionControl::Drop)
-            .wait();
+            .congestion_control(CongestionControl::Drop);
+        let put = match signature {
+            Some(signature) => put.attachment(signature.as_bytes()).wait(),
+            None => put.wait(),
+        };
         self.account.check(put);
     }
 

@@ -1,10 +1,10 @@
-//! What a robot of a sealed swarm signs for those who speak on its own computer.
+//! What a robot of a sealed swarm signs for those who speak on its own computer, and what it answers to instructors.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use gestalt_protocol::{InstructorId, Keys, RobotId, Topic};
-use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, word};
+use gestalt_protocol::{InstructorId, Keys, RobotId, Signature, Topic};
+use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, word};
 
 /// Signs words in the name of a robot.
 pub(crate) struct Words {
@@ -37,6 +37,11 @@ impl Words {
         let heading = WordHeading { speaker: Speaker::For(self.me), count };
         let attachment = word::sign(&self.identity, &self.swarm, by, &heading, &word);
         Vouched { key: self.keys.key(&Topic::Word(by.clone())), word, attachment, count }
+    }
+
+    /// Signs this robot's answer.
+    pub fn answer(&self, to: &InstructorId, answer: &[u8]) -> Signature {
+        answer::sign(&self.identity, &self.swarm, self.me, to, answer)
     }
 }
 

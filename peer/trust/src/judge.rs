@@ -8,6 +8,7 @@ use gestalt_protocol::{
     Announcement, Batches, CountedVote, Decision, Envelope, Give, Instruction, InstructorId, Message, RobotId,
 };
 
+use crate::answer::Answers;
 use crate::budget::Budget;
 use crate::distrust::Distrust;
 use crate::evidence::{Evidence, EvidenceError};
@@ -35,6 +36,7 @@ pub struct Judge<S: Scheme = Ed25519> {
     verifier: Verifier<S>,
     of_samples: Verifier<S>,
     of_words: Attention<S>,
+    of_answers: Answers<S>,
     precedence: Precedence,
     witness: Witness,
     /// Against whom, as it is told to others; those found here are yet to be.
@@ -51,6 +53,7 @@ impl<S: Scheme> Judge<S> {
             verifier: Verifier::new(roster.clone(), Budget::default()),
             of_samples: Verifier::new(roster, OF_SAMPLES),
             of_words: Attention::default(),
+            of_answers: Answers::default(),
             precedence: Precedence::default(),
             evidence: BTreeMap::new(),
             untold: Vec::new(),
@@ -75,6 +78,7 @@ impl<S: Scheme> Judge<S> {
         }
         self.of_samples.adopt(roster.clone())?;
         self.of_words.follow(&before, &roster);
+        self.of_answers.follow(&before, &roster);
         self.witness.follow(&before, &roster);
         self.evidence.retain(|robot, _| roster.keeps_key(&before, *robot));
         self.untold.retain(|robot| roster.keeps_key(&before, *robot));
@@ -93,6 +97,21 @@ impl<S: Scheme> Judge<S> {
         attachment: Option<&[u8]>,
     ) -> Result<(WordHeading, Roles), Distrust> {
         self.of_words.heed(now, self.verifier.roster(), by, word, attachment)
+    }
+
+    /// Whether that robot gave this answer to that instructor.
+    ///
+    /// # Errors
+    /// As [`Answers::check`].
+    pub fn answer(
+        &mut self,
+        now: Duration,
+        robot: RobotId,
+        to: &InstructorId,
+        answer: &[u8],
+        attachment: Option<&[u8]>,
+    ) -> Result<(), Distrust> {
+        self.of_answers.check(now, self.verifier.roster(), robot, to, answer, attachment)
     }
 
     /// Whether somebody with these roles may say that.

@@ -57,6 +57,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod answer;
 mod budget;
 mod distrust;
 mod document;
@@ -83,6 +84,7 @@ mod verify;
 mod witness;
 pub mod word;
 
+pub use answer::{ANSWER_DOMAIN, Answers};
 pub use budget::Budget;
 pub use distrust::Distrust;
 pub use evidence::{Conviction, Evidence, EvidenceError};

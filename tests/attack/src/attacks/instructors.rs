@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, Outcome, RobotId, Topic};
-use gestalt_trust::{Speaker, WordHeading, word};
+use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
+use gestalt_trust::{Speaker, WordHeading, answer, word};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};
@@ -31,9 +31,19 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "the true answer is given",
-        counted: Counted::None("none of it is refused"),
-        gap: Some("answers are not signed: who hears one keeps silent"),
+        counted: Counted::All(&["refused_answer_unsigned", "refused_answer_forged"]),
+        gap: None,
         play: |seed| beside(&Plan::sealed(), seed, answered_first, is_answered),
+    },
+    Attack {
+        number: "A17",
+        what: "the same, 1,000 times a second from before the word on, with made-up signatures",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: "the true answer is given",
+        counted: Counted::Some(&["refused_answer_forged", "refused_answer_too_fast"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, answered_all_along, is_answered),
     },
     Attack {
         number: "27",
@@ -99,21 +109,40 @@ fn in_her_name(swarm: &mut Swarm) {
     swarm.pass(Duration::from_secs(3));
 }
 
-fn answered_first(swarm: &mut Swarm) {
-    let round = swarm.show(1);
-    let at = swarm.now().as_nanos() as u64;
-    let to = was(round, 1);
+/// An answer to ada's word on that round, said then, which robot 1 never gave; and that signature under it.
+fn false_answer(swarm: &mut Swarm, round: RoundId, at: Duration, signature: Option<&[u8]>) {
     let answer = Answer {
-        robot: RobotId(9),
-        at,
-        to,
+        robot: RobotId(1),
+        at: at.as_nanos() as u64,
+        to: was(round, 1),
         outcome: Outcome::UnknownRound,
         class: None,
         samples: 0,
         looks_like: None,
     };
     let bytes = serde_json::to_vec(&answer).expect("an answer is JSON");
-    swarm.put(&Topic::Answer(instructor("ada")), &bytes);
+    let own = || answer::sign(&key(STRANGER), &swarm.id(), RobotId(1), &instructor("ada"), &bytes);
+    let attachment = signature.map_or_else(|| own().as_bytes().to_vec(), <[u8]>::to_vec);
+    let attachment = Some(attachment).filter(|attachment| !attachment.is_empty());
+    swarm.put_attached(&Topic::Answer(instructor("ada")), bytes, attachment);
+}
+
+fn answered_first(swarm: &mut Swarm) {
+    let round = swarm.show(1);
+    let at = swarm.now();
+    false_answer(swarm, round, at, Some(&[]));
+    false_answer(swarm, round, at, None);
+    swarm.teach(round, 1);
+}
+
+fn answered_all_along(swarm: &mut Swarm) {
+    let round = swarm.show(1);
+    let at = swarm.now() + Duration::from_secs(1);
+    for n in 0..1000_u32 {
+        swarm.pass(Duration::from_millis(1));
+        let signature = n.to_le_bytes().repeat(16);
+        false_answer(swarm, round, at, Some(&signature));
+    }
     swarm.teach(round, 1);
 }
 

@@ -91,6 +91,11 @@ impl Swarm {
         );
     }
 
+    /// Says these bytes under that key to every robot, with that attached.
+    pub fn put_attached(&mut self, topic: &Topic, bytes: Vec<u8>, attachment: Option<Vec<u8>>) {
+        self.replay(&Parcel { key: self.keys.key(topic), bytes, attachment, at: self.time() });
+    }
+
     /// Says a word as the instructor of that name, who has a key.
     pub fn put_word(&mut self, by: &str, instruction: &Instruction) {
         let parcel = self.word(by, instruction);

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Answer, Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::{Input, Mind, Output};
-use gestalt_trust::Roster;
+use gestalt_trust::{Roster, answer};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -13,7 +13,7 @@ use super::plan::Plan;
 use super::port::Parcel;
 use super::robot::{Account, Robot, is_vote};
 use super::shown::Shown;
-use super::world::{SWARM, roster};
+use super::world::{SWARM, key, roster};
 use crate::attack::Setting;
 
 /// What is to happen.
@@ -190,7 +190,12 @@ impl Swarm {
             }
             Output::Ask(question) => self.broadcast(i, &Topic::Question, json(&question)),
             Output::Answer(by, answer) => {
-                self.broadcast(i, &Topic::Answer(by), json(&answer));
+                let bytes = json(&answer);
+                let sign =
+                    || answer::sign(&key(me.0), &self.roster.swarm_id(), me, &by, &bytes).as_bytes().to_vec();
+                let attachment = (self.plan.setting == Setting::Sealed).then(sign);
+                let key = self.keys.key(&Topic::Answer(by));
+                self.publish(i, Parcel { key, bytes, attachment, at: self.time() });
                 self.answers.push(answer);
             }
             Output::Opened(_) => {
@@ -206,7 +211,10 @@ impl Swarm {
     }
 
     fn broadcast(&mut self, i: usize, topic: &Topic, bytes: Vec<u8>) {
-        let parcel = Parcel { key: self.keys.key(topic), bytes, attachment: None, at: self.time() };
+        self.publish(i, Parcel { key: self.keys.key(topic), bytes, attachment: None, at: self.time() });
+    }
+
+    fn publish(&mut self, i: usize, parcel: Parcel) {
         (0..self.robots.len()).filter(|j| *j != i).for_each(|j| self.carry(i, j, parcel.clone()));
         self.air.push(parcel);
     }

@@ -132,10 +132,7 @@ impl Port {
                 ("feedback", heard.map(|instruction| Some(word(instruction))))
             }
             Some(Topic::Word(by)) => ("word", self.on_word(now, by, parcel)),
-            Some(Topic::Answer(to)) => {
-                let heard = json::<Answer>(&parcel.bytes);
-                ("answer", heard.map(|answer| Some(Input::Answered(to, answer.at, answer.robot))))
-            }
+            Some(Topic::Answer(to)) => ("answer", self.on_answer(now, to, parcel)),
             _ => ("other", Err(Refusal::Key)),
         };
         taken.unwrap_or_else(|refusal| {
@@ -261,6 +258,19 @@ impl Port {
         // It is answered, which names it to whoever said it.
         *self.refused.entry("refused_word_not_allowed".to_owned()).or_default() += 1;
         Ok(Some(Input::Disallowed(said)))
+    }
+
+    fn on_answer(
+        &mut self,
+        now: Duration,
+        to: InstructorId,
+        parcel: &Parcel,
+    ) -> Result<Option<Input>, Refusal> {
+        let answer: Answer = json(&parcel.bytes)?;
+        if let Some(judge) = &mut self.judge {
+            judge.answer(now, answer.robot, &to, &parcel.bytes, parcel.attachment.as_deref())?;
+        }
+        Ok(Some(Input::Answered(to, answer.at, answer.robot)))
     }
 
     fn on_roster(&mut self, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
