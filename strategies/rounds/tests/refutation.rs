@@ -147,10 +147,10 @@ impl Swarm {
     fn tell(&mut self, now: Duration, to: usize, input: Input) {
         for output in self.robots[to].handle_with(now, input, &mut self.learned[to]) {
             match output {
-                Output::Broadcast(envelope) => self.to_all(now, to, &Input::Received(envelope)),
+                Output::Broadcast(envelope) => self.broadcast(now, to, &Input::Received(envelope)),
                 Output::Announce(announcement) => {
                     self.given.push(announcement.decision.clone());
-                    self.to_all(now, to, &Input::Announced(announcement));
+                    self.broadcast(now, to, &Input::Announced(announcement));
                 }
                 Output::Tell(other, envelope) => {
                     if let Envelope { message: Message::Give(give), .. } = &envelope {
@@ -163,7 +163,7 @@ impl Swarm {
         }
     }
 
-    fn to_all(&mut self, now: Duration, from: usize, input: &Input) {
+    fn broadcast(&mut self, now: Duration, from: usize, input: &Input) {
         for other in (0..self.robots.len()).filter(|other| *other != from) {
             self.send(now, from, other, input.clone());
         }

@@ -82,7 +82,7 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
             votes: counted,
             others,
             robots,
-            quorum: robots / 2 + 1,
+            quorum: MindConfig::default().needs(robots),
             elapsed_ms: 10,
             named: vec![],
             terms: MindConfig::default().terms(),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, ClassId, Decision, Give, Have, HeldVote, Holder, Message, RobotId, Stamp, Topic,
+    Announcement, ClassId, Decision, Envelope, Give, Have, HeldVote, Holder, Message, RobotId, Stamp, Topic,
 };
 
 use super::WHOEVER_SAYS_SO;
@@ -225,8 +225,17 @@ fn announced_aloud(swarm: &mut Swarm, votes: Vec<HeldVote>) {
 }
 
 fn given(swarm: &mut Swarm, votes: Vec<HeldVote>) {
-    let decision = forged::decision(swarm.round(), votes, 0);
-    swarm.give(50, Some(decision), Vec::new());
+    let signs = votes.iter().any(|held| held.signature.is_some());
+    let message = forged::given(forged::decision(swarm.round(), votes, 0));
+    if !signs {
+        return swarm.whisper(50, &message);
+    }
+    let stamp = Stamp { boot: 1, sequence: 3 };
+    let said = Envelope { author: RobotId(50), stamp, message, signature: None };
+    let said = forged::signed(said, &key(STRANGER), &swarm.id());
+    for to in 1..=swarm.honest() {
+        swarm.put_to(to, &Topic::Repair(RobotId(to)), &said.encode());
+    }
 }
 
 fn in_their_names(swarm: &mut Swarm) {
