@@ -114,6 +114,11 @@ def the_pool(pool: dict) -> bytes:
     return struct.pack("<2d", pool["likeness"], pool["temperature"]) + varint(pool["rounds"])
 
 
+def the_terms(terms: dict) -> bytes:
+    return struct.pack("<2d", terms["clip"], terms["alpha"]) + bytes([terms["majority"] is True]) \
+        + varint(terms["liars"]) + varint(terms["committee"])
+
+
 def statement(held: dict) -> bytes:
     """The vote as its robot said and signed it."""
     return bytes([VERSION]) + varint(held["robot"]) + number(held["stamp"]) + varint(VOTE) + the_vote(held["vote"])
@@ -139,6 +144,7 @@ def aloud(said: dict) -> bytes:
     body += vector(certificate["probabilities"], "d") + maybe(certificate.get("unknown"), lambda p: struct.pack("<d", p)) + gestures(certificate)
     body += varint(len(votes)) + b"".join(map(counted, votes)) + varint(len(others)) + b"".join(map(other, others))
     body += varint(certificate["robots"]) + varint(certificate["quorum"]) + varint(certificate["elapsed_ms"])
+    body += the_terms(certificate["terms"])
     body += maybe(said["label"], text)
     return bytes([VERSION]) + varint(said["announcer"]) + number(said["stamp"]) + varint(ANNOUNCED) + body
 
@@ -320,6 +326,8 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require(all(gestures == listed for gestures in over), "a vote over other gestures")
     require(named == (named_by([held["vote"] for held in votes], listed) if certificate["probabilities"] else []), "gestures that no vote names")
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
+    aside = [held for held in others if votes and held["vote"]["vocabulary"] == certificate["vocabulary"]]
+    require(not any(len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) == listed for held in aside), "a vote laid aside")
     # What a robot said before it saw anything proves nothing where liars are expected.
     counting, all_of, needed = votes if given.liars else votes + others, certificate["robots"], 0
     committee, gave = given.committee + 4 * given.liars, votes
@@ -332,6 +340,10 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     majority = len(counting) >= (needed or (all_of + given.liars) // 2 + 1)
     enough = given.liars == 0 or len(gave) > 2 * given.liars
     rule = certificate["rule"]
+    alpha = given.alpha or ALPHA.get(rule, 0.5)
+    terms = {"clip": given.clip, "alpha": alpha, "majority": True, "liars": given.liars, "committee": given.committee}
+    require(certificate["terms"] == terms, f"decided by other terms than {terms}")
+    require(certificate["quorum"] == (needed or (all_of + given.liars) // 2 + 1), "another quorum than that of so many robots")
     pool, unknown = certificate.get("pool"), certificate.get("unknown")
     require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
     require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
@@ -339,7 +351,7 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
         likeness, temperature = pool["likeness"], pool["temperature"]
         require(0 <= likeness <= 1 and 0.1 <= temperature <= 10, "an impossible pool")
         require(round(likeness * 20) / 20 == likeness and round(temperature * 100) / 100 == temperature, "a pool between the steps")
-    alpha, evidence = given.alpha or ALPHA.get(rule, 0.5), [spread(held["vote"], named) for held in votes]
+    evidence = [spread(held["vote"], named) for held in votes]
     if decision["class"] is None:
         if majority and enough and votes:
             require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")

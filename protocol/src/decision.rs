@@ -10,6 +10,7 @@ use crate::id::{ClassId, RobotId, RoundId, Stamp, VocabularyId};
 use crate::limits::{MAX_CLASSES, MAX_ROBOTS};
 use crate::pool::Pool;
 use crate::signature::Signature;
+use crate::terms::Terms;
 use crate::vote::{HeldVote, Vote, place};
 
 /// More looks than this of one robot make no decision fresher.
@@ -67,6 +68,9 @@ pub struct Certificate {
     pub quorum: u32,
     /// Milliseconds from the opening of the round, as its author saw it, to the decision.
     pub elapsed_ms: u32,
+    /// What it goes by beside the rule and the quorum.
+    #[serde(default)]
+    pub terms: Terms,
 }
 
 impl Certificate {

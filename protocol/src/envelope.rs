@@ -185,7 +185,7 @@ impl Decision {
     /// # Errors
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
-        let Certificate { pool, named, probabilities, unknown, votes, others, .. } = &self.certificate;
+        let Certificate { pool, named, probabilities, unknown, votes, others, terms, .. } = &self.certificate;
         let probability = |p: f64| (0.0..=1.0).contains(&p);
         let known = |class: ClassId| self.certificate.place(class).is_some();
         let in_order = named.is_sorted_by(|a, b| a < b) && named.iter().all(|class| class.is_named());
@@ -197,6 +197,9 @@ impl Decision {
         }
         if !pool.is_none_or(|pool| pool.is_sound()) {
             return Err(DecodeError::Impossible("a pool of an impossible likeness or temperature"));
+        }
+        if !terms.is_sound() {
+            return Err(DecodeError::Impossible("terms that no robot can decide by"));
         }
         if !self.class.is_none_or(known) || !votes.iter().all(|counted| known(counted.class)) {
             return Err(DecodeError::Impossible("a class outside the vocabulary"));

@@ -34,6 +34,7 @@ mod round_outcome;
 mod sample;
 mod signature;
 mod status;
+mod terms;
 mod vote;
 
 pub use announcement::{Announced, Announcement};
@@ -65,4 +66,5 @@ pub use signature::Signature;
 pub use status::{
     Camera, CameraState, LearningStatus, Motion, MotionState, NamedGesture, Opinion, Reported, Status,
 };
+pub use terms::Terms;
 pub use vote::{HeldVote, Vote};

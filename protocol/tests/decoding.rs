@@ -5,7 +5,7 @@ use gestalt_protocol::{
     FeatureSpaceId, FusionRule, Give, Have, HeldBatch, HeldVote, Holder, Holding, Instruction, Know, Known,
     Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
     MAX_SAMPLES, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId, SampleId, SampleSeries, Samples,
-    SharedSample, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    SharedSample, Stamp, Terms, Vector, VocabularyId, Vote, Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -100,6 +100,7 @@ fn decision() -> impl Strategy<Value = Decision> {
                     quorum,
                     elapsed_ms,
                     named: vec![],
+                    terms: Terms::default(),
                 },
             }
         },
@@ -507,6 +508,7 @@ fn a_decision_that_contradicts_itself_is_refused() {
             quorum: 3,
             elapsed_ms: 1,
             named: vec![],
+            terms: Terms::default(),
         },
     };
     assert_eq!(sound.check(), Ok(()));

@@ -5,7 +5,8 @@ use gestalt_protocol::{
     Announcement, Answer, Ask, Asked, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
     Fate, FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know,
     Known, Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, Question, RobotId, RoundId, SampleId,
-    SampleSeries, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word, decode_json,
+    SampleSeries, Samples, SharedSample, Signature, Stamp, Terms, Vector, VocabularyId, Vote, Word,
+    decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -47,6 +48,7 @@ fn decision() -> Decision {
             quorum: 2,
             elapsed_ms: 1250,
             named: vec![],
+            terms: Terms::default(),
         },
     }
 }
@@ -143,9 +145,10 @@ fn what_a_robot_gives() {
     let held =
         HeldVote { robot: RobotId(3), stamp: Stamp { boot: 2, sequence: 5 }, vote: vote(), signature: None };
     // The decision; its certificate: vocabulary, rule, no pool, probabilities, nothing of
-    // unknown, nothing named, one vote as it was said, unsigned, no others, n, q, time.
+    // unknown, nothing named, one vote as it was said, unsigned, no others, n, q, time; its terms: clip and alpha, a majority, liars, committee.
     let decided = "01 ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 00 \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209";
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209 \
+                   0000000000001840 9a9999999999a93f 01 00 48";
     let votes = "01 03 02 05 ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00";
     // One word on what a robot holds: robot, boot, sequence, the word as it was said, unsigned.
     let (stamp, holding) = (Stamp { boot: 2, sequence: 6 }, decision().holding(true));
@@ -170,7 +173,8 @@ fn what_an_announcer_signs() {
     let announcement = announcement();
     // The decision as it is given, but here it is final; some label.
     let decided = "ac0202a101 0101 000000000000e83f 04 01 84868808 02 00 02 000000000000d03f 000000000000e83f 00 00 \
-                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209";
+                   01 07 01 09 01 0000803f ac0202a101 84868808 02 0000c03f 0000c0bf 00000040 00 00 00 00 03 02 e209 \
+                   0000000000001840 9a9999999999a93f 01 00 48";
     let envelope = Envelope::from(announcement.clone());
     let expected = format!("{HEAD} 08 {decided} 01 04 70616c6d");
     assert_eq!(hex(&envelope.statement()), expected.replace([' ', '\n'], ""));
@@ -348,14 +352,15 @@ fn json_of_before(decision: &Decision) -> String {
         .replace(r#""unknown":null,"#, "")
         .replace(r#","unknown":null,"named":[]"#, "")
         .replace(r#""named":[],"#, "")
+        .replace(r#","terms":{"clip":6.0,"alpha":0.05,"majority":true,"liars":0,"committee":72}"#, "")
 }
 
 #[test]
 fn a_decision_for_clients() {
-    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","pool":null,"probabilities":[0.25,0.75],"unknown":null,"named":[],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0,"unknown":null,"named":[]},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250}}"#;
+    let json = r#"{"round":{"counter":300,"opener":2,"life":161},"class":1,"confidence":0.75,"author":4,"final":true,"certificate":{"vocabulary":16909060,"rule":"log_pool","pool":null,"probabilities":[0.25,0.75],"unknown":null,"named":[],"votes":[{"robot":7,"stamp":{"boot":1,"sequence":9},"class":1,"weight":1.0,"vote":{"round":{"counter":300,"opener":2,"life":161},"vocabulary":16909060,"evidence":[1.5,-1.5],"looks":2.0,"unknown":null,"named":[]},"signature":null}],"others":[],"robots":3,"quorum":2,"elapsed_ms":1250,"terms":{"clip":6.0,"alpha":0.05,"majority":true,"liars":0,"committee":72}}}"#;
     assert_eq!(serde_json::to_string(&decision()).unwrap(), json);
     assert_eq!(decode_json::<Decision>(json.as_bytes()), Ok(decision()));
-    // One recorded before robots could tell what is unknown.
+    // One recorded before robots could tell what is unknown, and stated their terms.
     let before = json_of_before(&decision());
     assert_eq!(decode_json::<Decision>(before.as_bytes()), Ok(decision()));
     let pool =

@@ -34,7 +34,8 @@ pub use candidates::Candidates;
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{
     Ballot, Classify, ClassifyError, Doubt, Evidence, Fuse, JudgedFrame, Judgement, Life, Observation,
-    Quorum, Refusal, Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, outcome,
+    Quorum, Refusal, Refusals, Sign, Vocabulary, VocabularyError, Voter, follows, fusion, is_refuted,
+    outcome,
 };
 pub use gestalt_svm::{
     CALIBRATION_BINS, Classifier, Components, Discriminant, Evaluation, FeatureSpace, Head, LabelledFeatures,

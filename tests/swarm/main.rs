@@ -119,6 +119,7 @@ fn main() -> std::process::ExitCode {
         [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
         [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
+        [Waits] liar::who_gives_what_does_not_follow_is_known_to_all_and_counts_no_more.await,
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,

@@ -5,7 +5,7 @@ use std::time::Duration;
 use gestalt_link::{LinkConfig, LinkError, Robot, RobotConfig};
 use gestalt_protocol::{
     Announcement, Certificate, ClassId, CountedVote, Decision, Envelope, FusionRule, Give, Keys, Message,
-    RobotId, RoundId, Stamp, Topic, Vote,
+    RobotId, RoundId, Stamp, Terms, Topic, Vote,
 };
 use gestalt_strategies::{Classify, MindConfig, Quorum};
 use gestalt_tests::{Fixed, Watched, agreed, config, start, unique};
@@ -124,6 +124,7 @@ pub fn invented(round: RoundId, author: RobotId, class: u8, robots: u32) -> Deci
             quorum: 1,
             elapsed_ms: 1,
             named: vec![],
+            terms: Terms::default(),
         },
     }
 }

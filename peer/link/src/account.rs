@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{DecodeError, Reported, RobotId, Status};
-use gestalt_trust::{Distrust, EvidenceError, RosterError};
+use gestalt_trust::{Distrust, EvidenceError, Lie, RosterError};
 
 const MAX_ERRORS: usize = 16;
 const MAX_ERROR_LENGTH: usize = 400;
@@ -78,12 +78,10 @@ impl Account {
         self.error(&Refusal::Twin.to_string());
     }
 
-    /// A member is proven to have said two things. Counted once, however often it is told again.
-    pub(super) fn convicted(&self, robot: RobotId) {
+    /// A member is proven to lie. Counted once, however often it is told again.
+    pub(super) fn convicted(&self, robot: RobotId, lie: Lie) {
         self.set(&format!("convicted_{robot}"), 1);
-        self.error(&format!(
-            "robot {robot} said two things under one stamp: it lies, or its key is in two hands; enrol it anew with a new key"
-        ));
+        self.error(&format!("robot {robot} {lie}; enrol it anew with a new key"));
     }
 
     /// Sets a counter that is kept elsewhere.

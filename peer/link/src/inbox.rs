@@ -179,6 +179,7 @@ impl Inbox {
             Some(Topic::Answer(to)) => ("answer", self.on_answer(to, sample)),
             _ => ("other", Err(Refusal::Key)),
         };
+        self.expel_fallen();
         let bytes = sample.payload().len();
         match taken {
             Ok(()) => {
@@ -267,11 +268,7 @@ impl Inbox {
         if matches!(envelope.message, Message::Lessons(_)) {
             self.believe(&envelope)?;
         }
-        let distrust = self.judged(|judge, now| match &mut envelope.message {
-            Message::Give(give) => judge.give(now, give),
-            Message::Batches(batches) => judge.batches(now, batches),
-            _ => None,
-        });
+        let distrust = self.judged(|judge, now| judge.passed_on(now, &mut envelope));
         if let Some(distrust) = distrust.flatten() {
             let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
             self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
@@ -288,15 +285,13 @@ impl Inbox {
 
     fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
         let evidence = Evidence::decode(&payload(sample, Evidence::MAX_LENGTH)?)?;
-        let news = self.judged(|judge, now| judge.evidence(now, evidence)).ok_or(Refusal::Kind)??;
-        news.into_iter().for_each(|liar| self.account.convicted(liar));
-        Ok(())
+        Ok(self.judged(|judge, now| judge.evidence(now, evidence)).ok_or(Refusal::Kind)??)
     }
 
     /// Evidence against members that is to be told to all, each once.
     pub(super) fn untold(&self) -> Vec<Evidence> {
-        let untold = self.judged(|judge, _| judge.untold()).unwrap_or_default().into_iter();
-        untold.inspect(|(robot, _)| self.account.convicted(*robot)).map(|(_, evidence)| evidence).collect()
+        let untold = self.judged(Judge::untold).unwrap_or_default();
+        untold.into_iter().map(|(_, evidence)| evidence).collect()
     }
 
     fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {

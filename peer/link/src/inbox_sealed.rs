@@ -1,5 +1,6 @@
 //! What arrives signed in a sealed swarm alone: words and answers, words of those on this computer, and rosters.
 
+use std::collections::BTreeSet;
 use std::sync::PoisonError;
 
 use gestalt_protocol::{Answer, Instruction, InstructorId, MAX_JSON, RobotId, Signature, decode_json};
@@ -87,7 +88,24 @@ impl Inbox {
             return Err(Refusal::TooOften);
         }
         let taken_up = self.judged(|judge, _| sealed.roll.take_up(judge, &json));
-        let Some(gone) = taken_up.ok_or(Refusal::Kind)?? else { return Ok(()) };
+        if let Some(gone) = taken_up.ok_or(Refusal::Kind)?? {
+            self.expel(gone);
+        }
+        Ok(())
+    }
+
+    /// Whoever was convicted meanwhile counts no more.
+    pub(super) fn expel_fallen(&self) {
+        let fallen = self.judged(|judge, _| judge.fallen()).unwrap_or_default();
+        fallen.iter().for_each(|(robot, lie)| self.account.convicted(*robot, *lie));
+        let others: BTreeSet<RobotId> = fallen.into_iter().map(|(robot, _)| robot).collect();
+        if !others.is_empty() {
+            self.expel(others);
+        }
+    }
+
+    /// Nothing counts that these said, in the midst of a round; nor are they there, unless they are members under another key.
+    fn expel(&self, gone: BTreeSet<RobotId>) {
         let mut state = self.lock();
         state.votes.retain(|robot, _| !gone.contains(robot));
         let left = |robot: &RobotId| !gone.contains(robot) || !self.is_stranger(*robot);
@@ -98,6 +116,5 @@ impl Inbox {
         drop(state);
         // Who is new was refused until now, its token too.
         self.unrest.notify_one();
-        Ok(())
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use gestalt_protocol::{Camera, Keys, RobotId, RoundId, Status};
-use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary};
+use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary, is_refuted};
 use gestalt_trust::Judge;
 use serde_json::Value;
 use tokio::runtime::{Handle, RuntimeFlavor};
@@ -137,7 +137,7 @@ impl Robot {
             let roll = Roll::new(id, key, roster.clone(), roster_file.clone(), account.clone());
             let words = Words::new(id, identity.clone(), roster.swarm_id(), keys.clone());
             Sealed {
-                judge: Mutex::new(Judge::new(roster.clone())),
+                judge: Mutex::new(Judge::new(roster.clone(), is_refuted)),
                 roll: Arc::new(roll),
                 words: Mutex::new(words),
             }

@@ -229,7 +229,7 @@ pub(super) fn robots<'a>(robots: impl IntoIterator<Item = &'a RobotId>) -> Strin
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{CountedVote, Stamp, VocabularyId, Vote};
+    use gestalt_protocol::{CountedVote, Stamp, Terms, VocabularyId, Vote};
 
     use super::*;
 
@@ -261,6 +261,7 @@ mod tests {
                 quorum: u32::from(!votes.is_empty()),
                 elapsed_ms: 252,
                 named: vec![],
+                terms: Terms::default(),
             },
         }
     }

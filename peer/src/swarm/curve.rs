@@ -92,7 +92,9 @@ fn mean(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Certificate, ClassId, Decision, FusionRule, RobotId, RoundId, VocabularyId};
+    use gestalt_protocol::{
+        Certificate, ClassId, Decision, FusionRule, RobotId, RoundId, Terms, VocabularyId,
+    };
 
     use super::*;
 
@@ -115,6 +117,7 @@ mod tests {
                 quorum: 1,
                 elapsed_ms: 0,
                 named: vec![],
+                terms: Terms::default(),
             },
         }
     }

@@ -28,9 +28,7 @@ pub fn schema(kind: Kind) -> Option<Value> {
         ),
         Kind::Feedback => ("An instructor's word to the swarm.", feedback()),
         Kind::Answer => ("What became of an instructor's word.", answer()),
-        Kind::Evidence => {
-            ("Proof that a member said two things.", vec![must("bytes", count("How long it is."))])
-        }
+        Kind::Evidence => ("Proof that a member lied.", vec![must("bytes", count("How long it is."))]),
         Kind::Unreadable => {
             ("What came under a key of the swarm and is no message of that key.", unreadable())
         }
@@ -193,6 +191,13 @@ fn decision() -> Vec<Field> {
         must("temperature", number("By how much one robot overstates its evidence.")),
         must("rounds", count("On how many confirmed rounds these rest.")),
     ];
+    let terms = vec![
+        must("clip", number("c: the bound on a robot's evidence, in nats.")),
+        must("alpha", probability("α: a gesture needs 1 - α.")),
+        must("majority", flag("Whether the quorum is a majority of the robots.")),
+        must("liars", count("f: how many liars a decision withstands.")),
+        must("committee", count("How many robots vote at least where not all do; 0: all do.")),
+    ];
     let certificate = vec![
         must("vocabulary", count("The list of gestures that the probabilities stand for.")),
         must("rule", text("The fusion rule.")),
@@ -205,6 +210,7 @@ fn decision() -> Vec<Field> {
         must("robots", count("n: how many robots its author had heard lately.")),
         must("quorum", count("q: how many it needed.")),
         must("elapsed_ms", count("Milliseconds from the opening of the round to the decision.")),
+        must("terms", object("What it goes by beside the rule and the quorum.", terms)),
     ];
     vec![
         must("round", round()),

@@ -20,7 +20,7 @@ pub enum Distrust {
     /// By a robot that the authority has expelled.
     #[error("its author was expelled: enrol it anew with a new key, if it is to come back")]
     Expelled,
-    /// By a key that was proven to say different things to different robots.
+    /// By a key that was proven to lie.
     #[error("its author was caught in a lie: enrol it anew with a new key, if it is to come back")]
     Convicted,
     /// A word of an instructor that was heeded before, or is older than one that was.

@@ -1,17 +1,25 @@
-//! Proof that somebody lies: two different statements under one stamp.
+//! Proof that somebody lies: two different statements under one stamp, or a decision that does not follow from its votes.
 
-use gestalt_protocol::{DecodeError, RobotId, Signature, Stamp};
+use std::fmt;
+
+use gestalt_protocol::{
+    Announced, Decision, DecodeError, Give, MAX_MESSAGE, Message, RobotId, Signature, Stamp,
+};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::public_key::PublicKey;
 use crate::roster::Roster;
 use crate::scheme::Scheme;
-use crate::signed::{MAX_EVIDENT, Signed};
+use crate::signed::{MAX_EVIDENT, MAX_SIGNED, Signed};
 use crate::statement::{self, Heading};
 
 /// The version byte in front of encoded evidence.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
+
+/// Whether a decision contradicts the votes that it brings with it, whoever asks: `is_refuted` of `gestalt-rounds`, of which nothing is known here. It says
+/// the same of the same decision everywhere, or robots would not agree on who lied.
+pub type Refutes = fn(&Decision) -> bool;
 
 /// Evidence that proves nothing, or not yet.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -26,27 +34,75 @@ pub enum EvidenceError {
     /// By two authors, or under two stamps.
     #[error("two statements of different authors or stamps, which may well differ")]
     Unrelated,
+    /// A single statement that gives no decision.
+    #[error("one statement, and no decision in it")]
+    Undecided,
+    /// A decision that may well follow from its votes, by the terms that it states.
+    #[error("a decision that may well follow from its votes")]
+    Founded,
     /// Against a robot that is not on the roster.
     #[error("robot {0} is not on the roster: bring the newest roster here")]
     Stranger(RobotId),
-    /// At least one of the two was not signed by that robot's key.
-    #[error("robot {0} did not sign both statements with its key of today")]
+    /// What it rests on was not signed by that robot's key, or not all of it.
+    #[error("robot {0} did not sign all of it with its key of today")]
     Forged(RobotId),
     /// More evidence against that robot than is checked.
     #[error("more evidence against robot {0} than is checked: it is looked at when it comes again")]
     TooFast(RobotId),
 }
 
+/// What lies are proven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Lie {
+    /// One thing here and another there.
+    TwoThings,
+    /// A decision that the votes it brings do not make.
+    Unfounded,
+}
+
+impl fmt::Display for Lie {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TwoThings => "said two things under one stamp: it lies, or its key is in two hands",
+            Self::Unfounded => {
+                "gave a decision that does not follow from its votes: it lies, or runs a program that is not Gestalt's"
+            }
+        })
+    }
+}
+
 /// Two different statements of one author under one stamp, each with its signature: the author said one thing here and another
 /// there. Stamps count over all that a robot says, of whatever kind, so an honest robot never does that; nor can anybody else make
 /// it look so. A robot whose memory was copied to a second one does: then its key is in two hands.
 ///
+/// Or a decision that its author gave or announced, and signed, which contradicts the votes that it brings: whoever concluded it, robots pass on what they have
+/// looked into. Whether those votes were cast does not matter.
+///
 /// It speaks for itself: everybody with the roster checks it, whoever brought it. At most [`Evidence::MAX_LENGTH`] bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Evidence {
-    first: Signed,
-    second: Signed,
+#[serde(try_from = "Proof")]
+pub struct Evidence(Proof);
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Proof {
+    TwoThings { first: Signed, second: Signed },
+    Unfounded(Signed),
+}
+
+impl TryFrom<Proof> for Evidence {
+    type Error = DecodeError;
+
+    fn try_from(proof: Proof) -> Result<Self, DecodeError> {
+        if let Proof::TwoThings { first, second } = &proof {
+            let length = first.statement.len().max(second.statement.len());
+            if length > MAX_EVIDENT {
+                return Err(DecodeError::TooLong { length, limit: MAX_EVIDENT });
+            }
+        }
+        Ok(Self(proof))
+    }
 }
 
 /// What evidence proves.
@@ -56,18 +112,43 @@ pub struct Conviction {
     pub robot: RobotId,
     /// The key it lied with. With a new key a robot begins anew.
     pub key: PublicKey,
-    /// The stamp on both statements.
+    /// The stamp on what it said.
     pub stamp: Stamp,
+    /// What the lie was.
+    pub lie: Lie,
 }
 
 impl Evidence {
-    /// The longest encoding: two statements of [`MAX_EVIDENT`] bytes, their lengths and signatures, the version.
-    pub const MAX_LENGTH: usize = 1 + 2 * (3 + MAX_EVIDENT + Signature::LENGTH);
+    /// The longest encoding: that of a decision with a little less than what fits in a message.
+    pub const MAX_LENGTH: usize = MAX_MESSAGE;
 
     /// The evidence of these two, in whichever order they were met.
-    pub(crate) fn new(one: Signed, other: Signed) -> Self {
+    pub(crate) fn of_two(one: Signed, other: Signed) -> Self {
         let (first, second) = if one <= other { (one, other) } else { (other, one) };
-        Self { first, second }
+        Self(Proof::TwoThings { first, second })
+    }
+
+    /// That of a statement that gives or announces a decision, with its author's signature.
+    #[must_use]
+    pub fn of_decision(statement: Vec<u8>, signature: Signature) -> Self {
+        Self(Proof::Unfounded(Signed { statement, signature }))
+    }
+
+    /// What lie it is evidence of.
+    #[must_use]
+    pub fn lie(&self) -> Lie {
+        match self.0 {
+            Proof::TwoThings { .. } => Lie::TwoThings,
+            Proof::Unfounded(_) => Lie::Unfounded,
+        }
+    }
+
+    /// How many bytes its statements have.
+    pub(crate) fn length(&self) -> usize {
+        match &self.0 {
+            Proof::TwoThings { first, second } => first.statement.len() + second.statement.len(),
+            Proof::Unfounded(said) => said.statement.len(),
+        }
     }
 
     /// The bytes that travel: a version byte, then postcard.
@@ -99,35 +180,65 @@ impl Evidence {
     /// # Errors
     /// [`EvidenceError`] for two statements that may well stand side by side, whoever signed them.
     pub fn heading(&self) -> Result<Heading, EvidenceError> {
-        let heading = statement::heading(&self.first.statement)?;
-        if statement::heading(&self.second.statement)? != heading {
-            return Err(EvidenceError::Unrelated);
+        match &self.0 {
+            Proof::TwoThings { first, second } => {
+                let heading = statement::heading(&first.statement)?;
+                if statement::heading(&second.statement)? != heading {
+                    return Err(EvidenceError::Unrelated);
+                }
+                if first.statement == second.statement {
+                    return Err(EvidenceError::Repeated);
+                }
+                Ok(heading)
+            }
+            Proof::Unfounded(said) if said.statement.len() > MAX_SIGNED => {
+                Err(DecodeError::TooLong { length: said.statement.len(), limit: MAX_SIGNED }.into())
+            }
+            Proof::Unfounded(said) => Ok(statement::heading(&said.statement)?),
         }
-        if self.first.statement == self.second.statement {
-            return Err(EvidenceError::Repeated);
-        }
-        Ok(heading)
     }
 
-    /// Whether it proves that a robot on that roster lied, with the key it has there.
+    /// Whether it proves that a robot on that roster lied, with the key it has there. A decision is looked into last, once it is known who gave it.
     ///
     /// # Errors
     /// The [`EvidenceError`] that says what it lacks.
-    pub fn check<S: Scheme>(&self, roster: &Roster<S>) -> Result<Conviction, EvidenceError> {
+    pub fn check<S: Scheme>(
+        &self,
+        roster: &Roster<S>,
+        refutes: Refutes,
+    ) -> Result<Conviction, EvidenceError> {
         let Heading { author: robot, stamp } = self.heading()?;
         let key = *roster.members().robots.get(&robot).ok_or(EvidenceError::Stranger(robot))?;
-        let both = [&self.first, &self.second];
-        if both.iter().any(|half| roster.check(&half.statement, &half.signature).is_err()) {
+        let is_signed = |said: &Signed| roster.check(&said.statement, &said.signature).is_ok();
+        let signed = match &self.0 {
+            Proof::TwoThings { first, second } => is_signed(first) && is_signed(second),
+            Proof::Unfounded(said) => is_signed(said),
+        };
+        if !signed {
             return Err(EvidenceError::Forged(robot));
         }
-        Ok(Conviction { robot, key, stamp })
+        if let Proof::Unfounded(said) = &self.0
+            && !refutes(&decision_in(&said.statement)?)
+        {
+            return Err(EvidenceError::Founded);
+        }
+        Ok(Conviction { robot, key, stamp, lie: self.lie() })
+    }
+}
+
+/// The decision that a statement gives or announces.
+fn decision_in(statement: &[u8]) -> Result<Decision, EvidenceError> {
+    match statement::read(statement)?.message {
+        Message::Give(Give { decision: Some(decision), .. })
+        | Message::Announced(Announced { decision, .. }) => Ok(decision),
+        _ => Err(EvidenceError::Undecided),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{authority, members, robot, roster, vote};
+    use crate::testing::{authority, decision, members, robot, roster, vote};
 
     fn signed(statement: Vec<u8>, by: u32) -> Signed {
         let signature = statement::sign(&robot(by), &roster(1).swarm_id(), &statement);
@@ -135,27 +246,36 @@ mod tests {
     }
 
     fn lie() -> Evidence {
-        Evidence::new(signed(vote(2, 5, 1.0), 2), signed(vote(2, 5, -1.0), 2))
+        Evidence::of_two(signed(vote(2, 5, 1.0), 2), signed(vote(2, 5, -1.0), 2))
     }
 
     #[test]
     fn it_convicts_the_key_that_lied() {
         let stamp = Stamp { boot: 1, sequence: 5 };
         let key = robot(2).public_key();
-        assert_eq!(lie().check(&roster(1)), Ok(Conviction { robot: RobotId(2), key, stamp }));
+        assert_eq!(
+            lie().check(&roster(1), |_| false),
+            Ok(Conviction { robot: RobotId(2), key, stamp, lie: Lie::TwoThings })
+        );
         // After the robot was enrolled anew, it proves nothing against the new key.
         let mut later = members(2);
         later.robots.insert(RobotId(2), robot(22).public_key());
-        assert_eq!(lie().check(&later.sign(&authority()).unwrap()), Err(EvidenceError::Forged(RobotId(2))));
+        assert_eq!(
+            lie().check(&later.sign(&authority()).unwrap(), |_| false),
+            Err(EvidenceError::Forged(RobotId(2)))
+        );
         let mut gone = members(2);
         gone.robots.remove(&RobotId(2));
-        assert_eq!(lie().check(&gone.sign(&authority()).unwrap()), Err(EvidenceError::Stranger(RobotId(2))));
+        assert_eq!(
+            lie().check(&gone.sign(&authority()).unwrap(), |_| false),
+            Err(EvidenceError::Stranger(RobotId(2)))
+        );
     }
 
     #[test]
     fn nobody_can_make_an_honest_robot_look_like_a_liar() {
         let said = signed(vote(2, 5, 1.0), 2);
-        let check = |other| Evidence::new(said.clone(), other).check(&roster(1));
+        let check = |other| Evidence::of_two(said.clone(), other).check(&roster(1), |_| false);
         assert_eq!(check(said.clone()), Err(EvidenceError::Repeated));
         assert_eq!(check(signed(vote(2, 6, -1.0), 2)), Err(EvidenceError::Unrelated));
         assert_eq!(check(signed(vote(3, 5, -1.0), 3)), Err(EvidenceError::Unrelated));
@@ -173,11 +293,50 @@ mod tests {
         assert_eq!(check(elsewhere), Err(EvidenceError::Forged(RobotId(2))));
     }
 
+    /// What that robot gives, decided by nobody; of so many milliseconds, which say here whether it follows.
+    fn gives(author: u32, elapsed_ms: u32) -> Vec<u8> {
+        let message = Message::Give(Give {
+            decision: Some(decision(elapsed_ms)),
+            votes: Vec::new(),
+            holders: Vec::new(),
+        });
+        let stamp = Stamp { boot: 1, sequence: 7 };
+        gestalt_protocol::Envelope { author: RobotId(author), stamp, message, signature: None }.statement()
+    }
+
+    fn refutes(decision: &Decision) -> bool {
+        decision.certificate.elapsed_ms == 13
+    }
+
+    #[test]
+    fn what_does_not_follow_convicts_who_gave_it_and_nobody_else() {
+        let check = |statement: Vec<u8>, by| {
+            let signed = signed(statement, by);
+            let evidence = Evidence::of_decision(signed.statement, signed.signature);
+            assert_eq!(Evidence::decode(&evidence.encode()), Ok(evidence.clone()));
+            evidence.check(&roster(1), refutes)
+        };
+        let (stamp, key) = (Stamp { boot: 1, sequence: 7 }, robot(2).public_key());
+        let proven = Conviction { robot: RobotId(2), key, stamp, lie: Lie::Unfounded };
+        assert_eq!(check(gives(2, 13), 2), Ok(proven));
+        assert_eq!(check(gives(2, 12), 2), Err(EvidenceError::Founded), "it may well follow");
+        // By the author of the decision, which is robot 0, nothing of it was given.
+        assert_eq!(check(gives(2, 13), 3), Err(EvidenceError::Forged(RobotId(2))));
+        assert_eq!(check(gives(0, 13), 2), Err(EvidenceError::Forged(RobotId(0))));
+        assert_eq!(check(gives(77, 13), 77), Err(EvidenceError::Stranger(RobotId(77))));
+        assert_eq!(check(vote(2, 5, 1.0), 2), Err(EvidenceError::Undecided));
+        assert!(matches!(check(vec![1, 2, 3], 2), Err(EvidenceError::Malformed(_))));
+        // In a longer spelling it is not what was signed.
+        let mut longer = gives(2, 13);
+        longer.splice(1..2, [0x82, 0x00]);
+        assert!(matches!(check(longer, 2), Err(EvidenceError::Malformed(_))));
+    }
+
     #[test]
     fn it_travels_in_bytes_and_in_text() {
         let bytes = lie().encode();
         assert_eq!(Evidence::decode(&bytes), Ok(lie()));
-        assert_eq!(bytes.len(), 1 + 2 * (1 + vote(2, 5, 1.0).len() + 64));
+        assert_eq!(bytes.len(), 2 + 2 * (1 + vote(2, 5, 1.0).len() + 64));
         let json = serde_json::to_string(&lie()).unwrap();
         assert_eq!(serde_json::from_str::<Evidence>(&json).unwrap(), lie());
         assert!(serde_json::from_str::<Evidence>(&json.replace("\"03", "\"3")).is_err());
@@ -185,20 +344,30 @@ mod tests {
             assert!(Evidence::decode(&bytes[..cut]).is_err(), "{cut}");
         }
         assert_eq!(Evidence::decode(&[bytes.as_slice(), &[0]].concat()), Err(DecodeError::Trailing(1)));
-        assert!(matches!(Evidence::decode(&[2]), Err(DecodeError::Impossible(_))));
+        assert!(matches!(Evidence::decode(&[1]), Err(DecodeError::Impossible(_))));
     }
 
     #[test]
     fn it_is_bounded() {
         let mut statement = vote(2, 5, 1.0);
         statement.resize(MAX_EVIDENT, 0);
-        let largest = Evidence::new(signed(statement.clone(), 2), signed(statement.clone(), 2));
-        assert_eq!(largest.encode().len(), Evidence::MAX_LENGTH);
-        assert_eq!(Evidence::decode(&largest.encode()), Ok(largest));
+        let two =
+            |statement: &[u8]| Evidence::of_two(signed(statement.to_vec(), 2), signed(vote(2, 5, 1.0), 2));
+        assert_eq!(Evidence::decode(&two(&statement).encode()), Ok(two(&statement)));
         statement.push(0);
-        let larger = Evidence::new(signed(statement, 2), signed(vote(2, 5, 1.0), 2));
-        assert!(Evidence::decode(&larger.encode()).is_err());
-        assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&larger).unwrap()).is_err());
+        assert!(Evidence::decode(&two(&statement).encode()).is_err());
+        assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&two(&statement)).unwrap()).is_err());
+        // A decision may be almost as long as a message.
+        let one = |statement: &[u8]| {
+            Evidence::of_decision(statement.to_vec(), Signature::from_bytes([7; Signature::LENGTH]))
+        };
+        statement.resize(MAX_SIGNED, 0);
+        let largest = one(&statement).encode();
+        assert!(largest.len() <= Evidence::MAX_LENGTH);
+        assert_eq!(Evidence::decode(&largest), Ok(one(&statement)));
+        statement.push(0);
+        assert!(Evidence::decode(&one(&statement).encode()).is_err());
+        assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&one(&statement)).unwrap()).is_err());
         let long = vec![VERSION; Evidence::MAX_LENGTH + 1];
         assert!(matches!(Evidence::decode(&long), Err(DecodeError::TooLong { .. })));
     }

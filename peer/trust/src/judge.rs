@@ -1,6 +1,5 @@
 //! What a robot of a sealed swarm lets in, message by message.
 
-use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use std::time::Duration;
 
@@ -11,7 +10,8 @@ use gestalt_protocol::{
 use crate::answer::Answers;
 use crate::budget::Budget;
 use crate::distrust::Distrust;
-use crate::evidence::{Evidence, EvidenceError};
+use crate::docket::Docket;
+use crate::evidence::{Evidence, EvidenceError, Lie, Refutes};
 use crate::precedence::Precedence;
 use crate::roles::Roles;
 use crate::roster::Roster;
@@ -29,7 +29,8 @@ const OF_SAMPLES: Budget = {
     Budget { burst: number(512), per_second: number(64), spare: number(1000) }
 };
 
-/// Lets in what members of the swarm signed, and finds out who of them says two things. Pure: time is an argument.
+/// Lets in what members of the swarm signed, and finds out who of them lies: who says two things, and who gives a decision that does not follow from its
+/// votes. Pure: time is an argument.
 #[derive(Clone, Debug)]
 pub struct Judge<S: Scheme = Ed25519> {
     /// For samples, and for all else that is signed: neither keeps the other waiting.
@@ -39,15 +40,14 @@ pub struct Judge<S: Scheme = Ed25519> {
     of_answers: Answers<S>,
     precedence: Precedence,
     witness: Witness,
-    /// Against whom, as it is told to others; those found here are yet to be.
-    evidence: BTreeMap<RobotId, Evidence>,
-    untold: Vec<RobotId>,
+    refutes: Refutes,
+    docket: Docket,
 }
 
 impl<S: Scheme> Judge<S> {
-    /// One that goes by that roster.
+    /// One that goes by that roster, and by that on which decisions do not follow from their votes.
     #[must_use]
-    pub fn new(roster: Roster<S>) -> Self {
+    pub fn new(roster: Roster<S>, refutes: Refutes) -> Self {
         Self {
             witness: Witness::new(&roster),
             verifier: Verifier::new(roster.clone(), Budget::default()),
@@ -55,8 +55,8 @@ impl<S: Scheme> Judge<S> {
             of_words: Attention::default(),
             of_answers: Answers::default(),
             precedence: Precedence::default(),
-            evidence: BTreeMap::new(),
-            untold: Vec::new(),
+            refutes,
+            docket: Docket::default(),
         }
     }
 
@@ -80,8 +80,7 @@ impl<S: Scheme> Judge<S> {
         self.of_words.follow(&before, &roster);
         self.of_answers.follow(&before, &roster);
         self.witness.follow(&before, &roster);
-        self.evidence.retain(|robot, _| roster.keeps_key(&before, *robot));
-        self.untold.retain(|robot| roster.keeps_key(&before, *robot));
+        self.docket.retain(|robot| roster.keeps_key(&before, robot));
         Ok(true)
     }
 
@@ -119,10 +118,16 @@ impl<S: Scheme> Judge<S> {
         self.precedence.permits(by, roles, said)
     }
 
+    /// Whether that robot was proven to lie, with the key that it has.
+    #[must_use]
+    pub fn convicts(&self, robot: RobotId) -> bool {
+        self.verifier.is_convicted(robot)
+    }
+
     /// Whether that robot is a member that is believed.
     #[must_use]
     pub fn is_member(&self, robot: RobotId) -> bool {
-        self.verifier.roster().members().robots.contains_key(&robot)
+        self.roster().members().robots.contains_key(&robot) && !self.convicts(robot)
     }
 
     /// Whether the author said that: a vote, what it holds, samples or what it passes on of instructors.
@@ -136,11 +141,26 @@ impl<S: Scheme> Judge<S> {
         let samples = matches!(envelope.message, Message::Samples(_));
         let verifier = if samples { &mut self.of_samples } else { &mut self.verifier };
         verifier.check(now, &statement, Some(signature))?;
-        let Some(evidence) = self.witness.observe(&statement, signature) else { return Ok(()) };
+        let evidence = self.witness.observe(&statement, signature);
         // What proves nothing is no reason to refuse it.
-        let Ok(Some(liar)) = self.evidence(now, evidence) else { return Ok(()) };
-        self.untold.push(liar);
-        Err(Distrust::Convicted)
+        if evidence.is_some_and(|evidence| self.found(evidence)) { Err(Distrust::Convicted) } else { Ok(()) }
+    }
+
+    /// Convicts who was found here to lie; whether it is proven.
+    fn found(&mut self, evidence: Evidence) -> bool {
+        let Ok(conviction) = evidence.check(self.roster(), self.refutes) else { return false };
+        self.verifier.believe_no_more(conviction.robot);
+        self.of_samples.believe_no_more(conviction.robot);
+        self.docket.enter(conviction, evidence, true);
+        true
+    }
+
+    /// Whether that member stands by a decision that it gave or announced, which is looked into before the votes that it rests on: their signatures are
+    /// more work, and prove nothing of who gave it.
+    fn stands_by(&mut self, said: &Envelope, decision: &Decision) -> Result<(), Distrust> {
+        let Some(signature) = said.signature.filter(|_| (self.refutes)(decision)) else { return Ok(()) };
+        let proven = self.found(Evidence::of_decision(said.statement(), signature));
+        if proven { Err(Distrust::Convicted) } else { Ok(()) }
     }
 
     /// Whether all the votes that a decision rests on were cast.
@@ -162,25 +182,37 @@ impl<S: Scheme> Judge<S> {
         if announcement.signature.is_none() {
             return Err(Distrust::Unsigned);
         }
-        self.envelope(now, &announcement.clone().into())?;
+        let said = Envelope::from(announcement.clone());
+        self.envelope(now, &said)?;
+        self.stands_by(&said, &announcement.decision)?;
         self.decision(now, &announcement.decision)
     }
 
-    /// Leaves of a gift what was really said; says why the rest is not believed. What is left may be true: who passes on what it was
-    /// told is no liar.
-    pub fn give(&mut self, now: Duration, give: &mut Give) -> Option<Distrust> {
-        let of_holders = self.retain(now, &mut give.holders);
-        let mut refused = self.retain(now, &mut give.votes).or(of_holders);
-        if let Some(Err(distrust)) = give.decision.as_ref().map(|decision| self.decision(now, decision)) {
-            give.decision = None;
-            refused = Some(distrust);
+    /// Leaves of what one robot passes on to another what was really said; says why the rest is not believed. What is left may be true: who passes on votes,
+    /// words and samples as it was told them is no liar. By a decision it stands itself.
+    pub fn passed_on(&mut self, now: Duration, envelope: &mut Envelope) -> Option<Distrust> {
+        let given = self.given(now, envelope);
+        match &mut envelope.message {
+            Message::Give(give) => {
+                let of_holders = self.retain(now, &mut give.holders);
+                let of_votes = self.retain(now, &mut give.votes);
+                if given.is_err() {
+                    give.decision = None;
+                }
+                given.err().or(of_votes).or(of_holders)
+            }
+            Message::Batches(Batches { batches }) => self.retain(now, batches),
+            _ => None,
         }
-        refused
     }
 
-    /// The same of samples.
-    pub fn batches(&mut self, now: Duration, batches: &mut Batches) -> Option<Distrust> {
-        self.retain(now, &mut batches.batches)
+    /// Whether its author gave that decision, if it gives any, and all the votes that it rests on were cast.
+    fn given(&mut self, now: Duration, said: &Envelope) -> Result<(), Distrust> {
+        let Message::Give(Give { decision: Some(decision), .. }) = &said.message else { return Ok(()) };
+        // Not for the witness, who remembers what is said to all.
+        self.verifier.check(now, &said.statement(), said.signature.as_ref())?;
+        self.stands_by(said, decision)?;
+        self.decision(now, decision)
     }
 
     fn retain<T: Clone + Into<Envelope>>(&mut self, now: Duration, held: &mut Vec<T>) -> Option<Distrust> {
@@ -195,27 +227,33 @@ impl<S: Scheme> Judge<S> {
         refused
     }
 
-    /// Takes in evidence; says against whom, if that is news.
+    /// Takes in evidence.
     ///
     /// # Errors
     /// [`EvidenceError`] for evidence that proves nothing against any member.
-    pub fn evidence(&mut self, now: Duration, evidence: Evidence) -> Result<Option<RobotId>, EvidenceError> {
-        let liar = self.verifier.convict(now, &evidence)?.robot;
-        self.of_samples.convict(now, &evidence)?;
-        let is_news = !self.evidence.contains_key(&liar);
-        self.evidence.entry(liar).or_insert(evidence);
-        Ok(is_news.then_some(liar))
+    pub fn evidence(&mut self, now: Duration, evidence: Evidence) -> Result<(), EvidenceError> {
+        let before = evidence.heading().is_ok_and(|heading| self.verifier.is_convicted(heading.author));
+        let conviction = self.verifier.convict(now, &evidence, self.refutes)?;
+        self.of_samples.believe_no_more(conviction.robot);
+        if !before {
+            self.docket.enter(conviction, evidence, false);
+        }
+        Ok(())
     }
 
-    /// The evidence that is to be told to all, each once.
-    pub fn untold(&mut self) -> Vec<(RobotId, Evidence)> {
-        let untold = std::mem::take(&mut self.untold).into_iter();
-        untold.filter_map(|liar| Some((liar, self.evidence.get(&liar)?.clone()))).collect()
+    /// Who was convicted since this was last asked, and of what: nothing that they said counts any more.
+    pub fn fallen(&mut self) -> Vec<(RobotId, Lie)> {
+        self.docket.fallen()
+    }
+
+    /// The evidence that is to be told to all now: once what was found here, and once more for those who came since, every five seconds at most.
+    pub fn untold(&mut self, now: Duration) -> Vec<(RobotId, Evidence)> {
+        self.docket.untold(now)
     }
 
     /// Somebody is here who was not: all evidence is to be told again.
     pub fn tell_again(&mut self) {
-        self.untold = self.evidence.keys().copied().collect();
+        self.docket.tell_again();
     }
 }
 
@@ -225,7 +263,7 @@ mod tests {
 
     use super::*;
     use crate::statement;
-    use crate::testing::{robot, roster, vote};
+    use crate::testing::{decision, robot, roster, vote};
 
     const NOW: Duration = Duration::from_secs(1000);
 
@@ -237,18 +275,20 @@ mod tests {
 
     #[test]
     fn who_says_two_things_is_told_of_once_and_again_to_those_who_come() {
-        let (mut here, mut there) = (Judge::new(roster(5)), Judge::new(roster(5)));
+        let (mut here, mut there) = (Judge::new(roster(5), |_| false), Judge::new(roster(5), |_| false));
         assert_eq!(here.envelope(NOW, &said(1, 1, 1.0)), Ok(()));
         assert_eq!(here.envelope(NOW, &said(1, 1, -1.0)), Err(Distrust::Convicted));
-        let told = here.untold();
-        assert_eq!((told.len(), here.untold().len()), (1, 0));
-        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(Some(RobotId(1))));
-        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(None), "no news");
+        let told = here.untold(NOW);
+        assert_eq!((told.len(), here.untold(NOW).len()), (1, 0));
+        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(()));
+        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(()));
+        assert_eq!(there.fallen(), [(RobotId(1), Lie::TwoThings)], "no news the second time");
+        assert!(there.fallen().is_empty() && !there.is_member(RobotId(1)));
         assert_eq!(there.envelope(NOW, &said(1, 2, 1.0)), Err(Distrust::Convicted));
         assert_eq!(there.envelope(NOW, &said(2, 2, 1.0)), Ok(()));
-        assert!(there.untold().is_empty(), "who found it tells it");
+        assert!(there.untold(NOW).is_empty(), "who found it tells it");
         there.tell_again();
-        assert_eq!(there.untold(), told);
+        assert_eq!(there.untold(NOW), told);
     }
 
     /// That robot's word that it holds something, signed by that one.
@@ -273,9 +313,15 @@ mod tests {
         Envelope { signature: Some(signature), ..said }
     }
 
+    /// What a robot passes on and does not sign.
+    fn hint(give: Give) -> Envelope {
+        let stamp = gestalt_protocol::Stamp { boot: 1, sequence: 12 };
+        Envelope { author: RobotId(4), stamp, message: Message::Give(give), signature: None }
+    }
+
     #[test]
     fn what_a_robot_holds_is_its_own_word() {
-        let mut judge = Judge::new(roster(5));
+        let mut judge = Judge::new(roster(5), |_| false);
         assert_eq!(judge.envelope(NOW, &word(1, 1)), Ok(()));
         assert_eq!(judge.envelope(NOW, &word(2, 1)), Err(Distrust::Forged));
         let holder = |said: Envelope| {
@@ -286,39 +332,21 @@ mod tests {
             gestalt_protocol::Holder { robot, stamp, holding, signature }
         };
         let (mine, forged) = (holder(word(1, 1)), holder(word(2, 1)));
-        let mut give = Give { decision: None, votes: vec![], holders: vec![forged, mine.clone()] };
-        assert_eq!(judge.give(NOW, &mut give), Some(Distrust::Forged));
-        assert_eq!(give.holders, [mine]);
+        let mut given = hint(Give { decision: None, votes: vec![], holders: vec![forged, mine.clone()] });
+        assert_eq!(judge.passed_on(NOW, &mut given), Some(Distrust::Forged));
+        assert_eq!(given, hint(Give { decision: None, votes: vec![], holders: vec![mine] }));
     }
 
     #[test]
     fn an_announcement_is_its_announcers_to_the_last_word() {
         let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
-        let decision = Decision {
-            round,
-            class: None,
-            confidence: 0.5,
-            author: RobotId(0),
-            is_final: true,
-            certificate: gestalt_protocol::Certificate {
-                vocabulary: gestalt_protocol::VocabularyId(9),
-                rule: gestalt_protocol::FusionRule::LogPool,
-                pool: None,
-                probabilities: vec![],
-                unknown: None,
-                votes: vec![],
-                others: vec![],
-                robots: 1,
-                quorum: 1,
-                elapsed_ms: 1,
-                named: vec![],
-            },
-        };
+        let decision = decision(1);
         let message = |decision| {
             Message::Announced(gestalt_protocol::Announced { decision, label: Some("palm".to_owned()) })
         };
         let said = |by| Announcement::of(signed(1, 5, message(decision.clone()), by)).unwrap();
-        let heard = |announcement: &Announcement| Judge::new(roster(5)).announcement(NOW, announcement);
+        let heard =
+            |announcement: &Announcement| Judge::new(roster(5), |_| false).announcement(NOW, announcement);
         assert_eq!(heard(&said(1)), Ok(()));
         assert_eq!(heard(&said(2)), Err(Distrust::Forged));
         assert_eq!(heard(&Announcement { signature: None, ..said(1) }), Err(Distrust::Unsigned));
@@ -359,8 +387,48 @@ mod tests {
     }
 
     #[test]
+    fn who_gives_what_does_not_follow_is_convicted_whatever_is_said_against_it_before() {
+        let refutes: Refutes = |decision| decision.certificate.elapsed_ms == 13;
+        let judge = || Judge::new(roster(5), refutes);
+        let give = |decision| {
+            Message::Give(Give { decision: Some(decision), votes: Vec::new(), holders: Vec::new() })
+        };
+        let (mut here, mut there) = (judge(), judge());
+        let mut honest = signed(1, 3, give(decision(12)), 1);
+        assert_eq!(here.passed_on(NOW, &mut honest), None);
+        let mut unsigned = Envelope { signature: None, ..honest.clone() };
+        assert_eq!(here.passed_on(NOW, &mut unsigned), Some(Distrust::Unsigned));
+        assert_eq!(unsigned.message, Message::Give(Give { decision: None, votes: vec![], holders: vec![] }));
+        let mut forged = signed(1, 4, give(decision(13)), 2);
+        assert_eq!(here.passed_on(NOW, &mut forged), Some(Distrust::Forged));
+        // Its budget for evidence is used up by others.
+        let false_evidence = Evidence::of_decision(honest.statement(), honest.signature.unwrap());
+        let made_up = (0..3000).map(|_| here.evidence(NOW, false_evidence.clone()));
+        let answers: Vec<_> = made_up.collect();
+        assert_eq!(answers[0], Err(EvidenceError::Founded));
+        assert_eq!(answers[2999], Err(EvidenceError::TooFast(RobotId(1))));
+        assert!(here.fallen().is_empty() && here.untold(NOW).is_empty() && !here.convicts(RobotId(1)));
+        let mut lie = signed(1, 5, give(decision(13)), 1);
+        // A signature that was believed before costs nothing, and one more is spared a second later.
+        let later = NOW + Duration::from_secs(2);
+        assert_eq!(here.passed_on(later, &mut lie), Some(Distrust::Convicted));
+        assert_eq!(here.fallen(), [(RobotId(1), Lie::Unfounded)]);
+        let told = here.untold(later);
+        assert_eq!((told.len(), here.untold(later).len()), (1, 0));
+        assert_eq!(there.evidence(NOW, told[0].1.clone()), Ok(()));
+        assert!(there.convicts(RobotId(1)) && !there.is_member(RobotId(1)));
+        assert_eq!(there.envelope(NOW, &said(1, 6, 1.0)), Err(Distrust::Convicted));
+        // Whoever comes hears of it, and whoever comes and goes makes nobody repeat it all the time.
+        here.tell_again();
+        assert_eq!(here.untold(later).len(), 1);
+        here.tell_again();
+        assert_eq!(here.untold(later + Duration::from_secs(4)).len(), 0);
+        assert_eq!(here.untold(later + Duration::from_secs(5)).len(), 1);
+    }
+
+    #[test]
     fn of_a_gift_stays_what_was_said() {
-        let mut judge = Judge::new(roster(5));
+        let mut judge = Judge::new(roster(5), |_| false);
         let held = |envelope: Envelope| {
             let Envelope { author: robot, stamp, message: Message::Vote(vote), signature } = envelope else {
                 unreachable!()
@@ -369,9 +437,10 @@ mod tests {
         };
         let forged = Envelope { signature: said(2, 1, 1.0).signature, ..said(1, 1, 1.0) };
         let votes = vec![held(forged), held(said(2, 1, 1.0))];
-        let mut give = Give { decision: None, votes, holders: Vec::new() };
-        assert_eq!(judge.give(NOW, &mut give), Some(Distrust::Forged));
-        assert_eq!(give.votes, [held(said(2, 1, 1.0))]);
-        assert_eq!(judge.give(NOW, &mut give), None);
+        let mut given = hint(Give { decision: None, votes, holders: Vec::new() });
+        assert_eq!(judge.passed_on(NOW, &mut given), Some(Distrust::Forged));
+        let left = Give { decision: None, votes: vec![held(said(2, 1, 1.0))], holders: Vec::new() };
+        assert_eq!(given, hint(left));
+        assert_eq!(judge.passed_on(NOW, &mut given), None);
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! An authority writes a [`Roster`]: which robots belong to the swarm, and the public key of each. A robot has an [`Identity`] and
 //! [signs](statement::sign) what it says; whoever hears it, from the author or through others, asks a [`Verifier`] whether to
-//! believe it. A [`Witness`] notices who says two things under one stamp, and the [`Evidence`] convicts the liar everywhere.
+//! believe it. A [`Witness`] notices who says two things under one stamp, a [`Judge`] who gives a decision that does not follow from the votes it brings,
+//! and the [`Evidence`] convicts the liar everywhere.
 //!
 //! ```text
 //! Envelope ─encode─► statement ─sign─► statement, Signature ~~ any relays ~~► Verifier::check ─► Ok: the author's own words
@@ -60,6 +61,7 @@
 pub mod answer;
 mod budget;
 mod distrust;
+mod docket;
 mod document;
 mod evidence;
 #[cfg(any(test, feature = "fake"))]
@@ -87,7 +89,7 @@ pub mod word;
 pub use answer::{ANSWER_DOMAIN, Answers};
 pub use budget::Budget;
 pub use distrust::Distrust;
-pub use evidence::{Conviction, Evidence, EvidenceError};
+pub use evidence::{Conviction, Evidence, EvidenceError, Lie, Refutes};
 #[cfg(feature = "fake")]
 pub use fake::Fake;
 pub use identity::Identity;

@@ -1,15 +1,18 @@
-//! One half of evidence.
+//! What evidence is made of.
 
 use std::fmt;
 
-use gestalt_protocol::Signature;
 use gestalt_protocol::hex::{self, Hex};
+use gestalt_protocol::{MAX_MESSAGE, Signature};
 use serde::de::{Deserializer, Error, Visitor};
 use serde::ser::Serializer;
 use serde::{Deserialize, Serialize};
 
-/// The longest statement that can be one half of evidence, in bytes. A vote has at most 400.
+/// The longest statement that can be one of two that contradict each other, in bytes. A vote has at most 400.
 pub const MAX_EVIDENT: usize = 32 * 1024;
+
+/// The longest of all, in bytes: with its signature, and what says that it is evidence, it is no longer than a message may be.
+pub(crate) const MAX_SIGNED: usize = MAX_MESSAGE - 128;
 
 /// A statement with its author's signature.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -29,7 +32,7 @@ fn write<S: Serializer>(bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> 
     }
 }
 
-/// At most [`MAX_EVIDENT`] bytes, looked at before anything is allocated for them.
+/// At most [`MAX_SIGNED`] bytes, looked at before anything is allocated for them.
 fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error> {
     struct Statement;
 
@@ -37,11 +40,11 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error>
         type Value = Vec<u8>;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            write!(f, "at most {MAX_EVIDENT} bytes")
+            write!(f, "at most {MAX_SIGNED} bytes")
         }
 
         fn visit_str<E: Error>(self, text: &str) -> Result<Vec<u8>, E> {
-            if text.len() > 2 * MAX_EVIDENT {
+            if text.len() > 2 * MAX_SIGNED {
                 return Err(E::invalid_length(text.len() / 2, &self));
             }
             let (pairs, rest) = text.as_bytes().as_chunks::<2>();
@@ -52,7 +55,7 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error>
         }
 
         fn visit_bytes<E: Error>(self, bytes: &[u8]) -> Result<Vec<u8>, E> {
-            if bytes.len() > MAX_EVIDENT {
+            if bytes.len() > MAX_SIGNED {
                 return Err(E::invalid_length(bytes.len(), &self));
             }
             Ok(bytes.to_vec())

@@ -1,6 +1,9 @@
 //! A small swarm for tests.
 
-use gestalt_protocol::{Envelope, Have, Message, RobotId, RoundId, Stamp, VocabularyId, Vote};
+use gestalt_protocol::{
+    Certificate, Decision, Envelope, FusionRule, Have, Message, RobotId, RoundId, Stamp, Terms, VocabularyId,
+    Vote,
+};
 
 use crate::identity::Identity;
 use crate::membership::Membership;
@@ -52,6 +55,26 @@ pub(crate) fn have(author: u32, sequence: u32) -> Vec<u8> {
     let have =
         Have { round: None, decision: None, holders: 0, votes: Vec::new(), knowledge: None, answer: false };
     said(author, sequence, Message::Have(have))
+}
+
+/// That nothing was decided, of no vote, in so many milliseconds.
+pub(crate) fn decision(elapsed_ms: u32) -> Decision {
+    let round = RoundId { counter: 1, opener: RobotId(0), life: 7 };
+    let certificate = Certificate {
+        vocabulary: VocabularyId(9),
+        rule: FusionRule::LogPool,
+        pool: None,
+        probabilities: vec![],
+        unknown: None,
+        named: vec![],
+        votes: vec![],
+        others: vec![],
+        robots: 1,
+        quorum: 1,
+        elapsed_ms,
+        terms: Terms::default(),
+    };
+    Decision { round, class: None, confidence: 0.5, author: RobotId(0), is_final: true, certificate }
 }
 
 fn said(author: u32, sequence: u32, message: Message) -> Vec<u8> {

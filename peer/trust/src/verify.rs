@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::budget::{Bucket, Budget};
 use crate::distrust::Distrust;
-use crate::evidence::{Conviction, Evidence, EvidenceError};
+use crate::evidence::{Conviction, Evidence, EvidenceError, Refutes};
 use crate::public_key::PublicKey;
 use crate::roster::Roster;
 use crate::roster_error::RosterError;
@@ -136,25 +136,43 @@ impl<S: Scheme> Verifier<S> {
     }
 
     /// Stops believing a robot that the evidence convicts, until a roster gives it a new key. Evidence has a budget of its own, as
-    /// large as the one for statements. Who starts again hands in again what evidence it kept.
+    /// large as the one for statements, and what is spared beside: nobody hides it in a flood. Who starts again hands in again what evidence it kept.
     ///
     /// # Errors
     /// [`EvidenceError`] for evidence that proves nothing against any robot on the roster.
-    pub fn convict(&mut self, now: Duration, evidence: &Evidence) -> Result<Conviction, EvidenceError> {
+    pub fn convict(
+        &mut self,
+        now: Duration,
+        evidence: &Evidence,
+        refutes: Refutes,
+    ) -> Result<Conviction, EvidenceError> {
         let claimed = evidence.heading()?;
         let on_roster = self.roster.members().robots.get(&claimed.author);
         let key: PublicKey = *on_roster.ok_or(EvidenceError::Stranger(claimed.author))?;
         if self.convicted.contains(&claimed.author) {
-            return Ok(Conviction { robot: claimed.author, key, stamp: claimed.stamp });
+            return Ok(Conviction { robot: claimed.author, key, stamp: claimed.stamp, lie: evidence.lie() });
         }
         let new = || Account::new(&self.budget, now);
         let account = self.authors.entry(claimed.author).or_insert_with(new);
-        if !account.evidence.take(&self.budget, now) {
+        let of_all = self.budget.of_all();
+        let spare = self.spare.get_or_insert_with(|| Bucket::new(&of_all, now));
+        if !account.evidence.take(&self.budget, now) && !spare.take(&of_all, now) {
             return Err(EvidenceError::TooFast(claimed.author));
         }
-        let conviction = evidence.check(&self.roster)?;
-        self.convicted.insert(conviction.robot);
+        let conviction = evidence.check(&self.roster, refutes)?;
+        self.believe_no_more(conviction.robot);
         Ok(conviction)
+    }
+
+    /// The same of a robot that was found here to lie, whatever was made up against it before.
+    pub(crate) fn believe_no_more(&mut self, robot: RobotId) {
+        self.convicted.insert(robot);
+    }
+
+    /// Whether that robot was convicted.
+    #[must_use]
+    pub fn is_convicted(&self, robot: RobotId) -> bool {
+        self.convicted.contains(&robot)
     }
 
     /// The robots on the roster that were convicted.
@@ -336,7 +354,7 @@ mod tests {
         let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
         let found = both.each_ref().map(|said| witness.observe(said, &sign(1, said)));
         let evidence = found[1].clone().unwrap();
-        assert_eq!(verifier.convict(NOW, &evidence).unwrap().robot, RobotId(1));
+        assert_eq!(verifier.convict(NOW, &evidence, |_| false).unwrap().robot, RobotId(1));
         assert_eq!(hear(&mut verifier, NOW, 1, 2), Err(Distrust::Convicted));
         assert_eq!(hear(&mut verifier, NOW, 2, 2), Ok(()));
         verifier.adopt(roster(6)).unwrap();
@@ -345,21 +363,21 @@ mod tests {
         renewed.robots.insert(RobotId(1), robot(11).public_key());
         verifier.adopt(renewed.sign(&authority()).unwrap()).unwrap();
         assert_eq!(verifier.convicted().count(), 0);
-        assert_eq!(verifier.convict(NOW, &evidence), Err(EvidenceError::Forged(RobotId(1))));
+        assert_eq!(verifier.convict(NOW, &evidence, |_| false), Err(EvidenceError::Forged(RobotId(1))));
         let said = vote(1, 3, 1.0);
         assert_eq!(verifier.check(NOW, &said, Some(&sign(11, &said))), Ok(()));
     }
 
     #[test]
     fn false_evidence_has_a_budget_of_its_own() {
-        let mut verifier = verifier();
+        let mut verifier = sparing();
         let mut witness = Witness::new(&roster(5));
         let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
         let forged = both.each_ref().map(|said| witness.observe(said, &sign(99, said)))[1].clone().unwrap();
-        let answers: Vec<_> = (0..100).map(|_| verifier.convict(NOW, &forged)).collect();
+        let answers: Vec<_> = (0..100).map(|_| verifier.convict(NOW, &forged, |_| false)).collect();
         let checked =
             answers.iter().filter(|answer| **answer == Err(EvidenceError::Forged(RobotId(1)))).count();
-        assert_eq!(checked, 16);
+        assert_eq!(checked, 16 + 1);
         assert_eq!(answers[99], Err(EvidenceError::TooFast(RobotId(1))));
         assert_eq!(hear(&mut verifier, NOW, 1, 2), Ok(()));
     }

@@ -75,7 +75,7 @@ impl Witness {
         let heard = self.authors.entry(heading.author).or_default();
         if let Some((_, held)) = heard.statements.iter().find(|(stamp, _)| *stamp == heading.stamp) {
             let differs = held.statement != new.statement;
-            return differs.then(|| Evidence::new(held.clone(), new));
+            return differs.then(|| Evidence::of_two(held.clone(), new));
         }
         heard.shrink_to(STATEMENTS - 1, self.share - cost(&new));
         heard.bytes += cost(&new);
@@ -121,7 +121,7 @@ mod tests {
             let mut witness = Witness::new(&roster(1));
             assert_eq!(observe(&mut witness, &vote(2, 5, 1.0), 2), None);
             let evidence = observe(&mut witness, &other, 2).unwrap();
-            assert_eq!(evidence.check(&roster(1)).unwrap().robot, RobotId(2));
+            assert_eq!(evidence.check(&roster(1), |_| false).unwrap().robot, RobotId(2));
             // In the other order it is the same evidence.
             let mut witness = Witness::new(&roster(1));
             observe(&mut witness, &other, 2);

@@ -34,7 +34,7 @@ fn a_fake_swarm_believes_doubts_and_convicts() {
         witness.observe(said, &signature)
     });
     let evidence = found[1].clone().expect("two statements under one stamp");
-    verifier.convict(Duration::ZERO, &evidence).unwrap();
+    verifier.convict(Duration::ZERO, &evidence, |_| false).unwrap();
     let more = said(2, false);
     let signature = statement::sign(&liar, &swarm, &more);
     assert_eq!(verifier.check(Duration::ZERO, &more, Some(&signature)), Err(Distrust::Convicted));

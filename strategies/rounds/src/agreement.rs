@@ -209,7 +209,7 @@ impl Agreement {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Certificate, CountedVote, FusionRule, RoundId, Stamp, VocabularyId, Vote};
+    use gestalt_protocol::{Certificate, CountedVote, FusionRule, RoundId, Stamp, Terms, VocabularyId, Vote};
     use proptest::prelude::*;
 
     use super::*;
@@ -249,6 +249,7 @@ mod tests {
                 quorum: 1,
                 elapsed_ms: 0,
                 named: vec![],
+                terms: Terms::default(),
             },
         }
     }

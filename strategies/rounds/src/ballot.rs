@@ -189,13 +189,12 @@ impl Ballot {
     #[must_use]
     pub fn counted(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Vec<CountedVote> {
         let columns = self.columns(scale);
-        let weight = |vote: &Vote| Some(rule.weight(clip, &vote.evidence) as f32);
         self.on(scale)
             .map(|HeldVote { robot, stamp, vote, signature }| CountedVote {
                 robot: *robot,
                 stamp: *stamp,
                 class: columns.top(vote),
-                weight: weight(vote).filter(|w| w.is_finite() && *w >= 0.0).unwrap_or(0.0),
+                weight: weight(rule, clip, vote),
                 vote: vote.clone(),
                 signature: *signature,
             })
@@ -224,6 +223,12 @@ impl Ballot {
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {
         self.votes.values().filter(move |held| scale.is_of(&held.vote))
     }
+}
+
+/// What a vote weighs, as a certificate lists it.
+pub(crate) fn weight(rule: &dyn Fuse, clip: f64, vote: &Vote) -> f32 {
+    let weight = rule.weight(clip, &vote.evidence) as f32;
+    if weight.is_finite() && weight >= 0.0 { weight } else { 0.0 }
 }
 
 fn scale_of(held: &HeldVote) -> (u32, usize) {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{FusionRule, MAX_ROBOTS, RuleName};
+use gestalt_protocol::{Certificate, FusionRule, MAX_ROBOTS, RuleName, Terms};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -182,7 +182,8 @@ impl RoundsConfig {
             Quorum::Majority if self.liars == 0 => reached,
             Quorum::Majority | Quorum::Evidence(_) => contributors,
         };
-        counted >= self.needs(robots) as usize && (self.liars == 0 || contributors > 2 * self.liars as usize)
+        counted >= self.needs(robots) as usize
+            && (self.liars == 0 || contributors as u64 > 2 * u64::from(self.liars))
     }
 
     /// Whether the top class of a fusion decides that has so much left if as many as are expected lied, see
@@ -203,6 +204,26 @@ impl RoundsConfig {
             | FusionRule::Other(_) => 0.05,
         };
         self.alpha.unwrap_or(by_rule)
+    }
+
+    /// The terms by which it decides, as certificates state them.
+    #[must_use]
+    pub fn terms(&self) -> Terms {
+        Terms {
+            clip: self.clip,
+            alpha: self.alpha(),
+            majority: self.quorum == Quorum::Majority,
+            liars: self.liars,
+            committee: self.committee,
+        }
+    }
+
+    /// One that decides by the rule and the terms that a certificate states.
+    pub(crate) fn stated(certificate: &Certificate) -> Self {
+        let Certificate { rule, quorum, terms, .. } = certificate;
+        let Terms { clip, alpha, majority, liars, committee } = *terms;
+        let quorum = if majority { Quorum::Majority } else { Quorum::Evidence(*quorum) };
+        Self { rule: *rule, alpha: Some(alpha), quorum, liars, clip, committee, ..Self::default() }
     }
 
     /// Whether a robot can work with these parameters.
@@ -274,6 +295,8 @@ mod tests {
     #[test]
     fn the_default_is_valid() {
         assert_eq!(RoundsConfig::default().validate(), Ok(()));
+        // What a recording of before they were stated is read as.
+        assert_eq!(RoundsConfig::default().terms(), Terms::default());
     }
 
     #[test]

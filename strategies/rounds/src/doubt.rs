@@ -95,7 +95,7 @@ fn divergence(opinions: &[Vec<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
+        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, Terms, VocabularyId, Vote,
     };
     use proptest::prelude::*;
 
@@ -131,6 +131,7 @@ mod tests {
             quorum: 2,
             elapsed_ms: 5000,
             named: vec![],
+            terms: Terms::default(),
         }
     }
 

@@ -51,7 +51,8 @@ use crate::fusion::Fusion;
 /// # Ok::<(), gestalt_rounds::RoundsConfigError>(())
 /// ```
 pub trait Fuse: Debug + Send + Sync {
-    /// How certificates name it: [`FusionRule::Other`] for a user's rule.
+    /// How certificates name it: [`FusionRule::Other`] for a user's rule. One that went by the name of a rule of Gestalt's and made something else of the votes
+    /// would have its robot taken for a liar.
     fn rule(&self) -> FusionRule;
 
     /// Fuses the votes: centred log-evidence, each of `classes` values in nats, as said and not yet clipped to ±`clip`, in

@@ -55,7 +55,7 @@ pub use lot::{Lottery, lot};
 pub use machine::{Follow, Input, Output, Rounds};
 pub use observation::Observation;
 pub use outcome::outcome;
-pub use proof::follows;
+pub use proof::{follows, is_refuted};
 pub use quorum::Quorum;
 pub use refusal::{Refusal, Refusals};
 pub use sign::Sign;

@@ -73,7 +73,7 @@ fn rivals(certificate: &Certificate) -> Option<([ClassId; 2], [u32; 2])> {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, VocabularyId, Vote,
+        CountedVote, FusionRule, HeldVote, Pool, RobotId, RoundId, Stamp, Terms, VocabularyId, Vote,
     };
 
     use super::*;
@@ -120,6 +120,7 @@ mod tests {
             quorum: config.needs(robots),
             elapsed_ms: 5000,
             named: vec![],
+            terms: Terms::default(),
         };
         let author = RobotId(1);
         let none = Decision { round, class: None, confidence: 0.5, author, is_final: true, certificate };
@@ -141,6 +142,7 @@ mod tests {
             quorum: 1,
             elapsed_ms: 9,
             named: vec![],
+            terms: Terms::default(),
         };
         let class = Some(ClassId(0));
         let made =

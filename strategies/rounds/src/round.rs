@@ -340,9 +340,11 @@ impl Round {
         {
             return;
         }
+        // Of fewer robots all count, as the certificate states how many there are.
+        let is_drawn = config.committee_of(view.robots).is_some();
         let suffice = || {
             contributors > 0
-                && match (view.committee, scale) {
+                && match (view.committee.filter(|_| is_drawn), scale) {
                     (Some(members), Some(scale)) => config.suffice(
                         self.ballot.reached_of(members),
                         self.ballot.contributors_of(scale, members),
@@ -400,6 +402,7 @@ impl Round {
                 robots: view.robots,
                 quorum: config.needs(view.robots),
                 elapsed_ms: u32::try_from(now.saturating_sub(self.since).as_millis()).unwrap_or(u32::MAX),
+                terms: config.terms(),
             },
         });
     }

@@ -261,6 +261,7 @@ mod tests {
                 quorum: 1,
                 elapsed_ms: 1,
                 named: vec![],
+                terms: gestalt_protocol::Terms::default(),
             },
         };
         let mut said = Vec::new();

@@ -3,8 +3,8 @@
 //! `cargo test -p gestalt-rounds --test likeness -- --nocapture` prints the figures.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, FusionRule, Pool, RobotId, RoundId, Stamp, VocabularyId,
-    Vote,
+    Certificate, ClassId, CountedVote, Decision, FusionRule, Pool, RobotId, RoundId, Stamp, Terms,
+    VocabularyId, Vote,
 };
 use gestalt_rounds::{CorrelatedPool, Fuse, RoundsConfig, Testimony, Weights, fit, follows};
 
@@ -81,6 +81,7 @@ fn decision(evidence: &[Vec<f32>], rule: &dyn Fuse) -> Decision {
             quorum: evidence.len() as u32 / 2 + 1,
             elapsed_ms: 300,
             named: vec![],
+            terms: Terms::default(),
         },
     }
 }
@@ -195,6 +196,12 @@ fn a_certificate_is_checked_by_the_pool_that_it_names() {
     assert!(!follows_from(&fitted, &other_rule));
     // Where liars are expected nobody's word on what robots have in common counts.
     let wary = RoundsConfig { liars: 1, ..config };
-    assert!(!follows_from(&fitted, &wary), "a liar may have chosen it");
-    assert!(follows_from(&prior, &wary) || prior.confidence < 0.99);
+    let by_wary = |decision: &Decision| {
+        let (terms, quorum) = (wary.terms(), wary.needs(5));
+        let certificate = Certificate { terms, quorum, ..decision.certificate.clone() };
+        Decision { certificate, ..decision.clone() }
+    };
+    assert!(!follows_from(&by_wary(&fitted), &wary), "a liar may have chosen it");
+    assert!(follows_from(&by_wary(&prior), &wary) || prior.confidence < 0.99);
+    assert!(!follows_from(&prior, &wary), "it is one of robots that expect no liar");
 }

@@ -72,7 +72,7 @@ impl JudgedRounds {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        Certificate, CountedVote, Decision, FusionRule, RobotId, Stamp, VocabularyId, Vote,
+        Certificate, CountedVote, Decision, FusionRule, RobotId, Stamp, Terms, VocabularyId, Vote,
     };
 
     use super::*;
@@ -109,6 +109,7 @@ mod tests {
             quorum: 3,
             elapsed_ms: 1,
             named: vec![],
+            terms: Terms::default(),
         };
         let author = RobotId(0);
         let decision = Decision { round, class: None, confidence: 0.0, author, is_final: false, certificate };

@@ -1,8 +1,9 @@
 //! Messages as an adversary makes them up. What robots come to sign is signed here too, in one place for each kind.
 
 use gestalt_protocol::{
-    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, HeldBatch, HeldVote, Lesson, Lessons,
-    MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Vote, Word,
+    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, Give, HeldBatch, HeldVote, Lesson,
+    Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Vote,
+    Word,
 };
 use gestalt_strategies::fusion::fuse;
 use gestalt_strategies::{Fuse, MindConfig, decode_vector};
@@ -81,11 +82,17 @@ pub fn decision(round: RoundId, votes: Vec<HeldVote>, author: u32) -> Decision {
             votes: counted,
             others,
             robots,
-            quorum: robots / 2 + 1,
+            quorum: MindConfig::default().needs(robots),
             elapsed_ms: 10,
             named: vec![],
+            terms: MindConfig::default().terms(),
         },
     }
+}
+
+/// A decision as one robot gives it to another.
+pub fn given(decision: Decision) -> Message {
+    Message::Give(Give { decision: Some(decision), votes: Vec::new(), holders: Vec::new() })
 }
 
 fn counted(held: HeldVote) -> CountedVote {

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Announcement, CountedVote, Decision, Envelope, Give, HeldVote, Message, Signature};
-use gestalt_strategies::Sign;
-use gestalt_trust::{Budget, Distrust, Fake, Verifier};
+use gestalt_strategies::{Sign, is_refuted};
+use gestalt_trust::{Budget, Distrust, Evidence, Fake, Lie, Verifier};
 
 use crate::swarm;
 
@@ -26,7 +26,7 @@ impl Gate {
     pub fn message(&mut self, now: Duration, mut envelope: Envelope) -> Result<Envelope, Distrust> {
         match &mut envelope.message {
             Message::Vote(_) | Message::Holding(_) => self.envelope(now, &envelope)?,
-            Message::Give(give) => self.give(now, give),
+            Message::Give(_) => self.give(now, &mut envelope),
             _ => {}
         }
         Ok(envelope)
@@ -37,8 +37,20 @@ impl Gate {
     /// # Errors
     /// Why it or one of them is not believed.
     pub fn announcement(&mut self, now: Duration, announcement: &Announcement) -> Result<(), Distrust> {
-        self.envelope(now, &announcement.clone().into())?;
+        let said = Envelope::from(announcement.clone());
+        self.envelope(now, &said)?;
+        self.stands_by(&said, &announcement.decision)?;
         self.decision(now, &announcement.decision)
+    }
+
+    /// Whether a member that was believed says what follows from the votes that it brings: if not, whoever is shown that convicts it.
+    fn stands_by(&self, said: &Envelope, decision: &Decision) -> Result<(), Distrust> {
+        let Some(signature) = said.signature.filter(|_| is_refuted(decision)) else { return Ok(()) };
+        let evidence = Evidence::of_decision(said.statement(), signature);
+        let evidence = Evidence::decode(&evidence.encode()).expect("it travels");
+        let convicted = evidence.check(swarm::roster(), is_refuted).expect("it was believed");
+        assert_eq!((convicted.robot, convicted.lie), (said.author, Lie::Unfounded));
+        Err(Distrust::Convicted)
     }
 
     /// Whether all the votes that a decision rests on were cast.
@@ -58,10 +70,18 @@ impl Gate {
         believed
     }
 
-    fn give(&mut self, now: Duration, give: &mut Give) {
+    fn give(&mut self, now: Duration, said: &mut Envelope) {
+        let stands = match &said.message {
+            Message::Give(Give { decision: Some(decision), .. }) => self
+                .envelope(now, said)
+                .and_then(|()| self.stands_by(said, decision))
+                .and_then(|()| self.decision(now, decision)),
+            _ => Ok(()),
+        };
+        let Message::Give(give) = &mut said.message else { return };
         give.votes.retain(|held| self.envelope(now, &held.clone().into()).is_ok());
         give.holders.retain(|holder| self.envelope(now, &holder.clone().into()).is_ok());
-        give.decision.take_if(|decision| self.decision(now, decision).is_err());
+        give.decision.take_if(|_| stands.is_err());
     }
 }
 

@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use gestalt_protocol::{MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, RobotId};
+use gestalt_protocol::{Decision, Envelope, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS, Message, RobotId};
 use gestalt_strategies::sample::MAX_SERIES;
 use gestalt_strategies::{
     Classify, ClassifyError, Components, FeatureSpace, Input, LearningConfig, LearningSetup, Life, Mind,
-    MindConfig, Observation, Output, OwnRules, Refusals, ScalingMethod, Vocabulary,
+    MindConfig, Observation, Output, OwnRules, Refusals, ScalingMethod, Vocabulary, is_refuted,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -79,6 +79,15 @@ pub fn taken_in() -> u64 {
     TAKEN_IN.load(Ordering::Relaxed)
 }
 
+/// The decision that a robot gives or announces there.
+fn given(output: &Output) -> Option<&Decision> {
+    match output {
+        Output::Announce(announcement) => Some(&announcement.decision),
+        Output::Tell(_, Envelope { message: Message::Give(give), .. }) => give.decision.as_ref(),
+        _ => None,
+    }
+}
+
 /// A mind, and what it may never do.
 #[derive(Debug)]
 pub struct Robot {
@@ -125,7 +134,7 @@ impl Robot {
     /// Lets it take in one input.
     ///
     /// # Panics
-    /// If it wants more done than one input is worth, or says what others could not read, or forgets what it refused.
+    /// If it wants more done than one input is worth, or says what others could not read or would convict it of, or forgets what it refused.
     pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
         TAKEN_IN.fetch_add(1, Ordering::Relaxed);
         let outputs = self.mind.handle(now, input);
@@ -135,6 +144,9 @@ impl Robot {
                 let written = envelope.encode();
                 assert!(written.len() <= MAX_MESSAGE);
                 assert_eq!(gestalt_protocol::Envelope::decode(&written).as_ref(), Ok(envelope));
+            }
+            if let Some(decision) = given(output) {
+                assert!(!is_refuted(decision), "an honest robot is taken for a liar: {decision:?}");
             }
         }
         let refusals = self.mind.refusals();

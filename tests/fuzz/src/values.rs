@@ -5,7 +5,7 @@ use gestalt_protocol::{
     FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
     Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
     Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
-    Signature, Stamp, Status, Vector, VocabularyId, Vote, Word,
+    Signature, Stamp, Status, Terms, Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -115,6 +115,7 @@ pub fn decision(rng: &mut impl Rng) -> Decision {
             quorum: number(rng),
             elapsed_ms: number(rng),
             named: vec![],
+            terms: Terms::default(),
         },
     }
 }

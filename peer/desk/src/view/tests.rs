@@ -2,7 +2,7 @@
 
 use gestalt_protocol::{
     Certificate, ClassId, CountedVote, Decision, FusionRule, Gesture, Instruction, Outcome, Reported, Stamp,
-    Vote,
+    Terms, Vote,
 };
 use proptest::prelude::*;
 
@@ -61,6 +61,7 @@ fn decided(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
         quorum: 3,
         elapsed_ms: 480,
         named: vec![],
+        terms: Terms::default(),
     };
     let class = class.map(ClassId);
     let decision =

@@ -107,7 +107,7 @@ fn clocks(facts: &SwarmFacts) -> Option<Finding> {
     ))
 }
 
-/// Members that are proven to have said two things.
+/// Members that are proven to have lied.
 fn liars(facts: &SwarmFacts) -> Vec<Finding> {
     let convicted: BTreeSet<&str> = facts
         .answers()
@@ -120,8 +120,8 @@ fn liars(facts: &SwarmFacts) -> Vec<Finding> {
         .map(|robot| {
             Finding::failure(
                 "liar",
-                format!("robot {robot} said two things under one stamp"),
-                "it lies, or its key is in two hands; nothing of it counts any more",
+                format!("robot {robot} is proven to have lied"),
+                "it said two things under one stamp, or gave a decision that does not follow from its votes; nothing of it counts any more",
                 format!("gestalt trust rekey {robot} keys -e ENDPOINT     where authority.key is; then start robot {robot} again"),
             )
         })

@@ -13,7 +13,7 @@ use super::members::expected;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
-use crate::proof::follows;
+use crate::proof::{follows, is_consistent};
 use crate::refusal::Refusal;
 use crate::round::{Round, View};
 
@@ -330,7 +330,7 @@ impl Rounds {
         if decision.class.is_none() {
             // It decides nothing, but may be the first word of a round: somebody must have been in that.
             let somebody = this || decision.certificate.reached() > 0;
-            return if somebody { Ok(()) } else { Err(Refusal::Unfounded) };
+            return if somebody && is_consistent(decision) { Ok(()) } else { Err(Refusal::Unfounded) };
         }
         let Certificate { vocabulary, votes, others, .. } = &decision.certificate;
         if self.is_foreign(Scale { vocabulary: *vocabulary, classes: decision.certificate.listed() }) {

@@ -224,7 +224,7 @@ impl Rounds {
         self.names = names;
     }
 
-    /// The same rounds, in which this robot signs what it stands by: votes, what it holds and announces, samples and what it passes on
+    /// The same rounds, in which this robot signs what it stands by: votes, what it holds, gives and announces, samples and what it passes on
     /// of instructors.
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
@@ -337,8 +337,11 @@ impl Rounds {
     #[must_use]
     pub fn stamped(&mut self, message: Message) -> Envelope {
         self.stamp.sequence = self.stamp.sequence.saturating_add(1);
-        let is_hint =
-            matches!(message, Message::Have(_) | Message::Know(_) | Message::Give(_) | Message::Batches(_));
+        let is_hint = match &message {
+            // Who gives a decision stands by it.
+            Message::Give(give) => give.decision.is_none(),
+            message => matches!(message, Message::Have(_) | Message::Know(_) | Message::Batches(_)),
+        };
         let envelope = Envelope { author: self.me, stamp: self.stamp, message, signature: None };
         let signer = self.signer.as_deref().filter(|_| !is_hint);
         Envelope { signature: signer.map(|signer| signer.sign(&envelope.statement())), ..envelope }

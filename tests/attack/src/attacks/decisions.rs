@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, ClassId, Decision, Give, Have, HeldVote, Holder, Message, RobotId, Stamp, Topic,
+    Announcement, ClassId, Decision, Envelope, Give, Have, HeldVote, Holder, Message, RobotId, Stamp, Topic,
 };
 
 use super::WHOEVER_SAYS_SO;
@@ -17,8 +17,8 @@ use crate::swarm::{Parcel, Plan, Swarm};
 const MS: Duration = Duration::from_millis(1);
 
 /// The gesture that is shown, and the one that the adversary wants.
-const TRUE: u32 = 2;
-const FALSE: u32 = 4;
+pub(super) const TRUE: u32 = 2;
+pub(super) const FALSE: u32 = 4;
 const OTHER: u32 = 5;
 
 pub const ALL: &[Attack] = &[
@@ -125,28 +125,6 @@ pub const ALL: &[Attack] = &[
         play: |seed| beside(&eight(), seed, chosen, same_gesture),
     },
     Attack {
-        number: "A4 · 11",
-        what: "an enrolled robot decides on such votes, and claims the gesture that it wants",
-        tier: Tier::T4,
-        setting: Setting::Sealed,
-        expected: "nothing",
-        counted: Counted::All(&["refused_unfounded_decision"]),
-        gap: None,
-        play: |seed| beside(&eight(), seed, underivable, unmoved),
-    },
-    Attack {
-        number: "11",
-        what: "an enrolled robot that claimed what does not follow from its votes goes on voting",
-        tier: Tier::T4,
-        setting: Setting::Sealed,
-        expected: "it is expelled: its votes count no more",
-        counted: Counted::Some(&["refused_unfounded_decision"]),
-        gap: Some(
-            "robots do not sign the decisions they give, so none of them is evidence (E4), and nobody is expelled live",
-        ),
-        play: |seed| beside(&eight(), seed, then_votes, liar_is_out),
-    },
-    Attack {
         number: "A16",
         what: "contradicts every 150 ms with a lesser decision that does not follow",
         tier: Tier::T0,
@@ -179,12 +157,12 @@ pub const ALL: &[Attack] = &[
 ];
 
 /// Enough honest robots to outvote the liar among them with the margin that one liar needs.
-fn eight() -> Plan {
+pub(super) fn eight() -> Plan {
     Plan { honest: 8, ..Plan::sealed().liars(1).withstanding(1) }
 }
 
 /// Begins a round, lets the adversary act in its midst, ends it.
-fn amid_a_round(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
+pub(super) fn amid_a_round(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
     let began = swarm.now();
     swarm.begin(TRUE);
     swarm.pass(50 * MS);
@@ -247,8 +225,17 @@ fn announced_aloud(swarm: &mut Swarm, votes: Vec<HeldVote>) {
 }
 
 fn given(swarm: &mut Swarm, votes: Vec<HeldVote>) {
-    let decision = forged::decision(swarm.round(), votes, 0);
-    swarm.give(50, Some(decision), Vec::new());
+    let signs = votes.iter().any(|held| held.signature.is_some());
+    let message = forged::given(forged::decision(swarm.round(), votes, 0));
+    if !signs {
+        return swarm.whisper(50, &message);
+    }
+    let stamp = Stamp { boot: 1, sequence: 3 };
+    let said = Envelope { author: RobotId(50), stamp, message, signature: None };
+    let said = forged::signed(said, &key(STRANGER), &swarm.id());
+    for to in 1..=swarm.honest() {
+        swarm.put_to(to, &Topic::Repair(RobotId(to)), &said.encode());
+    }
 }
 
 fn in_their_names(swarm: &mut Swarm) {
@@ -360,7 +347,7 @@ fn final_as_in_peace(peace: &Swarm, war: &Swarm) -> Result<(), String> {
 }
 
 /// What the liar decides by the first vote with evidence of each other.
-fn of_chosen_votes(swarm: &Swarm) -> Decision {
+pub(super) fn of_chosen_votes(swarm: &Swarm) -> Decision {
     let (round, id) = (swarm.round(), swarm.id());
     let liar = swarm.liar();
     let own = forged::said(liar, Stamp { boot: 1, sequence: 1 }, forged::vote(round, FALSE, 16.0));
@@ -371,11 +358,15 @@ fn of_chosen_votes(swarm: &Swarm) -> Decision {
             votes.push(held);
         }
     }
-    forged::decision(round, votes, liar)
+    let mut decision = forged::decision(round, votes, liar);
+    let certificate = &mut decision.certificate;
+    certificate.terms = swarm.rounds().terms();
+    certificate.quorum = swarm.rounds().needs(certificate.robots);
+    decision
 }
 
 /// Waits until everybody has voted.
-fn once_all_voted(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
+pub(super) fn once_all_voted(swarm: &mut Swarm, act: &dyn Fn(&mut Swarm)) {
     let began = swarm.now();
     swarm.begin(TRUE);
     swarm.pass(340 * MS);
@@ -387,25 +378,6 @@ fn chosen(swarm: &mut Swarm) {
     once_all_voted(swarm, &|swarm| {
         let decision = of_chosen_votes(swarm);
         swarm.give(swarm.liar(), Some(decision), Vec::new());
-    });
-}
-
-fn underivable(swarm: &mut Swarm) {
-    once_all_voted(swarm, &|swarm| {
-        let mut decision = of_chosen_votes(swarm);
-        decision.class = Some(ClassId(FALSE));
-        swarm.put_decision(&decision);
-        swarm.give(swarm.liar(), Some(decision), Vec::new());
-    });
-}
-
-fn then_votes(swarm: &mut Swarm) {
-    underivable(swarm);
-    amid_a_round(swarm, &|swarm| {
-        let (round, id) = (swarm.round(), swarm.id());
-        let liar = swarm.liar();
-        let vote = forged::said(liar, Stamp { boot: 1, sequence: 9 }, forged::vote(round, FALSE, 1.0));
-        swarm.put_vote(&forged::signed(vote, &key(liar), &id));
     });
 }
 
@@ -421,7 +393,7 @@ pub fn liar_is_out(_: &Swarm, war: &Swarm) -> Result<(), String> {
 }
 
 /// No robot holds another gesture than in peace; which votes it rests on may differ.
-fn same_gesture(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+pub(super) fn same_gesture(peace: &Swarm, war: &Swarm) -> Result<(), String> {
     decided_alike(peace, war, 1000 * MS)
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
+use gestalt_strategies::is_refuted;
 use gestalt_trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 
 use super::decisions::liar_is_out;
@@ -97,7 +98,7 @@ fn convicted(seed: u64) -> Played {
     let mut refused = BTreeMap::new();
     let reached = match (observe(&mut witness, &one), observe(&mut witness, &other)) {
         (None, Some(evidence)) => verifiers.iter_mut().try_for_each(|verifier| {
-            let convicted = verifier.convict(now, &evidence);
+            let convicted = verifier.convict(now, &evidence, is_refuted);
             if !matches!(convicted, Ok(Conviction { robot: RobotId(6), .. })) {
                 return Err(format!("{convicted:?}"));
             }

@@ -3,6 +3,7 @@
 //! | file | aims at |
 //! |---|---|
 //! | `decisions` | what the swarm settles on |
+//! | `unfounded` | what is claimed of votes, and who is accused of that |
 //! | `votes` | what is counted |
 //! | `equivocation` | saying two things at once |
 //! | `floods` | saying too much |
@@ -26,6 +27,7 @@ mod replay;
 mod rosters;
 mod rounds;
 mod samples;
+mod unfounded;
 mod votes;
 
 use crate::attack::Attack;
@@ -35,6 +37,7 @@ use crate::attack::Attack;
 pub fn all() -> Vec<Attack> {
     let parts = [
         decisions::ALL,
+        unfounded::ALL,
         votes::ALL,
         equivocation::ALL,
         floods::ALL,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::{
     Announcement, Decision, Envelope, Give, HeldVote, Instruction, Message, RobotId, RoundId, Stamp, Topic,
 };
-use gestalt_strategies::Input;
+use gestalt_strategies::{Input, MindConfig};
 use gestalt_trust::SwarmId;
 
 use crate::forged;
@@ -34,6 +34,16 @@ impl Swarm {
     /// The number of the first liar.
     pub fn liar(&self) -> u32 {
         self.plan.honest + 1
+    }
+
+    /// By what its robots decide.
+    pub fn rounds(&self) -> &MindConfig {
+        &self.plan.rounds
+    }
+
+    /// How many honest robots have convicted that one.
+    pub fn convicting(&self, robot: u32) -> u32 {
+        self.robots.iter().map(|honest| u32::from(honest.port.convicts(RobotId(robot)))).sum()
     }
 
     /// The round that robot 1 knows, which everybody hears of.
@@ -181,9 +191,11 @@ impl Swarm {
             }
         }
         match envelope.message {
-            Message::Lessons(_) | Message::Holding(_) | Message::Announced(_) | Message::Asked(_) => {
-                forged::signed(envelope, &key(by.0), &self.id())
-            }
+            Message::Give(Give { decision: Some(_), .. })
+            | Message::Lessons(_)
+            | Message::Holding(_)
+            | Message::Announced(_)
+            | Message::Asked(_) => forged::signed(envelope, &key(by.0), &self.id()),
             _ => envelope,
         }
     }

@@ -143,10 +143,11 @@ impl Swarm {
 
     pub(super) fn arrive(&mut self, i: usize, parcel: &Parcel) {
         let now = self.now;
-        if let Some(input) = self.robots[i].port.take(now, parcel) {
+        let heard = self.robots[i].port.take(now, parcel);
+        for input in heard.into_iter().chain(self.robots[i].port.fallen()) {
             self.tell(i, input);
         }
-        for evidence in self.robots[i].port.untold() {
+        for evidence in self.robots[i].port.untold(now) {
             self.broadcast(i, &Topic::Evidence, evidence);
         }
     }

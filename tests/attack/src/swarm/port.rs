@@ -193,11 +193,7 @@ impl Port {
             Message::Lessons(_) => self.judge(now, &envelope)?,
             _ => {}
         }
-        let distrust = self.judge.as_mut().and_then(|judge| match &mut envelope.message {
-            Message::Give(give) => judge.give(now, give),
-            Message::Batches(batches) => judge.batches(now, batches),
-            _ => None,
-        });
+        let distrust = self.judge.as_mut().and_then(|judge| judge.passed_on(now, &mut envelope));
         if let Some(distrust) = distrust {
             // The rest of it may be true.
             self.refuse("repair", &Refusal::Distrust(distrust));
@@ -287,9 +283,21 @@ impl Port {
         Ok(self.judge.as_mut().map_or(Ok(()), |judge| judge.envelope(now, envelope))?)
     }
 
+    /// Whether that robot was convicted here.
+    pub fn convicts(&self, robot: RobotId) -> bool {
+        self.judge.as_ref().is_some_and(|judge| judge.convicts(robot))
+    }
+
+    /// Who was convicted here since this was last asked: the mind is to hear of it.
+    pub fn fallen(&mut self) -> Option<Input> {
+        let fallen = self.judge.as_mut().map(Judge::fallen).unwrap_or_default();
+        let fallen: BTreeSet<RobotId> = fallen.into_iter().map(|(robot, _)| robot).collect();
+        (!fallen.is_empty()).then_some(Input::Expelled(fallen))
+    }
+
     /// The evidence that was found here, as it is told to all.
-    pub fn untold(&mut self) -> Vec<Vec<u8>> {
-        let untold = self.judge.as_mut().map(Judge::untold).unwrap_or_default();
+    pub fn untold(&mut self, now: Duration) -> Vec<Vec<u8>> {
+        let untold = self.judge.as_mut().map(|judge| judge.untold(now)).unwrap_or_default();
         untold.into_iter().map(|(_, evidence)| evidence.encode()).collect()
     }
 

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Fnv1a, Keys, RobotId, Signature, Stamp};
-use gestalt_strategies::{Input, LearningSetup, Life, Mind, Output, RecordChange, RobotMemory, Sign};
+use gestalt_strategies::{
+    Input, LearningSetup, Life, Mind, Output, RecordChange, RobotMemory, Sign, is_refuted,
+};
 use gestalt_trust::{Identity, Judge, Roster, SwarmId, statement};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -181,7 +183,7 @@ fn waken(
         mind = mind.signed_by(Arc::new(Signer { identity: key(id.0), swarm: roster.swarm_id() }));
     }
     let keys = Keys::new(SWARM).expect("a name");
-    (mind, Port::new(id, keys, roster.cloned().map(Judge::new)))
+    (mind, Port::new(id, keys, roster.cloned().map(|roster| Judge::new(roster, is_refuted))))
 }
 
 /// A message of a robot's, as the network carries it.

@@ -6,7 +6,7 @@ use gestalt_protocol::{
     Announcement, Answer, Envelope, Instruction, Keys, MAX_ROBOTS, Message, Question, RobotId, Topic,
     decode_json,
 };
-use gestalt_strategies::{Input, Instructed};
+use gestalt_strategies::{Input, Instructed, is_refuted};
 use gestalt_trust::Witness;
 use rand::RngExt;
 
@@ -85,7 +85,8 @@ impl Inbox {
                 let signature = envelope.signature?;
                 let liar = self.witness.observe(&envelope.statement(), &signature);
                 if let Some(evidence) = liar {
-                    let convicted = evidence.check(swarm::roster()).expect("both halves were believed");
+                    let convicted =
+                        evidence.check(swarm::roster(), is_refuted).expect("both halves were believed");
                     assert_eq!(convicted.robot, id);
                 }
                 Input::Received(envelope)
@@ -166,6 +167,7 @@ impl Inbox {
                     give.votes.iter_mut().for_each(swarm::seal_vote);
                     give.holders.iter_mut().for_each(swarm::seal_holder);
                     give.decision.iter_mut().for_each(|decision| swarm::seal_decision(decision, 0xff));
+                    swarm::seal(&mut envelope);
                 }
                 _ => {}
             }

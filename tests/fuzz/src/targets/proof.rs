@@ -5,7 +5,7 @@ use std::time::Duration;
 use gestalt_protocol::{
     ClassId, CountedVote, Decision, Envelope, FusionRule, Message, RobotId, Stamp, decode_json,
 };
-use gestalt_strategies::{Fuse, MindConfig, Quorum, follows, fusion};
+use gestalt_strategies::{Fuse, MindConfig, Quorum, follows, fusion, is_refuted};
 
 use crate::gate::{Gate, votes};
 use crate::memory::bounded;
@@ -41,6 +41,7 @@ pub fn run(bytes: &[u8]) {
     let (sound, drawn) = (decision.check().is_ok(), follows(&decision));
     if drawn {
         assert!(sound, "it follows, and no robot may say it");
+        assert!(!is_refuted(&decision), "it follows, and would convict whoever gives it");
         names_one_gesture(&decision, &follows);
     }
     if sound {
@@ -70,7 +71,9 @@ fn given(decision: Decision) -> Vec<u8> {
 /// Makes of a decision what its votes make of it.
 fn draw(decision: &mut Decision, config: &MindConfig) {
     let certificate = &mut decision.certificate;
-    (certificate.rule, certificate.pool) = (config.rule, config.rule.pool());
+    (certificate.rule, certificate.pool, certificate.terms) =
+        (config.rule, config.rule.pool(), config.terms());
+    certificate.quorum = config.needs(certificate.robots);
     certificate.unknown = None;
     certificate.votes.iter_mut().for_each(|counted| counted.vote.unknown = None);
     let classes = certificate.votes.first().map_or(0, |counted| counted.vote.evidence.len());
@@ -83,7 +86,11 @@ fn draw(decision: &mut Decision, config: &MindConfig) {
     certificate.votes.iter_mut().for_each(|counted: &mut CountedVote| {
         counted.vote.round = decision.round;
         counted.vote.vocabulary = certificate.vocabulary;
-        counted.class = ClassId(0);
+        let evidence = &counted.vote.evidence;
+        let greatest = evidence.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let top = evidence.iter().position(|nats| *nats == greatest).unwrap_or_default();
+        counted.class = ClassId(top as u32);
+        counted.weight = config.rule.weight(config.clip, evidence) as f32;
     });
 }
 

@@ -160,6 +160,7 @@ impl Plot {
                 quorum: config.needs(robots as u32),
                 elapsed_ms: took.as_millis() as u32,
                 named: vec![],
+                terms: config.terms(),
             },
         })
     }

@@ -95,18 +95,21 @@ fn a_changed_class_is_announced_again_and_the_same_class_is_not() {
 
 #[test]
 fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
-    let sound = decision(1, Some(1), 3, 5);
+    let config = RoundsConfig { quorum: Quorum::Evidence(3), ..adding_up() };
+    let sound = by(&config, decision(1, Some(1), 3, 5));
     let changed = |change: &dyn Fn(&mut Decision)| {
         let mut decision = sound.clone();
         change(&mut decision);
         decision
     };
-    let config = RoundsConfig { quorum: Quorum::Evidence(3), ..adding_up() };
     for (lie, refusal) in [
         (changed(&|d| d.certificate.vocabulary = VocabularyId(77)), Refusal::Vocabulary),
         (changed(&|d| d.certificate.probabilities.push(0.0)), Refusal::Impossible),
         (changed(&|d| d.certificate.rule = FusionRule::Majority), Refusal::Unfounded),
-        (decision(1, Some(1), 2, 5), Refusal::Unfounded),
+        (by(&config, decision(1, Some(1), 2, 5)), Refusal::Unfounded),
+        // Of other robots, by their own terms.
+        (decision(1, Some(1), 3, 5), Refusal::Unfounded),
+        (by(&RoundsConfig { alpha: Some(0.1), ..config.clone() }, sound.clone()), Refusal::Unfounded),
         (changed(&|d| d.class = Some(ClassId(0))), Refusal::Unfounded),
         (changed(&|d| d.confidence = 0.999), Refusal::Unfounded),
         (changed(&|d| d.certificate.probabilities = vec![0.0, 1.0, 0.0]), Refusal::Unfounded),
@@ -123,7 +126,7 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
                         .iter_mut()
                         .for_each(|counted| counted.vote.evidence = vec![0.0, 0.1, -0.1]);
                 });
-                decided(round(1, 1), Some(1), votes.certificate.votes, 5)
+                by(&config, decided(round(1, 1), Some(1), votes.certificate.votes, 5))
             },
             Refusal::Unfounded,
         ),

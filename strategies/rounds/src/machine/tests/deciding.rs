@@ -102,10 +102,11 @@ fn a_liars_vote_is_clipped_and_f_liars_cannot_make_a_decision() {
 
 #[test]
 fn with_liars_a_decision_heard_needs_more_than_two_votes_for_each_and_their_margin() {
-    let mut mind = mind_with(7, RoundsConfig { liars: 1, ..adding_up() });
-    mind.handle(ms(0), gives(66, decision(1, Some(2), 2, 66)));
+    let config = RoundsConfig { liars: 1, ..adding_up() };
+    let mut mind = mind_with(7, config.clone());
+    mind.handle(ms(0), gives(66, by(&config, decision(1, Some(2), 2, 66))));
     assert_eq!((mind.held(), mind.refusals().count(Refusal::Unfounded)), (None, 1));
-    mind.handle(ms(2), gives(1, decision(1, Some(2), 5, 1)));
+    mind.handle(ms(2), gives(1, by(&config, decision(1, Some(2), 5, 1))));
     assert_eq!(mind.held().unwrap().class, Some(ClassId(2)));
 }
 
@@ -211,12 +212,12 @@ fn liars_tip_no_balance_that_honest_votes_leave() {
 #[test]
 fn where_liars_are_expected_a_decision_that_leaves_out_what_is_known_is_not_believed() {
     let config = RoundsConfig { liars: 1, ..adding_up() };
-    let mut mind = mind_with(7, config);
+    let mut mind = mind_with(7, config.clone());
     for robot in 1..=9 {
         mind.handle(ms(0), votes(robot, 1, vote(1, 0, SURE)));
     }
-    let mut early = mind_with(7, RoundsConfig { liars: 1, ..adding_up() });
-    let forged = || gives(66, decision(1, Some(2), 8, 66));
+    let mut early = mind_with(7, config.clone());
+    let forged = || gives(66, by(&config, decision(1, Some(2), 8, 66)));
     mind.handle(ms(1), forged());
     assert_ne!(mind.held().and_then(|held| held.class), Some(ClassId(2)));
     // Before all have spoken, too.

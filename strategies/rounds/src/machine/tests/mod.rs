@@ -168,8 +168,16 @@ fn decided(round: RoundId, class: Option<u32>, votes: Vec<CountedVote>, author: 
             quorum: robots / 2 + 1,
             elapsed_ms: 10,
             named: vec![],
+            terms: gestalt_protocol::Terms::default(),
         },
     }
+}
+
+/// The same decision by the terms of that configuration.
+fn by(config: &RoundsConfig, decision: Decision) -> Decision {
+    let (terms, quorum) = (config.terms(), config.needs(decision.certificate.robots));
+    let certificate = gestalt_protocol::Certificate { terms, quorum, ..decision.certificate };
+    Decision { certificate, ..decision }
 }
 
 /// A robot that holds a decision gives it to this one.

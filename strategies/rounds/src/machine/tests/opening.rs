@@ -221,7 +221,9 @@ fn a_round_under_a_count_that_was_used_elsewhere_is_opened_anew() {
     let mut late = mind(7);
     let mut other = mind(9);
     let lasted = |decision: Decision| {
-        let certificate = gestalt_protocol::Certificate { elapsed_ms: 5000, ..decision.certificate };
+        let (robots, quorum, elapsed_ms) = (3, 2, 5000);
+        let certificate =
+            gestalt_protocol::Certificate { robots, quorum, elapsed_ms, ..decision.certificate };
         Decision { certificate, ..decision }
     };
     let counted = decision(1, Some(0), 1, 9).certificate.votes;
