@@ -291,7 +291,7 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
     put(Topic::Sample(RobotId(1)), said(Message::Samples(of_another_class(100)))).await;
     put(Topic::Repair(RobotId(0)), give(of_another_class(200), None)).await;
     put(Topic::Repair(RobotId(0)), give(of_another_class(0), true_batch.signature)).await;
-    let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word };
+    let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word, said: None };
     let lessons = vec![word(2, Word::Was(ClassId(5))), word(3, Word::Retracted)];
     put(Topic::Repair(RobotId(0)), said(Message::Lessons(Lessons { lessons }))).await;
     // What is true is true whoever says it, and nothing new.

@@ -264,7 +264,7 @@ impl Inbox {
         if let Some((_, last)) = self.lock().heard.get_mut(&envelope.author) {
             *last = Some(Instant::now());
         }
-        if matches!(envelope.message, Message::Lessons(_)) {
+        if matches!(envelope.message, Message::Lessons(_) | Message::Namings(_)) {
             self.believe(&envelope)?;
         }
         let distrust = self.judged(|judge, now| match &mut envelope.message {
@@ -321,7 +321,7 @@ impl Inbox {
         }
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
-        self.queue(Input::Instructed(Instructed { by, at, instruction }))
+        self.queue(Input::Instructed(Instructed { by, at, instruction, said: None }))
     }
 
     fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {

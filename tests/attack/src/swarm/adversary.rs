@@ -176,9 +176,11 @@ impl Swarm {
             }
         }
         match envelope.message {
-            Message::Lessons(_) | Message::Holding(_) | Message::Announced(_) | Message::Asked(_) => {
-                forged::signed(envelope, &key(by.0), &self.id())
-            }
+            Message::Lessons(_)
+            | Message::Namings(_)
+            | Message::Holding(_)
+            | Message::Announced(_)
+            | Message::Asked(_) => forged::signed(envelope, &key(by.0), &self.id()),
             _ => envelope,
         }
     }

@@ -144,7 +144,12 @@ impl Swarm {
     pub(super) fn arrive(&mut self, i: usize, parcel: &Parcel) {
         let now = self.now;
         if let Some(input) = self.robots[i].port.take(now, parcel) {
+            let is_new_roster = matches!(input, Input::Expelled(_));
             self.tell(i, input);
+            let believer = self.robots[i].port.believer().filter(|_| is_new_roster);
+            if let Some(believer) = believer {
+                self.tell(i, Input::Believe(believer));
+            }
         }
         for evidence in self.robots[i].port.untold() {
             self.broadcast(i, &Topic::Evidence, evidence);
