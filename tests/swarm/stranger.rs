@@ -303,10 +303,16 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
     }
     assert_eq!(knows(&robots[0], [2, 4]).await, common);
 
-    // Robot 1 is gone; who comes late has its samples from others, under its signature.
+    // Robot 1 is gone; who comes late has its samples from others, under its signature, and what ada said, under that of the robot she said it at.
     robots.remove(1).stop().await;
     let late = pupil(3, &locators).await;
     assert_eq!(knows(&late, [0, 6]).await, common);
+    let deadline = tokio::time::Instant::now() + PATIENCE;
+    while late.robot.status().learning.expect("it learns").lessons != 1 {
+        assert!(tokio::time::Instant::now() < deadline, "{:?}", late.robot.status());
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert!(!late.robot.status().counters.contains_key("refused_lesson_unproven"));
     client.close().await;
     liar.close().await.unwrap();
     late.stop().await;
