@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::bounded;
 use crate::decode::DecodeError;
 use crate::id::{ClassId, InstructorId};
+use crate::lesson::SignedWord;
 
 /// The most gestures of which a robot keeps that they were named: retired ones, and those that became another, among them.
 pub const MAX_NAMED: usize = 256;
@@ -19,14 +20,18 @@ pub struct Naming {
     pub by: InstructorId,
     /// How: 1 to 64 bytes. With `by` it makes the gesture's number.
     pub label: String,
-    /// One more than the highest that was known of this gesture to the robot that heard the latest word on it: the higher replaces the lower.
+    /// The higher replaces the lower. In a sealed swarm it is the count that was signed with the latest word on it. In an open one it is one more than
+    /// the highest that was known of this gesture to the robot that heard that word.
     pub count: u64,
-    /// When that was said, as NTP64. Orders words of one count, which were said to robots that did not hear each other.
+    /// In an open swarm when that was said, as NTP64. Orders words of one count, which were said to robots that did not hear each other. In a sealed one
+    /// the count again.
     pub at: u64,
     /// Who said it: any instructor may.
     pub said_by: InstructorId,
     /// What became of it.
     pub fate: Fate,
+    /// The word that says so, as in a [`Lesson`](crate::Lesson).
+    pub said: Option<SignedWord>,
 }
 
 /// What became of a gesture that was named.

@@ -3,9 +3,10 @@
 use gestalt_protocol::{
     Announced, Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope,
     FeatureSpaceId, FusionRule, Give, Have, HeldBatch, HeldVote, Holder, Holding, Instruction, Know, Known,
-    Lesson, Lessons, MAX_ALLOCATION, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS,
-    MAX_SAMPLES, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId, SampleId, SampleSeries, Samples,
-    SharedSample, Stamp, Terms, Vector, VocabularyId, Vote, Word, decode_json,
+    Lesson, Lessons, MAX_ALLOCATION, MAX_ATTACHMENT, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE,
+    MAX_ROBOTS, MAX_SAMPLES, MAX_WORD, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId, SampleId,
+    SampleSeries, Samples, SharedSample, SignedWord, Stamp, Terms, Vector, VocabularyId, Vote, Word,
+    decode_json,
 };
 use proptest::prelude::*;
 
@@ -222,13 +223,17 @@ fn lesson() -> impl Strategy<Value = Lesson> {
         (0..MAX_CLASSES as u32).prop_map(|class| Word::Not(ClassId(class))),
         Just(Word::Retracted),
     ];
-    (round(), "[a-zA-Z0-9_-]{1,32}", any::<(u64, u64)>(), word).prop_map(
-        |(round, name, (count, at), word)| Lesson {
+    let bytes = |most| prop::collection::vec(any::<u8>(), 0..most);
+    let said = (bytes(MAX_WORD), bytes(MAX_ATTACHMENT))
+        .prop_map(|(word, attachment)| SignedWord { word, attachment });
+    (round(), "[a-zA-Z0-9_-]{1,32}", any::<(u64, u64)>(), word, prop::option::of(said)).prop_map(
+        |(round, name, (count, at), word, said)| Lesson {
             round,
             instructor: name.parse().expect("a name of that form"),
             count,
             at,
             word,
+            said,
         },
     )
 }

@@ -5,8 +5,8 @@ use gestalt_protocol::{
     Announcement, Answer, Ask, Asked, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope,
     Fate, FeatureSpaceId, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder, Instruction, Know,
     Known, Lesson, Lessons, Message, Naming, Namings, Outcome, Pool, Question, RobotId, RoundId, SampleId,
-    SampleSeries, Samples, SharedSample, Signature, Stamp, Terms, Vector, VocabularyId, Vote, Word,
-    decode_json,
+    SampleSeries, Samples, SharedSample, Signature, SignedWord, Stamp, Terms, Vector, VocabularyId, Vote,
+    Word, decode_json,
 };
 
 const ROUND: RoundId = RoundId { counter: 300, opener: RobotId(2), life: 0xA1 };
@@ -319,12 +319,20 @@ fn what_a_robot_knows() {
 
 #[test]
 fn what_instructors_said() {
-    let said = |word| Lesson { round: ROUND, instructor: "ada".parse().unwrap(), count: 2, at: 1, word };
-    let lessons = vec![said(Word::Was(ClassId(3))), said(Word::Not(ClassId(4))), said(Word::Retracted)];
+    let said = |word| {
+        let instructor = "ada".parse().unwrap();
+        Lesson { round: ROUND, instructor, count: 2, at: 1, word, said: None }
+    };
+    let signed = SignedWord { word: b"{}".to_vec(), attachment: vec![1, 2, 3] };
+    let lessons = vec![
+        said(Word::Was(ClassId(3))),
+        said(Word::Not(ClassId(4))),
+        Lesson { said: Some(signed), ..said(Word::Retracted) },
+    ];
     travels_as(
         Message::Lessons(Lessons { lessons }),
         &format!(
-            "{HEAD} 05 03 ac0202a101 03616461 02 01 0003 ac0202a101 03616461 02 01 0104 ac0202a101 03616461 02 01 02"
+            "{HEAD} 05 03 ac0202a101 03616461 02 01 0003 00 ac0202a101 03616461 02 01 0104 00 ac0202a101 03616461 02 01 02 01 027b7d 03010203"
         ),
     );
 }
@@ -339,10 +347,11 @@ fn what_instructors_named() {
         at: 1,
         said_by: bob,
         fate: Fate::Same(ClassId(3)),
+        said: None,
     };
     travels_as(
         Message::Namings(Namings { namings: vec![circle] }),
-        &format!("{HEAD} 09 01 03616e61 06636972636c65 02 01 03626f62 0103"),
+        &format!("{HEAD} 09 01 03616e61 06636972636c65 02 01 03626f62 0103 00"),
     );
 }
 

@@ -1,29 +1,66 @@
 //! What instructors said of which round: one latest word per instructor and round, so that what is heard twice, late
 //! or in another order comes to the same.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RoundId, Word};
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RoundId, SignedWord, Word};
 use siphasher::sip::SipHasher24;
 
+use crate::believe::Standing;
 use crate::candidates::Candidates;
 
-/// The most instructors of one round: beyond, those who were heard of first, on whatever round, are kept. Names made up
-/// later lock nobody out.
+/// The most instructors of one round: beyond, those of the higher standing, and of these who were heard of first, on whatever round, are kept. Names made
+/// up later lock nobody out.
 pub(crate) const MAX_INSTRUCTORS: usize = 16;
 
 /// The most instructors of whom it is known who was heard of first.
 const MAX_FAMILIAR: usize = 256;
 
-/// How far a count may lie beyond the highest known on its round: nobody says so much that others hear none of it.
+/// How far a count that nobody signed may lie beyond the highest known on its round: nobody says so much that others hear none of it.
 const COUNT_LEAP: u64 = 1 << 32;
 
-/// The highest count taken in on a round of which nothing is known. There are as many beyond it.
+/// The highest such count taken in on a round of which nothing is known. There are as many beyond it.
 const FIRST_COUNT: u64 = u64::MAX / 2;
 
-/// The count, the time and the word of an instructor on a round; the greatest counts.
-type Said = (u64, u64, Word);
+/// What an instructor said of a round, and by which right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Said {
+    standing: Standing,
+    count: u64,
+    at: u64,
+    word: Word,
+    proof: Option<SignedWord>,
+}
+
+impl Said {
+    fn new(lesson: &Lesson, standing: Standing) -> Self {
+        let Lesson { count, at, word, said: ref proof, .. } = *lesson;
+        Self { standing, count, at, word, proof: proof.clone() }
+    }
+
+    /// Of one instructor's words the greatest counts; what is proven before what is not.
+    fn order(&self) -> (bool, u64, u64, Word) {
+        (self.is_proven(), self.count, self.at, self.word)
+    }
+
+    fn is_proven(&self) -> bool {
+        self.standing > Standing::Unproven
+    }
+
+    fn of(&self, round: RoundId, instructor: &InstructorId) -> Lesson {
+        let Self { count, at, word, proof, .. } = self;
+        Lesson {
+            round,
+            instructor: instructor.clone(),
+            count: *count,
+            at: *at,
+            word: *word,
+            said: proof.clone(),
+        }
+    }
+}
 
 /// Which gestures a round may have shown, by all that was said of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,6 +86,8 @@ pub enum LessonReceipt {
     Full,
     /// Its round, or its count, lies too far ahead of all that is known.
     FarAhead,
+    /// Nothing shows that its instructor said that, or may.
+    Unproven,
 }
 
 /// What every instructor said of every round, as far as it is kept: the latest [`MAX_LESSONS`] rounds, of each the words of
@@ -61,37 +100,40 @@ pub struct LessonBook {
 }
 
 impl LessonBook {
-    /// Takes in one lesson. Of two words of one count and time the greater counts, so that all robots keep the same.
+    /// Takes in one lesson, as in an open swarm. Of two words of one count and time the greater counts, so that all robots keep the same.
     pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
-        self.hear_among(lesson, |_| false).0
+        self.hear_among(lesson, None, |_| false).0
     }
 
     /// The same for a robot that lived through some rounds: words on those are taken in before words on others, so that
-    /// made-up rounds keep nobody from teaching. Says also which round was forgotten for it.
+    /// made-up rounds keep nobody from teaching. Says also which round was forgotten for it. In a sealed swarm a word has a `standing`, and its count
+    /// was signed.
     pub fn hear_among(
         &mut self,
         lesson: &Lesson,
+        standing: Option<Standing>,
         lived: impl Fn(RoundId) -> bool,
     ) -> (LessonReceipt, Option<RoundId>) {
-        let said = (lesson.count, lesson.at, lesson.word);
         let highest = match self.highest_count([lesson.round]) {
             0 => FIRST_COUNT,
             known => known.saturating_add(COUNT_LEAP),
         };
-        if lesson.count > highest {
+        if standing.is_none() && lesson.count > highest {
             return (LessonReceipt::FarAhead, None);
         }
+        let said = Said::new(lesson, standing.unwrap_or(Standing::Overrules));
         let (mut replaced, mut forgotten) = (None, None);
         match self.rounds.get(&lesson.round) {
             Some(words) => match words.get(&lesson.instructor) {
-                Some(known) if *known >= said => return (LessonReceipt::Known, None),
+                Some(known) if known.order() >= said.order() => return (LessonReceipt::Known, None),
                 None if words.len() >= MAX_INSTRUCTORS => {
-                    let latest = words.keys().max_by_key(|name| self.standing(name)).cloned();
-                    if latest.as_ref().is_some_and(|l| self.standing(l) <= self.standing(&lesson.instructor))
+                    let place = |name, said: &Said| (Reverse(said.standing), self.familiarity(name));
+                    let last = words.iter().max_by_key(|(name, said)| place(name, said));
+                    if last.is_some_and(|(name, last)| place(name, last) <= place(&lesson.instructor, &said))
                     {
                         return (LessonReceipt::Full, None);
                     }
-                    replaced = latest;
+                    replaced = last.map(|(name, _)| name.clone());
                 }
                 _ => {}
             },
@@ -119,15 +161,37 @@ impl LessonBook {
     }
 
     /// The smaller, the longer that instructor is known.
-    fn standing(&self, instructor: &InstructorId) -> usize {
+    fn familiarity(&self, instructor: &InstructorId) -> usize {
         self.familiar.get(instructor).copied().unwrap_or(MAX_FAMILIAR)
+    }
+
+    /// Whether that lesson, or a later one of the same instructor, is known and can be shown to others.
+    pub(crate) fn is_known(&self, lesson: &Lesson) -> bool {
+        let known = self.rounds.get(&lesson.round).and_then(|words| words.get(&lesson.instructor));
+        known.is_some_and(|known| {
+            known.is_proven() && (known.count, known.at, known.word) >= (lesson.count, lesson.at, lesson.word)
+        })
+    }
+
+    /// Asks anew by which right each word was said; gives the rounds of which a word has another standing now.
+    pub(crate) fn judge_again(&mut self, standing: impl Fn(&Lesson) -> Standing) -> Vec<RoundId> {
+        let mut changed = Vec::new();
+        for (round, words) in &mut self.rounds {
+            for (instructor, said) in words {
+                let now = standing(&said.of(*round, instructor));
+                if std::mem::replace(&mut said.standing, now) != now && changed.last() != Some(round) {
+                    changed.push(*round);
+                }
+            }
+        }
+        changed
     }
 
     /// The highest count of any word on a round, by all its names; 0 if there is none.
     #[must_use]
     pub fn highest_count(&self, names: impl IntoIterator<Item = RoundId>) -> u64 {
         let words = names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten();
-        words.map(|(_, (count, ..))| *count).max().unwrap_or(0)
+        words.map(|(_, said)| said.count).max().unwrap_or(0)
     }
 
     /// Forgets what was said of rounds with higher counters; says of which.
@@ -149,8 +213,8 @@ impl LessonBook {
         self.rounds.remove(&round);
     }
 
-    /// What all that was said of a round comes to, where these are the gestures there are. Where instructors contradict
-    /// each other the latest word counts alone.
+    /// What all that was said of a round comes to, where these are the gestures there are. Words of the highest standing count. Where instructors who may
+    /// overrule contradict each other, the latest word counts alone; of those who may not, the earliest that stands does.
     #[must_use]
     pub fn verdict(&self, round: RoundId, classes: &Candidates) -> Verdict {
         self.verdict_by_names([round], classes)
@@ -163,27 +227,24 @@ impl LessonBook {
         names: impl IntoIterator<Item = RoundId>,
         classes: &Candidates,
     ) -> Verdict {
-        let mut words: BTreeMap<&InstructorId, Said> = BTreeMap::new();
-        for (instructor, said) in names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten() {
-            words.entry(instructor).and_modify(|known| *known = *said.max(known)).or_insert(*said);
-        }
+        let words = self.by_instructor(names);
         if words.is_empty() {
             return Verdict::Unsaid;
         }
-        let valid = words.values().filter(|(.., word)| *word != Word::Retracted);
-        let Some((.., latest)) = valid.clone().max() else { return Verdict::Retracted };
+        let leading = leading(&words);
+        let Some((_, latest)) = leading.last() else { return Verdict::Retracted };
         // What was shown has a name, also where nobody uses that any more, or this robot has not heard of it.
-        let named = match latest {
-            Word::Was(class) if class.is_named() => Some(*class),
+        let named = match latest.word {
+            Word::Was(class) if class.is_named() => Some(class),
             _ => None,
         };
         let mut candidates = classes.clone();
         candidates.0.extend(named);
-        valid.for_each(|(.., word)| candidates.restrict(*word));
+        leading.iter().for_each(|(_, said)| candidates.restrict(said.word));
         if candidates.0.is_empty() {
             candidates = classes.clone();
             candidates.0.extend(named);
-            candidates.restrict(*latest);
+            candidates.restrict(latest.word);
         }
         match candidates.only() {
             Some(class) => Verdict::Class(class),
@@ -192,21 +253,44 @@ impl LessonBook {
         }
     }
 
-    /// Every lesson about a round, the latest first: who takes that in takes in the others.
-    pub fn of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
-        let mut lessons: Vec<Lesson> = self.all_of(round).collect();
-        lessons.sort_by_key(|lesson| std::cmp::Reverse(lesson.count));
-        lessons.into_iter()
+    /// Whether what that instructor said of a round that has several names counts there: not where somebody else's word goes before it.
+    #[must_use]
+    pub fn is_heeded(&self, names: impl IntoIterator<Item = RoundId>, instructor: &InstructorId) -> bool {
+        let words = self.by_instructor(names);
+        leading(&words).iter().any(|(name, _)| *name == instructor)
     }
 
-    fn all_of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
-        self.rounds.get(&round).into_iter().flatten().map(move |(instructor, (count, at, word))| Lesson {
-            round,
-            instructor: instructor.clone(),
-            count: *count,
-            at: *at,
-            word: *word,
-        })
+    /// The latest word of each instructor on a round that has several names.
+    fn by_instructor(&self, names: impl IntoIterator<Item = RoundId>) -> BTreeMap<&InstructorId, &Said> {
+        let mut words: BTreeMap<&InstructorId, &Said> = BTreeMap::new();
+        for (instructor, said) in names.into_iter().filter_map(|name| self.rounds.get(&name)).flatten() {
+            let known = words.entry(instructor).or_insert(said);
+            if known.order() < said.order() {
+                *known = said;
+            }
+        }
+        words
+    }
+
+    /// Every lesson about a round, the latest first: who takes that in takes in the others.
+    pub fn of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
+        self.those_of(round, |_| true)
+    }
+
+    /// Those of them that can be shown to others.
+    pub fn told_of(&self, round: RoundId) -> impl Iterator<Item = Lesson> + '_ {
+        self.those_of(round, Said::is_proven)
+    }
+
+    fn those_of(
+        &self,
+        round: RoundId,
+        is_wanted: impl Fn(&Said) -> bool,
+    ) -> impl Iterator<Item = Lesson> + '_ {
+        let words = self.rounds.get(&round).into_iter().flatten().filter(|(_, said)| is_wanted(said));
+        let mut lessons: Vec<Lesson> = words.map(|(instructor, said)| said.of(round, instructor)).collect();
+        lessons.sort_by_key(|lesson| Reverse(lesson.count));
+        lessons.into_iter()
     }
 
     /// The latest word of one instructor on a round that has several names, with its count and time.
@@ -217,12 +301,18 @@ impl LessonBook {
         instructor: &InstructorId,
     ) -> Option<(u64, u64, Word)> {
         let words = names.into_iter().filter_map(|name| self.rounds.get(&name)?.get(instructor));
-        words.max().copied()
+        words.max_by_key(|said| said.order()).map(|said| (said.count, said.at, said.word))
     }
 
-    /// The rounds of which something is known, each with a digest of what under that key.
+    /// The rounds of which something is known that can be shown to others, each with a digest of what under that key.
     pub fn rounds(&self, key: u64) -> impl Iterator<Item = (RoundId, u64)> + '_ {
-        self.rounds.keys().map(move |round| (*round, self.digest_of(*round, key)))
+        let told = self.rounds.iter().filter(|(_, words)| words.values().any(Said::is_proven));
+        told.map(move |(round, _)| (*round, self.digest_of(*round, key)))
+    }
+
+    /// The rounds of which anything is known.
+    pub(crate) fn all_rounds(&self) -> impl Iterator<Item = RoundId> + '_ {
+        self.rounds.keys().copied()
     }
 
     /// The oldest round of which something is known.
@@ -249,19 +339,23 @@ impl LessonBook {
         self.rounds.is_empty()
     }
 
-    /// A digest of everything under a key: the same lessons, heard in whatever order, give the same.
+    /// A digest of everything that can be shown to others under a key: the same lessons, heard in whatever order, give the same.
     #[must_use]
     pub fn digest(&self, key: u64) -> u64 {
         self.rounds(key).fold(0, |digest, (_, of_round)| digest ^ of_round)
     }
 
-    /// The digest of what is known of one round under a key, 0 for nothing.
+    /// The same of one round, 0 for nothing.
     #[must_use]
     pub fn digest_of(&self, round: RoundId, key: u64) -> u64 {
-        let Some(words) = self.rounds.get(&round) else { return 0 };
+        let words = self.rounds.get(&round).into_iter().flatten().filter(|(_, said)| said.is_proven());
+        let mut words = words.peekable();
+        if words.peek().is_none() {
+            return 0;
+        }
         let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"lessons "));
         [round.counter, round.opener.0, round.life].iter().for_each(|part| sip.write(&part.to_le_bytes()));
-        for (instructor, (count, at, word)) in words {
+        for (instructor, Said { count, at, word, .. }) in words {
             let (kind, class) = match word {
                 Word::Was(class) => (1_u8, class.0),
                 Word::Not(class) => (2, class.0),
@@ -278,153 +372,19 @@ impl LessonBook {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use gestalt_protocol::RobotId;
-    use proptest::prelude::*;
-
-    use super::*;
-
-    fn lesson(counter: u32, who: &str, count: u64, word: Word) -> Lesson {
-        let round = RoundId { counter, opener: RobotId(1), life: 0 };
-        Lesson { round, instructor: who.parse().unwrap(), count, at: 7, word }
+/// The words that count, by when they were said: of those that were not taken back, the ones of the highest standing. Who may not overrule is heard where
+/// nobody else has spoken: of several such the earliest is the one.
+fn leading<'a>(words: &BTreeMap<&'a InstructorId, &'a Said>) -> Vec<(&'a InstructorId, &'a Said)> {
+    let valid = words.iter().filter(|(_, said)| said.word != Word::Retracted);
+    let Some(standing) = valid.clone().map(|(_, said)| said.standing).max() else { return Vec::new() };
+    let of_that = valid.filter(|(_, said)| said.standing == standing);
+    let mut leading: Vec<_> = of_that.map(|(name, said)| (*name, *said)).collect();
+    leading.sort_by_key(|(_, said)| said.order());
+    if matches!(standing, Standing::Vouched | Standing::Teaches) {
+        leading.truncate(1);
     }
-
-    fn six() -> Candidates {
-        Candidates::of((0..6).map(ClassId))
-    }
-
-    fn was(class: u32) -> Word {
-        Word::Was(ClassId(class))
-    }
-
-    fn not(class: u32) -> Word {
-        Word::Not(ClassId(class))
-    }
-
-    fn verdict(words: &[(&str, u64, Word)]) -> Verdict {
-        let mut book = LessonBook::default();
-        for (who, at, word) in words {
-            book.hear(&lesson(1, who, *at, *word));
-        }
-        book.verdict(RoundId { counter: 1, opener: RobotId(1), life: 0 }, &six())
-    }
-
-    #[test]
-    fn words_add_up_and_the_latest_settles_a_contradiction() {
-        let class = |class| Verdict::Class(ClassId(class));
-        assert_eq!(verdict(&[]), Verdict::Unsaid);
-        assert_eq!(verdict(&[("ada", 1, was(3))]), class(3));
-        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, was(4))]), class(4));
-        assert_eq!(verdict(&[("ada", 1, was(3)), ("bob", 2, was(4))]), class(4));
-        assert_eq!(verdict(&[("ada", 1, was(3)), ("bob", 2, not(4))]), class(3), "no contradiction");
-        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, Word::Retracted)]), Verdict::Retracted);
-        assert_eq!(verdict(&[("ada", 1, was(3)), ("ada", 2, Word::Retracted), ("bob", 1, was(2))]), class(2));
-        let Verdict::Among(candidates) = verdict(&[("ada", 1, not(3)), ("bob", 2, not(5))]) else {
-            panic!("not one alone")
-        };
-        let left: Vec<u32> = (0..8).filter(|class| candidates.contains(ClassId(*class))).collect();
-        assert_eq!(left, [0, 1, 2, 4]);
-        let four = [("a", 1, not(0)), ("b", 1, not(1)), ("c", 1, not(2)), ("d", 1, not(3)), ("e", 1, not(5))];
-        assert_eq!(verdict(&four), class(4), "only one is left");
-    }
-
-    proptest! {
-        #[test]
-        fn the_order_and_repetition_of_lessons_make_no_difference(
-            lessons in prop::collection::vec((0..4_u32, 0..3_usize, 0..5_u64, 0..3_u32, any::<bool>()), 0..40),
-            order in any::<prop::sample::Index>(),
-        ) {
-            let lessons: Vec<Lesson> = lessons
-                .into_iter()
-                .map(|(round, who, at, class, is)| {
-                    lesson(round, ["ada", "bob", "cyn"][who], at, if is { was(class) } else { not(class) })
-                })
-                .collect();
-            let mut forwards = LessonBook::default();
-            lessons.iter().for_each(|lesson| { forwards.hear(lesson); });
-            let mut turned = LessonBook::default();
-            let middle = order.index(lessons.len() + 1);
-            let twice = lessons[middle..].iter().chain(&lessons[..middle]).rev().chain(&lessons);
-            twice.for_each(|lesson| { turned.hear(lesson); });
-            prop_assert_eq!(forwards.digest(7), turned.digest(7));
-            prop_assert_eq!(forwards.rounds, turned.rounds);
-        }
-    }
-
-    #[test]
-    fn the_oldest_rounds_are_forgotten_and_not_taken_up_again() {
-        let mut book = LessonBook::default();
-        for counter in 0..MAX_LESSONS as u32 + 10 {
-            assert_eq!(book.hear(&lesson(counter + 5, "ada", 1, was(1))), LessonReceipt::New);
-        }
-        assert_eq!(book.len(), MAX_LESSONS);
-        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), LessonReceipt::Full);
-        let mut fresh = LessonBook::default();
-        book.rounds.keys().for_each(|round| {
-            fresh.hear(&lesson(round.counter, "ada", 1, was(1)));
-        });
-        assert_eq!(book.digest(7), fresh.digest(7), "the digest is of what is kept");
-    }
-
-    #[test]
-    fn a_round_has_only_so_many_instructors_and_none_heard_before_is_locked_out() {
-        let mut book = LessonBook::default();
-        assert_eq!(book.hear(&lesson(1, "ada", 1, was(1))), LessonReceipt::New);
-        for i in 0..MAX_INSTRUCTORS {
-            assert_eq!(book.hear(&lesson(2, &format!("i{i}"), 1, was(1))), LessonReceipt::New);
-        }
-        assert_eq!(book.hear(&lesson(2, "one-more", 1, was(1))), LessonReceipt::Full);
-        assert_eq!(
-            book.hear(&lesson(2, "i3", 2, was(2))),
-            LessonReceipt::New,
-            "who is known may speak again"
-        );
-        assert_eq!(book.hear(&lesson(2, "ada", 3, was(4))), LessonReceipt::New, "the newest name gives way");
-        let round = lesson(2, "ada", 1, was(1)).round;
-        assert_eq!(book.of(round).count(), MAX_INSTRUCTORS);
-        assert_eq!(book.verdict(round, &six()), Verdict::Class(ClassId(4)));
-        for i in 0..2 * MAX_FAMILIAR {
-            book.hear(&lesson(3 + i as u32 / 10, &format!("flood{i}"), 1, was(1)));
-        }
-        assert_eq!(book.familiar.len(), MAX_FAMILIAR);
-    }
-
-    #[test]
-    fn no_word_is_beyond_correction() {
-        let mut book = LessonBook::default();
-        let round = lesson(1, "ada", 1, was(1)).round;
-        assert_eq!(book.hear(&lesson(1, "ada", u64::MAX, Word::Retracted)), LessonReceipt::FarAhead);
-        // As far as may be, and at a time that no clock comes to.
-        for _ in 0..100 {
-            let count = book.highest_count([round]) + COUNT_LEAP;
-            let forged = Lesson { at: u64::MAX, ..lesson(1, "ada", count, Word::Retracted) };
-            assert_eq!(book.hear(&forged), LessonReceipt::New);
-            let count = book.highest_count([round]) + 1;
-            assert_eq!(book.hear(&lesson(1, "ada", count, was(2))), LessonReceipt::New);
-            assert_eq!(book.verdict(round, &six()), Verdict::Class(ClassId(2)));
-        }
-    }
-
-    #[test]
-    fn made_up_rounds_keep_nobody_from_teaching() {
-        let mut book = LessonBook::default();
-        let lived = |round: RoundId| round.life == 0;
-        let made_up = |i: u32| {
-            let round = RoundId { counter: 9, opener: RobotId(u32::MAX), life: 1 + i };
-            Lesson { round, ..lesson(9, "eve", 1, was(1)) }
-        };
-        for i in 0..2 * MAX_LESSONS as u32 {
-            book.hear_among(&made_up(i), lived);
-        }
-        assert_eq!(book.len(), MAX_LESSONS);
-        for counter in 1..9 {
-            assert_eq!(book.hear_among(&lesson(counter, "ada", 1, was(3)), lived).0, LessonReceipt::New);
-        }
-        for i in 0..2 * MAX_LESSONS as u32 {
-            book.hear_among(&made_up(u32::MAX / 2 + i), lived);
-        }
-        assert_eq!(book.len(), MAX_LESSONS);
-        assert!((1..9).all(|counter| book.contains(lesson(counter, "ada", 1, was(3)).round)));
-    }
+    leading
 }
+
+#[cfg(test)]
+mod tests;

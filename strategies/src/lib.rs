@@ -16,6 +16,7 @@
 //! needs of both is re-exported here.
 
 mod asking;
+mod believe;
 mod candidates;
 pub mod forgetting;
 pub mod geometry;
@@ -30,6 +31,7 @@ mod training_set;
 mod vector_codec;
 
 pub use asking::{Occasion, QuestionBudget, QuestionsConfig, QuestionsConfigError, worth_asking};
+pub use believe::{Believe, Standing};
 pub use candidates::Candidates;
 pub use forgetting::{Forgetting, ForgettingRule};
 pub use gestalt_rounds::{

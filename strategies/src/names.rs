@@ -7,7 +7,9 @@ use std::hash::Hasher;
 use gestalt_protocol::{ClassId, Fate, InstructorId, MAX_NAMED, Naming};
 use siphasher::sip::SipHasher24;
 
-/// How far a count may lie beyond the highest known of its gesture: nobody says so much that others hear none of it.
+use crate::believe::Standing;
+
+/// How far a count that nobody signed may lie beyond the highest known of its gesture: nobody says so much that others hear none of it.
 const COUNT_LEAP: u64 = 1 << 32;
 
 /// What came of a word on a gesture that was named.
@@ -21,20 +23,41 @@ pub enum NamingReceipt {
     Full,
     /// Its count lies too far ahead of all that is known.
     FarAhead,
+    /// Nothing shows that who is said to have said it did, or may.
+    Unproven,
 }
 
 /// All gestures that were named, with what became of each: at most [`MAX_NAMED`], those of the smallest numbers, so that all robots keep the same.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NameBook {
-    namings: BTreeMap<ClassId, Naming>,
+    namings: BTreeMap<ClassId, Said>,
+}
+
+/// The latest word on a gesture, and by which right it was said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Said {
+    naming: Naming,
+    standing: Standing,
+}
+
+impl Said {
+    fn is_proven(&self) -> bool {
+        self.standing > Standing::Unproven
+    }
 }
 
 impl NameBook {
-    /// Takes in what was said of a gesture. Of two words of one count and time the greater counts.
+    /// Takes in what was said of a gesture, as in an open swarm. Of two words of one count and time the greater counts.
     pub fn hear(&mut self, naming: &Naming) -> NamingReceipt {
-        let receipt = self.would_hear(naming);
+        self.hear_by(naming, None)
+    }
+
+    /// The same in a sealed swarm, where a word has a `standing` and its count was signed.
+    pub(crate) fn hear_by(&mut self, naming: &Naming, standing: Option<Standing>) -> NamingReceipt {
+        let receipt = self.would_hear(naming, standing);
         if receipt == NamingReceipt::New {
-            self.namings.insert(naming.gesture(), naming.clone());
+            let standing = standing.unwrap_or(Standing::Overrules);
+            self.namings.insert(naming.gesture(), Said { naming: naming.clone(), standing });
             if self.namings.len() > MAX_NAMED {
                 self.namings.pop_last();
             }
@@ -43,13 +66,15 @@ impl NameBook {
     }
 
     /// What would come of it.
-    pub(crate) fn would_hear(&self, naming: &Naming) -> NamingReceipt {
+    pub(crate) fn would_hear(&self, naming: &Naming, standing: Option<Standing>) -> NamingReceipt {
         let gesture = naming.gesture();
         let known = self.namings.get(&gesture);
         let greatest = self.namings.last_key_value().map(|(greatest, _)| *greatest);
-        if known.is_some_and(|known| order(known) >= order(naming)) {
+        let highest = known.map_or(0, |known| known.naming.count).saturating_add(COUNT_LEAP);
+        let place = (right(standing.unwrap_or(Standing::Overrules)), order(naming));
+        if known.is_some_and(|known| (right(known.standing), order(&known.naming)) >= place) {
             NamingReceipt::Known
-        } else if naming.count > known.map_or(0, |known| known.count).saturating_add(COUNT_LEAP) {
+        } else if standing.is_none() && naming.count > highest {
             NamingReceipt::FarAhead
         } else if known.is_none() && self.namings.len() >= MAX_NAMED && greatest <= Some(gesture) {
             NamingReceipt::Full
@@ -60,18 +85,41 @@ impl NameBook {
 
     /// Takes in what this robot knew before, whatever its count.
     pub(crate) fn hear_again(&mut self, naming: &Naming) {
-        self.namings.insert(naming.gesture(), naming.clone());
+        let said = Said { naming: naming.clone(), standing: Standing::Overrules };
+        self.namings.insert(naming.gesture(), said);
+    }
+
+    /// Whether that word, or a later one on the same gesture, is known and can be shown to others.
+    pub(crate) fn is_known(&self, naming: &Naming) -> bool {
+        let known = self.namings.get(&naming.gesture());
+        known.is_some_and(|known| known.is_proven() && order(&known.naming) >= order(naming))
+    }
+
+    /// Asks anew by which right each word was said; gives the gestures on which a word has another standing now.
+    pub(crate) fn judge_again(&mut self, standing: impl Fn(&Naming) -> Standing) -> Vec<ClassId> {
+        let mut changed = Vec::new();
+        for (gesture, said) in &mut self.namings {
+            let now = standing(&said.naming);
+            let before = std::mem::replace(&mut said.standing, now);
+            changed.extend((before != now).then_some(*gesture));
+        }
+        changed
     }
 
     /// What is known of a gesture.
     #[must_use]
     pub fn get(&self, gesture: ClassId) -> Option<&Naming> {
-        self.namings.get(&gesture)
+        self.namings.get(&gesture).map(|said| &said.naming)
     }
 
     /// All of it, by number.
     pub fn iter(&self) -> impl Iterator<Item = &Naming> {
-        self.namings.values()
+        self.namings.values().map(|said| &said.naming)
+    }
+
+    /// What of it can be shown to others.
+    pub(crate) fn told(&self) -> impl Iterator<Item = &Naming> {
+        self.namings.values().filter(|said| said.is_proven()).map(|said| &said.naming)
     }
 
     /// Whether nothing was named.
@@ -100,7 +148,7 @@ impl NameBook {
             if let Some(begin) = passed.iter().position(|known| *known == at) {
                 return passed[begin..].iter().min().copied();
             }
-            match self.namings.get(&at)?.fate {
+            match self.get(at)?.fate {
                 Fate::InUse => return Some(at),
                 Fate::Retired => return None,
                 Fate::Same(other) => {
@@ -129,10 +177,21 @@ impl NameBook {
                 return Some(theirs);
             }
         }
-        let of_label = self.namings.iter().filter(|(_, naming)| naming.label == label);
+        let of_label = self.namings.iter().filter(|(_, said)| said.naming.label == label);
         let mut of_label = of_label.map(|(gesture, _)| *gesture).filter(|gesture| self.is_in_use(*gesture));
         let only = of_label.next();
         only.filter(|_| of_label.next().is_none())
+    }
+
+    /// Whether an instructor can have meant that gesture by a label that is not of the list: whichever of those that bear it.
+    pub(crate) fn can_mean(&self, label: &str, by: &InstructorId, gesture: ClassId) -> bool {
+        let theirs = |label: &str| {
+            let (label, whose) = label.strip_suffix(')')?.rsplit_once(" (")?;
+            Some(ClassId::named(&whose.parse().ok()?, label))
+        };
+        ClassId::named(by, label) == gesture
+            || theirs(label) == Some(gesture)
+            || self.get(gesture).is_some_and(|naming| naming.label == label)
     }
 
     /// What each gesture is called: by its label, and where another in use, or of the list, has the same, by who named it too. One that is the
@@ -140,14 +199,14 @@ impl NameBook {
     #[must_use]
     pub fn titles(&self, listed: &[String]) -> BTreeMap<ClassId, String> {
         let mut times: BTreeMap<&str, usize> = listed.iter().map(|label| (label.as_str(), 1)).collect();
-        for (_, naming) in self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture)) {
-            *times.entry(&naming.label).or_default() += 1;
+        for (_, said) in self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture)) {
+            *times.entry(&said.naming.label).or_default() += 1;
         }
         let title = |naming: &Naming| match times.get(naming.label.as_str()) {
             Some(2..) => format!("{} ({})", naming.label, naming.by),
             _ => naming.label.clone(),
         };
-        let called = |gesture: ClassId| match self.namings.get(&gesture) {
+        let called = |gesture: ClassId| match self.get(gesture) {
             Some(naming) => Some(title(naming)),
             None => listed.get(gesture.index()).cloned(),
         };
@@ -156,15 +215,17 @@ impl NameBook {
             .collect()
     }
 
-    /// A digest of everything under a key: the same words, heard in whatever order, give the same; 0 for nothing.
+    /// A digest of everything that can be shown to others under a key: the same words, heard in whatever order, give the same; 0 for nothing.
     #[must_use]
     pub fn digest(&self, key: u64) -> u64 {
-        if self.namings.is_empty() {
+        let mut told = self.told().peekable();
+        if told.peek().is_none() {
             return 0;
         }
         let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"names   "));
-        for (gesture, Naming { count, at, said_by, fate, .. }) in &self.namings {
-            sip.write(&gesture.0.to_le_bytes());
+        for naming in told {
+            let Naming { count, at, said_by, fate, .. } = naming;
+            sip.write(&naming.gesture().0.to_le_bytes());
             sip.write(&count.to_le_bytes());
             sip.write(&at.to_le_bytes());
             let name = said_by.to_string();
@@ -184,8 +245,13 @@ impl NameBook {
 
 /// The later word is the greater. Of two names that make one number, which chance gives once in many thousand swarms, the greater is kept.
 fn order(naming: &Naming) -> (u64, u64, &InstructorId, Fate, &InstructorId, &str) {
-    let Naming { by, label, count, at, said_by, fate } = naming;
+    let Naming { by, label, count, at, said_by, fate, .. } = naming;
     (*count, *at, said_by, *fate, by, label)
+}
+
+/// What was named may be merged, retired and restored by anybody who teaches; without a key, as long as nobody with one has spoken of it.
+fn right(standing: Standing) -> Standing {
+    standing.min(Standing::Teaches)
 }
 
 #[cfg(test)]
@@ -199,7 +265,7 @@ mod tests {
     }
 
     fn naming(by: &str, label: &str, count: u64, fate: Fate) -> Naming {
-        Naming { by: who(by), label: label.to_owned(), count, at: 7, said_by: who(by), fate }
+        Naming { by: who(by), label: label.to_owned(), count, at: 7, said_by: who(by), fate, said: None }
     }
 
     fn book(said: &[Naming]) -> NameBook {

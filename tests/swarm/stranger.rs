@@ -251,7 +251,7 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
     put(Topic::Sample(RobotId(1)), said(Message::Samples(of_another_class(100)))).await;
     put(Topic::Repair(RobotId(0)), give(of_another_class(200), None)).await;
     put(Topic::Repair(RobotId(0)), give(of_another_class(0), true_batch.signature)).await;
-    let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word };
+    let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word, said: None };
     let lessons = vec![word(2, Word::Was(ClassId(5))), word(3, Word::Retracted)];
     put(Topic::Repair(RobotId(0)), said(Message::Lessons(Lessons { lessons }))).await;
     // What is true is true whoever says it, and nothing new.
@@ -263,10 +263,16 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
     }
     assert_eq!(knows(&robots[0], [2, 4]).await, common);
 
-    // Robot 1 is gone; who comes late has its samples from others, under its signature.
+    // Robot 1 is gone; who comes late has its samples from others, under its signature, and what ada said, under that of the robot she said it at.
     robots.remove(1).stop().await;
     let late = pupil(3, &locators).await;
     assert_eq!(knows(&late, [0, 6]).await, common);
+    let deadline = tokio::time::Instant::now() + PATIENCE;
+    while late.robot.status().learning.expect("it learns").lessons != 1 {
+        assert!(tokio::time::Instant::now() < deadline, "{:?}", late.robot.status());
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    assert!(!late.robot.status().counters.contains_key("refused_lesson_unproven"));
     client.close().await;
     liar.close().await.unwrap();
     late.stop().await;

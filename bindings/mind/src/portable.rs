@@ -268,7 +268,7 @@ impl PortableMind {
         let key = || self.keys.key(&Topic::Feedback(by.clone()));
         let instruction: Instruction =
             decode_json(word).map_err(|cause| MindError::Message { key: key(), cause })?;
-        self.tell(now, Input::Instructed(Instructed { by, at, instruction }));
+        self.tell(now, Input::Instructed(Instructed { by, at, instruction, said: None }));
         Ok(())
     }
 

@@ -71,6 +71,7 @@ fn lessons_and_signed_votes_come_back_byte_for_byte() {
         count: 1,
         at: u64::MAX,
         word: Word::Was(ClassId(3)),
+        said: None,
     };
     comes_back(&envelope(Message::Lessons(Lessons { lessons: vec![lesson] })));
     let vote = Vote {

@@ -50,6 +50,7 @@ impl Host {
         let (inbox, guests) = (self.inbox.clone(), self.guests.clone());
         let ended = self.supervisor.ended();
         tokio::pin!(ended);
+        self.believe();
         loop {
             let wake = self.mind.next_wake().map(|wake| self.started + wake);
             let wake = wake.into_iter().chain(self.voice.due()).min();
@@ -88,6 +89,13 @@ impl Host {
             if count > 0 {
                 self.account.set(refusal.name(), count);
             }
+        }
+    }
+
+    /// In a sealed swarm: the mind is told who may teach.
+    fn believe(&mut self) {
+        if let Some(believer) = self.inbox.believer() {
+            self.handle(Input::Believe(believer));
         }
     }
 
@@ -160,6 +168,7 @@ impl Host {
         };
         apprentice.take_up();
         self.mind = mind;
+        self.believe();
         self.sight.begin_anew();
         self.account.count("memory_taken_up");
         let open = {

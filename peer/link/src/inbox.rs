@@ -265,7 +265,7 @@ impl Inbox {
         if let Some((_, last)) = self.lock().heard.get_mut(&envelope.author) {
             *last = Some(Instant::now());
         }
-        if matches!(envelope.message, Message::Lessons(_)) {
+        if matches!(envelope.message, Message::Lessons(_) | Message::Namings(_)) {
             self.believe(&envelope)?;
         }
         let distrust = self.judged(|judge, now| judge.passed_on(now, &mut envelope));
@@ -316,7 +316,7 @@ impl Inbox {
         }
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
-        self.queue(Input::Instructed(Instructed { by, at, instruction }))
+        self.queue(Input::Instructed(Instructed { by, at, instruction, said: None }))
     }
 
     /// Hands over what this robot's own threads have done. Never refused: they do one thing at a time.

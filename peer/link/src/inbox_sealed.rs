@@ -1,15 +1,18 @@
 //! What arrives signed in a sealed swarm alone: words and answers, words of those on this computer, and rosters.
 
 use std::collections::BTreeSet;
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
 
-use gestalt_protocol::{Answer, Instruction, InstructorId, MAX_JSON, RobotId, Signature, decode_json};
-use gestalt_strategies::{Input, Instructed};
+use gestalt_protocol::{
+    Answer, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId, Signature, SignedWord,
+    decode_json,
+};
+use gestalt_strategies::{Believe, Input, Instructed};
 use gestalt_trust::MAX_ROSTER;
-use gestalt_trust::word::MAX_WORD_ATTACHMENT;
 use zenoh::sample::Sample;
 
 use crate::account::Refusal;
+use crate::believer::Believer;
 use crate::inbox::{Inbox, MAX_QUEUE, payload};
 use crate::words::Vouched;
 
@@ -31,8 +34,9 @@ impl Inbox {
         }
         let mut words = sealed.words.lock().unwrap_or_else(PoisonError::into_inner);
         let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
-        let vouched = words.vouch(&by, sample.payload().to_bytes().into_owned());
-        let said = Instructed { by, at: vouched.count, instruction };
+        let vouched = words.vouch(&by, payload(sample, MAX_WORD)?.into_owned());
+        let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
+        let said = Instructed { by, at: vouched.count, instruction, said: Some(signed) };
         if !allowed {
             return self.queue(Input::Disallowed(said));
         }
@@ -67,15 +71,22 @@ impl Inbox {
     }
 
     pub(super) fn on_word(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
-        let word = payload(sample, MAX_JSON)?;
+        let word = payload(sample, MAX_WORD)?;
         let instruction: Instruction = decode_json(&word)?;
-        let attachment = sample.attachment().filter(|it| it.len() <= MAX_WORD_ATTACHMENT);
+        let attachment = sample.attachment().filter(|it| it.len() <= MAX_ATTACHMENT);
         let attachment = attachment.map(|it| it.to_bytes());
         let heeded = self.judged(|judge, now| judge.word(now, &by, &word, attachment.as_deref()));
         let (heading, roles) = heeded.ok_or(Refusal::Kind)??;
         let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
-        let said = Instructed { by, at: heading.count, instruction };
+        let attachment = attachment.unwrap_or_default().into_owned();
+        let signed = SignedWord { word: word.into_owned(), attachment };
+        let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
         self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) })
+    }
+
+    /// Who knows by the roster of today whose words count.
+    pub(super) fn believer(&self) -> Option<Arc<dyn Believe>> {
+        self.judged(|judge, _| Believer::new(judge.roster().clone()))
     }
 
     pub(super) fn on_roster(&self, sample: &Sample) -> Result<(), Refusal> {
@@ -113,6 +124,7 @@ impl Inbox {
         state.alive_changed = true;
         // Before anything that it may be asked to believe from now on.
         state.queue.push_back(Input::Expelled(gone));
+        state.queue.extend(self.believer().map(Input::Believe));
         drop(state);
         // Who is new was refused until now, its token too.
         self.unrest.notify_one();

@@ -11,6 +11,7 @@
 
 mod account;
 mod apprentice;
+mod believer;
 mod boot;
 mod census;
 mod client;

@@ -68,3 +68,27 @@ fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u8>, D::Error>
         deserializer.deserialize_bytes(Statement)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn json(statement: &str) -> Result<Signed, serde_json::Error> {
+        let signature = Hex(&[7; Signature::LENGTH]);
+        serde_json::from_str(&format!("{{\"statement\": \"{statement}\", \"signature\": \"{signature}\"}}"))
+    }
+
+    #[test]
+    fn as_json_it_is_as_long_as_it_may_be_and_no_longer() {
+        let longest = json(&"a7".repeat(MAX_SIGNED)).unwrap();
+        assert_eq!(longest.statement, vec![0xa7; MAX_SIGNED]);
+        assert_eq!(
+            serde_json::from_str::<Signed>(&serde_json::to_string(&longest).unwrap()).unwrap(),
+            longest
+        );
+        let over = json(&"a7".repeat(MAX_SIGNED + 1)).unwrap_err().to_string();
+        let lengths = (format!("length {}", MAX_SIGNED + 1), format!("at most {MAX_SIGNED} bytes"));
+        assert!(over.contains(&lengths.0) && over.contains(&lengths.1), "{over}");
+        assert!(json("a7a").is_err() && json("g7").is_err());
+    }
+}

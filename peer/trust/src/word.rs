@@ -28,9 +28,6 @@ use crate::statement::SwarmId;
 /// Stands first under every signature of a word.
 pub const WORD_DOMAIN: &[u8; 15] = b"gestalt-word-1\0";
 
-/// The longest attachment of a word, in bytes.
-pub const MAX_WORD_ATTACHMENT: usize = 1 + 4 + 8 + Signature::LENGTH;
-
 /// Who signed a word.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Speaker {
@@ -201,6 +198,8 @@ impl<S: Scheme> Attention<S> {
 
 #[cfg(test)]
 mod tests {
+    use gestalt_protocol::MAX_ATTACHMENT;
+
     use super::*;
     use crate::membership::Instructor;
     use crate::roles::Role;
@@ -231,7 +230,7 @@ mod tests {
         let local = said("console", 2, Speaker::For(RobotId(2)), 7, b"open");
         let heading = WordHeading { speaker: Speaker::For(RobotId(2)), count: 7 };
         assert_eq!(check("console", &local), Ok((heading, Roles::up_to(Role::Open))));
-        assert!(own.len() < MAX_WORD_ATTACHMENT && local.len() == MAX_WORD_ATTACHMENT);
+        assert!(own.len() < MAX_ATTACHMENT && local.len() == MAX_ATTACHMENT);
     }
 
     #[test]

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Batches, ClassId, Envelope, FeatureSpaceId, HeldBatch, Instruction, Message, RobotId, RoundId, SampleId,
-    Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
+    Batches, ClassId, DecodeError, Envelope, FeatureSpaceId, HeldBatch, Instruction, MAX_MESSAGE, Message,
+    RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
 };
 use gestalt_trust::{
     Distrust, Identity, Judge, MAX_ROSTER, Membership, Role, Roles, Roster, RosterError, statement,
@@ -54,7 +54,7 @@ fn batch(author: u32, sequence: u32, by: u8) -> HeldBatch {
 
 #[test]
 fn a_newer_roster_is_gone_by_everywhere_and_no_other() {
-    let mut judge = Judge::new(roster(1));
+    let mut judge = Judge::new(roster(1), |_| false);
     assert!(judge.is_member(RobotId(3)) && !judge.is_member(RobotId(4)));
     assert_eq!(judge.envelope(NOW, &vote(3, 1, 1.0, 3)), Ok(()));
     // It said two things by its old key.
@@ -66,28 +66,42 @@ fn a_newer_roster_is_gone_by_everywhere_and_no_other() {
     assert_eq!(judge.roster(), &roster(2));
     assert!(matches!(judge.adopt(roster(1)), Err(RosterError::Older { held: 2, offered: 1 })));
     // What the old key did is forgotten with it; votes and samples are the new one's.
-    assert!(judge.untold().is_empty());
+    assert!(judge.untold(NOW).is_empty());
     assert!(judge.envelope(NOW, &vote(3, 3, 1.0, 3)).is_err());
     assert_eq!(judge.envelope(NOW, &vote(3, 1, 3.0, 33)), Ok(()));
-    let mut given = Batches { batches: vec![batch(3, 8, 3), batch(3, 9, 33), batch(2, 9, 2)] };
-    assert!(judge.batches(NOW, &mut given).is_some(), "the first is the old key's");
-    assert_eq!(given.batches, [batch(3, 9, 33), batch(2, 9, 2)]);
-    assert_eq!(judge.batches(NOW, &mut given), None);
+    let stamp = Stamp { boot: 1, sequence: 20 };
+    let batches = vec![batch(3, 8, 3), batch(3, 9, 33), batch(2, 9, 2)];
+    let message = Message::Batches(Batches { batches });
+    let mut given = Envelope { author: RobotId(1), stamp, message, signature: None };
+    assert!(judge.passed_on(NOW, &mut given).is_some(), "the first is the old key's");
+    assert_eq!(given.message, Message::Batches(Batches { batches: vec![batch(3, 9, 33), batch(2, 9, 2)] }));
+    assert_eq!(judge.passed_on(NOW, &mut given), None);
 }
 
 #[test]
 fn evidence_against_who_keeps_its_key_outlives_a_newer_roster() {
-    let mut judge = Judge::new(roster(1));
+    let mut judge = Judge::new(roster(1), |_| false);
     assert_eq!(judge.envelope(NOW, &vote(2, 1, 1.0, 2)), Ok(()));
     assert_eq!(judge.envelope(NOW, &vote(2, 1, 2.0, 2)), Err(Distrust::Convicted));
     assert!(judge.adopt(roster(2)).unwrap());
-    assert_eq!(judge.untold().len(), 1);
+    assert_eq!(judge.untold(NOW).len(), 1);
     assert_eq!(judge.envelope(NOW, &vote(2, 2, 1.0, 2)), Err(Distrust::Convicted));
 }
 
 #[test]
+fn what_is_as_long_as_it_may_be_is_read() {
+    let mut statement = vote(1, 1, 1.0, 1).statement();
+    statement.resize(MAX_MESSAGE, 0);
+    assert!(gestalt_trust::statement::heading(&statement).is_ok());
+    statement.push(0);
+    let limit = MAX_MESSAGE;
+    let too_long = DecodeError::TooLong { length: limit + 1, limit };
+    assert_eq!(gestalt_trust::statement::heading(&statement).unwrap_err(), too_long);
+}
+
+#[test]
 fn a_word_needs_its_role() {
-    let mut judge = Judge::new(roster(1));
+    let mut judge = Judge::new(roster(1), |_| false);
     let ada = "ada".parse().unwrap();
     assert!(judge.permits(&ada, Roles::up_to(Role::Open), &Instruction::Open));
     assert!(!judge.permits(&ada, Roles::NONE, &Instruction::Open));

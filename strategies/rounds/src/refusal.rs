@@ -33,6 +33,10 @@ pub enum Refusal {
     LessonFull,
     /// A lesson on a round, or with a count, so far ahead of all known that it is taken for a mistake or a lie.
     LessonFarAhead,
+    /// A lesson that nothing shows to be its instructor's word, or of one who may not teach.
+    LessonUnproven,
+    /// The same of a gesture's name, or of what became of it.
+    NamingUnproven,
     /// A question about what this robot knows, of one that is no neighbour.
     Stranger,
     /// A question about what this robot knows, of a neighbour that was told much just now.
@@ -47,7 +51,7 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 22] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -63,6 +67,8 @@ impl Refusal {
         Self::SampleNumber,
         Self::LessonFull,
         Self::LessonFarAhead,
+        Self::LessonUnproven,
+        Self::NamingUnproven,
         Self::Stranger,
         Self::TooOften,
         Self::DecisionTooOften,
@@ -89,6 +95,8 @@ impl Refusal {
             Self::SampleNumber => "refused_sample_number",
             Self::LessonFull => "refused_lesson_full",
             Self::LessonFarAhead => "refused_lesson_far_ahead",
+            Self::LessonUnproven => "refused_lesson_unproven",
+            Self::NamingUnproven => "refused_naming_unproven",
             Self::Stranger => "refused_question_of_stranger",
             Self::TooOften => "refused_question_too_often",
             Self::DecisionTooOften => "refused_decision_too_often",

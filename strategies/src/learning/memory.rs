@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, Envelope, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, Naming, RobotId, RoundId,
-    SampleId, SampleSeries, VocabularyId, Word,
+    ClassId, Envelope, Fate, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, Naming, RobotId,
+    RoundId, SampleId, SampleSeries, SignedWord, VocabularyId, Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
@@ -119,6 +119,9 @@ struct StoredAside {
 /// An instructor's word on a round, with its count and time.
 type StoredWord = (InstructorId, u64, u64, Word);
 
+/// What was said of a gesture: who named it and how, the count and the time of the word, who said that, and what became of it.
+type StoredNaming = (InstructorId, String, u64, u64, InstructorId, Fate);
+
 impl Item {
     /// The record's key: a byte for the kind, then its number in big-endian order.
     pub fn key(self) -> Vec<u8> {
@@ -199,10 +202,40 @@ pub(super) fn encode_aside(aside: &UnresolvedSample) -> Vec<u8> {
     })
 }
 
+/// The words, and behind them their proofs, one for each: releases before there were any wrote, and read, the words alone.
 pub(super) fn encode_lessons(lessons: impl Iterator<Item = Lesson>) -> Vec<u8> {
-    let words: Vec<StoredWord> =
-        lessons.map(|lesson| (lesson.instructor, lesson.count, lesson.at, lesson.word)).collect();
-    encode(&words)
+    let stored = |lesson: Lesson| ((lesson.instructor, lesson.count, lesson.at, lesson.word), lesson.said);
+    let stored: (Vec<StoredWord>, Vec<Option<SignedWord>>) = lessons.map(stored).unzip();
+    encode(&stored)
+}
+
+fn decode_lessons(round: RoundId, bytes: &[u8]) -> Result<impl Iterator<Item = Lesson>, MemoryError> {
+    let (words, rest): (Vec<StoredWord>, _) = decode_first(bytes)?;
+    let proofs: Vec<Option<SignedWord>> =
+        if rest.is_empty() { vec![None; words.len()] } else { decode(rest)? };
+    if proofs.len() != words.len() {
+        return Err(MemoryError::Damaged("words and proofs that are not as many"));
+    }
+    Ok(words.into_iter().zip(proofs).map(move |((instructor, count, at, word), said)| Lesson {
+        round,
+        instructor,
+        count,
+        at,
+        word,
+        said,
+    }))
+}
+
+/// The same of what was named.
+pub(super) fn encode_naming(naming: &Naming) -> Vec<u8> {
+    let Naming { by, label, count, at, said_by, fate, said } = naming;
+    encode(&((by, label, count, at, said_by, fate), said))
+}
+
+fn decode_naming(bytes: &[u8]) -> Result<Naming, MemoryError> {
+    let ((by, label, count, at, said_by, fate), rest): (StoredNaming, _) = decode_first(bytes)?;
+    let said = if rest.is_empty() { None } else { decode(rest)? };
+    Ok(Naming { by, label, count, at, said_by, fate, said })
 }
 
 fn part_number(part: SetPart) -> u8 {
@@ -256,16 +289,9 @@ impl RobotMemory {
                 }
                 Item::Seen(series) => seen.push((series, decode(value)?)),
                 Item::Lessons(round) => {
-                    let words: Vec<StoredWord> = decode(value)?;
-                    memory.lessons.extend(words.into_iter().map(|(instructor, count, at, word)| Lesson {
-                        round,
-                        instructor,
-                        count,
-                        at,
-                        word,
-                    }));
+                    memory.lessons.extend(decode_lessons(round, value)?);
                 }
-                Item::Naming(_) => memory.namings.push(decode(value)?),
+                Item::Naming(_) => memory.namings.push(decode_naming(value)?),
                 Item::Batch(first) => memory.batches.push(decode_batch(first, value)?),
                 Item::Aside(number) => {
                     let StoredAside { part, shared, round, vector, guess } = decode(value)?;
@@ -343,7 +369,12 @@ fn decode_batch(first: SampleId, bytes: &[u8]) -> Result<HeldBatch, MemoryError>
 }
 
 fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, MemoryError> {
-    postcard::from_bytes(bytes).map_err(|_| MemoryError::Damaged("a record that cannot be read"))
+    decode_first(bytes).map(|(value, _)| value)
+}
+
+/// A value, and what stands behind it.
+fn decode_first<T: DeserializeOwned>(bytes: &[u8]) -> Result<(T, &[u8]), MemoryError> {
+    postcard::take_from_bytes(bytes).map_err(|_| MemoryError::Damaged("a record that cannot be read"))
 }
 
 fn finite(vector: Vec<f32>) -> Result<Vec<f32>, MemoryError> {

@@ -8,6 +8,7 @@ use super::changes::{TrainingChange, inserted_as};
 use super::memory::Item;
 use super::state::Learning;
 use super::unresolved;
+use crate::believe::Standing;
 use crate::candidates::Candidates;
 use crate::names::{NameBook, NamingReceipt};
 
@@ -24,7 +25,14 @@ impl Learning {
     /// Takes in what was said of a gesture that was named, and trains by it.
     pub fn hear_naming(&mut self, naming: &Naming) -> NamingReceipt {
         // Neighbours say all they know: mostly there is nothing to be done.
-        let heard = self.names.would_hear(naming);
+        if self.names.is_known(naming) {
+            return NamingReceipt::Known;
+        }
+        let standing = self.standing_of_naming(naming);
+        if standing == Some(Standing::Unproven) {
+            return NamingReceipt::Unproven;
+        }
+        let heard = self.names.would_hear(naming, standing);
         if heard != NamingReceipt::New {
             return heard;
         }
@@ -32,7 +40,7 @@ impl Learning {
         let before: Vec<(ClassId, Option<ClassId>)> =
             classes.into_iter().map(|class| (class, self.trained_as(class))).collect();
         let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
-        self.names.hear(naming);
+        self.names.hear_by(naming, standing);
         let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
         self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
         self.gestures = self.all_gestures();
@@ -42,7 +50,7 @@ impl Learning {
                 self.train_anew(class);
             }
         }
-        let rounds: Vec<_> = self.lessons.rounds(0).map(|(round, _)| round).collect();
+        let rounds: Vec<_> = self.lessons.all_rounds().collect();
         rounds.into_iter().for_each(|round| self.apply_to_round(round));
         heard
     }

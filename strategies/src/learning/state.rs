@@ -25,6 +25,7 @@ use super::recent_rounds::RecentRounds;
 use super::setup::{LearningError, LearningSetup};
 use super::shelf::Shelf;
 use super::unresolved::Unresolved;
+use crate::believe::{Believe, Standing};
 use crate::candidates::Candidates;
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
 use crate::names::NameBook;
@@ -79,6 +80,8 @@ pub(crate) struct Learning {
     pub(super) set: TrainingSet,
     pub(super) lessons: LessonBook,
     pub(super) names: NameBook,
+    /// In a sealed swarm: who knows who may teach.
+    pub(super) believer: Option<Arc<dyn Believe>>,
     /// All gestures there are to be told apart.
     pub(super) gestures: Candidates,
     pub(super) recent: RecentRounds,
@@ -166,6 +169,7 @@ impl Learning {
             set,
             lessons,
             names,
+            believer: None,
             gestures,
             recent: RecentRounds::default(),
             judged: JudgedRounds::default(),
@@ -233,8 +237,16 @@ impl Learning {
         if lesson.round.counter > self.furthest() {
             return LessonReceipt::FarAhead;
         }
+        // What is known needs no look at its signature.
+        if self.lessons.is_known(lesson) {
+            return LessonReceipt::Known;
+        }
+        let standing = self.standing_of_lesson(lesson);
+        if standing == Some(Standing::Unproven) {
+            return LessonReceipt::Unproven;
+        }
         let recent = &self.recent;
-        let (heard, forgotten) = self.lessons.hear_among(lesson, |round| recent.contains(round));
+        let (heard, forgotten) = self.lessons.hear_among(lesson, standing, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.judged.doubt();
             self.dirty.insert(Item::Lessons(lesson.round));
@@ -269,7 +281,12 @@ impl Learning {
         self.lessons.latest(self.recent.names(round), instructor)
     }
 
-    /// The count of what is said next of a round.
+    /// Whether what that instructor said of a round counts: not where somebody else's word goes before it.
+    pub fn is_heeded(&self, round: RoundId, instructor: &InstructorId) -> bool {
+        self.lessons.is_heeded(self.recent.names(round), instructor)
+    }
+
+    /// The count of what is said next of a round, where instructors sign none.
     pub fn next_count(&self, round: RoundId) -> u64 {
         self.lessons.highest_count(self.recent.names(round)).saturating_add(1)
     }
@@ -372,7 +389,7 @@ impl Learning {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
             }
-            Item::Naming(gesture) => self.names.get(gesture).map(memory::encode),
+            Item::Naming(gesture) => self.names.get(gesture).map(memory::encode_naming),
             Item::Aside(number) => self.aside.get(number).map(memory::encode_aside),
             Item::Batch(first) => self.batches.get(first).map(memory::encode_batch),
         }

@@ -4,8 +4,10 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, Question, RobotId};
+use gestalt_protocol::{Announcement, Envelope, Instruction, InstructorId, Question, RobotId, SignedWord};
 use gestalt_rounds::{Classify, Input as AboutRounds, Observation};
+
+use crate::believe::Believe;
 
 /// What the world tells the mind.
 #[derive(Clone, Debug)]
@@ -45,6 +47,8 @@ pub enum Input {
     Neighbours(BTreeSet<RobotId>),
     /// These robots belong to the swarm no more, or were given another key: nothing that they said counts in the round that is open.
     Expelled(BTreeSet<RobotId>),
+    /// The swarm is sealed, and this one knows who may teach: at the start, and whenever that changes.
+    Believe(Arc<dyn Believe>),
     /// A new classifier takes the place of the old one.
     Learned(Arc<dyn Classify>),
     /// All that was to be remembered up to this revision is safe.
@@ -56,10 +60,12 @@ pub enum Input {
 pub struct Instructed {
     /// Who said it.
     pub by: InstructorId,
-    /// When, in the swarm's own time: the same at every robot.
+    /// When, in the swarm's own time, or in a sealed swarm the count that was signed with it: the same at every robot.
     pub at: u64,
     /// What was said.
     pub instruction: Instruction,
+    /// In a sealed swarm the word as it was signed, to be passed on.
+    pub said: Option<SignedWord>,
 }
 
 /// What an input is about.
@@ -71,6 +77,7 @@ pub(super) enum Concern {
     Answered(InstructorId, u64, RobotId),
     Remembered(u64),
     Asked(Question),
+    Believe(Arc<dyn Believe>),
 }
 
 impl Input {
@@ -84,6 +91,7 @@ impl Input {
             Self::Answered(by, at, robot) => return Concern::Answered(by, at, robot),
             Self::Asked(question) => return Concern::Asked(question),
             Self::Remembered(revision) => return Concern::Remembered(revision),
+            Self::Believe(believer) => return Concern::Believe(believer),
             Self::Tick => AboutRounds::Tick,
             Self::Shown(began) => AboutRounds::Shown(began),
             Self::Left => AboutRounds::Left,

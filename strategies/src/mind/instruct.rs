@@ -1,5 +1,6 @@
 //! What instructors say, and what they are answered: one answer for each word, from the first robot that can give it.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, InstructorId, Lesson, Outcome, RobotId, Word};
@@ -9,6 +10,7 @@ use super::answers::Waiting;
 use super::input::Instructed;
 use super::machine::Mind;
 use super::output::Output;
+use crate::believe::Believe;
 use crate::learning::Learning;
 use crate::lessons::{LessonReceipt, Verdict};
 
@@ -29,6 +31,17 @@ impl Mind {
         };
         self.share();
         self.prepare_answer(now, instructed, outcome, named);
+        AboutRounds::Tick
+    }
+
+    /// Who may teach is known anew.
+    pub(super) fn on_believe(&mut self, believer: Arc<dyn Believe>) -> AboutRounds {
+        if let Some(learning) = &mut self.learning {
+            learning.believe(believer);
+        }
+        // What was not believed may be.
+        self.exchanges.forget_declined_lessons();
+        self.share();
         AboutRounds::Tick
     }
 
@@ -65,21 +78,29 @@ impl Mind {
             Instruction::Wrong { of, .. } => class(of).map(Word::Not),
         };
         let Some(word) = word else { return Outcome::UnknownGesture };
-        let latest = learning.latest(round, &instructed.by);
+        let Instructed { by, at, said, .. } = instructed;
+        let latest = learning.latest(round, by);
         let again = latest.is_some_and(|(.., latest)| latest == word);
         let count = match latest {
+            _ if said.is_some() => *at,
             // A neighbour told of it before it was heard.
-            Some((count, at, _)) if again && at == instructed.at => count,
+            Some((count, known, _)) if again && known == *at => count,
             _ => learning.next_count(round),
         };
-        let lesson = Lesson { round, instructor: instructed.by.clone(), count, at: instructed.at, word };
+        let lesson = Lesson { round, instructor: by.clone(), count, at: *at, word, said: said.clone() };
         match learning.hear(&lesson) {
+            LessonReceipt::New | LessonReceipt::Known
+                if word != Word::Retracted && !learning.is_heeded(round, by) =>
+            {
+                Outcome::NotAllowed
+            }
             LessonReceipt::New if again => Outcome::Known,
             LessonReceipt::New if word != Word::Retracted && learning.held_of(round) == 0 => {
                 Outcome::NothingSeen
             }
             LessonReceipt::New => Outcome::Learned,
             LessonReceipt::Known => Outcome::Known,
+            LessonReceipt::Unproven => Outcome::NotAllowed,
             LessonReceipt::Full | LessonReceipt::FarAhead => Outcome::UnknownRound,
         }
     }
@@ -91,7 +112,7 @@ impl Mind {
         outcome: Outcome,
         named: Option<ClassId>,
     ) {
-        let Instructed { by, at, instruction } = instructed;
+        let Instructed { by, at, instruction, .. } = instructed;
         if self.answers.needs_none(&by, at) {
             return;
         }

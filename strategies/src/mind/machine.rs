@@ -142,6 +142,7 @@ impl Mind {
             Concern::Disallowed(word) => self.on_disallowed(now, word),
             Concern::Answered(by, at, robot) => self.on_answered(by, at, robot),
             Concern::Asked(question) => self.on_asked(now, question),
+            Concern::Believe(believer) => self.on_believe(believer),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };
         let round = self.rounds.round();

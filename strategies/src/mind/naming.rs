@@ -3,9 +3,11 @@
 use gestalt_protocol::{
     ClassId, Fate, Gesture, Instruction, InstructorId, MAX_LABEL, Naming, Namings, Outcome, RoundId,
 };
+use gestalt_rounds::Refusal;
 
 use super::input::Instructed;
 use super::machine::Mind;
+use super::sample_repair::MAX_UNPROVEN;
 use crate::learning::Learning;
 use crate::names::NamingReceipt;
 
@@ -18,19 +20,20 @@ pub(super) type Named = (Outcome, Option<ClassId>);
 impl Mind {
     /// Names a gesture, or merges, retires or restores one. `None` for any other word.
     pub(super) fn name(&mut self, instructed: &Instructed) -> Option<Named> {
-        let Instructed { by, at, instruction } = instructed;
         let learning = self.learning.as_mut();
-        let named = match instruction {
-            Instruction::New { label, .. } => learning.map(|learning| learning.name_anew(label, by, *at)),
-            Instruction::Same { class, of } => learning.map(|learning| match learning.gesture(of, by) {
-                Some(of) => learning.decree(class, by, *at, Fate::Same(of)),
-                None => (Outcome::UnknownGesture, None),
-            }),
+        let named = match &instructed.instruction {
+            Instruction::New { label, .. } => learning.map(|learning| learning.name_anew(label, instructed)),
+            Instruction::Same { class, of } => {
+                learning.map(|learning| match learning.gesture(of, &instructed.by) {
+                    Some(of) => learning.decree(class, instructed, Fate::Same(of)),
+                    None => (Outcome::UnknownGesture, None),
+                })
+            }
             Instruction::Retire { class } => {
-                learning.map(|learning| learning.decree(class, by, *at, Fate::Retired))
+                learning.map(|learning| learning.decree(class, instructed, Fate::Retired))
             }
             Instruction::Restore { class } => {
-                learning.map(|learning| learning.decree(class, by, *at, Fate::InUse))
+                learning.map(|learning| learning.decree(class, instructed, Fate::InUse))
             }
             Instruction::Open
             | Instruction::Was { .. }
@@ -45,9 +48,26 @@ impl Mind {
     /// Takes in what a neighbour heard of names.
     pub(super) fn on_namings(&mut self, namings: &Namings) {
         let Some(learning) = &mut self.learning else { return };
-        let heard: Vec<NamingReceipt> =
-            namings.namings.iter().map(|naming| learning.hear_naming(naming)).collect();
-        if heard.contains(&NamingReceipt::New) {
+        let (mut news, mut unproven) = (false, Vec::new());
+        for naming in &namings.namings {
+            match learning.hear_naming(naming) {
+                NamingReceipt::New => news = true,
+                NamingReceipt::Unproven if unproven.len() == MAX_UNPROVEN => break,
+                NamingReceipt::Unproven => unproven.push(naming),
+                NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
+            }
+        }
+        // A gesture can be the same as one that was named behind it.
+        for naming in unproven {
+            match learning.hear_naming(naming) {
+                NamingReceipt::New => news = true,
+                NamingReceipt::Unproven => self.rounds.note_refusal(Refusal::NamingUnproven),
+                NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
+            }
+        }
+        if news {
+            // Lessons may name what was not known.
+            self.exchanges.forget_declined_lessons();
             self.call_by_names();
             // The other neighbours may lack it too.
             self.rounds.hurry_repair();
@@ -81,7 +101,8 @@ impl Learning {
         }
     }
 
-    fn name_anew(&mut self, label: &str, by: &InstructorId, at: u64) -> Named {
+    fn name_anew(&mut self, label: &str, said: &Instructed) -> Named {
+        let by = &said.by;
         if let Some(listed) = self.vocabulary().class(label) {
             return (Outcome::Known, Some(listed));
         }
@@ -91,38 +112,38 @@ impl Learning {
         if !(1..=MAX_LABEL).contains(&label.len()) || !room {
             return (Outcome::NoRoom, None);
         }
-        self.say_of(by.clone(), label.to_owned(), by, at, Fate::InUse)
+        self.say_of(by.clone(), label.to_owned(), said, Fate::InUse)
     }
 
     /// Says what became of a gesture that was named, whoever named it.
-    fn decree(&mut self, gesture: &Gesture, said_by: &InstructorId, at: u64, fate: Fate) -> Named {
-        let known = self.gesture(gesture, said_by).and_then(|gesture| self.names().get(gesture));
+    fn decree(&mut self, gesture: &Gesture, said: &Instructed, fate: Fate) -> Named {
+        let known = self.gesture(gesture, &said.by).and_then(|gesture| self.names().get(gesture));
         let Some(Naming { by, label, .. }) = known.cloned() else { return (Outcome::UnknownGesture, None) };
         if fate == Fate::Same(ClassId::named(&by, &label)) {
             return (Outcome::UnknownGesture, None);
         }
-        self.say_of(by, label, said_by, at, fate)
+        self.say_of(by, label, said, fate)
     }
 
-    fn say_of(
-        &mut self,
-        by: InstructorId,
-        label: String,
-        said_by: &InstructorId,
-        at: u64,
-        fate: Fate,
-    ) -> Named {
+    fn say_of(&mut self, by: InstructorId, label: String, word: &Instructed, fate: Fate) -> Named {
+        let Instructed { by: said_by, at, said, .. } = word;
         let gesture = ClassId::named(&by, &label);
         let known = self.names().get(gesture);
+        let again = known.is_some_and(|known| known.fate == fate);
+        let is_later = known.is_none_or(|known| known.count < *at);
         let count = match known {
-            Some(known) if known.fate == fate => return (Outcome::Known, Some(gesture)),
+            _ if said.is_some() => *at,
+            Some(_) if again => return (Outcome::Known, Some(gesture)),
             Some(known) => known.count.saturating_add(1),
             None => 1,
         };
-        let naming = Naming { by, label, count, at, said_by: said_by.clone(), fate };
+        let naming = Naming { by, label, count, at: *at, said_by: said_by.clone(), fate, said: said.clone() };
         match self.hear_naming(&naming) {
-            NamingReceipt::New => (Outcome::Learned, Some(gesture)),
-            NamingReceipt::Known => (Outcome::Known, Some(gesture)),
+            NamingReceipt::New if !again => (Outcome::Learned, Some(gesture)),
+            // Somebody with a key has spoken of it, and this one has none.
+            NamingReceipt::Known if !again && is_later => (Outcome::NotAllowed, None),
+            NamingReceipt::New | NamingReceipt::Known => (Outcome::Known, Some(gesture)),
+            NamingReceipt::Unproven => (Outcome::NotAllowed, None),
             NamingReceipt::Full | NamingReceipt::FarAhead => (Outcome::NoRoom, None),
         }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{
     Digest, HeldBatch, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS,
-    Message, Namings, RobotId, RoundId,
+    Message, Naming, Namings, RobotId, RoundId,
 };
 use gestalt_rounds::Refusal;
 
@@ -17,14 +17,17 @@ use crate::names::NameBook;
 use crate::sample::{MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_SERIES, SeenSamples};
 use crate::vector_codec::VectorError;
 
-/// About how many bytes of samples one message takes, so that a vote never waits long behind it.
+/// About how many bytes of samples, or of lessons, one message takes, so that a vote never waits long behind it.
 const CHUNK: usize = 16 * 1024;
 
 /// The most messages given at once; the next comparison brings more.
 const MAX_CHUNKS: usize = 32;
 
-/// The most lessons in one message.
+/// The most lessons given at once.
 const MAX_TOLD: usize = 256;
+
+/// How many words of one message may turn out to be nobody's: what stands behind them is not looked at. Checking a signature is work.
+pub(super) const MAX_UNPROVEN: usize = 16;
 
 // What is kept of samples and lessons can be told, all of it in one message: an interval takes 10 bytes at most, a series 11
 // beside its intervals, a round of lessons 25, all else 64.
@@ -33,7 +36,32 @@ const _: () = assert!(10 * MAX_INTERVALS_IN_ALL + 11 * MAX_SERIES + 25 * MAX_LES
 
 /// All that was named, if anything was: it is little, and seldom differs.
 fn names_to_give(names: &NameBook) -> Option<Message> {
-    (!names.is_empty()).then(|| Message::Namings(Namings { namings: names.iter().cloned().collect() }))
+    let namings: Vec<Naming> = names.told().cloned().collect();
+    (!namings.is_empty()).then_some(Message::Namings(Namings { namings }))
+}
+
+/// These lessons, round by round, in messages: all of a round in one, so that it is known to be all.
+fn lessons_to_give(rounds: impl Iterator<Item = impl Iterator<Item = Lesson>>) -> Vec<Message> {
+    let (mut messages, mut lessons, mut told, mut bytes) = (Vec::new(), Vec::new(), 0, 0);
+    for of_round in rounds {
+        if told + MAX_INSTRUCTORS > MAX_TOLD {
+            break;
+        }
+        if bytes >= CHUNK {
+            messages.push(Message::Lessons(Lessons { lessons: std::mem::take(&mut lessons) }));
+            bytes = 0;
+        }
+        let before = lessons.len();
+        lessons.extend(of_round);
+        told += lessons.len() - before;
+        let signed =
+            |lesson: &Lesson| lesson.said.as_ref().map_or(0, |it| it.word.len() + it.attachment.len());
+        bytes += lessons[before..].iter().map(|lesson| 64 + signed(lesson)).sum::<usize>();
+    }
+    if !lessons.is_empty() {
+        messages.push(Message::Lessons(Lessons { lessons }));
+    }
+    messages
 }
 
 impl Mind {
@@ -111,23 +139,14 @@ impl Mind {
                 book.digest_of(*round, key) != *digest && declined.get(round) != Some(digest)
             });
             let lacking = book.rounds(key).filter(|(round, digest)| theirs.get(round) != Some(digest));
-            let mut lessons: Vec<Lesson> = Vec::new();
-            for (round, _) in lacking {
-                // All of a round in one message, so that it is known to be all.
-                if lessons.len() + MAX_INSTRUCTORS > MAX_TOLD {
-                    break;
-                }
-                lessons.extend(book.of(round));
-            }
-            if !lessons.is_empty() {
-                given.push(Message::Lessons(Lessons { lessons }));
-            }
+            // First the names: lessons may speak of them.
             let names = learning.names();
             if names.digest(key) != know.named {
                 lacking_here |= know.named != 0;
                 let again = self.exchanges.may_give_names(from, (names.digest(0), know.named));
                 given.extend(names_to_give(names).filter(|_| again));
             }
+            given.extend(lessons_to_give(lacking.map(|(round, _)| book.told_of(round))));
         }
         let settled = given.is_empty() && !learning.withholds();
         self.exchanges.spend(from, given.len() + 1);
@@ -200,8 +219,11 @@ impl Mind {
     pub(super) fn on_lessons(&mut self, from: RobotId, lessons: &[Lesson]) {
         let is_neighbour = self.compares_with(from);
         let Some(learning) = &mut self.learning else { return };
-        let mut news = false;
+        let (mut news, mut unproven) = (false, 0);
         for of_round in lessons.chunk_by(|a, b| a.round == b.round) {
+            if unproven >= MAX_UNPROVEN {
+                break;
+            }
             let mut refused = false;
             for lesson in of_round {
                 match learning.hear(lesson) {
@@ -214,6 +236,10 @@ impl Mind {
                     LessonReceipt::FarAhead => {
                         refused = true;
                         self.rounds.note_refusal(Refusal::LessonFarAhead);
+                    }
+                    LessonReceipt::Unproven => {
+                        (refused, unproven) = (true, unproven + 1);
+                        self.rounds.note_refusal(Refusal::LessonUnproven);
                     }
                 }
             }

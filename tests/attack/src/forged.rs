@@ -1,15 +1,15 @@
 //! Messages as an adversary makes them up. What robots come to sign is signed here too, in one place for each kind.
 
 use gestalt_protocol::{
-    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, Give, HeldBatch, HeldVote, Lesson,
-    Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Vote,
-    Word,
+    Batches, Certificate, ClassId, CountedVote, Decision, Envelope, Give, HeldBatch, HeldVote, Instruction,
+    Lesson, Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, SignedWord,
+    Stamp, Vector, Vote, Word,
 };
 use gestalt_strategies::fusion::fuse;
 use gestalt_strategies::{Fuse, MindConfig, decode_vector};
-use gestalt_trust::{Identity, SwarmId, statement};
+use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, statement, word};
 
-use crate::swarm::world::{CLASSES, instructor, space, vocabulary};
+use crate::swarm::world::{CLASSES, instructor, key, space, vocabulary};
 
 /// The highest stamp there is.
 pub const LAST: Stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
@@ -127,9 +127,22 @@ pub fn samples(samples: Vec<SharedSample>) -> Message {
     Message::Batches(Batches { batches: batches.collect() })
 }
 
-/// A lesson that somebody may have heard.
+/// A lesson that somebody may have heard, and cannot show.
 pub fn lesson(round: RoundId, by: &str, count: u64, word: Word) -> Lesson {
-    Lesson { round, instructor: instructor(by), count, at: u64::MAX, word }
+    Lesson { round, instructor: instructor(by), count, at: count, word, said: None }
+}
+
+/// A lesson made of that word, whoever signed it, for whichever round.
+pub fn lesson_of(said: SignedWord, round: RoundId, by: &str, count: u64, word: Word) -> Lesson {
+    Lesson { said: Some(said), ..lesson(round, by, count, word) }
+}
+
+/// A word that the robot of that number signs for somebody of that name.
+pub fn vouched(robot: u32, swarm: &SwarmId, by: &str, count: u64, instruction: &Instruction) -> SignedWord {
+    let word = serde_json::to_vec(instruction).expect("a word is JSON");
+    let heading = WordHeading { speaker: Speaker::For(RobotId(robot)), count };
+    let attachment = word::sign(&key(robot), swarm, &instructor(by), &heading, &word);
+    SignedWord { word, attachment }
 }
 
 /// Lessons as they travel.

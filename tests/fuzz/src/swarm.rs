@@ -2,8 +2,15 @@
 
 use std::sync::OnceLock;
 
-use gestalt_protocol::{Announcement, Decision, Envelope, HeldVote, Holder, Question, RobotId, Signature};
-use gestalt_trust::{Fake, Identity, Instructor, Membership, Role, Roles, Roster, SwarmId, statement};
+use gestalt_protocol::{
+    Announcement, Decision, Envelope, HeldVote, Holder, InstructorId, Lesson, Question, RobotId, Signature,
+    SignedWord,
+};
+use gestalt_strategies::{Believe, Standing};
+use gestalt_trust::{
+    Fake, Identity, Instructor, Membership, Role, Roles, Roster, Speaker, SwarmId, WordHeading, statement,
+    word,
+};
 
 /// Robots 1 to so many are on the roster.
 pub const MEMBERS: u32 = 5;
@@ -21,10 +28,14 @@ pub fn identity(robot: RobotId) -> Identity<Fake> {
     Identity::fake(u64::from(robot.0) + 1)
 }
 
+fn ada() -> Identity<Fake> {
+    Identity::fake(1 << 40)
+}
+
 /// The swarm `demo`.
 pub fn members() -> Membership {
     let key = |number| (RobotId(number), identity(RobotId(number)).public_key());
-    let ada = Identity::<Fake>::fake(1 << 40).public_key();
+    let ada = ada().public_key();
     Membership {
         swarm: "demo".to_owned(),
         epoch: 3,
@@ -52,6 +63,26 @@ pub fn sign(robot: RobotId, said: &[u8]) -> Signature {
 
 fn sign_in(swarm: &SwarmId, robot: RobotId, said: &[u8]) -> Signature {
     statement::sign(&identity(robot), swarm, said)
+}
+
+/// Signs the word that a lesson is said to be made of, as ada, whoever it names.
+pub fn seal_lesson(lesson: &mut Lesson) {
+    let (by, count) = (lesson.instructor.clone(), lesson.count);
+    let Some(said) = &mut lesson.said else { return };
+    let heading = WordHeading { speaker: Speaker::Own(by.clone()), count };
+    said.attachment = word::sign(&ada(), &roster().swarm_id(), &by, &heading, &said.word);
+    lesson.at = count;
+}
+
+/// Believes words of ada's, and of no other.
+#[derive(Debug)]
+pub struct Members;
+
+impl Believe for Members {
+    fn believe(&self, by: &InstructorId, said: &SignedWord) -> Option<(u64, Standing)> {
+        let (heading, roles) = roster().check_word(by, &said.word, Some(&said.attachment)).ok()?;
+        roles.has(Role::Teach).then_some((heading.count, Standing::Teaches))
+    }
 }
 
 /// Puts the author's own signature under a message.

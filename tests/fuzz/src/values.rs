@@ -5,7 +5,7 @@ use gestalt_protocol::{
     FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
     Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
     Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
-    Signature, Stamp, Status, Terms, Vector, VocabularyId, Vote, Word,
+    Signature, SignedWord, Stamp, Status, Terms, Vector, VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -210,7 +210,14 @@ pub fn lesson(rng: &mut impl Rng, round: RoundId) -> Lesson {
         _ => Word::Retracted,
     };
     let (count, at) = (u64::from(number(rng)), u64::from(number(rng)));
-    Lesson { round, instructor: instructor(rng), count, at, word }
+    let said = maybe(rng, signed_word);
+    Lesson { round, instructor: instructor(rng), count, at, word, said }
+}
+
+/// A word with somebody's signature.
+pub fn signed_word(rng: &mut impl Rng) -> SignedWord {
+    let word = serde_json::to_vec(&instruction(rng)).expect("a word is JSON");
+    SignedWord { word, attachment: some(rng, 77, |rng| rng.random()) }
 }
 
 /// What instructors said.
@@ -307,8 +314,16 @@ pub fn naming(rng: &mut impl Rng) -> Naming {
         1 => Fate::Same(ClassId::named(&instructor(rng), "circle")),
         _ => Fate::Retired,
     };
-    let (by, said_by) = (instructor(rng), instructor(rng));
-    Naming { by, label: "circle".to_owned(), count: number(rng).into(), at: rng.random(), said_by, fate }
+    let (by, said_by, said) = (instructor(rng), instructor(rng), maybe(rng, signed_word));
+    Naming {
+        by,
+        label: "circle".to_owned(),
+        count: number(rng).into(),
+        at: rng.random(),
+        said_by,
+        fate,
+        said,
+    }
 }
 
 /// What the swarm answers.

@@ -11,7 +11,10 @@ fn a_correction_reaches_all_also_who_was_away() {
     let at = swarm.now.as_millis() as u64;
     for i in 0..2 {
         let instruction = Instruction::Was { round, class: Gesture::Label("4".to_owned()) };
-        swarm.input(i, Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction }));
+        swarm.input(
+            i,
+            Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction, said: None }),
+        );
     }
     swarm.pass(Duration::from_secs(10));
     assert_eq!(swarm.outcome(at), Outcome::Learned);
@@ -94,7 +97,7 @@ fn who_does_not_learn_says_so() {
     let instruction = Instruction::Right { round, of: Gesture::Class(ClassId(0)) };
     mind.handle(
         Duration::ZERO,
-        Input::Instructed(Instructed { by: "ada".parse().unwrap(), at: 1, instruction }),
+        Input::Instructed(Instructed { by: "ada".parse().unwrap(), at: 1, instruction, said: None }),
     );
     let out = mind.handle(Duration::from_secs(2), Input::Tick);
     let answered = |output: &Output| matches!(output, Output::Answer(_, answer) if answer.outcome == Outcome::NotLearning);
@@ -105,8 +108,14 @@ fn who_does_not_learn_says_so() {
 fn a_lesson_counts_for_samples_that_come_after_it() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 13);
     let round = swarm.show(1);
-    let lesson =
-        Lesson { round, instructor: "ada".parse().unwrap(), count: 1, at: 9, word: Word::Was(ClassId(3)) };
+    let lesson = Lesson {
+        round,
+        instructor: "ada".parse().unwrap(),
+        count: 1,
+        at: 9,
+        word: Word::Was(ClassId(3)),
+        said: None,
+    };
     swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
     let sample = SharedSample {
         id: SampleId { author: RobotId(9), life: 5, number: 1 },

@@ -168,7 +168,7 @@ fn teach_alone(swarm: &mut Swarm, i: usize, class: u32) {
     }
     let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
     let at = swarm.now.as_millis() as u64;
-    swarm.input(i, Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction }));
+    swarm.input(i, Input::Instructed(Instructed { by: "ada".parse().unwrap(), at, instruction, said: None }));
     swarm.loss = 0.0;
 }
 

@@ -1,6 +1,7 @@
 //! Whole minds that learn, joined by a network of a few lines.
 
 mod asking;
+mod believing;
 mod feedback;
 mod knowledge;
 mod naming;
@@ -23,6 +24,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Input, Instructed, Mind, Output};
+use crate::believe::Believe;
 use crate::learning::{
     Learning, LearningConfig, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange, RobotMemory,
     TrainingChange, training_key,
@@ -82,6 +84,8 @@ struct Swarm {
     trained: Vec<BTreeMap<u64, ClassId>>,
     spaces: Vec<Arc<FeatureSpace>>,
     vocabularies: Vec<Vocabulary>,
+    /// In a sealed swarm: who knows who may teach.
+    believer: Option<Arc<dyn Believe>>,
     /// What the clock says at the next start, if not the truth.
     boot: Option<u32>,
     /// Of the latest start.
@@ -111,6 +115,7 @@ impl Swarm {
             trained: vec![BTreeMap::new(); n],
             spaces: vec![space(); n],
             vocabularies: vec![vocabulary(); n],
+            believer: None,
             boot: None,
             started: 0,
             nonce: 0,
@@ -150,6 +155,9 @@ impl Swarm {
 
     fn introduce(&mut self, i: usize) {
         let others: BTreeSet<RobotId> = self.minds.iter().map(Mind::me).collect();
+        if let Some(believer) = self.believer.clone() {
+            self.input(i, Input::Believe(believer));
+        }
         self.input(i, Input::Learned(Arc::new(ByFirst)));
         self.input(i, Input::Alive(others.clone()));
         self.input(i, Input::Neighbours(others));
@@ -275,7 +283,8 @@ impl Swarm {
     fn say(&mut self, who: &str, instruction: Instruction) -> u64 {
         let at = self.now.as_millis() as u64;
         for i in 0..self.minds.len() {
-            let instructed = Instructed { by: who.parse().unwrap(), at, instruction: instruction.clone() };
+            let instructed =
+                Instructed { by: who.parse().unwrap(), at, instruction: instruction.clone(), said: None };
             if self.arrives() {
                 self.input(i, Input::Instructed(instructed));
             }

@@ -73,7 +73,7 @@ fn lessons(swarm: &mut Swarm, i: usize, lessons: Vec<Lesson>) {
 }
 
 fn forged(round: RoundId, who: &str, count: u64, word: Word) -> Lesson {
-    Lesson { round, instructor: who.parse().unwrap(), count, at: u64::MAX, word }
+    Lesson { round, instructor: who.parse().unwrap(), count, at: u64::MAX, word, said: None }
 }
 
 #[test]
@@ -144,7 +144,8 @@ fn no_clock_orders_the_words_of_an_instructor() {
     for (at, class) in [(u64::MAX, 1), (500, 2), (400, 3)] {
         let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(class)) };
         for i in 0..3 {
-            let instructed = Instructed { by: "ada".parse().unwrap(), at, instruction: instruction.clone() };
+            let instructed =
+                Instructed { by: "ada".parse().unwrap(), at, instruction: instruction.clone(), said: None };
             swarm.input(i, Input::Instructed(instructed));
         }
         swarm.pass(Duration::from_secs(5));

@@ -89,7 +89,7 @@ fn instructors_beyond_those_kept_are_not_told_again_and_again() {
         for instructor in 0..16 {
             let (by, at) = (format!("of-{i}-{instructor}").parse().unwrap(), 1);
             let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(1)) };
-            swarm.input(i, Input::Instructed(Instructed { by, at, instruction }));
+            swarm.input(i, Input::Instructed(Instructed { by, at, instruction, said: None }));
         }
     }
     swarm.pass(Duration::from_secs(10));

@@ -130,7 +130,7 @@ fn what_waits_for_a_disk_that_fails_is_bounded() {
         mind.handle(now, Input::Observed(Observation { features, quality: 1.0 }));
         let round = mind.round().unwrap();
         let instruction = Instruction::Was { round, class: Gesture::Class(ClassId(1)) };
-        let told = Instructed { by: "ada".parse().unwrap(), at: second, instruction };
+        let told = Instructed { by: "ada".parse().unwrap(), at: second, instruction, said: None };
         let out = mind.handle(now, Input::Instructed(told));
         shared += out
             .iter()

@@ -2,15 +2,12 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Lesson, Outcome, RobotId, RoundId, Word};
+use gestalt_protocol::{ClassId, Gesture, Instruction, Lesson, Outcome, RobotId, RoundId, Word};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};
 use crate::forged;
 use crate::swarm::{Plan, Swarm};
-
-/// Why an enrolled robot is believed what it says that an instructor said.
-const NO_KEYS: &str = "instructors have no keys yet: an enrolled robot may say that it heard what it likes";
 
 pub const ALL: &[Attack] = &[
     Attack {
@@ -28,10 +25,20 @@ pub const ALL: &[Attack] = &[
         what: "an enrolled robot tells 4,096 lessons on made-up rounds as far ahead as may be",
         tier: Tier::T4,
         setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_lesson_unproven"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| near_rounds(swarm, 6), learned_alike),
+    },
+    Attack {
+        number: "A9",
+        what: "an enrolled robot vouches for 1,100 such lessons of somebody without a key",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
         expected: "the next true word is learned by all",
         counted: Counted::None("a round that nobody lived through gives way to one that somebody did"),
         gap: None,
-        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| near_rounds(swarm, 6), next_word_counts),
+        play: |seed| beside(&Plan::sealed().liars(1), seed, vouched_rounds, next_word_counts),
     },
     Attack {
         number: "A9",
@@ -49,7 +56,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T4,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::All(&["refused_lesson_far_ahead"]),
+        counted: Counted::All(&["refused_lesson_unproven"]),
         gap: None,
         play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| taken_back(swarm, 6, u64::MAX), unmoved),
     },
@@ -58,12 +65,10 @@ pub const ALL: &[Attack] = &[
         what: "an enrolled robot takes it back under the highest count that is taken, and in 16 made-up names",
         tier: Tier::T4,
         setting: Setting::Sealed,
-        expected: "ada's next word counts",
-        counted: Counted::Some(&["refused_lesson_full"]),
+        expected: "nothing",
+        counted: Counted::All(&["refused_lesson_unproven"]),
         gap: None,
-        play: |seed| {
-            beside(&Plan::sealed().liars(1), seed, |swarm| taken_back(swarm, 6, 1 << 32), next_word_counts)
-        },
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| taken_back(swarm, 6, 1 << 32), unmoved),
     },
     Attack {
         number: "A10 · 3",
@@ -74,16 +79,6 @@ pub const ALL: &[Attack] = &[
         counted: Counted::All(&["refused_repair_unsigned"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, taken_back_for_good, learned_alike),
-    },
-    Attack {
-        number: "3",
-        what: "an enrolled robot relabels in ada's name what she taught",
-        tier: Tier::T4,
-        setting: Setting::Sealed,
-        expected: "nothing",
-        counted: Counted::None("none of it is refused"),
-        gap: Some(NO_KEYS),
-        play: |seed| beside(&Plan::sealed().liars(1), seed, relabelled, learned_alike),
     },
 ];
 
@@ -116,6 +111,23 @@ fn near_rounds(swarm: &mut Swarm, from: u32) {
         forged::lesson(round, "eve", 1, Word::Was(ClassId(4)))
     };
     tell(swarm, from, (0..4096).map(of).collect());
+    swarm.pass(Duration::from_secs(5));
+    show_and_teach(swarm, 2);
+}
+
+fn vouched_rounds(swarm: &mut Swarm) {
+    let first = show_and_teach(swarm, 1);
+    if swarm.at_war() {
+        let of = |n: u32| {
+            let round = RoundId { counter: first.counter + n % 64, opener: RobotId(u32::MAX), life: n };
+            let was = Instruction::Was { round, class: Gesture::Class(ClassId(4)) };
+            let said = forged::vouched(6, &swarm.id(), "guest", n.into(), &was);
+            forged::lesson_of(said, round, "guest", n.into(), Word::Was(ClassId(4)))
+        };
+        for lessons in (0..1100).map(of).collect::<Vec<_>>().chunks(256) {
+            swarm.whisper(6, &forged::lessons(lessons.to_vec()));
+        }
+    }
     swarm.pass(Duration::from_secs(5));
     show_and_teach(swarm, 2);
 }
@@ -163,11 +175,5 @@ fn taken_back(swarm: &mut Swarm, from: u32, count: u64) {
 fn taken_back_for_good(swarm: &mut Swarm) {
     let round = show_and_teach(swarm, 1);
     tell(swarm, 50, vec![forged::lesson(round, "ada", 2, Word::Retracted)]);
-    swarm.pass(Duration::from_secs(5));
-}
-
-fn relabelled(swarm: &mut Swarm) {
-    let round = show_and_teach(swarm, 1);
-    tell(swarm, 6, vec![forged::lesson(round, "ada", 2, Word::Was(ClassId(4)))]);
     swarm.pass(Duration::from_secs(5));
 }

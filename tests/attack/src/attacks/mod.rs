@@ -9,6 +9,7 @@
 //! | `floods` | saying too much |
 //! | `rounds` | when a round begins and ends, and who is waited for |
 //! | `lessons` | what instructors said |
+//! | `words` | what instructors signed, passed on |
 //! | `instructors` | who is an instructor |
 //! | `samples` | what robots learn from |
 //! | `relays` | what passes on samples and lessons |
@@ -29,6 +30,7 @@ mod rounds;
 mod samples;
 mod unfounded;
 mod votes;
+mod words;
 
 use crate::attack::Attack;
 
@@ -43,6 +45,7 @@ pub fn all() -> Vec<Attack> {
         floods::ALL,
         rounds::ALL,
         lessons::ALL,
+        words::ALL,
         instructors::ALL,
         samples::ALL,
         relays::ALL,

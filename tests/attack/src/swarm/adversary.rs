@@ -193,6 +193,7 @@ impl Swarm {
         match envelope.message {
             Message::Give(Give { decision: Some(_), .. })
             | Message::Lessons(_)
+            | Message::Namings(_)
             | Message::Holding(_)
             | Message::Announced(_)
             | Message::Asked(_) => forged::signed(envelope, &key(by.0), &self.id()),

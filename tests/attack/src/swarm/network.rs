@@ -145,7 +145,12 @@ impl Swarm {
         let now = self.now;
         let heard = self.robots[i].port.take(now, parcel);
         for input in heard.into_iter().chain(self.robots[i].port.fallen()) {
+            let is_new_roster = matches!(input, Input::Expelled(_));
             self.tell(i, input);
+            let believer = self.robots[i].port.believer().filter(|_| is_new_roster);
+            if let Some(believer) = believer {
+                self.tell(i, Input::Believe(believer));
+            }
         }
         for evidence in self.robots[i].port.untold(now) {
             self.broadcast(i, &Topic::Evidence, evidence);

@@ -1,14 +1,17 @@
 //! Where a robot hears: what the inbox of `gestalt-link` does with bytes under a key, before the mind hears of it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
-    Message, Question, RobotId, Topic, decode_json,
+    MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
 };
-use gestalt_strategies::{Input, Instructed};
+use gestalt_strategies::{Believe, Input, Instructed};
 use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge, RosterError};
+
+use super::believer::Believer;
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;
@@ -128,7 +131,9 @@ impl Port {
             }
             Some(Topic::Feedback(by)) => {
                 let heard = json::<Instruction>(&parcel.bytes);
-                let word = |instruction| Input::Instructed(Instructed { by, at: parcel.at, instruction });
+                let word = |instruction| {
+                    Input::Instructed(Instructed { by, at: parcel.at, instruction, said: None })
+                };
                 ("feedback", heard.map(|instruction| Some(word(instruction))))
             }
             Some(Topic::Word(by)) => ("word", self.on_word(now, by, parcel)),
@@ -190,7 +195,7 @@ impl Port {
             | Message::Asked(_) => {
                 return Err(Refusal::Kind);
             }
-            Message::Lessons(_) => self.judge(now, &envelope)?,
+            Message::Lessons(_) | Message::Namings(_) => self.judge(now, &envelope)?,
             _ => {}
         }
         let distrust = self.judge.as_mut().and_then(|judge| judge.passed_on(now, &mut envelope));
@@ -244,10 +249,13 @@ impl Port {
         parcel: &Parcel,
     ) -> Result<Option<Input>, Refusal> {
         let judge = self.judge.as_mut().ok_or(Refusal::Kind)?;
+        within(&parcel.bytes, MAX_WORD)?;
         let instruction: Instruction = json(&parcel.bytes)?;
         let (heading, roles) = judge.word(now, &by, &parcel.bytes, parcel.attachment.as_deref())?;
         let allowed = judge.permits(&by, roles, &instruction);
-        let said = Instructed { by, at: heading.count, instruction };
+        let attachment = parcel.attachment.clone().unwrap_or_default();
+        let signed = SignedWord { word: parcel.bytes.clone(), attachment };
+        let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
         if allowed {
             return Ok(Some(Input::Instructed(said)));
         }
@@ -277,6 +285,12 @@ impl Port {
         judge.adopt(next)?;
         let gone = before.into_iter().filter(|(robot, key)| after.get(robot) != Some(key));
         Ok(Some(Input::Expelled(gone.map(|(robot, _)| robot).collect())))
+    }
+
+    /// In a sealed swarm: who knows by the roster of today whose words count.
+    pub fn believer(&self) -> Option<Arc<dyn Believe>> {
+        let judge = self.judge.as_ref()?;
+        Some(Arc::new(Believer(judge.roster().clone())))
     }
 
     fn judge(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Refusal> {

@@ -101,12 +101,14 @@ impl Robot {
     }
 
     /// What it is told when it starts.
-    pub fn introduction(&self, alive: &BTreeSet<RobotId>, neighbours: &BTreeSet<RobotId>) -> [Input; 3] {
-        [
+    pub fn introduction(&self, alive: &BTreeSet<RobotId>, neighbours: &BTreeSet<RobotId>) -> Vec<Input> {
+        let believe = self.port.believer().map(Input::Believe);
+        let others = [
             Input::Learned(Arc::new(ByFirst)),
             Input::Alive(alive.clone()),
             Input::Neighbours(neighbours.clone()),
-        ]
+        ];
+        believe.into_iter().chain(others).collect()
     }
 
     /// Writes to its disk.

@@ -88,15 +88,18 @@ pub const STRANGER: u32 = 77;
 /// So many robots, from 1 on, as members of the swarm in that epoch.
 pub fn members(robots: u32, epoch: u64) -> Membership {
     let robots = (1..=robots).map(|id| (RobotId(id), key(id).public_key())).collect();
-    // Ada was there first, and may overrule; the others may teach.
+    // Ada was there first, and may overrule; the others may teach, but for Olga, who may open rounds.
     let others = (0..16).map(|n| format!("eve{n}")).chain(["eve".to_owned()]);
-    let names = others.map(|name| (name, Role::Teach)).chain([("ada".to_owned(), Role::Overrule)]);
+    let teachers = others.map(|name| (name, Role::Teach));
+    let names = teachers.chain([("ada".to_owned(), Role::Overrule), ("olga".to_owned(), Role::Open)]);
     let enrolled = |(name, role): (String, Role)| {
         let key = key_of(&instructor(&name)).public_key();
         (instructor(&name), Instructor { key, roles: Roles::up_to(role) })
     };
     let instructors = names.map(enrolled).collect();
-    Membership { swarm: SWARM.to_owned(), epoch, robots, instructors, ..Membership::default() }
+    // Whoever works on a robot's own computer may teach.
+    let local = Roles::up_to(Role::Teach);
+    Membership { swarm: SWARM.to_owned(), epoch, robots, instructors, local, ..Membership::default() }
 }
 
 /// Those, enrolled.

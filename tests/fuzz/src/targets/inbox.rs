@@ -1,5 +1,6 @@
 //! Whatever arrives at a robot of a sealed swarm: a key and a payload, looked at as `gestalt-link` does, then taken in by its mind.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
@@ -66,7 +67,8 @@ struct Inbox {
 
 impl Inbox {
     fn new() -> Self {
-        let (gate, robot) = (Gate::default(), Robot::new(ME, false));
+        let (gate, mut robot) = (Gate::default(), Robot::new(ME, false));
+        robot.handle(Duration::ZERO, Input::Believe(Arc::new(swarm::Members)));
         let keys = Keys::new("demo").expect("a name");
         Self { keys, gate, witness: Witness::new(swarm::roster()), robot, now: Duration::ZERO }
     }
@@ -144,7 +146,7 @@ impl Inbox {
             Topic::Feedback(by) => {
                 let instruction: Instruction = bounded(payload, || decode_json(payload)).ok()?;
                 let at = self.now.as_millis() as u64;
-                Input::Instructed(Instructed { by, at, instruction })
+                Input::Instructed(Instructed { by, at, instruction, said: None })
             }
             Topic::Answer(to) => {
                 let answer: Answer = bounded(payload, || decode_json(payload)).ok()?;
@@ -163,6 +165,7 @@ impl Inbox {
         if seal {
             match &mut envelope.message {
                 Message::Vote(_) | Message::Holding(_) => swarm::seal(&mut envelope),
+                Message::Lessons(lessons) => lessons.lessons.iter_mut().for_each(swarm::seal_lesson),
                 Message::Give(give) => {
                     give.votes.iter_mut().for_each(swarm::seal_vote);
                     give.holders.iter_mut().for_each(swarm::seal_holder);

@@ -145,7 +145,7 @@ impl Swarm<'_> {
         self.note(&Happening::Instruct { robot, instruction: &instruction });
         let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
         let bytes = json_bytes(&instruction);
-        let instructed = Rc::new(Instructed { by, at, instruction });
+        let instructed = Rc::new(Instructed { by, at, instruction, said: None });
         self.broadcast(i, bytes, Kind::Words, &Parcel::Instructed(instructed.clone()));
         self.arrive(i, Parcel::Instructed(instructed));
     }

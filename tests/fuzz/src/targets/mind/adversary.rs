@@ -118,8 +118,10 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
             // To one or two of them, or to all.
             for robot in (0..ROBOTS).filter(|robot| to & 3 == 3 || to >> robot & 1 == 1) {
                 let by = by.clone();
-                world
-                    .input(robot, Input::Instructed(Instructed { by, at, instruction: instruction.clone() }));
+                world.input(
+                    robot,
+                    Input::Instructed(Instructed { by, at, instruction: instruction.clone(), said: None }),
+                );
             }
         }
         // What a stranger says, in any name.

@@ -1,0 +1,30 @@
+//! Whose words count, by the roster.
+
+use std::sync::Arc;
+
+use gestalt_protocol::{InstructorId, SignedWord};
+use gestalt_strategies::{Believe, Standing};
+use gestalt_trust::{Role, Roster, Speaker};
+
+/// Knows who may teach from the roster that is gone by.
+#[derive(Debug)]
+pub(crate) struct Believer(Roster);
+
+impl Believer {
+    pub fn new(roster: Roster) -> Arc<dyn Believe> {
+        Arc::new(Self(roster))
+    }
+}
+
+impl Believe for Believer {
+    fn believe(&self, by: &InstructorId, said: &SignedWord) -> Option<(u64, Standing)> {
+        let (heading, roles) = self.0.check_word(by, &said.word, Some(&said.attachment)).ok()?;
+        let standing = match heading.speaker {
+            _ if !roles.has(Role::Teach) => return None,
+            _ if roles.has(Role::Overrule) => Standing::Overrules,
+            Speaker::Own(_) => Standing::Teaches,
+            Speaker::For(_) => Standing::Vouched,
+        };
+        Some((heading.count, standing))
+    }
+}

@@ -1,0 +1,212 @@
+//! Whose words are believed in a sealed swarm, and by whom.
+
+use gestalt_protocol::{InstructorId, Lessons, SignedWord, Word};
+
+use super::*;
+use crate::believe::{Believe, Standing};
+
+/// Who may teach. A word is signed by whoever's name stands before its count.
+#[derive(Debug)]
+struct Roll(&'static [(&'static str, Standing)]);
+
+impl Believe for Roll {
+    fn believe(&self, by: &InstructorId, said: &SignedWord) -> Option<(u64, Standing)> {
+        let name = by.to_string();
+        let count = said.attachment.strip_prefix(name.as_bytes())?.try_into().ok()?;
+        let (_, standing) = self.0.iter().find(|(known, _)| *known == name)?;
+        Some((u64::from_le_bytes(count), *standing))
+    }
+}
+
+const BOTH: &[(&str, Standing)] = &[("ada", Standing::Overrules), ("bob", Standing::Teaches)];
+
+fn signed(who: &str, count: u64, instruction: &Instruction) -> SignedWord {
+    let attachment = [who.as_bytes(), &count.to_le_bytes()].concat();
+    SignedWord { word: serde_json::to_vec(instruction).unwrap(), attachment }
+}
+
+fn was(round: RoundId, class: u32) -> Instruction {
+    Instruction::Was { round, class: Gesture::Class(ClassId(class)) }
+}
+
+impl Swarm {
+    fn sealed(seed: u64) -> Self {
+        let mut swarm = Self::new(3, config(3, 1.0), seed);
+        swarm.believe(BOTH);
+        swarm
+    }
+
+    fn believe(&mut self, roll: &'static [(&'static str, Standing)]) {
+        let believer: Arc<dyn Believe> = Arc::new(Roll(roll));
+        (0..self.minds.len()).for_each(|i| self.input(i, Input::Believe(believer.clone())));
+        self.believer = Some(believer);
+    }
+
+    /// One robot hears that word itself.
+    fn hear(&mut self, i: usize, who: &str, count: u64, instruction: &Instruction) {
+        let said = Some(signed(who, count, instruction));
+        let (by, instruction) = (who.parse().unwrap(), instruction.clone());
+        self.input(i, Input::Instructed(Instructed { by, at: count, instruction, said }));
+    }
+
+    fn of_class(&self, class: u32) -> Vec<usize> {
+        let count = |mind: &Mind| mind.training_set().unwrap().class_count(ClassId(class));
+        self.minds.iter().map(count).collect()
+    }
+
+    fn lessons(&self) -> Vec<usize> {
+        self.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect()
+    }
+
+    /// How many lessons are told in half a minute.
+    fn told_from_now(&mut self) -> usize {
+        let told = |swarm: &Self| swarm.told.get("lessons").map_or(0, |(messages, _)| *messages);
+        let before = told(self);
+        self.pass(Duration::from_secs(30));
+        told(self) - before
+    }
+}
+
+#[test]
+fn who_was_away_believes_the_word_and_not_who_tells_it() {
+    let mut swarm = Swarm::sealed(31);
+    let round = swarm.show(1);
+    swarm.hear(0, "ada", 700, &was(round, 4));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+    let instructor: InstructorId = "ada".parse().unwrap();
+    let made_up = |said| {
+        let (instructor, word) = (instructor.clone(), Word::Was(ClassId(2)));
+        Lesson { round, instructor, count: 800, at: 800, word, said }
+    };
+    let of_bob = signed("bob", 800, &was(round, 2));
+    let of_another_class = signed("ada", 800, &was(round, 3));
+    let of_another_count = signed("ada", 801, &was(round, 2));
+    for said in [None, Some(of_bob), Some(of_another_class), Some(of_another_count)] {
+        let message = Message::Lessons(Lessons { lessons: vec![made_up(said)] });
+        let stamp = Stamp { boot: u32::MAX, sequence: 1 };
+        swarm.input(2, Input::Received(Envelope { author: RobotId(1), stamp, message, signature: None }));
+    }
+    assert_eq!(swarm.minds[2].refusals().count(gestalt_rounds::Refusal::LessonUnproven), 4);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+    swarm.check();
+}
+
+#[test]
+fn the_newest_word_is_the_one_that_its_instructor_counted_last() {
+    let mut swarm = Swarm::sealed(32);
+    let round = swarm.show(1);
+    let (first, second) = (was(round, 2), was(round, 3));
+    swarm.hear(0, "ada", 700, &second);
+    swarm.hear(1, "ada", 600, &first);
+    swarm.hear(2, "ada", 700, &second);
+    swarm.hear(2, "ada", 600, &first);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(3), [9, 9, 9]);
+    swarm.check();
+}
+
+#[test]
+fn what_was_taught_goes_on_from_disk_to_who_comes_late() {
+    let mut swarm = Swarm::sealed(33);
+    let round = swarm.show(1);
+    (0..3).for_each(|i| swarm.hear(i, "ada", 700, &was(round, 4)));
+    swarm.pass(Duration::from_secs(3));
+    swarm.restart_all();
+    swarm.restart_empty(2);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.lessons(), [1, 1, 1]);
+    // What its author says of a sample is not what ada says of it.
+    swarm.hear(0, "ada", 800, &was(round, 5));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [0, 0, 0]);
+    assert_eq!(swarm.told_from_now(), 0, "all know the same");
+}
+
+#[test]
+fn what_a_memory_of_before_holds_counts_here_and_is_told_to_nobody() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 34);
+    let round = swarm.show(1);
+    swarm.was(round, 4);
+    // Releases without proofs wrote the words alone: no list of one proof, which is none.
+    let lessons = swarm.disks.iter_mut().flatten().filter(|(key, _)| key[0] == 4);
+    lessons.for_each(|(_, value)| assert_eq!(value.split_off(value.len() - 2), [1, 0]));
+    swarm.believe(BOTH);
+    swarm.restart_all();
+    swarm.restart_empty(2);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.lessons(), [1, 1, 0]);
+    assert_eq!(swarm.told_from_now(), 0, "they rest, though they do not know the same");
+    assert_eq!(swarm.of_class(4)[..2], [9, 9]);
+    swarm.hear(2, "bob", 1, &was(round, 3));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [0, 0, 0], "what can be shown goes before it");
+    assert_eq!(swarm.told_from_now(), 0);
+}
+
+#[test]
+fn what_somebody_said_who_may_teach_no_more_stays_where_it_is_until_another_speaks() {
+    let mut swarm = Swarm::sealed(35);
+    let round = swarm.show(1);
+    (0..3).for_each(|i| swarm.hear(i, "bob", 700, &was(round, 4)));
+    swarm.pass(Duration::from_secs(3));
+    swarm.believe(&BOTH[..1]);
+    swarm.restart_empty(2);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!((swarm.lessons(), &swarm.of_class(4)[..2]), (vec![1, 1, 0], &[9, 9][..]));
+    assert_eq!(swarm.told_from_now(), 0);
+    swarm.hear(0, "ada", 1, &was(round, 5));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [0, 0, 0]);
+    // He may again, and she goes before him.
+    swarm.believe(BOTH);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [0, 0, 0]);
+    assert_eq!(swarm.told_from_now(), 0);
+}
+
+#[test]
+fn who_may_not_overrule_is_told_so() {
+    let mut swarm = Swarm::sealed(36);
+    let round = swarm.show(1);
+    (0..3).for_each(|i| swarm.hear(i, "ada", 700, &was(round, 4)));
+    (0..3).for_each(|i| swarm.hear(i, "bob", 800, &was(round, 5)));
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!([swarm.outcome(700), swarm.outcome(800)], [Outcome::Learned, Outcome::NotAllowed]);
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+}
+
+#[test]
+fn a_name_is_believed_by_the_word_that_gave_it() {
+    let mut swarm = Swarm::sealed(37);
+    let round = swarm.show(1);
+    let (circle, ring) = ("circle".to_owned(), "ring".to_owned());
+    swarm.hear(0, "bob", 500, &Instruction::New { label: circle.clone(), round: None });
+    swarm.hear(0, "ada", 600, &Instruction::New { label: ring.clone(), round: Some(round) });
+    // By a label that only another's gesture has.
+    let same = Instruction::Same { class: Gesture::Label(circle.clone()), of: Gesture::Label(ring) };
+    swarm.hear(0, "ada", 700, &same);
+    swarm.pass(Duration::from_secs(10));
+    let named = |mind: &Mind| mind.learned().unwrap().named.len();
+    assert_eq!(swarm.minds.iter().map(named).collect::<Vec<_>>(), [1, 1, 1]);
+    let ring = ClassId::named(&"ada".parse().unwrap(), "ring");
+    assert_eq!(swarm.of_class(ring.0), [9, 9, 9]);
+    let retired = gestalt_protocol::Naming {
+        by: "bob".parse().unwrap(),
+        label: circle,
+        count: 900,
+        at: 900,
+        said_by: "ada".parse().unwrap(),
+        fate: gestalt_protocol::Fate::Retired,
+        said: Some(signed("ada", 900, &same)),
+    };
+    let message = Message::Namings(gestalt_protocol::Namings { namings: vec![retired] });
+    let stamp = Stamp { boot: u32::MAX, sequence: 1 };
+    swarm.input(2, Input::Received(Envelope { author: RobotId(1), stamp, message, signature: None }));
+    assert_eq!(swarm.minds[2].refusals().count(gestalt_rounds::Refusal::NamingUnproven), 1);
+    swarm.restart_all();
+    swarm.restart_empty(2);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.minds.iter().map(named).collect::<Vec<_>>(), [1, 1, 1]);
+}
