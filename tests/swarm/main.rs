@@ -22,6 +22,7 @@ mod memory;
 mod mixed;
 mod motion;
 mod naming;
+mod paced;
 mod page;
 mod partition;
 mod pause;
@@ -88,6 +89,8 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one.await,
         [Waits] stream::pictures_that_appear_late_and_bad_ones_among_them_are_streamed.await,
         [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
+        [Waits] paced::a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_frames_count.await,
+        [Waits] paced::a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_waiting.await,
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
         [Waits] stream::nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks.await,
         [Waits] stream::who_is_there_already_and_who_comes_too_many_is_refused_and_counted.await,
