@@ -122,7 +122,7 @@ fn main() -> std::process::ExitCode {
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
-        [Alone] stream::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
+        [Alone] paced::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
         [Alone] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Alone] scouting::a_hundred_robots_in_hearing_keep_four_links_each_and_agree.await,
     ])

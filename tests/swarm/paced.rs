@@ -6,19 +6,22 @@ use std::time::{Duration, Instant, SystemTime};
 
 use gestalt_link::{Client, LinkConfig, boot_number, fresh_nonce};
 use gestalt_peer::center::Center;
-use gestalt_peer::stream::{Credit, Sender};
-use gestalt_protocol::{CameraState, FrameHeader, ImageEncoding, RobotId};
+use gestalt_peer::stream::Credit;
+use gestalt_protocol::{CameraState, FrameHeader, ImageEncoding, RobotId, Status};
 use gestalt_strategies::Quorum;
-use gestalt_tests::{Hands, center_config, sender_config, unique};
+use gestalt_tests::{Hands, center_config, unique};
 use gestalt_vision::model::RobotModel;
 use serde_json::json;
 use tokio::sync::mpsc;
+
+use crate::stream::{center_asking, parrot, wait_for};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A centre whose rounds, once open, stay so.
 async fn center(swarm: &str, hands: &Hands) -> Center {
-    let orders = json!({"id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": {"workers": 1}});
+    let orders =
+        json!({"id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": {"workers": 1}});
     let mut config = center_config(&orders);
     config.rounds.quorum = Quorum::Evidence(4096);
     config.rounds.deadline = Duration::from_secs(3600);
@@ -65,11 +68,7 @@ pub async fn a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_
     let center = center(&swarm, &hands).await;
     let mut streaming = tokio::task::JoinSet::new();
     for id in 1..=3 {
-        let orders = json!({
-            "id": id, "swarm": swarm, "link": {"connect": center.robot().locators()}, "stream": {"images": hands.encoded()},
-        });
-        let (config, feed) = sender_config(&orders);
-        streaming.spawn(Sender::start(config, feed).unwrap().run(|_| {}));
+        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));
     }
     wait_live(&center, 3).await;
     let received = |center: &Center| -> Vec<u64> {
@@ -80,7 +79,11 @@ pub async fn a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_
     let before = received(&center);
     tokio::time::sleep(Duration::from_secs(4)).await;
     for (before, after) in before.iter().zip(received(&center)) {
-        assert!((3..=12).contains(&(after - before)), "{} frames in four seconds between rounds", after - before);
+        assert!(
+            (3..=12).contains(&(after - before)),
+            "{} frames in four seconds between rounds",
+            after - before
+        );
     }
     let opened = Instant::now();
     wait_round(&center).await;
@@ -98,7 +101,13 @@ pub async fn a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_
 }
 
 /// A camera that sends when it may, and hears nothing while it is `deaf`.
-async fn camera(id: u32, swarm: String, locators: Vec<String>, pictures: Vec<Vec<u8>>, deaf: Arc<AtomicBool>) {
+async fn camera(
+    id: u32,
+    swarm: String,
+    locators: Vec<String>,
+    pictures: Vec<Vec<u8>>,
+    deaf: Arc<AtomicBool>,
+) {
     let link = LinkConfig { connect: locators, ..LinkConfig::default() };
     let client = Client::open(&swarm, &link).await.unwrap();
     let (acknowledge, mut acknowledged) = mpsc::channel(16);
@@ -154,5 +163,61 @@ pub async fn a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_
     eprintln!("deaf and hearing: {lost:.2?}, then both hearing: {found:.2?} looks a second");
     assert!(found.iter().all(|rate| *rate >= 3.0), "{found:?}");
     playing.shutdown().await;
+    center.stop().await;
+}
+
+/// Memory of this process, in MB.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok()).unwrap_or_default() / 1024.0
+}
+
+pub async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
+    const PARROTS: u32 = 60;
+    let hands = Hands::new(3);
+    let swarm = unique("slow");
+    // Asked for all that they take, they are too many for one worker.
+    let center = center_asking(&swarm, &hands, 64, None).await;
+    let mut streaming = tokio::task::JoinSet::new();
+    for id in 1..=PARROTS {
+        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));
+    }
+    let count = |status: &Status, what: &str| status.counters.get(what).copied().unwrap_or_default();
+    let served = |status: &Status| count(status, "frames_received") - count(status, "frames_overwritten");
+    let all_served = || {
+        let parrots = center.served();
+        (parrots.len() == PARROTS as usize && parrots.iter().all(|parrot| served(parrot) > 0)).then_some(())
+    };
+    wait_for("Parrots", all_served).await;
+    // Whatever looks at a hand has its buffers from the first look on.
+    let looked =
+        || center.served().iter().all(|parrot| count(parrot, "frames_with_a_hand") > 9).then_some(());
+    wait_for("looks", || looked().or_else(|| (center.robot().open_round(), None).1)).await;
+    let long = std::env::var_os("GESTALT_LONG").is_some();
+    // Enough frames of each for an uneven hand to show.
+    let enough = if long { 6000 } else { 60 };
+    let (before, memory, began) = (center.served(), resident(), Instant::now());
+    // Rounds go on meanwhile: every frame of them is judged.
+    let (after, frames) = loop {
+        center.robot().open_round();
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        let after = center.served();
+        let frames: Vec<u64> = before.iter().zip(&after).map(|(b, a)| served(a) - served(b)).collect();
+        if frames.iter().any(|frames| *frames >= enough) {
+            break (after, frames);
+        }
+    };
+    let (seconds, grown) = (began.elapsed().as_secs_f64(), resident() - memory);
+    let rates: Vec<f64> = frames.iter().map(|frames| *frames as f64 / seconds).collect();
+    let (least, most) = rates.iter().fold((f64::MAX, 0.0_f64), |(a, b), rate| (a.min(*rate), b.max(*rate)));
+    let p99 = after.iter().map(|status| status.counters["frame_delay_p99_us"]).max().unwrap_or_default();
+    eprintln!(
+        "one worker, {PARROTS} Parrots for {seconds:.0} s: {least:.1} to {most:.1} fps each, p99 {} ms, {grown:+.1} MB",
+        p99 / 1000
+    );
+    assert!(most < 1.2 * least, "{rates:?}");
+    assert!(grown < 16.0, "{grown:.1} MB more");
+    streaming.shutdown().await;
     center.stop().await;
 }

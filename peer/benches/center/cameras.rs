@@ -11,7 +11,7 @@ use gestalt_protocol::{FrameHeader, ImageEncoding, RobotId};
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::human::{Human, Schedule};
 use gestalt_vision::pose::Pose;
-use gestalt_vision::source::{Glove, RenderedSource, ScheduledSource, Scene, Source, encode_jpeg};
+use gestalt_vision::source::{Glove, RenderedSource, Scene, ScheduledSource, Source, encode_jpeg};
 use serde::{Deserialize, Serialize};
 use tokio::sync::mpsc;
 

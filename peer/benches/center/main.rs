@@ -202,7 +202,9 @@ async fn run(parrots: u32, rounds: Rounds, model: &RobotModel, clips: &Path, tim
     let seen = Seen {
         rounds,
         frames: rates(|status| counter(status, "frames_received") - counter(status, "frames_overwritten")),
-        looks: rates(|status| counter(status, "frames_with_a_hand") + counter(status, "frames_without_a_hand")),
+        looks: rates(|status| {
+            counter(status, "frames_with_a_hand") + counter(status, "frames_without_a_hand")
+        }),
         p50: medians.get(medians.len() / 2).copied().unwrap_or_default(),
         p99: after.iter().map(|status| micros(status, "frame_delay_p99_us")).max().unwrap_or_default(),
         cores,

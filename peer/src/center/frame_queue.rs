@@ -356,7 +356,12 @@ mod tests {
 
     /// Works for that long at so much a frame, while every camera that is asked sends at once. Says how often each was served, and
     /// how many frames waited at most.
-    fn work(queue: &FrameQueue<Blind, u32>, robots: u32, time: Duration, each: Duration) -> (Vec<u32>, usize) {
+    fn work(
+        queue: &FrameQueue<Blind, u32>,
+        robots: u32,
+        time: Duration,
+        each: Duration,
+    ) -> (Vec<u32>, usize) {
         (0..robots).for_each(|robot| put(queue, robot, 0));
         let (mut served, mut most, until) = (vec![0; robots as usize], 0, Instant::now() + time);
         while Instant::now() < until {

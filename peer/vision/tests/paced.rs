@@ -19,7 +19,7 @@ use gestalt_vision::motion::Change;
 use gestalt_vision::pose::Pose;
 use gestalt_vision::sight::{Sight, SightConfig};
 use gestalt_vision::source::{
-    Frame, Glove, MAX_MEGAPIXELS, RenderedSource, ScheduledSource, Scene, Source, decode_reduced, encode_jpeg,
+    Frame, Glove, MAX_MEGAPIXELS, RenderedSource, Scene, ScheduledSource, Source, decode_reduced, encode_jpeg,
 };
 use opencv::core::Mat;
 use rand::{RngExt as _, SeedableRng as _};
@@ -43,7 +43,8 @@ struct Paces {
     watching: Duration,
 }
 
-const PACED: Paces = Paces { looking: Duration::from_nanos(166_666_667), watching: Duration::from_millis(100) };
+const PACED: Paces =
+    Paces { looking: Duration::from_nanos(166_666_667), watching: Duration::from_millis(100) };
 const EVERY_FRAME: Paces = Paces { looking: Duration::ZERO, watching: Duration::ZERO };
 
 /// One robot, as a centre sees for it.
@@ -92,9 +93,10 @@ impl<'a> Centre<'a> {
             return;
         }
         let closely = seat.sight.looks_closely(self.opened.is_some());
-        let enough = |size| if closely { size } else { seat.sight.enough(size) };
+        let as_it_is = closely || self.paces.watching.is_zero();
+        let enough = |size| if as_it_is { size } else { seat.sight.enough(size) };
         let whole = decode_reduced(jpeg, MAX_MEGAPIXELS, enough, &mut seat.frame.image).unwrap();
-        *(if closely { &mut self.taken.0 } else { &mut self.taken.1 }) += 1;
+        *(if as_it_is { &mut self.taken.0 } else { &mut self.taken.1 }) += 1;
         seat.frame.at = at;
         let taken = seat.sight.take_reduced(&seat.frame, whole, self.opened.is_some());
         seat.due = at + if closely { self.paces.looking } else { self.paces.watching };
@@ -130,8 +132,7 @@ impl<'a> Centre<'a> {
     fn score(&self, human: &Human, showings: u64) -> [u64; 2] {
         let mut score = [0, 0];
         for showing in 0..showings {
-            let of: Vec<_> =
-                self.rounds.iter().filter(|(at, _)| SCHEDULE.divide(*at).0 == showing).collect();
+            let of: Vec<_> = self.rounds.iter().filter(|(at, _)| SCHEDULE.divide(*at).0 == showing).collect();
             if let [(at, decided)] = &of[..] {
                 let right = *decided == human.last_shown(*at, &SCHEDULE).map(usize::from);
                 score = [score[0] + 1, score[1] + u64::from(right)];

@@ -153,11 +153,14 @@ pub(super) mod tests {
     #[test]
     fn a_picture_is_reduced_as_far_as_is_enough_and_shows_the_same() {
         // Smooth, as cameras see: of pixels that have nothing in common, every reduction makes something else.
-        let coarse = imgcodecs::imdecode(&Vector::from_slice(&encoded(".png", 8, 5)), imgcodecs::IMREAD_COLOR);
+        let coarse =
+            imgcodecs::imdecode(&Vector::from_slice(&encoded(".png", 8, 5)), imgcodecs::IMREAD_COLOR);
         let mut picture = Mat::default();
         resize(&coarse.unwrap(), &mut picture, Size::new(640, 361), 0.0, 0.0, INTER_AREA).unwrap();
         let jpeg = encode_jpeg(&picture, 90).unwrap();
-        for (enough, expected) in [((640, 361), 1), ((321, 10), 1), ((320, 181), 2), ((160, 90), 4), ((1, 1), 8)] {
+        for (enough, expected) in
+            [((640, 361), 1), ((321, 10), 1), ((320, 181), 2), ((160, 90), 4), ((1, 1), 8)]
+        {
             let mut image = Mat::default();
             let enough = Size::new(enough.0, enough.1);
             let whole = decode_reduced(&jpeg, MAX_MEGAPIXELS, |_| enough, &mut image).unwrap();
