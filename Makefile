@@ -7,8 +7,8 @@ export RUSTUP_TOOLCHAIN := stable
 endif
 .PHONY: demo test attack fuzz miri bench lint eyes deb deb-test packages test-packages
 
-# OpenCV's smallest set of headers, what the bindings are generated with, and what the whole-swarm tests drive.
-PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev \
+# OpenCV's smallest set of headers, libjpeg-turbo's, what the bindings are generated with, and what the whole-swarm tests drive.
+PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev libturbojpeg0-dev \
             libclang1-14 clang pkg-config
 TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++ systemd \
                  dpkg-dev lintian python3-numpy python3-websockets mypy

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Camera, CameraState, Motion, Opinion};
 use gestalt_strategies::Classify;
-use opencv::core::Mat;
+use opencv::core::{Mat, Size};
 use opencv::prelude::*;
 
 use crate::opinion::opinion;
@@ -131,18 +131,7 @@ impl CameraReport {
 
     /// The camera delivered a picture at that time. Says whether it is worth looking at: a frozen one is not.
     pub fn note_frame(&mut self, image: &Mat, at: Duration) -> bool {
-        self.urgent |= self.errors > 0 || self.taken.is_empty();
-        self.errors = 0;
-        self.error = None;
-        let side = |length: i32| u32::try_from(length).unwrap_or_default();
-        self.size = [side(image.cols()), side(image.rows())];
-        self.taken.push_back(at);
-        while self.taken.len() > *FRAMES.end()
-            || self.taken.len() > *FRAMES.start()
-                && self.taken.front().is_some_and(|first| *first + WINDOW < at)
-        {
-            self.taken.pop_front();
-        }
+        self.note_size(Size::new(image.cols(), image.rows()), at);
         if !self.changes {
             return true;
         }
@@ -151,6 +140,22 @@ impl CameraReport {
             (self.picture, self.picture_since) = (picture, at);
         }
         !self.is_same_picture(at)
+    }
+
+    /// The camera delivered a picture of that size at that time.
+    pub fn note_size(&mut self, size: Size, at: Duration) {
+        self.urgent |= self.errors > 0 || self.taken.is_empty();
+        self.errors = 0;
+        self.error = None;
+        let side = |length: i32| u32::try_from(length).unwrap_or_default();
+        self.size = [side(size.width), side(size.height)];
+        self.taken.push_back(at);
+        while self.taken.len() > *FRAMES.end()
+            || self.taken.len() > *FRAMES.start()
+                && self.taken.front().is_some_and(|first| *first + WINDOW < at)
+        {
+            self.taken.pop_front();
+        }
     }
 
     /// A frame was judged at that time; these are the features of its hand.

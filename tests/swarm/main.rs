@@ -22,6 +22,7 @@ mod memory;
 mod mixed;
 mod motion;
 mod naming;
+mod paced;
 mod page;
 mod partition;
 mod pause;
@@ -92,6 +93,8 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one.await,
         [Waits] stream::pictures_that_appear_late_and_bad_ones_among_them_are_streamed.await,
         [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
+        [Waits] paced::a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_frames_count.await,
+        [Waits] paced::a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_waiting.await,
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
         [Waits] stream::nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks.await,
         [Waits] stream::who_is_there_already_and_who_comes_too_many_is_refused_and_counted.await,
@@ -124,7 +127,7 @@ fn main() -> std::process::ExitCode {
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
-        [Alone] stream::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
+        [Alone] paced::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
         [Alone] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
         [Alone] scouting::a_hundred_robots_in_hearing_keep_four_links_each_and_agree.await,
     ])

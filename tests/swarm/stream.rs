@@ -27,16 +27,28 @@ fn model(hands: &Hands) -> RobotModel {
     RobotModel::read(&hands.model()).unwrap()
 }
 
-async fn center(swarm: &str, hands: &Hands, max_robots: usize) -> Center {
+/// A centre with one worker; `frames_per_look` as in its configuration.
+pub async fn center_asking(
+    swarm: &str,
+    hands: &Hands,
+    max_robots: usize,
+    frames_per_look: Option<u32>,
+) -> Center {
     let serve = json!({"workers": 1, "max_robots": max_robots});
     let orders = json!({
         "id": 100, "swarm": swarm, "link": {"listen": ["tcp/127.0.0.1:0"]}, "serve": serve,
     });
-    Center::start(&center_config(&orders), model(hands), boot_number(SystemTime::now())).await.unwrap()
+    let mut config = center_config(&orders);
+    config.center.frames_per_look = frames_per_look;
+    Center::start(&config, model(hands), boot_number(SystemTime::now())).await.unwrap()
+}
+
+async fn center(swarm: &str, hands: &Hands, max_robots: usize) -> Center {
+    center_asking(swarm, hands, max_robots, Some(3)).await
 }
 
 /// A Parrot that streams to `locators` until it is aborted.
-fn parrot(id: u32, swarm: &str, locators: &[String], pictures: &Path) -> Sender {
+pub fn parrot(id: u32, swarm: &str, locators: &[String], pictures: &Path) -> Sender {
     let orders = json!({
         "id": id, "swarm": swarm, "link": {"connect": locators}, "stream": {"images": pictures},
     });
@@ -44,7 +56,7 @@ fn parrot(id: u32, swarm: &str, locators: &[String], pictures: &Path) -> Sender 
     Sender::start(config, feed).unwrap()
 }
 
-async fn wait_for<T>(what: &str, mut pick: impl FnMut() -> Option<T>) -> T {
+pub async fn wait_for<T>(what: &str, mut pick: impl FnMut() -> Option<T>) -> T {
     let deadline = Instant::now() + PATIENCE;
     loop {
         if let Some(found) = pick() {
@@ -389,55 +401,4 @@ pub async fn a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one() {
         taken.said("nobody writes to the pipe", said).await;
     }
     taken.stop().await;
-}
-
-/// Memory of this process, in MB.
-fn resident() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
-    line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok()).unwrap_or_default() / 1024.0
-}
-
-pub async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
-    const PARROTS: u32 = 14;
-    let hands = Hands::new(3);
-    let swarm = unique("slow");
-    let center = center(&swarm, &hands, 64).await;
-    let mut streaming = tokio::task::JoinSet::new();
-    for id in 1..=PARROTS {
-        streaming.spawn(parrot(id, &swarm, center.robot().locators(), &hands.encoded()).run(|_| {}));
-    }
-    let count = |status: &Status, what: &str| status.counters.get(what).copied().unwrap_or_default();
-    let served = |status: &Status| count(status, "frames_received") - count(status, "frames_overwritten");
-    let all_served = || {
-        let parrots = center.served();
-        (parrots.len() == PARROTS as usize && parrots.iter().all(|parrot| served(parrot) > 0)).then_some(())
-    };
-    wait_for("Parrots", all_served).await;
-    let long = std::env::var_os("GESTALT_LONG").is_some();
-    // Enough frames of each for an uneven hand to show.
-    let enough = if long { 6000 } else { 60 };
-    let (before, memory, began) = (center.served(), resident(), Instant::now());
-    // Rounds go on meanwhile: every frame of them is judged.
-    let (after, frames) = loop {
-        center.robot().open_round();
-        tokio::time::sleep(Duration::from_millis(500)).await;
-        let after = center.served();
-        let frames: Vec<u64> = before.iter().zip(&after).map(|(b, a)| served(a) - served(b)).collect();
-        if frames.iter().any(|frames| *frames >= enough) {
-            break (after, frames);
-        }
-    };
-    let (seconds, grown) = (began.elapsed().as_secs_f64(), resident() - memory);
-    let rates: Vec<f64> = frames.iter().map(|frames| *frames as f64 / seconds).collect();
-    let (least, most) = rates.iter().fold((f64::MAX, 0.0_f64), |(a, b), rate| (a.min(*rate), b.max(*rate)));
-    let p99 = after.iter().map(|status| status.counters["frame_delay_p99_us"]).max().unwrap_or_default();
-    eprintln!(
-        "one worker, {PARROTS} Parrots for {seconds:.0} s: {least:.1} to {most:.1} fps each, p99 {} ms, {grown:+.1} MB",
-        p99 / 1000
-    );
-    assert!(most < 1.2 * least, "{rates:?}");
-    assert!(grown < 16.0, "{grown:.1} MB more");
-    streaming.shutdown().await;
-    center.stop().await;
 }

@@ -12,6 +12,7 @@ use tokio::time::MissedTickBehavior;
 
 use super::Frames;
 use super::frame_queue::Put;
+use super::pace::Paces;
 use super::seat::Seat;
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
 use gestalt_link::boot_number;
@@ -152,7 +153,8 @@ impl Door {
         drop(robot.events());
         robot.learned(self.model.classifier.clone(), &self.model.name);
         let period = Duration::from_secs_f32(1.0 / frame.header.fps.max(0.1));
-        let seat = Seat::new(Arc::new(robot), sight, self.config.center.frozen_after.max(3 * period));
+        let patience = self.config.center.frozen_after.max(3 * period);
+        let seat = Seat::new(Arc::new(robot), sight, Paces::new(&self.config), patience);
         self.queue.admit(id, Arc::new(seat));
         Ok(())
     }

@@ -2,10 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{FrameTaken, RobotId, RoundId};
 
 use gestalt_link::FrameArrival;
+
+/// A camera that was asked and has not sent within this time keeps nobody else waiting: it may be gone.
+const ANSWER: Duration = Duration::from_millis(100);
+
+/// A round that opens is noticed within this time, whoever sleeps meanwhile.
+const NOTICE: Duration = Duration::from_millis(20);
 
 /// A frame that can be acknowledged.
 pub(super) trait Acknowledge {
@@ -17,18 +24,22 @@ pub(super) trait Acknowledge {
 pub(super) trait Look {
     /// The round that is judged now.
     fn round(&self) -> Option<RoundId>;
+
+    /// When its camera is to be asked for the next frame, if it was asked for the last at that time.
+    fn due(&self, asked: Instant, now: Instant) -> Instant;
 }
 
 /// The newest frame of each robot, until a worker takes it.
 ///
-/// A camera sends its next frame when the one before was acknowledged, which happens as it is taken. When as many frames
-/// wait as the workers need to be busy, acknowledgements wait too, and go to the robots in the order in which they were
-/// served: then every camera sends its frame just before its turn, and overload makes frames fewer, not older.
+/// A camera sends its next frame when the one before was acknowledged, which happens when the next is due: what nobody needs is not
+/// sent. When as many frames wait or are on their way as the workers need to be busy, acknowledgements wait too, and go to the
+/// robots in the order in which they were served: then every camera sends its frame just before its turn, and overload makes
+/// frames fewer, not older.
 #[derive(Debug)]
 pub(super) struct FrameQueue<S, F> {
     state: Mutex<State<S, F>>,
     changed: Condvar,
-    /// How many frames may wait before acknowledgements do.
+    /// How many frames may wait or be on their way before acknowledgements wait.
     ahead: usize,
 }
 
@@ -49,6 +60,10 @@ struct Slot<S, F> {
     served: u64,
     /// The acknowledgement it has not been given yet.
     owed: Option<FrameTaken>,
+    /// When it was asked for a frame last, or its first one came.
+    asked: Instant,
+    /// It has not sent it yet.
+    on_its_way: bool,
     count: Count,
 }
 
@@ -84,7 +99,16 @@ impl<S: Look, F: Acknowledge> FrameQueue<S, F> {
     pub fn admit(&self, robot: RobotId, seat: Arc<S>) {
         let mut state = self.lock();
         let served = state.turn;
-        let slot = Slot { seat, newest: None, busy: false, served, owed: None, count: Count::default() };
+        let slot = Slot {
+            seat,
+            newest: None,
+            busy: false,
+            served,
+            owed: None,
+            asked: Instant::now(),
+            on_its_way: false,
+            count: Count::default(),
+        };
         state.slots.entry(robot).or_insert(slot);
     }
 
@@ -108,6 +132,7 @@ impl<S: Look, F: Acknowledge> FrameQueue<S, F> {
         let mut state = self.lock();
         let Some(slot) = state.slots.get_mut(&robot) else { return Put::Unknown(frame) };
         slot.count.received += 1;
+        slot.on_its_way = false;
         slot.count.overwritten += u64::from(slot.newest.replace(frame).is_some());
         drop(state);
         self.changed.notify_one();
@@ -124,11 +149,14 @@ impl<S: Look, F: Acknowledge> FrameQueue<S, F> {
                 return None;
             }
             let taken = state.take().map(|(robot, seat, frame)| Turn { queue: self, robot, seat, frame });
-            // Nothing to do: whoever can send shall.
-            let ahead = if taken.is_some() { self.ahead } else { usize::MAX };
-            let granted = state.grants(ahead);
+            let (granted, wait) = state.grants(Instant::now(), self.ahead);
             if taken.is_none() && granted.is_empty() {
-                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+                state = match wait {
+                    Some(wait) => {
+                        self.changed.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0
+                    }
+                    None => self.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+                };
                 continue;
             }
             // Not under the lock: Zenoh's threads put frames here.
@@ -173,17 +201,36 @@ impl<S: Look, F: Acknowledge> State<S, F> {
         let frame = slot.newest.take()?;
         self.turn += 1;
         (slot.busy, slot.served) = (true, self.turn);
-        slot.owed = Some(frame.taken(slot.seat.round()));
+        slot.owed = Some(frame.taken(None));
         Some((*robot, slot.seat.clone(), frame))
     }
 
-    /// The acknowledgements to be given, as long as fewer than `ahead` frames wait.
-    fn grants(&mut self, ahead: usize) -> Vec<(RobotId, FrameTaken)> {
-        let waiting = self.slots.values().filter(|slot| slot.newest.is_some()).count();
-        let mut owed: Vec<_> = self.slots.iter_mut().filter(|(_, slot)| slot.owed.is_some()).collect();
-        owed.sort_by_key(|(_, slot)| slot.served);
-        let first = owed.into_iter().take(ahead.saturating_sub(waiting));
-        first.filter_map(|(robot, slot)| Some((*robot, slot.owed.take()?))).collect()
+    /// The acknowledgements to be given now, as long as fewer than `ahead` frames wait or are on their way; and for how long at most
+    /// no other is, if any is owed.
+    fn grants(&mut self, now: Instant, ahead: usize) -> (Vec<(RobotId, FrameTaken)>, Option<Duration>) {
+        let is_expected = |slot: &Slot<S, F>| slot.on_its_way && now < slot.asked + ANSWER;
+        let expected = self.slots.values().filter(|slot| slot.newest.is_some() || is_expected(slot)).count();
+        let mut wait: Option<Duration> = None;
+        let mut due = Vec::new();
+        for (robot, slot) in self.slots.iter_mut().filter(|(_, slot)| slot.owed.is_some()) {
+            let until = slot.seat.due(slot.asked, now).saturating_duration_since(now);
+            if until.is_zero() {
+                due.push((*robot, slot));
+            } else {
+                wait = Some(wait.unwrap_or(NOTICE).min(until));
+            }
+        }
+        if !due.is_empty() {
+            wait = Some(wait.unwrap_or(NOTICE));
+        }
+        due.sort_by_key(|(_, slot)| slot.served);
+        let first = due.into_iter().take(ahead.saturating_sub(expected));
+        let granted = first.filter_map(|(robot, slot)| {
+            let round = slot.seat.round();
+            (slot.asked, slot.on_its_way) = (now, true);
+            Some((robot, FrameTaken { round, ..slot.owed.take()? }))
+        });
+        (granted.collect(), wait)
     }
 }
 
@@ -199,12 +246,18 @@ mod tests {
 
     use super::*;
 
+    const MS: Duration = Duration::from_millis(1);
+
+    /// Whose camera is asked so often.
     #[derive(Debug)]
-    struct Blind;
+    struct Blind(Duration);
 
     impl Look for Blind {
         fn round(&self) -> Option<RoundId> {
             None
+        }
+        fn due(&self, asked: Instant, _: Instant) -> Instant {
+            asked + self.0
         }
     }
 
@@ -214,10 +267,14 @@ mod tests {
         }
     }
 
-    fn queue(robots: u32, ahead: usize) -> FrameQueue<Blind, u32> {
+    fn paced(robots: u32, ahead: usize, pace: Duration) -> FrameQueue<Blind, u32> {
         let queue = FrameQueue::new(ahead);
-        (0..robots).for_each(|robot| queue.admit(RobotId(robot), Arc::new(Blind)));
+        (0..robots).for_each(|robot| queue.admit(RobotId(robot), Arc::new(Blind(pace))));
         queue
+    }
+
+    fn queue(robots: u32, ahead: usize) -> FrameQueue<Blind, u32> {
+        paced(robots, ahead, Duration::ZERO)
     }
 
     fn put(queue: &FrameQueue<Blind, u32>, robot: u32, frame: u32) {
@@ -275,7 +332,7 @@ mod tests {
         assert_eq!(take(&queue), (3, 1, vec![0]), "one waits, one more may");
         put(&queue, 0, 2);
         assert_eq!(take(&queue), (4, 1, vec![1]));
-        assert_eq!(take(&queue), (0, 2, vec![2, 3]));
+        assert_eq!(take(&queue), (0, 2, vec![2]), "that of 1 is on its way");
     }
 
     #[test]
@@ -288,12 +345,73 @@ mod tests {
         let granted = RefCell::new(Vec::new());
         std::thread::scope(|scope| {
             scope.spawn(|| {
-                std::thread::sleep(std::time::Duration::from_millis(50));
+                std::thread::sleep(6 * ANSWER);
                 queue.close();
             });
             assert!(queue.next(|robot, _| granted.borrow_mut().push(robot.0)).is_none());
         });
         // The last one taken had granted 0.
         assert_eq!(granted.into_inner(), [1, 2, 3, 4]);
+    }
+
+    /// Works for that long at so much a frame, while every camera that is asked sends at once. Says how often each was served, and
+    /// how many frames waited at most.
+    fn work(
+        queue: &FrameQueue<Blind, u32>,
+        robots: u32,
+        time: Duration,
+        each: Duration,
+    ) -> (Vec<u32>, usize) {
+        (0..robots).for_each(|robot| put(queue, robot, 0));
+        let (mut served, mut most, until) = (vec![0; robots as usize], 0, Instant::now() + time);
+        while Instant::now() < until {
+            let asked = RefCell::new(Vec::new());
+            let turn = queue.next(|robot, _| asked.borrow_mut().push(robot.0)).unwrap();
+            std::thread::sleep(each);
+            served[turn.robot.0 as usize] += 1;
+            drop(turn);
+            asked.into_inner().into_iter().for_each(|robot| put(queue, robot, 1));
+            let waiting = queue.lock().slots.values().filter(|slot| slot.newest.is_some()).count();
+            // All sent once unasked.
+            most = most.max(if served.contains(&0) { 0 } else { waiting });
+        }
+        (served, most)
+    }
+
+    #[test]
+    fn cameras_are_asked_no_more_often_than_is_due() {
+        let queue = paced(4, 8, 40 * MS);
+        let (asked, to_ask) = std::sync::mpsc::channel();
+        let mut times = [const { Vec::new() }; 4];
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let grant = |robot: RobotId, _| asked.send((robot.0, Instant::now())).unwrap();
+                while let Some(turn) = queue.next(grant) {
+                    drop(turn);
+                }
+            });
+            (0..4).for_each(|robot| put(&queue, robot, 0));
+            while let Ok((robot, at)) = to_ask.recv_timeout(Duration::from_secs(10)) {
+                times[robot as usize].push(at);
+                if times.iter().map(Vec::len).sum::<usize>() == 40 {
+                    break;
+                }
+                put(&queue, robot, 1);
+            }
+            queue.close();
+        });
+        for times in &times {
+            assert!(times.len() >= 8, "{times:?}");
+            assert!(times.windows(2).all(|pair| pair[1] + MS >= pair[0] + 40 * MS), "{times:?}");
+        }
+    }
+
+    #[test]
+    fn overload_makes_frames_of_all_fewer_alike_and_none_older() {
+        // Forty cameras that are due at any time, and time for five hundred frames.
+        let (served, waiting) = work(&queue(40, 4), 40, Duration::from_secs(1), 2 * MS);
+        let (least, most) = (served.iter().min().unwrap(), served.iter().max().unwrap());
+        assert!(*least > 2 && most - least <= 1, "{served:?}");
+        assert!(waiting <= 4, "{waiting} wait");
     }
 }

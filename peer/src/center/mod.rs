@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! robot/<id>/frame ─► door ─► queue: newest frame of each robot ─► workers: decode ─► sight ─► that robot ─► vote
-//!                      │                      └──────► robot/<id>/taken                          ▲
+//!                      │                      └─ due ► robot/<id>/taken                          ▲
 //!                      └─ admits: a guest of the centre (central), or a robot of its own (swarm) ─┘
 //! ```
 //!
@@ -12,6 +12,7 @@
 
 mod door;
 mod frame_queue;
+mod pace;
 mod seat;
 mod service;
 mod workers;
@@ -35,6 +36,9 @@ use workers::{Work, Workers, cores};
 
 /// How many frames of robots not served yet wait at the door.
 const MAX_WAITING: usize = 64;
+
+/// How many frames of each worker wait or are on their way: their way takes longer than looking at them.
+const AHEAD: usize = 12;
 
 /// Why a centre cannot start.
 #[derive(Debug, Error)]
@@ -112,7 +116,7 @@ impl Center {
     /// Opens the door and puts the workers behind it.
     async fn open(config: &Config, model: RobotModel, robot: Arc<Robot>) -> Result<Self, CenterError> {
         let workers = config.center.workers.unwrap_or_else(cores);
-        let queue = Arc::new(Frames::new(2 * workers.max(2)));
+        let queue = Arc::new(Frames::new(AHEAD * workers.max(2)));
         let (knock, knocks) = mpsc::channel(MAX_WAITING);
         let (of_gate, of_robot) = (queue.clone(), Arc::downgrade(&robot));
         let gate = robot

@@ -3,17 +3,18 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Motion, RoundId, Status};
-use opencv::core::Mat;
+use gestalt_protocol::{Motion, MotionState, RoundId, Status};
+use opencv::core::{Mat, Size};
 
 use super::frame_queue::{Count, Look};
+use super::pace::{Pace, Paces};
 use super::service::{Lately, Service};
 use crate::camera_report::CameraReport;
 use crate::stream::MAX_MEGAPIXELS;
 use crate::telling::{tell, tell_camera};
 use gestalt_link::{FrameArrival, Robot};
 use gestalt_vision::sight::{Sight, Taken};
-use gestalt_vision::source::{Frame, PictureError, SourceError, decode};
+use gestalt_vision::source::{Frame, PictureError, SourceError, decode_reduced};
 use gestalt_vision::steady::{Broken, Steady};
 
 /// What the status says of the camera.
@@ -26,12 +27,15 @@ pub(super) struct Seat {
     eye: Mutex<Eye>,
     /// Never held for long.
     record: Mutex<Record>,
+    /// Likewise.
+    pace: Mutex<Pace>,
 }
 
 struct Eye {
     sight: Steady<Sight>,
-    /// The frame at hand; its buffer is used again.
-    frame: Frame,
+    /// The frame at hand, as it is or reduced; their buffers are used again.
+    whole: Frame,
+    reduced: Frame,
 }
 
 struct Record {
@@ -44,18 +48,23 @@ struct Record {
 
 impl Seat {
     /// A seat for that robot, which counts as blind until a picture of it was seen. It is silent after `patience`.
-    pub fn new(robot: Arc<Robot>, sight: Steady<Sight>, patience: Duration) -> Self {
+    pub fn new(robot: Arc<Robot>, sight: Steady<Sight>, paces: Paces, patience: Duration) -> Self {
         let now = Instant::now();
         robot.blind(true);
         let mut camera = CameraReport::of_stream(patience, robot.started().elapsed());
         tell_camera(&mut camera, &robot, SOURCE, None, robot.started());
-        let frame = Frame { image: Mat::default(), at: Duration::ZERO };
+        let frame = || Frame { image: Mat::default(), at: Duration::ZERO };
+        let eye = Eye { sight, whole: frame(), reduced: frame() };
         let record = Record { camera, motion: None, service: Service::new(now), heard: now, judged: 0 };
-        Self { robot, eye: Mutex::new(Eye { sight, frame }), record: Mutex::new(record) }
+        Self { robot, eye: Mutex::new(eye), record: Mutex::new(record), pace: Mutex::new(Pace::new(paces)) }
     }
 
     fn record(&self) -> MutexGuard<'_, Record> {
         self.record.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn pace(&self) -> MutexGuard<'_, Pace> {
+        self.pace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Looks at a frame, and tells the robot what it showed.
@@ -67,27 +76,34 @@ impl Seat {
         let zero = self.robot.started();
         let age = Duration::from_micros(u64::from(arrival.header.age_us));
         let mut eye = self.eye.lock().unwrap_or_else(PoisonError::into_inner);
-        let Eye { sight, frame } = &mut *eye;
+        let Eye { sight, whole, reduced } = &mut *eye;
         // Two frames of which the older was longer under way must not change places.
-        frame.at = arrival.at.saturating_duration_since(zero).saturating_sub(age).max(frame.at);
-        let judge = self.round().is_some();
+        let at = arrival.at.saturating_duration_since(zero).saturating_sub(age);
+        let at = at.max(whole.at).max(reduced.at);
+        let period = Duration::from_secs_f32(1.0 / arrival.header.fps.max(0.1));
+        let judge = self.judges(zero + at, period);
         let now = zero.elapsed();
-        let looked = sight.run(now, |sight| -> Result<Taken, PictureError> {
-            decode(&arrival.picture(), MAX_MEGAPIXELS, &mut frame.image)?;
+        let looked = sight.run(now, |sight| -> Result<(Size, Taken), PictureError> {
+            let (picture, closely) = (arrival.picture(), sight.looks_closely(judge));
+            let frame = if closely { whole } else { reduced };
+            frame.at = at;
+            let enough = |size| if closely { size } else { sight.enough(size) };
+            let size = decode_reduced(&picture, MAX_MEGAPIXELS, enough, &mut frame.image)?;
             sight.rate_is(f64::from(arrival.header.fps));
-            Ok(sight.take(frame, judge))
+            Ok((size, sight.take_reduced(frame, size, judge)))
         });
         let motion = sight.get().and_then(Sight::motion);
         let mut record = self.record();
         let record = &mut *record;
         record.motion = motion;
+        self.pace().moves(motion.is_some_and(|motion| motion.state == MotionState::Moving));
         let said = match looked {
-            Ok(Ok(taken)) => {
-                record.camera.note_frame(&frame.image, arrival.at.saturating_duration_since(zero));
+            Ok(Ok((size, taken))) => {
+                record.camera.note_size(size, arrival.at.saturating_duration_since(zero));
                 let hand = taken.observation.as_ref().and_then(|seen| seen.as_ref().ok());
                 let features = hand.map(|observation| observation.features.clone());
                 record.camera.note_judged(taken.at, zero.elapsed(), features);
-                record.judged += u64::from(judge);
+                record.judged += u64::from(taken.observation.is_some());
                 record.service.served(age + arrival.at.elapsed());
                 tell(taken, &self.robot, zero);
                 Ok(())
@@ -106,6 +122,13 @@ impl Seat {
             tell_camera(&mut record.camera, &self.robot, SOURCE, motion, zero);
         }
         said
+    }
+
+    /// Whether a frame taken at that time is to be judged.
+    fn judges(&self, taken: Instant, period: Duration) -> bool {
+        let mut pace = self.pace();
+        pace.follow(self.round(), Instant::now());
+        pace.counts(taken, period)
     }
 
     /// Puts how it goes into the robot's status. Says for how long nothing was heard of it.
@@ -153,5 +176,11 @@ impl Seat {
 impl Look for Seat {
     fn round(&self) -> Option<RoundId> {
         self.robot.open()
+    }
+
+    fn due(&self, asked: Instant, now: Instant) -> Instant {
+        let mut pace = self.pace();
+        pace.follow(self.round(), now);
+        pace.due(asked)
     }
 }

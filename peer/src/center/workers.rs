@@ -88,6 +88,7 @@ mod tests {
     use std::sync::Mutex;
     use std::sync::mpsc;
     use std::thread::ThreadId;
+    use std::time::Instant;
 
     use gestalt_protocol::RoundId;
 
@@ -98,6 +99,9 @@ mod tests {
     impl Look for Blind {
         fn round(&self) -> Option<RoundId> {
             None
+        }
+        fn due(&self, asked: Instant, _: Instant) -> Instant {
+            asked
         }
     }
 

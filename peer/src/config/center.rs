@@ -18,6 +18,9 @@ pub struct CenterSection {
     pub max_robots: usize,
     /// Perception threads; `null`: one per core. Range `1..=64`.
     pub workers: Option<usize>,
+    /// Into how many of a robot's frames one look (`rounds.decorrelation`) is divided; no more are asked for. `None`: every frame
+    /// that its camera takes. Range `1..=32`.
+    pub frames_per_look: Option<u32>,
     /// A robot silent for this long counts as frozen.
     #[serde(with = "humantime_serde")]
     pub frozen_after: Duration,
@@ -55,6 +58,7 @@ impl Default for CenterSection {
             fuse: Fuse::Central,
             max_robots: 64,
             workers: None,
+            frames_per_look: Some(3),
             frozen_after: Duration::from_secs(2),
             gone_after: Duration::from_secs(10),
             robots: BTreeMap::new(),
@@ -73,6 +77,10 @@ impl CenterSection {
         if let Some(workers) = self.workers.filter(|workers| !(1..=64).contains(workers)) {
             let cause = format!("{workers} is outside 1..=64: null means one per core");
             found.push(ConfigError::value("center.workers", cause));
+        }
+        if let Some(frames) = self.frames_per_look.filter(|frames| !(1..=32).contains(frames)) {
+            let cause = format!("{frames} is outside 1..=32: null means every frame");
+            found.push(ConfigError::value("center.frames_per_look", cause));
         }
         let day = Duration::from_secs(24 * 60 * 60);
         if self.frozen_after.is_zero() || self.gone_after < self.frozen_after || self.gone_after > day {

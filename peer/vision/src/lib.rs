@@ -29,6 +29,8 @@ pub mod network;
 pub mod perception;
 pub mod pose;
 #[cfg(feature = "opencv")]
+mod reduction;
+#[cfg(feature = "opencv")]
 pub mod sight;
 #[cfg(feature = "opencv")]
 pub mod source;

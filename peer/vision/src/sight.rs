@@ -8,12 +8,14 @@ use std::time::Duration;
 
 use gestalt_protocol::{Motion, MotionState};
 use gestalt_strategies::Observation;
+use opencv::core::{Mat, MatTraitConst, Size};
 use thiserror::Error;
 
 use crate::camera_model::CameraModel;
 use crate::config::{LayerConfig, MotionConfig};
 use crate::motion::{Change, MotionDetector, MotionError};
-use crate::perception::{FeatureSet, HandConfig, NoObservation, Perception, PerceptionError};
+use crate::perception::{FeatureSet, HandConfig, NoObservation, Perception, PerceptionError, check};
+use crate::reduction::{Reduction, reduced};
 use crate::source::Frame;
 use crate::steady::Steady;
 use mismatch::Mismatch;
@@ -57,6 +59,8 @@ pub struct Sight {
     perception: Perception,
     /// `None` when motion is not watched.
     detector: Option<MotionDetector>,
+    /// The frame at hand, for both.
+    reduction: Reduction,
     mismatch: Mismatch,
 }
 
@@ -83,6 +87,7 @@ impl Sight {
         Ok(Self {
             perception: Perception::for_camera(features, HandConfig::default(), layer, &camera)?,
             detector: motion.enabled.then(|| MotionDetector::new(motion)).transpose()?,
+            reduction: Reduction::default(),
             mismatch: Mismatch::new(camera),
             layer,
             features,
@@ -101,18 +106,52 @@ impl Sight {
     /// Takes in the next frame; `judge`: also says what hand it shows. Frames between which no round is open are taken
     /// in as well, for they show what moves.
     pub fn take(&mut self, frame: &Frame, judge: bool) -> Taken {
-        let mut trouble = self.adapt_to(frame);
-        let change = self.detector.as_mut().map(|detector| detector.watch(&frame.image, frame.at));
+        let whole = frame.image.size().unwrap_or_default();
+        self.take_reduced(frame, whole, judge)
+    }
+
+    /// Whether the next frame is to be taken in as it is, because the hand in it is to be found.
+    #[must_use]
+    pub fn looks_closely(&self, judge: bool) -> bool {
+        judge && !self.is_moving()
+    }
+
+    /// How large a frame of that size must be left when it need not be taken in as it is.
+    #[must_use]
+    pub fn enough(&self, whole: Size) -> Size {
+        if self.detector.is_some() { reduced(whole) } else { Size::new(1, 1) }
+    }
+
+    /// Takes in a frame that is of size `whole`, or was before it was reduced to what is enough; then it shows what moves, and no hand.
+    pub fn take_reduced(&mut self, frame: &Frame, whole: Size, judge: bool) -> Taken {
+        let mut trouble = self.adapt_to(frame.at, whole);
+        let reduced = self.reduce(&frame.image, whole);
+        let change = self.detector.as_mut().map(|detector| match reduced {
+            true => detector.watch_reduced(&self.reduction.image, whole, frame.at),
+            false => detector.watch(&frame.image, frame.at),
+        });
         let change = change.unwrap_or(Ok(None)).unwrap_or_else(|error: MotionError| {
             trouble = Some(error.to_string());
             None
         });
-        let moving = self.detector.as_ref().is_some_and(|d| d.state() == MotionState::Moving);
-        let observation = (judge && !moving).then(|| {
+        let is_whole = frame.image.size().is_ok_and(|size| size == whole);
+        let observation = (is_whole && self.looks_closely(judge)).then(|| {
             let background = self.detector.as_ref().and_then(MotionDetector::background);
-            self.perception.observe_before(&frame.image, background)
+            match reduced {
+                true => self.perception.observe_reduced((&frame.image, &self.reduction.image), background),
+                false => self.perception.observe_before(&frame.image, background),
+            }
         });
         Taken { at: frame.at, change, observation, trouble }
+    }
+
+    /// Reduces a frame for whoever looks at it; what is no frame is left to them to refuse.
+    fn reduce(&mut self, image: &Mat, whole: Size) -> bool {
+        check(image).is_ok() && self.reduction.take(image, whole).is_ok()
+    }
+
+    fn is_moving(&self) -> bool {
+        self.detector.as_ref().is_some_and(|detector| detector.state() == MotionState::Moving)
     }
 
     /// With what it looked last: where in the frame, and at which pixels, it found the hand of the last observation.
@@ -141,10 +180,10 @@ impl Sight {
     }
 
     /// Reads frames as what they are when they are not what the configuration says. Says so, once.
-    fn adapt_to(&mut self, frame: &Frame) -> Option<String> {
-        let rate = self.mismatch.notice_rate(frame.at);
+    fn adapt_to(&mut self, at: Duration, whole: Size) -> Option<String> {
+        let rate = self.mismatch.notice_rate(at);
         // Every frame says its own size; only what counts in seconds has to be made anew.
-        let Some(said) = rate else { return self.mismatch.notice_size(frame) };
+        let Some(said) = rate else { return self.mismatch.notice_size(whole) };
         let model = self.mismatch.model();
         match Perception::for_camera(self.features, HandConfig::default(), self.layer, &model) {
             Ok(perception) => {

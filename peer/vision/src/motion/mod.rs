@@ -23,7 +23,7 @@ mod view;
 use std::time::Duration;
 
 use gestalt_protocol::MotionState;
-use opencv::core::Mat;
+use opencv::core::{Mat, MatTraitConst, Size};
 use thiserror::Error;
 
 pub use crate::config::{MotionConfig, MotionConfigError};
@@ -31,6 +31,8 @@ use background::Background;
 use difference::Difference;
 use energy::Energy;
 use view::View;
+
+use crate::reduction::Reduction;
 
 /// By how many pixels of a view, a hundredth of its width each two, things may tremble before a movement begins.
 const COARSE: i32 = 2;
@@ -97,6 +99,7 @@ pub struct MotionDetector {
     /// The share of the picture that somebody covers: what differed from the empty scene when last compared or, before that is
     /// known, the most that the movement changed.
     covered: f64,
+    reduction: Reduction,
 }
 
 impl MotionDetector {
@@ -115,6 +118,7 @@ impl MotionDetector {
             began: None,
             shown: false,
             covered: 0.0,
+            reduction: Reduction::default(),
             config,
         })
     }
@@ -125,10 +129,27 @@ impl MotionDetector {
     /// # Errors
     /// [`MotionError::Frame`] or [`MotionError::OpenCv`]; the detector is ready for the next frame.
     pub fn watch(&mut self, bgr: &Mat, at: Duration) -> Result<Option<Change>, MotionError> {
+        let size = bgr.size()?;
+        View::check(bgr, size)?;
+        let mut reduction = std::mem::take(&mut self.reduction);
+        let change = reduction.take(bgr, size).map_err(MotionError::from);
+        let change = change.and_then(|()| self.watch_reduced(&reduction.image, size, at));
+        self.reduction = reduction;
+        change
+    }
+
+    /// The same, of a frame of size `whole` that was reduced already.
+    pub(crate) fn watch_reduced(
+        &mut self,
+        reduced: &Mat,
+        whole: Size,
+        at: Duration,
+    ) -> Result<Option<Change>, MotionError> {
+        View::check(reduced, whole)?;
         if self.energy.newest().is_some_and(|newest| at <= newest) {
             return Ok(None);
         }
-        let view = View::of(bgr, at, self.energy.spare())?;
+        let view = View::of(reduced, at, self.energy.spare())?;
         if self.energy.before().is_some_and(|before| !before.is_like(&view)) {
             return self.start_anew(view);
         }

@@ -8,9 +8,6 @@ use opencv::prelude::*;
 
 use super::MotionError;
 
-/// Views are the largest images of their frame's aspect ratio within this.
-const LIMIT: Size = Size { width: 160, height: 120 };
-
 /// The smallest frame that can be watched.
 const SMALLEST: i32 = 16;
 
@@ -24,24 +21,26 @@ pub(super) struct View {
     pub least: Mat,
     pub greatest: Mat,
     reach: Option<i32>,
-    halved: [Mat; 2],
-    reduced: Mat,
 }
 
 impl View {
-    /// The view of a frame, in the buffers of a view that is no longer needed.
-    pub fn of(bgr: &Mat, at: Duration, buffers: Self) -> Result<Self, MotionError> {
-        let (width, height) = (bgr.cols(), bgr.rows());
-        if width.min(height) < SMALLEST || bgr.typ() != core::CV_8UC3 {
-            return Err(MotionError::Frame { width, height, channels: bgr.channels() });
-        }
+    /// The view of a frame that was reduced, in the buffers of a view that is no longer needed.
+    pub fn of(reduced: &Mat, at: Duration, buffers: Self) -> Result<Self, MotionError> {
         let mut view = Self { at, reach: None, ..buffers };
-        view.reduce(bgr)?;
         // Averages out codec noise and what noise the reduction has left.
         let anchor = Point::new(-1, -1);
         let border = core::BORDER_REPLICATE;
-        imgproc::blur(&view.reduced, &mut view.picture, Size::new(3, 3), anchor, border)?;
+        imgproc::blur(reduced, &mut view.picture, Size::new(3, 3), anchor, border)?;
         Ok(view)
+    }
+
+    /// Whether a picture of a frame of that size can be watched.
+    pub fn check(bgr: &Mat, frame: Size) -> Result<(), MotionError> {
+        let Size { width, height } = frame;
+        if width.min(height) < SMALLEST || bgr.typ() != core::CV_8UC3 {
+            return Err(MotionError::Frame { width, height, channels: bgr.channels() });
+        }
+        Ok(())
     }
 
     /// Whether two views can be compared.
@@ -68,29 +67,5 @@ impl View {
     pub fn renew(&mut self, at: Duration) {
         self.at = at;
         self.reach = None;
-    }
-
-    /// Reduces by area, so that no pixel of the frame is lost; by halves first, which is several times as fast.
-    fn reduce(&mut self, bgr: &Mat) -> opencv::Result<()> {
-        let fit = |frame: Size| {
-            let scale = (f64::from(LIMIT.width) / f64::from(frame.width))
-                .min(f64::from(LIMIT.height) / f64::from(frame.height))
-                .min(1.0);
-            let side = |length: i32| ((f64::from(length) * scale).round() as i32).max(1);
-            Size::new(side(frame.width), side(frame.height))
-        };
-        let target = fit(bgr.size()?);
-        let [even, odd] = &mut self.halved;
-        let mut source: &Mat = bgr;
-        for buffer in [even, odd] {
-            let size = source.size()?;
-            let half = Size::new(size.width / 2, size.height / 2);
-            if half.width < target.width || half.height < target.height {
-                break;
-            }
-            imgproc::resize(source, buffer, half, 0.0, 0.0, imgproc::INTER_AREA)?;
-            source = buffer;
-        }
-        imgproc::resize(source, &mut self.reduced, target, 0.0, 0.0, imgproc::INTER_AREA)
     }
 }

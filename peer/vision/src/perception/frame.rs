@@ -60,6 +60,26 @@ impl View {
     ///
     /// Nothing is padded: a margin of one colour would pass for background.
     pub fn look(&mut self, frame: &Mat, before: Option<&Mat>, region: Rect) -> Result<(), NoObservation> {
+        let size = self.size_for(region)?;
+        scale_part(frame, region, size, &mut self.image)?;
+        self.turn_to(region, frame.size()?, size, before)
+    }
+
+    /// Looks at the whole of a frame of that size, which was reduced already; and at the scene without anyone.
+    pub fn look_at_reduced(
+        &mut self,
+        (reduced, frame): (&Mat, Size),
+        before: Option<&Mat>,
+    ) -> Result<(), NoObservation> {
+        let whole = Rect::new(0, 0, frame.width, frame.height);
+        let size = self.size_for(whole)?;
+        let reduced_to = reduced.size()?;
+        scale_part(reduced, Rect::new(0, 0, reduced_to.width, reduced_to.height), size, &mut self.image)?;
+        self.turn_to(whole, frame, size, before)
+    }
+
+    /// The size at which a region is seen.
+    fn size_for(&self, region: Rect) -> Result<Size, NoObservation> {
         let scale = self.limit.map_or(1.0, |limit| {
             let fit = |limit: i32, side: i32| f64::from(limit) / f64::from(side);
             fit(limit.width, region.width).min(fit(limit.height, region.height))
@@ -69,9 +89,18 @@ impl View {
         if size.width.min(size.height) < SHORTEST {
             return Err(NoObservation::TooNarrow { width: region.width, height: region.height });
         }
-        scale_part(frame, region, size, &mut self.image)?;
-        self.region = region;
-        self.frame = frame.size()?;
+        Ok(size)
+    }
+
+    /// Notes what is seen now, and looks at the same of the scene without anyone.
+    fn turn_to(
+        &mut self,
+        region: Rect,
+        frame: Size,
+        size: Size,
+        before: Option<&Mat>,
+    ) -> Result<(), NoObservation> {
+        (self.region, self.frame) = (region, frame);
         match before {
             Some(before) => {
                 let whole = before.size()?;

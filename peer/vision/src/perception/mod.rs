@@ -36,6 +36,7 @@ use thiserror::Error;
 
 use crate::camera_model::CameraModel;
 use crate::eyes::EyesError;
+use crate::reduction::Reduction;
 
 use canonical::Canonical;
 use colour::ColourModel;
@@ -127,6 +128,7 @@ pub struct Perception {
     layer: LayerConfig,
     canvas: Mat,
     canvas_before: Mat,
+    reduction: Reduction,
     glance: View,
     colours: ColourModel,
     close: View,
@@ -178,6 +180,7 @@ impl Perception {
             layer,
             canvas: Mat::default(),
             canvas_before: Mat::default(),
+            reduction: Reduction::default(),
             glance: View::new(Some(GLANCE)),
             colours: ColourModel::new(hand.minimum_contrast, layer.colour, period),
             close: View::new((layer.geometry && layer.resolution).then_some(CLOSE)),
@@ -227,7 +230,12 @@ impl Perception {
             check(background)?;
         }
         if self.layer.geometry {
-            return self.see(bgr, background, 1.0);
+            let mut reduction = std::mem::take(&mut self.reduction);
+            let taken = if self.learned.is_none() { reduction.take(bgr, bgr.size()?) } else { Ok(()) };
+            let seen = taken.map_err(NoObservation::from);
+            let seen = seen.and_then(|()| self.see(bgr, background, Some(&reduction.image), 1.0));
+            self.reduction = reduction;
+            return seen;
         }
         let (mut canvas, mut before) =
             (std::mem::take(&mut self.canvas), std::mem::take(&mut self.canvas_before));
@@ -235,14 +243,34 @@ impl Perception {
         if let Some(background) = background {
             resize(background, &mut before, CANVAS, 0.0, 0.0, INTER_AREA)?;
         }
-        let seen = self.see(&canvas, background.map(|_| &before), CANVAS.width as f32 / bgr.cols() as f32);
+        let scale = CANVAS.width as f32 / bgr.cols() as f32;
+        let seen = self.see(&canvas, background.map(|_| &before), None, scale);
         self.region = Rect::new(0, 0, bgr.cols(), bgr.rows());
         (self.canvas, self.canvas_before) = (canvas, before);
         seen
     }
 
-    /// `scale`: pixels of this frame per pixel of the camera.
-    fn see(&mut self, bgr: &Mat, before: Option<&Mat>, scale: f32) -> Result<Observation, NoObservation> {
+    /// The same, of a frame that was reduced already.
+    pub(crate) fn observe_reduced(
+        &mut self,
+        (bgr, reduced): (&Mat, &Mat),
+        background: Option<&Mat>,
+    ) -> Result<Observation, NoObservation> {
+        if !self.layer.geometry {
+            return self.observe_before(bgr, background);
+        }
+        check(bgr)?;
+        self.see(bgr, background, Some(reduced), 1.0)
+    }
+
+    /// `reduced`: the frame at a glance, where that is known; `scale`: pixels of this frame per pixel of the camera.
+    fn see(
+        &mut self,
+        bgr: &Mat,
+        before: Option<&Mat>,
+        reduced: Option<&Mat>,
+        scale: f32,
+    ) -> Result<Observation, NoObservation> {
         let whole = Rect::new(0, 0, bgr.cols(), bgr.rows());
         self.region = whole;
         if let Some(learned) = &mut self.learned {
@@ -250,7 +278,10 @@ impl Perception {
             (observation, self.region) = learned.observe(bgr, self.layer.geometry)?;
             return Ok(observation);
         }
-        self.glance.look(bgr, before, whole)?;
+        match reduced {
+            Some(reduced) => self.glance.look_at_reduced((reduced, bgr.size()?), before)?,
+            None => self.glance.look(bgr, before, whole)?,
+        }
         self.colours.learn(&self.glance)?;
         self.colours.mark(&mut self.glance)?;
         let found = self.finder.locate(&self.glance)?;

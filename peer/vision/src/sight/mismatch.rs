@@ -3,10 +3,9 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use opencv::prelude::*;
+use opencv::core::Size;
 
 use crate::camera_model::CameraModel;
-use crate::source::Frame;
 
 /// Over how many frames the rate is taken: their median interval, so that a pause or a hiccup makes none.
 const FRAMES: usize = 24;
@@ -59,8 +58,8 @@ impl Mismatch {
     }
 
     /// Another size than the configuration says; said once.
-    pub fn notice_size(&mut self, frame: &Frame) -> Option<String> {
-        let size = (frame.image.cols(), frame.image.rows());
+    pub fn notice_size(&mut self, frame: Size) -> Option<String> {
+        let size = (frame.width, frame.height);
         let meant = (self.model.width_px, self.model.height_px);
         if self.size_said || size == meant || size.0 <= 0 || size.1 <= 0 {
             return None;
@@ -113,23 +112,21 @@ impl Mismatch {
 
 #[cfg(test)]
 mod tests {
-    use opencv::core::{CV_8UC3, Scalar};
-
     use super::*;
 
-    fn frame(width: i32, height: i32, at_ms: u64) -> Frame {
-        let image = Mat::new_rows_cols_with_default(height, width, CV_8UC3, Scalar::all(9.0)).unwrap();
-        Frame { image, at: Duration::from_millis(at_ms) }
+    /// A frame's size, and when it was taken.
+    fn frame(width: i32, height: i32, at_ms: u64) -> (Size, Duration) {
+        (Size::new(width, height), Duration::from_millis(at_ms))
     }
 
-    fn notice(mismatch: &mut Mismatch, frame: &Frame) -> Vec<String> {
-        [mismatch.notice_rate(frame.at), mismatch.notice_size(frame)].into_iter().flatten().collect()
+    fn notice(mismatch: &mut Mismatch, (size, at): (Size, Duration)) -> Vec<String> {
+        [mismatch.notice_rate(at), mismatch.notice_size(size)].into_iter().flatten().collect()
     }
 
     #[test]
     fn what_the_configuration_says_is_no_news() {
         let mut mismatch = Mismatch::new(CameraModel::footbot());
-        assert!((0..100).all(|at| notice(&mut mismatch, &frame(384, 288, at * 500)).is_empty()));
+        assert!((0..100).all(|at| notice(&mut mismatch, frame(384, 288, at * 500)).is_empty()));
         assert_eq!(mismatch.model(), CameraModel::footbot());
     }
 
@@ -141,7 +138,7 @@ mod tests {
         let said: Vec<String> = (0..200)
             .flat_map(|at| {
                 let (width, height) = sizes[at as usize % 3];
-                notice(&mut mismatch, &frame(width, height, at * 100))
+                notice(&mut mismatch, frame(width, height, at * 100))
             })
             .collect();
         let [size, rate] = &said[..] else { panic!("{said:?}") };
@@ -158,7 +155,7 @@ mod tests {
         let mut mismatch = Mismatch::new(CameraModel::parrot());
         for at in 0..100 {
             mismatch.passed_over(2);
-            assert_eq!(notice(&mut mismatch, &frame(640, 360, at * 100)), Vec::<String>::new());
+            assert_eq!(notice(&mut mismatch, frame(640, 360, at * 100)), Vec::<String>::new());
         }
     }
 
@@ -166,9 +163,9 @@ mod tests {
     fn the_rate_that_a_sender_states_counts_whatever_arrives() {
         let mut mismatch = Mismatch::new(CameraModel::parrot());
         mismatch.rate_is(30.0);
-        assert!((0..100).all(|at| notice(&mut mismatch, &frame(640, 360, at * 500)).is_empty()));
+        assert!((0..100).all(|at| notice(&mut mismatch, frame(640, 360, at * 500)).is_empty()));
         mismatch.rate_is(5.0);
-        let said = notice(&mut mismatch, &frame(640, 360, 60_000));
+        let said = notice(&mut mismatch, frame(640, 360, 60_000));
         assert!(said[0].contains("5.0 frames per second where camera.model says 30"), "{said:?}");
     }
 }

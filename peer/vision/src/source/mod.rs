@@ -1,9 +1,11 @@
 //! Where frames come from: a camera, drawn, read from a folder, or played from a video.
 
+mod container;
 mod device;
 mod emulated_view;
 mod folder;
 mod image_file;
+mod picture;
 mod pipe;
 mod reader;
 pub mod rendered;
@@ -27,9 +29,8 @@ use crate::steady::Broken;
 pub use device::Device;
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
-pub use image_file::{
-    MAX_IMAGE_BYTES, MAX_MEGAPIXELS, PictureError, decode, encode_jpeg, read_image, read_jpeg, through_jpeg,
-};
+pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image, read_jpeg};
+pub use picture::{PictureError, decode, decode_reduced, encode_jpeg, through_jpeg};
 pub use pipe::Pipe;
 pub use reader::{Opener, Reader};
 pub use rendered::{Glove, RenderedSource, ScheduledSource};

@@ -45,9 +45,10 @@ pub const TABLE: [Feature; 24] = [
 pub fn measure(hand: &Hand<'_>, outline: &Outline) -> Result<[f32; TABLE.len()], opencv::Error> {
     let area = hand.moments.m00 as f32;
     let unit = area.sqrt();
-    let rectangle = min_area_rect(hand.contour)?.size;
+    // Whatever encloses the corners of the hull encloses the outline, of which they are few.
+    let rectangle = min_area_rect(&outline.corners)?.size;
     let (mut centre, mut radius) = (Point2f::default(), 0.0);
-    min_enclosing_circle(hand.contour, &mut centre, &mut radius)?;
+    min_enclosing_circle(&outline.corners, &mut centre, &mut radius)?;
     let m = &hand.moments;
     let (right, up) = hand.axes(hand.centroid());
 

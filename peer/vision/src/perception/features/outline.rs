@@ -29,6 +29,8 @@ pub struct Outline {
     pub perimeter: f32,
     /// Corners of the convex hull as indices into `points`, ascending.
     pub hull: Vec<usize>,
+    /// The same as pixels.
+    pub corners: Vector<Point>,
     pub hull_area: f32,
     pub hull_perimeter: f32,
 }
@@ -64,6 +66,7 @@ impl Outline {
             hull,
             hull_area: contour_area_def(&corners)? as f32,
             hull_perimeter: arc_length(&corners, true)? as f32,
+            corners,
         })
     }
 }

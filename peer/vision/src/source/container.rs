@@ -1,0 +1,134 @@
+//! What a JPEG or PNG file claims to hold, before anything of it is decoded.
+//!
+//! Decoders give a JPEG that was cut short as a partly grey image, with a word at most, and decode any size. So the
+//! container is checked first: what it is, how large, and whether its end is there.
+
+use opencv::core::Size;
+
+use super::picture::PictureError;
+
+/// A whole file's claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Claim {
+    pub width: u32,
+    pub height: u32,
+    /// A JPEG of one or three channels that is not to be turned.
+    pub plain_jpeg: bool,
+}
+
+impl Claim {
+    /// `None` when it is larger than any image in memory.
+    pub fn size(&self) -> Option<Size> {
+        Some(Size::new(i32::try_from(self.width).ok()?, i32::try_from(self.height).ok()?))
+    }
+}
+
+/// What a whole JPEG or PNG file claims.
+pub(super) fn inspect(bytes: &[u8]) -> Result<Claim, PictureError> {
+    if let Some(rest) = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n") {
+        inspect_png(rest)
+    } else if let Some(rest) = bytes.strip_prefix(b"\xff\xd8\xff") {
+        // The third byte belongs to the first marker.
+        inspect_jpeg(&bytes[bytes.len() - rest.len() - 1..])
+    } else {
+        Err(PictureError::NotAnImage)
+    }
+}
+
+/// Walks the chunks (length, type, data, checksum) up to the end chunk.
+fn inspect_png(mut rest: &[u8]) -> Result<Claim, PictureError> {
+    let fields = rest.get(8..16).ok_or(PictureError::Truncated)?;
+    let (width, height) = (big_endian(&fields[..4]), big_endian(&fields[4..]));
+    loop {
+        let (Some(length), Some(kind)) = (rest.get(..4), rest.get(4..8)) else {
+            return Err(PictureError::Truncated);
+        };
+        let end = (big_endian(length) as usize).saturating_add(12);
+        if rest.len() < end {
+            return Err(PictureError::Truncated);
+        }
+        if kind == b"IEND" {
+            return Ok(Claim { width, height, plain_jpeg: false });
+        }
+        rest = &rest[end..];
+    }
+}
+
+/// Walks the marker segments, and through the scans between them, up to the end-of-image marker (ITU-T T.81, B.1).
+fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
+    const START_OF_SCAN: u8 = 0xda;
+    const END_OF_IMAGE: u8 = 0xd9;
+    const APPLICATION_1: u8 = 0xe1;
+    let (mut claim, mut may_be_turned) = (None, false);
+    loop {
+        // A marker is 0xff, any number of times, and a code.
+        let Some(fill) = rest.iter().position(|byte| *byte != 0xff) else {
+            return Err(PictureError::Truncated);
+        };
+        if fill == 0 {
+            return Err(PictureError::NotAnImage);
+        }
+        let marker = rest[fill];
+        rest = &rest[fill + 1..];
+        if marker == END_OF_IMAGE {
+            let claim: Claim = claim.ok_or(PictureError::NotAnImage)?;
+            return Ok(Claim { plain_jpeg: claim.plain_jpeg && !may_be_turned, ..claim });
+        }
+        let Some(length) = rest.get(..2) else { return Err(PictureError::Truncated) };
+        let length = big_endian(length) as usize;
+        let Some(segment) = rest.get(..length) else { return Err(PictureError::Truncated) };
+        may_be_turned |= marker == APPLICATION_1;
+        // Start of frame, of any coding: C0 to CF but for tables (C4, C8, CC).
+        if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
+            let fields = segment.get(3..8).ok_or(PictureError::NotAnImage)?;
+            let (height, width) = (big_endian(&fields[..2]), big_endian(&fields[2..4]));
+            claim = Some(Claim { width, height, plain_jpeg: matches!(fields[4], 1 | 3) });
+        }
+        rest = &rest[length..];
+        if marker == START_OF_SCAN {
+            rest = &rest[end_of_scan(rest).ok_or(PictureError::Truncated)?..];
+        }
+    }
+}
+
+/// Where coded data ends: in it, 0xff is followed by a zero (stuffing) or a restart marker.
+fn end_of_scan(coded: &[u8]) -> Option<usize> {
+    memchr::memchr_iter(0xff, coded).find(|&at| !matches!(coded.get(at + 1), None | Some(0x00 | 0xd0..=0xd7)))
+}
+
+fn big_endian(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::picture::tests::encoded;
+    use super::*;
+
+    #[test]
+    fn a_file_cut_short_anywhere_is_truncated() {
+        for extension in [".jpg", ".png"] {
+            let whole = encoded(extension, 40, 30);
+            let claim = Claim { width: 40, height: 30, plain_jpeg: extension == ".jpg" };
+            assert_eq!(inspect(&whole), Ok(claim));
+            for length in 12..whole.len() {
+                assert_eq!(inspect(&whole[..length]), Err(PictureError::Truncated), "{extension} {length}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_may_have_to_be_turned_is_not_plain() {
+        let mut jpeg = encoded(".jpg", 40, 30);
+        jpeg.splice(2..2, *b"\xff\xe1\x00\x08Exif\0\0");
+        assert_eq!(inspect(&jpeg), Ok(Claim { width: 40, height: 30, plain_jpeg: false }));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn no_bytes_panic(bytes: Vec<u8>, png: bool) {
+            let magic: &[u8] = if png { b"\x89PNG\r\n\x1a\n" } else { b"\xff\xd8\xff" };
+            let _ = inspect(&[magic, &bytes].concat());
+        }
+    }
+}
