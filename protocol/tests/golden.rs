@@ -374,11 +374,8 @@ fn a_decision_for_clients() {
     assert_eq!(decode_json::<Decision>(before.as_bytes()), Ok(decision()));
     let pool =
         Certificate { pool: Some(Pool::PRIOR), rule: FusionRule::CorrelatedPool, ..decision().certificate };
-    assert!(
-        serde_json::to_string(&pool)
-            .unwrap()
-            .contains(r#""rule":"correlated_pool","pool":{"likeness":0.5,"temperature":1.1,"rounds":0}"#)
-    );
+    let spelt = r#""rule":"correlated_pool","pool":{"likeness":0.5,"temperature":1.1,"rounds":0}"#;
+    assert!(serde_json::to_string(&pool).unwrap().contains(spelt));
     let more = r#","label":"palm","announcer":7,"stamp":{"boot":1,"sequence":130},"signature":null}"#;
     let json = format!("{}{more}", json.strip_suffix('}').unwrap());
     assert_eq!(serde_json::to_string(&announcement()).unwrap(), json);

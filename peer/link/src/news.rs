@@ -16,6 +16,7 @@ use zenoh::sample::{Sample, SampleKind};
 const MAX_WAITING: usize = 1024;
 
 /// One thing that happened.
+#[expect(clippy::large_enum_variant, reason = "it is taken apart as it comes, and not kept")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
     /// The swarm decided.
