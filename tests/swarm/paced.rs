@@ -191,9 +191,11 @@ pub async fn a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat() {
     };
     wait_for("Parrots", all_served).await;
     // Whatever looks at a hand has its buffers from the first look on.
-    let looked =
-        || center.served().iter().all(|parrot| count(parrot, "frames_with_a_hand") > 9).then_some(());
-    wait_for("looks", || looked().or_else(|| (center.robot().open_round(), None).1)).await;
+    wait_for("looks", || {
+        center.robot().open_round();
+        center.served().iter().all(|parrot| count(parrot, "frames_with_a_hand") > 9).then_some(())
+    })
+    .await;
     let long = std::env::var_os("GESTALT_LONG").is_some();
     // Enough frames of each for an uneven hand to show.
     let enough = if long { 6000 } else { 60 };

@@ -4,8 +4,28 @@
 //! container is checked first: what it is, how large, and whether its end is there.
 
 use opencv::core::Size;
+use thiserror::Error;
 
-use super::picture::PictureError;
+/// Encoded bytes that are no picture, or none to be decoded.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PictureError {
+    /// Neither JPEG nor PNG, or a damaged one.
+    #[error("no JPEG or PNG picture that can be decoded")]
+    NotAnImage,
+    /// The end is missing. (A decoder would fill the rest with grey and say nothing.)
+    #[error("a picture cut short: its end is missing")]
+    Truncated,
+    /// More pixels than allowed; it was not decoded.
+    #[error("a picture of {width}×{height} pixels: at most {limit} megapixels are decoded")]
+    TooLarge {
+        /// In pixels.
+        width: u32,
+        /// In pixels.
+        height: u32,
+        /// In millions of pixels.
+        limit: f64,
+    },
+}
 
 /// A whole file's claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,8 +122,17 @@ fn big_endian(bytes: &[u8]) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::picture::tests::encoded;
+    use opencv::core::{CV_8UC3, Mat, Scalar, Vector};
+    use opencv::imgcodecs::imencode_def;
+
     use super::*;
+
+    fn encoded(extension: &str, width: i32, height: i32) -> Vec<u8> {
+        let picture = Mat::new_rows_cols_with_default(height, width, CV_8UC3, Scalar::all(90.0)).unwrap();
+        let mut bytes = Vector::new();
+        imencode_def(extension, &picture, &mut bytes).unwrap();
+        bytes.iter().collect()
+    }
 
     #[test]
     fn a_file_cut_short_anywhere_is_truncated() {

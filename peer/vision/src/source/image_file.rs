@@ -7,8 +7,8 @@ use std::path::Path;
 use opencv::core::Mat;
 
 use super::SourceError;
-use super::container::inspect;
-use super::picture::{PictureError, decode};
+use super::container::{PictureError, inspect};
+use super::picture::decode;
 
 /// The largest image that is decoded, in millions of pixels.
 pub const MAX_MEGAPIXELS: f64 = 50.0;

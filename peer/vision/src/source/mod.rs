@@ -26,11 +26,12 @@ use crate::camera_model::CameraModelError;
 use crate::pose::PoseError;
 use crate::steady::Broken;
 
+pub use container::PictureError;
 pub use device::Device;
 pub use emulated_view::EmulatedView;
 pub use folder::ImageFolder;
 pub use image_file::{MAX_IMAGE_BYTES, MAX_MEGAPIXELS, read_image, read_jpeg};
-pub use picture::{PictureError, decode, decode_reduced, encode_jpeg, through_jpeg};
+pub use picture::{decode, decode_reduced, encode_jpeg, through_jpeg};
 pub use pipe::Pipe;
 pub use reader::{Opener, Reader};
 pub use rendered::{Glove, RenderedSource, ScheduledSource};

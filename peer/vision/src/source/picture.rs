@@ -6,32 +6,10 @@
 use opencv::core::{CV_8UC3, Mat, Scalar, Size, Vector};
 use opencv::imgcodecs;
 use opencv::prelude::*;
-use thiserror::Error;
 use turbojpeg::{Decompressor, Image, PixelFormat};
 
 use super::SourceError;
-use super::container::inspect;
-
-/// Encoded bytes that are no picture, or none to be decoded.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum PictureError {
-    /// Neither JPEG nor PNG, or a damaged one.
-    #[error("no JPEG or PNG picture that can be decoded")]
-    NotAnImage,
-    /// The end is missing. (A decoder would fill the rest with grey and say nothing.)
-    #[error("a picture cut short: its end is missing")]
-    Truncated,
-    /// More pixels than allowed; it was not decoded.
-    #[error("a picture of {width}×{height} pixels: at most {limit} megapixels are decoded")]
-    TooLarge {
-        /// In pixels.
-        width: u32,
-        /// In pixels.
-        height: u32,
-        /// In millions of pixels.
-        limit: f64,
-    },
-}
+use super::container::{PictureError, inspect};
 
 /// Decodes a JPEG or PNG picture as BGR, 8 bits, upright, into a buffer that is reused where its size fits.
 ///
