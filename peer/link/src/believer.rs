@@ -1,20 +1,12 @@
 //! Whose words count, by the roster.
 
-use std::sync::Arc;
-
 use gestalt_protocol::{InstructorId, SignedWord};
 use gestalt_strategies::{Believe, Standing};
 use gestalt_trust::{Role, Roster, Speaker};
 
 /// Knows who may teach from the roster that is gone by.
 #[derive(Debug)]
-pub(crate) struct Believer(Roster);
-
-impl Believer {
-    pub fn new(roster: Roster) -> Arc<dyn Believe> {
-        Arc::new(Self(roster))
-    }
-}
+pub(crate) struct Believer(pub Roster);
 
 impl Believe for Believer {
     fn believe(&self, by: &InstructorId, said: &SignedWord) -> Option<(u64, Standing)> {

@@ -86,7 +86,8 @@ impl Inbox {
 
     /// Who knows by the roster of today whose words count.
     pub(super) fn believer(&self) -> Option<Arc<dyn Believe>> {
-        self.judged(|judge, _| Believer::new(judge.roster().clone()))
+        let roster = self.judged(|judge, _| judge.roster().clone())?;
+        Some(Arc::new(Believer(roster)))
     }
 
     pub(super) fn on_roster(&self, sample: &Sample) -> Result<(), Refusal> {

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, Fate, Gesture, Instruction, InstructorId, Lesson, Naming, SignedWord, Word};
+use gestalt_protocol::{
+    ClassId, Fate, Gesture, Instruction, InstructorId, Lesson, Naming, RoundId, SignedWord, Word,
+};
 use gestalt_rounds::Vocabulary;
 
 use super::memory::Item;
@@ -27,6 +29,21 @@ impl Learning {
             self.dirty.insert(Item::Lessons(round));
             self.apply_to_round(round);
         }
+    }
+
+    /// The latest word of an instructor on a round, with its count and time.
+    pub fn latest(&self, round: RoundId, instructor: &InstructorId) -> Option<(u64, u64, Word)> {
+        self.lessons.latest(self.recent.names(round), instructor)
+    }
+
+    /// Whether what that instructor said of a round counts: not where somebody else's word goes before it.
+    pub fn is_heeded(&self, round: RoundId, instructor: &InstructorId) -> bool {
+        self.lessons.is_heeded(self.recent.names(round), instructor)
+    }
+
+    /// The count of what is said next of a round, where instructors sign none.
+    pub fn next_count(&self, round: RoundId) -> u64 {
+        self.lessons.highest_count(self.recent.names(round)).saturating_add(1)
     }
 
     /// By which right a lesson counts; `None` in an open swarm, where nobody is asked.

@@ -8,8 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Digest, FeatureSpaceId, Fnv1a, InstructorId, LearningStatus, Lesson, RobotId, RoundId, SampleId,
-    SharedSample, Word,
+    Digest, FeatureSpaceId, Fnv1a, LearningStatus, Lesson, RobotId, RoundId, SampleId, SharedSample,
 };
 use gestalt_rounds::Vocabulary;
 use gestalt_svm::FeatureSpace;
@@ -274,21 +273,6 @@ impl Learning {
             let forgotten = self.lessons.forget_beyond(self.furthest());
             self.dirty.extend(forgotten.into_iter().map(Item::Lessons));
         }
-    }
-
-    /// The latest word of an instructor on a round, with its count and time.
-    pub fn latest(&self, round: RoundId, instructor: &InstructorId) -> Option<(u64, u64, Word)> {
-        self.lessons.latest(self.recent.names(round), instructor)
-    }
-
-    /// Whether what that instructor said of a round counts: not where somebody else's word goes before it.
-    pub fn is_heeded(&self, round: RoundId, instructor: &InstructorId) -> bool {
-        self.lessons.is_heeded(self.recent.names(round), instructor)
-    }
-
-    /// The count of what is said next of a round, where instructors sign none.
-    pub fn next_count(&self, round: RoundId) -> u64 {
-        self.lessons.highest_count(self.recent.names(round)).saturating_add(1)
     }
 
     /// Takes in a sample that another robot shared. Says whether it was news.
