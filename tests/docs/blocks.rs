@@ -4,13 +4,16 @@ use std::fmt::Write as _;
 
 use crate::stage::{Stage, root};
 
-const TEXTS: [&str; 13] = [
+const TEXTS: [&str; 16] = [
     "README.md",
     "CONTRIBUTING.md",
     "SECURITY.md",
+    "docs/cameras.md",
     "docs/capture.md",
+    "docs/clients.md",
     "docs/doctor.md",
     "docs/foxglove.md",
+    "docs/gestures.md",
     "docs/install.md",
     "docs/recording.md",
     "docs/round.md",
