@@ -48,7 +48,7 @@ pub fn open_source(
         SourceSection::Rendered(rendered) => {
             // Every robot has a noise of its own, of the same scene.
             let noise = rendered.seed.rotate_left(32) ^ u64::from(robot.0);
-            let source = RenderedSource::new(properties, rendered.pose, Glove::default(), noise)?;
+            let source = RenderedSource::new(properties, rendered.pose, rendered.glove, noise)?;
             match rendered.schedule {
                 Some(schedule) => {
                     Box::new(ScheduledSource::new(source, Human::new(rendered.seed), schedule, clock))

@@ -51,7 +51,7 @@ impl Stage {
         self.folder.path().join(name)
     }
 
-    /// A dataset of rendered hands: three gestures, each by eight persons.
+    /// A dataset of rendered bare hands: three gestures, each by eight persons.
     pub fn dataset(&self, name: &str, seed: u64) {
         for fingers in [1, 3, 5] {
             let folder = self.path(name).join(fingers.to_string());
@@ -59,8 +59,7 @@ impl Stage {
             for person in 0..8 {
                 let pose = Pose { bearing_deg: f64::from(person * 9 - 30), distance_m: 0.7, ..Pose::FRONTAL };
                 let seed = seed + u64::from(person as u32);
-                let mut source =
-                    RenderedSource::new(CameraModel::footbot(), pose, Glove::default(), seed).unwrap();
+                let mut source = RenderedSource::new(CameraModel::laptop(), pose, Glove::Skin, seed).unwrap();
                 let scene = Scene { gesture: Some(fingers), seed };
                 let image = source.next_frame(Duration::ZERO, &scene).unwrap().image;
                 write_png(&folder.join(format!("s{person:03}_a.png")), &image).unwrap();

@@ -33,7 +33,7 @@ fn config(id: u32, swarm: &str, source: SourceSection) -> Config {
 }
 
 fn rendered() -> SourceSection {
-    SourceSection::Rendered(RenderedSection { pose: Pose::FRONTAL, seed: 4, schedule: None })
+    SourceSection::Rendered(RenderedSection { seed: 4, ..RenderedSection::default() })
 }
 
 fn device(path: &Path) -> SourceSection {

@@ -54,7 +54,7 @@ fn config(id: u32, swarm: &str, connect: &[String]) -> Config {
     config.swarm.0 = swarm.to_owned();
     config.camera = CameraSection {
         model: CameraChoice::Laptop,
-        source: SourceSection::Rendered(RenderedSection { pose: Pose::FRONTAL, seed: 4, schedule: None }),
+        source: SourceSection::Rendered(RenderedSection { seed: 4, ..RenderedSection::default() }),
         ..CameraSection::default()
     };
     (config.rounds.patience, config.rounds.deadline) = (3 * PATIENCE, 3 * PATIENCE);

@@ -30,7 +30,12 @@ fn config(id: u32, swarm: &str) -> Config {
     let pose = Pose { bearing_deg, elevation_deg: 0.0, distance_m: 0.9 };
     config.camera = CameraSection {
         model: if id % 2 == 1 { CameraChoice::Footbot } else { CameraChoice::Parrot },
-        source: SourceSection::Rendered(RenderedSection { pose, seed: SEED, schedule: Some(SCHEDULE) }),
+        source: SourceSection::Rendered(RenderedSection {
+            pose,
+            seed: SEED,
+            schedule: Some(SCHEDULE),
+            ..RenderedSection::default()
+        }),
         motion: MotionConfig::watching(),
         ..CameraSection::default()
     };

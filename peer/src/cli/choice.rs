@@ -24,6 +24,12 @@ pub(super) fn learn() -> impl TypedValueParser<Value = LearnFrom> {
     one_of(&["nothing", "model"])
 }
 
+/// `--glove`.
+#[cfg(feature = "opencv")]
+pub(super) fn glove() -> impl TypedValueParser<Value = gestalt_vision::source::Glove> {
+    one_of(&["cyan", "orange", "skin"])
+}
+
 /// `--fuse`.
 pub(super) fn fuse() -> impl TypedValueParser<Value = Fuse> {
     one_of(&["central", "swarm"])

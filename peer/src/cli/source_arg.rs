@@ -7,11 +7,12 @@ use std::str::FromStr;
 use gestalt_vision::config::DeviceSettings;
 use gestalt_vision::dataset::has_image_name;
 use gestalt_vision::pose::Pose;
+use gestalt_vision::source::Glove;
 use thiserror::Error;
 
 use crate::config::{DeviceSection, FilesSection, ModelSection, RenderedSection, RosSection, SourceSection};
 
-/// `/dev/video0`, `hand.mp4`, `DIR`, `image.png`, `ros:/camera/image_raw`, `rendered`, or `rendered:3,bearing=-30,distance=1.2,seed=7`.
+/// `/dev/video0`, `hand.mp4`, `DIR`, `image.png`, `ros:/camera/image_raw`, `rendered`, or `rendered:3,glove=skin,distance=1.2,seed=7`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourceArg {
     /// A synthetic hand.
@@ -29,6 +30,8 @@ pub struct Rendered {
     pub fingers: Option<u8>,
     /// From where it is seen.
     pub pose: Option<Pose>,
+    /// What it wears.
+    pub glove: Option<Glove>,
     /// Of what its person, its light and the camera's noise follow.
     pub seed: Option<u64>,
 }
@@ -51,7 +54,7 @@ pub enum Kind {
 pub enum SourceArgError {
     /// An item that says nothing about a synthetic hand.
     #[error(
-        "'{0}' does not describe a synthetic hand: write, for example, rendered:3 or rendered:bearing=-30,elevation=5,distance=1.2,seed=7"
+        "'{0}' does not describe a synthetic hand: write, for example, rendered:3 or rendered:glove=skin,bearing=-30,elevation=5,distance=1.2,seed=7"
     )]
     Item(String),
     /// A place where no camera can be.
@@ -95,6 +98,10 @@ impl Rendered {
                 read.seed = Some(value.parse().map_err(|_| wrong())?);
                 continue;
             }
+            if name == "glove" {
+                read.glove = Some(value.parse().map_err(|_| wrong())?);
+                continue;
+            }
             let value = value.parse().map_err(|_| wrong())?;
             let pose = read.pose.get_or_insert_default();
             match name {
@@ -111,10 +118,11 @@ impl Rendered {
 }
 
 impl SourceArg {
-    /// The model for whoever names none: rendered hands wear a glove that no person wears.
+    /// The model for whoever names none: rendered hands wear a glove that no person wears, unless they are bare.
     #[must_use]
     pub fn usual_model(&self) -> ModelSection {
         match self {
+            Self::Rendered(Rendered { glove: Some(Glove::Skin), .. }) => ModelSection::Hands,
             Self::Rendered(_) => ModelSection::Rendered,
             Self::Ros(_) | Self::Path(_) => ModelSection::Hands,
         }
@@ -127,9 +135,13 @@ impl SourceArg {
     pub fn section(&self) -> Result<SourceSection, SourceArgError> {
         let path = match self {
             Self::Rendered(Rendered { fingers: Some(_), .. }) => return Err(SourceArgError::Fingers),
-            Self::Rendered(Rendered { pose, seed, .. }) => {
-                let (pose, seed) = (pose.unwrap_or_default(), seed.unwrap_or_default());
-                return Ok(SourceSection::Rendered(RenderedSection { pose, seed, schedule: None }));
+            Self::Rendered(Rendered { pose, glove, seed, .. }) => {
+                return Ok(SourceSection::Rendered(RenderedSection {
+                    pose: pose.unwrap_or_default(),
+                    glove: glove.unwrap_or_default(),
+                    seed: seed.unwrap_or_default(),
+                    schedule: None,
+                }));
             }
             Self::Ros(topic) => {
                 return Ok(SourceSection::Ros(RosSection { topic: topic.clone(), router: None, domain: 0 }));
@@ -182,13 +194,17 @@ mod tests {
         let read = |text: &str| text.parse::<SourceArg>();
         assert_eq!(read("rendered"), Ok(SourceArg::Rendered(Rendered::default())));
         let pose = Pose { bearing_deg: -30.0, distance_m: 1.2, ..Pose::FRONTAL };
-        let all = Rendered { fingers: Some(3), pose: Some(pose), seed: Some(7) };
-        assert_eq!(read("rendered:3,bearing=-30,distance=1.2,seed=7"), Ok(SourceArg::Rendered(all)));
+        let all = Rendered { fingers: Some(3), pose: Some(pose), glove: Some(Glove::Skin), seed: Some(7) };
+        assert_eq!(
+            read("rendered:3,glove=skin,bearing=-30,distance=1.2,seed=7"),
+            Ok(SourceArg::Rendered(all))
+        );
         assert_eq!(read("rendered.mp4"), Ok(SourceArg::Path("rendered.mp4".into())));
         for (wrong, cause) in [
             ("rendered:6", "'6'"),
             ("rendered:", "rendered:3"),
             ("rendered:tilt=3", "tilt=3"),
+            ("rendered:glove=wool", "glove=wool"),
             ("rendered:distance=0", "0.3"),
         ] {
             let error = read(wrong).unwrap_err().to_string();

@@ -53,9 +53,9 @@ pub struct Args {
     /// Learn so many variations of each image beside it: mirrored or not, rolled by up to 30°, half to twice as bright. 0: none
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=50))]
     augment: u8,
-    /// Feature set: `hog` (histogram of oriented gradients), `shape` (110 shape descriptors) or `embedding` (24 values of
-    /// learned eyes)
-    #[arg(long, default_value = "hog", value_name = "SET")]
+    /// Feature set: `embedding` (24 values of learned eyes, which know bare hands; carries over best to other people and
+    /// cameras), `shape` (110 shape descriptors; gloves too) or `hog` (histogram of oriented gradients; for the same camera)
+    #[arg(long, default_value = "embedding", value_name = "SET")]
     features: FeatureSet,
     /// Gestures, in this order: `fist,palm` or `0-5` [default: all folders]
     #[arg(long, value_name = "LIST")]
@@ -197,6 +197,14 @@ fn learn(
         all.images.into_iter().partition(|image| image.person.is_some_and(|p| held_out.contains(&p)));
     let survey = look(&learned, args.augment, args.seed, perception);
     report::rejected(&survey);
+    if args.features == FeatureSet::Embedding && survey.seen.len() < survey.without_hand.len() {
+        return Err(format!(
+            "learned eyes find a hand in only {} of {} images: they know bare hands; for gloves and drawn hands use --features shape",
+            survey.seen.len(),
+            survey.readable()
+        )
+        .into());
+    }
 
     let started = Instant::now();
     let trained = fit(args, vocabulary, &Lessons::of(&[&survey]))?;

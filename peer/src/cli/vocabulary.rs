@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 #[cfg(feature = "opencv")]
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "opencv")]
+use gestalt_vision::source::Glove;
 use gestalt_vision::vocabulary::GestureBook;
 use serde_json::json;
 
@@ -33,6 +35,10 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 60, requires = "pictures",
         value_parser = clap::value_parser!(u32).range(1..=1000))]
     people: u32,
+    /// What the hands wear there: cyan or orange gloves, or `skin`
+    #[cfg(feature = "opencv")]
+    #[arg(long, value_name = "GLOVE", default_value = "cyan", requires = "pictures", value_parser = super::choice::glove())]
+    glove: Glove,
     /// What people, light and places follow from
     #[cfg(feature = "opencv")]
     #[arg(long, value_name = "N", default_value_t = 1, requires = "pictures")]
@@ -65,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     #[cfg(feature = "opencv")]
     if let Some(folder) = &args.pictures {
-        let kept = keep(&book, folder, args.people, args.seed)?;
+        let kept = keep(&book, folder, args.people, args.glove, args.seed)?;
         eprintln!("{kept} pictures → {}", folder.display());
     }
     if args.json {
@@ -88,15 +94,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Keeps pictures of each gesture, shown by so many people, each to a camera in a place of its own.
 #[cfg(feature = "opencv")]
-fn keep(book: &GestureBook, folder: &Path, people: u32, seed: u64) -> Result<usize, Failure> {
+fn keep(book: &GestureBook, folder: &Path, people: u32, glove: Glove, seed: u64) -> Result<usize, Failure> {
     use crate::capture::Album;
+    use gestalt_vision::source::encode_jpeg;
     use gestalt_vision::source::rendered::TrainingFrames;
-    use gestalt_vision::source::{Glove, encode_jpeg};
 
     const QUALITY: i32 = 92;
     /// Robots around a hand see it from as far aside as this.
     const BEARING_DEG: f64 = 45.0;
-    let frames = TrainingFrames::new(Vec::new(), Glove::default(), BEARING_DEG, seed).showing(book.poses());
+    let frames = TrainingFrames::new(Vec::new(), glove, BEARING_DEG, seed).showing(book.poses());
     let wanted = people as usize * book.gestures.len();
     let shown = super::progress::bar("pictures", wanted);
     for frame in frames.take(wanted) {

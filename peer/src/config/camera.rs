@@ -8,6 +8,7 @@ use gestalt_ros::NodeName;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, Schedule};
 use gestalt_vision::pose::Pose;
+use gestalt_vision::source::Glove;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
@@ -52,7 +53,7 @@ pub enum SourceSection {
     /// Nowhere: a robot that relays and counts, but sees nothing.
     #[default]
     None,
-    /// A synthetic, gloved hand.
+    /// A synthetic hand.
     Rendered(RenderedSection),
     /// A camera of this machine.
     Device(DeviceSection),
@@ -72,6 +73,8 @@ pub enum SourceSection {
 pub struct RenderedSection {
     /// Where the robot stands.
     pub pose: Pose,
+    /// What the hand wears. The same at all robots that look at the same person.
+    pub glove: Glove,
     /// What the person shows in each round, and this robot's noise, follow from it. The same at all robots that
     /// look at the same person.
     pub seed: u64,

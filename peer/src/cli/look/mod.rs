@@ -119,13 +119,14 @@ fn frame(
     let first = index.unwrap_or(0);
     match source {
         SourceArg::Rendered(hand) => {
-            let (pose, seed) = match section.map(|section| &section.source) {
-                Some(SourceSection::Rendered(rendered)) => (rendered.pose, rendered.seed),
-                _ => (Pose::FRONTAL, 1),
+            let (pose, glove, seed) = match section.map(|section| &section.source) {
+                Some(SourceSection::Rendered(rendered)) => (rendered.pose, rendered.glove, rendered.seed),
+                _ => (Pose::FRONTAL, Glove::default(), 1),
             };
             let (pose, seed) = (hand.pose.unwrap_or(pose), hand.seed.unwrap_or(seed));
+            let glove = hand.glove.unwrap_or(glove);
             let camera = camera.cloned().unwrap_or_else(CameraModel::footbot);
-            let mut rendered = RenderedSource::new(camera, pose, Glove::default(), seed)?;
+            let mut rendered = RenderedSource::new(camera, pose, glove, seed)?;
             let described = match hand.fingers {
                 None => "synthetic empty scene".to_owned(),
                 Some(fingers) => format!("synthetic hand showing {fingers} fingers"),

@@ -29,6 +29,7 @@ use gestalt_desk::Desk;
 use gestalt_lab::shape::NetworkShape;
 use gestalt_link::{Client, LinkConfig, News};
 use gestalt_vision::model::RobotModel;
+use gestalt_vision::source::Glove;
 
 /// Run a swarm of robots with synthetic cameras around one person, each a real Zenoh peer
 #[derive(Debug, clap::Args)]
@@ -64,6 +65,10 @@ pub struct Args {
     /// Model file written by `gestalt train`, `hands` (bare hands before any camera) or `rendered` (synthetic hands)
     #[arg(long, value_name = "FILE|hands|rendered", default_value = "rendered")]
     model: ModelSection,
+
+    /// What the hand wears: a cyan or orange glove, or `skin` [`--model hands` reads bare hands]
+    #[arg(long, value_name = "GLOVE", default_value = "cyan", value_parser = super::choice::glove())]
+    glove: Glove,
 
     /// Let the robots learn, starting from `nothing` (no gesture known) or from the `model`. After each round a scripted
     /// instructor says which gesture it was

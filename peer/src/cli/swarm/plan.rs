@@ -27,7 +27,12 @@ pub(super) fn configs(args: &Args, keys: Option<&Path>) -> Result<Vec<Config>, F
         config.swarm.0.clone_from(&args.swarm);
         config.camera = CameraSection {
             model: camera.clone(),
-            source: SourceSection::Rendered(RenderedSection { pose, seed: args.seed, schedule }),
+            source: SourceSection::Rendered(RenderedSection {
+                pose,
+                glove: args.glove,
+                seed: args.seed,
+                schedule,
+            }),
             motion: MotionConfig { enabled: args.by == By::Motion, ..MotionConfig::default() },
             ..CameraSection::default()
         };

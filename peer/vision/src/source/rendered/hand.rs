@@ -3,22 +3,9 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
+use crate::config::Glove;
 use crate::vocabulary::{Finger, HandPose, Thumb, Which};
-
-/// What covers the hand.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Glove {
-    /// A saturated blue-green glove, easy to find by colour.
-    #[default]
-    Cyan,
-    /// A saturated orange glove.
-    Orange,
-    /// None: skin, from fair to dark.
-    Skin,
-}
 
 /// A bone with its flesh: a sphere swept along a segment, growing or shrinking on the way. Metres.
 #[derive(Clone, Copy, Debug)]

@@ -19,7 +19,6 @@ use opencv::core::Mat;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-pub use hand::Glove;
 pub(super) use pinhole::Pinhole;
 pub use scheduled::ScheduledSource;
 pub use training::{LabelledFrame, TrainingFrames};
@@ -29,6 +28,7 @@ use raster::{Light, Rasterizer};
 
 use super::{Frame, Scene, Sensor, Source, SourceError};
 use crate::camera_model::CameraModel;
+pub use crate::config::Glove;
 use crate::pose::Pose;
 use crate::vocabulary::HandPose;
 
