@@ -5,10 +5,11 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// How many signatures are checked in the name of one author. What is known already costs nothing.
+/// How many signatures are checked in the name of one author, of those that come by one way: as it says them itself, as others pass them on, as
+/// evidence against it. What is known already costs nothing.
 ///
 /// The default, 16 at once and 8 a second, is twice what an honest robot says at its fastest. A hundred authors who all use theirs
-/// up cost a desktop core 4 % of its time, and what is spared for those who are flooded as much again.
+/// up cost a desktop core 4 % of its time for each way, and what is spared for those who are flooded as much again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Budget {
@@ -16,7 +17,7 @@ pub struct Budget {
     pub burst: NonZeroU32,
     /// How many more every second. At least 1.
     pub per_second: NonZeroU32,
-    /// How many every second in all names together, beyond those, for authors whose own are used up: somebody may flood the swarm in
+    /// How many every second in all names together by one way, beyond those, for authors whose own are used up: somebody may flood the swarm in
     /// the name of one that has something to say, and a slower flood than this does not silence it. At least 1.
     pub spare: NonZeroU32,
 }
@@ -61,6 +62,34 @@ impl Bucket {
         let left = self.credit.checked_sub(cost(budget));
         self.credit = left.unwrap_or(self.credit);
         left.is_some()
+    }
+}
+
+/// By which way something comes to be checked. A flood on one leaves the others as they are: so what is said in the midst of a flood in its author's
+/// name comes by repair, from whoever heard it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// Under its author's own key.
+    Said,
+    /// Passed on by somebody, or in a decision that rests on it.
+    PassedOn,
+    /// In evidence against its author.
+    Evidence,
+}
+
+/// What is left of a [`Budget`] by each way.
+#[derive(Clone, Debug)]
+pub(crate) struct Ways([Bucket; 3]);
+
+impl Ways {
+    /// Full ones.
+    pub(crate) fn new(budget: &Budget, now: Duration) -> Self {
+        Self(std::array::from_fn(|_| Bucket::new(budget, now)))
+    }
+
+    /// Takes one check out by that way, if there is one.
+    pub(crate) fn take(&mut self, way: Way, budget: &Budget, now: Duration) -> bool {
+        self.0[way as usize].take(budget, now)
     }
 }
 

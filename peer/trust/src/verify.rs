@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::{RobotId, Signature, Stamp};
 use sha2::{Digest, Sha256};
 
-use crate::budget::{Bucket, Budget};
+use crate::budget::{Budget, Way, Ways};
 use crate::distrust::Distrust;
 use crate::evidence::{Conviction, Evidence, EvidenceError, Refutes};
 use crate::public_key::PublicKey;
@@ -22,7 +22,8 @@ const REMEMBERED: usize = 16;
 ///
 /// Pure: time is an argument, counted from any point that stays the same. Checking a signature is the last and only costly step;
 /// before it, strangers, the expelled and what was verified before are told apart, and every author named has a [`Budget`] of its
-/// own: a flood in robot 7's name costs robot 7 alone. What is spared beside these lets robot 7 be heard in the midst of it.
+/// own: a flood in robot 7's name costs robot 7 alone. What is spared beside these lets robot 7 be heard in the midst of it, and
+/// what others pass on has budgets apart from what is said under its author's own key: a flood on one way leaves the other open.
 ///
 /// Memory is bounded by the roster: up to a kilobyte for each robot on it, none for anybody else.
 #[derive(Clone, Debug)]
@@ -30,16 +31,15 @@ pub struct Verifier<S: Scheme = Ed25519> {
     roster: Roster<S>,
     budget: Budget,
     authors: BTreeMap<RobotId, Account>,
-    /// What is left for all whose own budgets are used up; `None` before anybody's was.
-    spare: Option<Bucket>,
+    /// What is left for all whose own budgets are used up; `None` before anything was checked.
+    spare: Option<Ways>,
     convicted: BTreeSet<RobotId>,
 }
 
 /// What is remembered of one author.
 #[derive(Clone, Debug)]
 struct Account {
-    statements: Bucket,
-    evidence: Bucket,
+    left: Ways,
     verified: VecDeque<Seen>,
 }
 
@@ -53,11 +53,7 @@ struct Seen {
 
 impl Account {
     fn new(budget: &Budget, now: Duration) -> Self {
-        Self {
-            statements: Bucket::new(budget, now),
-            evidence: Bucket::new(budget, now),
-            verified: VecDeque::new(),
-        }
+        Self { left: Ways::new(budget, now), verified: VecDeque::new() }
     }
 }
 
@@ -88,6 +84,30 @@ impl<S: Scheme> Verifier<S> {
         statement: &[u8],
         signature: Option<&Signature>,
     ) -> Result<(), Distrust> {
+        self.check_by(Way::Said, now, statement, signature)
+    }
+
+    /// The same of a statement that somebody else passes on, or a decision rests on: however many are made up under the author's own key, and
+    /// refused as too many, that one has a budget of its own.
+    ///
+    /// # Errors
+    /// The [`Distrust`] that it meets.
+    pub fn check_passed_on(
+        &mut self,
+        now: Duration,
+        statement: &[u8],
+        signature: Option<&Signature>,
+    ) -> Result<(), Distrust> {
+        self.check_by(Way::PassedOn, now, statement, signature)
+    }
+
+    fn check_by(
+        &mut self,
+        way: Way,
+        now: Duration,
+        statement: &[u8],
+        signature: Option<&Signature>,
+    ) -> Result<(), Distrust> {
         let signature = signature.ok_or(Distrust::Unsigned)?;
         let (heading, key) = self.roster.author(statement)?;
         if self.convicted.contains(&heading.author) {
@@ -105,8 +125,8 @@ impl<S: Scheme> Verifier<S> {
             }
         }
         let of_all = self.budget.of_all();
-        let spare = self.spare.get_or_insert_with(|| Bucket::new(&of_all, now));
-        if !account.statements.take(&self.budget, now) && !spare.take(&of_all, now) {
+        let spare = self.spare.get_or_insert_with(|| Ways::new(&of_all, now));
+        if !account.left.take(way, &self.budget, now) && !spare.take(way, &of_all, now) {
             return Err(Distrust::TooFast);
         }
         if !statement::is_signed::<S>(key, &self.roster.swarm_id(), statement, signature) {
@@ -136,7 +156,7 @@ impl<S: Scheme> Verifier<S> {
     }
 
     /// Stops believing a robot that the evidence convicts, until a roster gives it a new key. Evidence has a budget of its own, as
-    /// large as the one for statements, and what is spared beside: nobody hides it in a flood. Who starts again hands in again what evidence it kept.
+    /// large as the one for statements, and as much is spared beside: nobody hides it in a flood of statements. Who starts again hands in again what evidence it kept.
     ///
     /// # Errors
     /// [`EvidenceError`] for evidence that proves nothing against any robot on the roster.
@@ -155,8 +175,9 @@ impl<S: Scheme> Verifier<S> {
         let new = || Account::new(&self.budget, now);
         let account = self.authors.entry(claimed.author).or_insert_with(new);
         let of_all = self.budget.of_all();
-        let spare = self.spare.get_or_insert_with(|| Bucket::new(&of_all, now));
-        if !account.evidence.take(&self.budget, now) && !spare.take(&of_all, now) {
+        let spare = self.spare.get_or_insert_with(|| Ways::new(&of_all, now));
+        let way = Way::Evidence;
+        if !account.left.take(way, &self.budget, now) && !spare.take(way, &of_all, now) {
             return Err(EvidenceError::TooFast(claimed.author));
         }
         let conviction = evidence.check(&self.roster, refutes)?;
@@ -182,203 +203,4 @@ impl<S: Scheme> Verifier<S> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::num::NonZeroU32;
-
-    use super::*;
-    use crate::membership::Membership;
-    use crate::testing::{authority, members, robot, roster, vote};
-    use crate::witness::Witness;
-
-    const NOW: Duration = Duration::from_secs(1000);
-
-    fn verifier() -> Verifier {
-        Verifier::new(roster(5), Budget::default())
-    }
-
-    /// One with next to nothing beside the budgets of the authors.
-    fn sparing() -> Verifier {
-        Verifier::new(roster(5), Budget { spare: NonZeroU32::MIN, ..Budget::default() })
-    }
-
-    fn sign(by: u32, statement: &[u8]) -> Signature {
-        statement::sign(&robot(by), &roster(5).swarm_id(), statement)
-    }
-
-    /// What the verifier makes of that vote, truly signed by its author.
-    fn hear(verifier: &mut Verifier, now: Duration, author: u32, sequence: u32) -> Result<(), Distrust> {
-        let said = vote(author, sequence, 1.0);
-        verifier.check(now, &said, Some(&sign(author, &said)))
-    }
-
-    fn forge(verifier: &mut Verifier, now: Duration, author: u32, sequence: u32) -> Result<(), Distrust> {
-        let said = vote(author, sequence, 1.0);
-        verifier.check(now, &said, Some(&sign(99, &said)))
-    }
-
-    #[test]
-    fn each_cause_is_told_apart() {
-        let mut members = members(5);
-        let gone = members.robots.remove(&RobotId(3)).unwrap();
-        members.expelled.insert(RobotId(3), gone);
-        let mut verifier = Verifier::new(members.sign(&authority()).unwrap(), Budget::default());
-        assert_eq!(hear(&mut verifier, NOW, 1, 1), Ok(()));
-        assert_eq!(forge(&mut verifier, NOW, 1, 2), Err(Distrust::Forged));
-        assert_eq!(hear(&mut verifier, NOW, 3, 1), Err(Distrust::Expelled));
-        assert_eq!(hear(&mut verifier, NOW, 50, 1), Err(Distrust::Stranger));
-        assert_eq!(verifier.check(NOW, &vote(1, 3, 1.0), None), Err(Distrust::Unsigned));
-        let junk = Signature::from_bytes([0; 64]);
-        assert_eq!(verifier.check(NOW, b"junk", Some(&junk)), Err(Distrust::Malformed));
-    }
-
-    #[test]
-    fn what_repeats_is_believed_at_no_cost() {
-        let mut verifier = verifier();
-        for _ in 0..100 {
-            assert_eq!(hear(&mut verifier, NOW, 1, 1), Ok(()));
-        }
-        // The same statement under another signature could not be passed on.
-        assert_eq!(forge(&mut verifier, NOW, 1, 1), Err(Distrust::Forged));
-    }
-
-    #[test]
-    fn a_flood_in_one_name_costs_that_name_alone() {
-        let mut verifier = sparing();
-        hear(&mut verifier, NOW, 1, 0).unwrap();
-        let answers: Vec<_> = (1..1000).map(|sequence| forge(&mut verifier, NOW, 1, sequence)).collect();
-        assert_eq!(answers.iter().filter(|answer| **answer == Err(Distrust::Forged)).count(), 15 + 1);
-        assert_eq!(hear(&mut verifier, NOW, 1, 2000), Err(Distrust::TooFast));
-        assert_eq!(hear(&mut verifier, NOW, 1, 0), Ok(()), "known before the flood");
-        assert_eq!(hear(&mut verifier, NOW, 2, 1), Ok(()));
-        assert_eq!(hear(&mut verifier, NOW + Duration::from_millis(125), 1, 2000), Ok(()));
-    }
-
-    #[test]
-    fn who_is_flooded_is_heard_in_the_midst_of_it_and_the_flood_is_bounded() {
-        let mut verifier = verifier();
-        let (mut heard, mut checked) = (0, 0);
-        // As fast as what is spared comes back, and then all at once.
-        for ms in 0..1000 {
-            let now = NOW + Duration::from_millis(ms.into());
-            checked += u32::from(forge(&mut verifier, now, 1, ms) == Err(Distrust::Forged));
-            if ms % 250 == 249 {
-                heard += u32::from(hear(&mut verifier, now, 1, 20_000 + ms) == Ok(()));
-            }
-        }
-        assert_eq!(heard, 4);
-        for ms in 1000..4000 {
-            checked +=
-                u32::from(forge(&mut verifier, NOW + Duration::from_secs(1), 1, ms) == Err(Distrust::Forged));
-        }
-        // 16 at once and 8 a second of its own, 1,000 at once and a second beside them.
-        let all = checked + heard;
-        assert!((2000..=16 + 8 + 1000 + 1000).contains(&all), "{all} were checked");
-        assert_eq!(hear(&mut verifier, NOW + Duration::from_secs(1), 2, 1), Ok(()), "others have their own");
-    }
-
-    #[test]
-    fn a_flood_is_bounded_whatever_the_clock_says() {
-        let day = Duration::from_secs(86_400);
-        // Standing still; from 1970 to today; back by a day and forth again.
-        for (clock, most) in [
-            ([NOW, NOW, NOW], 17),
-            ([Duration::ZERO, 20_000 * day, 20_000 * day], 34),
-            ([2 * day, day, 2 * day], 34),
-            ([Duration::MAX, Duration::ZERO, Duration::MAX], 34),
-        ] {
-            let mut verifier = sparing();
-            let mut sequence = 0;
-            let mut checked = 0;
-            for now in clock {
-                for _ in 0..100 {
-                    sequence += 1;
-                    checked += u32::from(forge(&mut verifier, now, 1, sequence) == Err(Distrust::Forged));
-                }
-            }
-            assert_eq!(checked, most, "{clock:?}");
-        }
-    }
-
-    #[test]
-    fn memory_is_bounded_by_the_roster() {
-        let mut verifier = verifier();
-        for sequence in 0..500 {
-            let now = NOW + Duration::from_secs(sequence.into());
-            assert_eq!(hear(&mut verifier, now, sequence % 4, sequence), Ok(()));
-            assert_eq!(hear(&mut verifier, now, 4 + sequence, sequence), Err(Distrust::Stranger));
-        }
-        assert_eq!(verifier.authors.len(), 4);
-        assert!(verifier.authors.values().all(|author| author.verified.len() == REMEMBERED));
-    }
-
-    #[test]
-    fn a_swarm_never_goes_back() {
-        let mut verifier = verifier();
-        assert!(matches!(verifier.adopt(roster(4)), Err(RosterError::Older { held: 5, offered: 4 })));
-        assert!(matches!(verifier.adopt(roster(5)), Ok(false)));
-        let mut fewer = members(5);
-        fewer.robots.remove(&RobotId(0));
-        let contradiction = verifier.adopt(fewer.sign(&authority()).unwrap());
-        assert!(matches!(contradiction, Err(RosterError::Contradiction { epoch: 5 })));
-        let usurper = members(6).sign(&robot(1)).unwrap();
-        assert!(matches!(verifier.adopt(usurper), Err(RosterError::OtherSwarm)));
-        let renamed = Membership { swarm: "other".to_owned(), ..members(6) }.sign(&authority()).unwrap();
-        assert!(matches!(verifier.adopt(renamed), Err(RosterError::OtherSwarm)));
-        assert_eq!(verifier.roster(), &roster(5));
-        assert!(matches!(verifier.adopt(roster(6)), Ok(true)));
-    }
-
-    #[test]
-    fn who_is_expelled_is_not_believed_any_more_and_comes_back_with_a_new_key() {
-        let mut verifier = verifier();
-        assert_eq!(hear(&mut verifier, NOW, 1, 1), Ok(()));
-        let mut expels = members(6);
-        let key = expels.robots.remove(&RobotId(1)).unwrap();
-        expels.expelled.insert(RobotId(1), key);
-        verifier.adopt(expels.clone().sign(&authority()).unwrap()).unwrap();
-        assert_eq!(hear(&mut verifier, NOW, 1, 1), Err(Distrust::Expelled), "not even what was verified");
-        let again = Membership { epoch: 7, ..expels.clone() };
-        let with_old_key = Membership { robots: [(RobotId(1), key)].into(), ..again.clone() };
-        assert!(with_old_key.sign(&authority()).is_err());
-        let with_new_key = Membership { robots: [(RobotId(1), robot(11).public_key())].into(), ..again };
-        verifier.adopt(with_new_key.sign(&authority()).unwrap()).unwrap();
-        assert_eq!(hear(&mut verifier, NOW, 1, 1), Err(Distrust::Forged), "signed by the old key");
-        let said = vote(1, 1, 1.0);
-        assert_eq!(verifier.check(NOW, &said, Some(&sign(11, &said))), Ok(()));
-    }
-
-    #[test]
-    fn who_was_caught_in_a_lie_is_not_believed_until_it_has_a_new_key() {
-        let mut verifier = verifier();
-        let mut witness = Witness::new(&roster(5));
-        let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
-        let found = both.each_ref().map(|said| witness.observe(said, &sign(1, said)));
-        let evidence = found[1].clone().unwrap();
-        assert_eq!(verifier.convict(NOW, &evidence, |_| false).unwrap().robot, RobotId(1));
-        assert_eq!(hear(&mut verifier, NOW, 1, 2), Err(Distrust::Convicted));
-        assert_eq!(hear(&mut verifier, NOW, 2, 2), Ok(()));
-        verifier.adopt(roster(6)).unwrap();
-        assert_eq!(verifier.convicted().collect::<Vec<_>>(), [RobotId(1)]);
-        let mut renewed = members(7);
-        renewed.robots.insert(RobotId(1), robot(11).public_key());
-        verifier.adopt(renewed.sign(&authority()).unwrap()).unwrap();
-        assert_eq!(verifier.convicted().count(), 0);
-        assert_eq!(verifier.convict(NOW, &evidence, |_| false), Err(EvidenceError::Forged(RobotId(1))));
-        let said = vote(1, 3, 1.0);
-        assert_eq!(verifier.check(NOW, &said, Some(&sign(11, &said))), Ok(()));
-    }
-
-    #[test]
-    fn false_evidence_has_a_budget_of_its_own() {
-        let mut verifier = sparing();
-        let mut witness = Witness::new(&roster(5));
-        let both = [vote(1, 1, 1.0), vote(1, 1, -1.0)];
-        let forged = both.each_ref().map(|said| witness.observe(said, &sign(99, said)))[1].clone().unwrap();
-        let answers: Vec<_> = (0..100).map(|_| verifier.convict(NOW, &forged, |_| false)).collect();
-        let checked =
-            answers.iter().filter(|answer| **answer == Err(EvidenceError::Forged(RobotId(1)))).count();
-        assert_eq!(checked, 16 + 1);
-        assert_eq!(answers[99], Err(EvidenceError::TooFast(RobotId(1))));
-        assert_eq!(hear(&mut verifier, NOW, 1, 2), Ok(()));
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{RobotId, Signature, Stamp, Topic};
+use gestalt_protocol::{Envelope, Give, Message, RobotId, Signature, Stamp, Topic};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, decided_in_time};
@@ -28,25 +28,84 @@ pub const ALL: &[Attack] = &[
         what: "1,000 votes a second in robot 3's name, with the newest stamps and made-up signatures",
         tier: Tier::T0,
         setting: Setting::Sealed,
-        expected: "after 1 s of the round, and of the flood, robot 3 is counted everywhere",
+        expected: COUNTED,
         counted: Counted::Some(&["refused_vote_forged"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed(), seed, |swarm| flood_in_its_name(swarm, 1), third_is_counted),
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Said, 1), third_is_counted)
+        },
     },
     Attack {
         number: "17",
         what: "8,000 votes a second in robot 3's name, with the newest stamps and made-up signatures",
         tier: Tier::T0,
         setting: Setting::Sealed,
-        expected: "after 1 s of the round, and of the flood, robot 3 is counted everywhere",
+        expected: COUNTED,
         counted: Counted::Some(&["refused_vote_forged", "refused_vote_too_fast"]),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Said, 8), third_is_counted)
+        },
+    },
+    Attack {
+        number: "17",
+        what: "20,000 votes a second in robot 3's name, with the newest stamps and made-up signatures",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: COUNTED,
+        counted: Counted::Some(&["refused_vote_forged", "refused_vote_too_fast"]),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Said, 20), third_is_counted)
+        },
+    },
+    Attack {
+        number: "17",
+        what: "gives 8,000 such votes a second, as its neighbours do",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: COUNTED,
+        counted: Counted::Some(&["refused_repair_forged", "refused_repair_too_fast"]),
+        gap: None,
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Given, 8), third_is_counted)
+        },
+    },
+    Attack {
+        number: "17",
+        what: "8,000 such votes a second by each of both ways",
+        tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: COUNTED,
+        counted: Counted::Some(&[
+            "refused_vote_forged",
+            "refused_vote_too_fast",
+            "refused_repair_forged",
+            "refused_repair_too_fast",
+        ]),
         gap: Some(
-            "before a signature is checked nothing tells the true vote from the false: who says more than 1,000 a second \
-                   in a robot's name leaves it nothing; links that know who speaks would",
+            "what a robot says and what others pass on of it have budgets apart; who uses up both, with more than 1,000 a second each, leaves it \
+                   the luck of coming when there is something left",
         ),
-        play: |seed| beside(&Plan::sealed(), seed, |swarm| flood_in_its_name(swarm, 8), third_is_counted),
+        play: |seed| {
+            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Both, 8), third_is_counted)
+        },
     },
 ];
+
+/// Of a robot in whose name others speak.
+const COUNTED: &str = "after 1 s of the round, and of the flood, robot 3 is counted everywhere";
+
+/// How votes come that were made up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// As their author says them,
+    Said,
+    /// as its neighbours pass them on,
+    Given,
+    /// or so many by each.
+    Both,
+}
 
 /// How many votes the enrolled robot says, in half a second.
 const FLOOD: u32 = 2000;
@@ -79,22 +138,27 @@ fn few_checked(peace: &Swarm, war: &Swarm) -> Result<(), String> {
 }
 
 /// So many votes a millisecond.
-fn flood_in_its_name(swarm: &mut Swarm, rate: u32) {
+fn in_its_name(swarm: &mut Swarm, way: Way, rate: u32) {
     let flood = |swarm: &mut Swarm, from: u32, time: u32| {
-        for n in from * rate..(from + time) * rate {
-            swarm.pass(MS / rate);
-            if !swarm.at_war() {
-                continue;
+        for ms in from..from + time {
+            // Spread over the millisecond, or all in one message.
+            if way != Way::Given {
+                for n in ms * rate..(ms + 1) * rate {
+                    swarm.pass(MS / rate);
+                    if swarm.at_war() {
+                        let bytes = made_up(swarm, n).encode();
+                        [1, 2]
+                            .into_iter()
+                            .for_each(|robot| swarm.put_to(robot, &Topic::Vote(RobotId(3)), &bytes));
+                    }
+                }
+            } else {
+                swarm.pass(MS);
             }
-            let vote = forged::vote(swarm.round(), 4, 16.0);
-            let mut said = forged::said(3, Stamp { boot: u32::MAX, sequence: n }, vote);
-            let mut bytes = [0x5a; 64];
-            bytes[..4].copy_from_slice(&n.to_le_bytes());
-            // Below the order of the group, so that all of the check is made.
-            bytes[63] = 0x01;
-            said.signature = Some(Signature::from_bytes(bytes));
-            for robot in [1, 2] {
-                swarm.put_to(robot, &Topic::Vote(RobotId(3)), &said.encode());
+            if way != Way::Said && swarm.at_war() {
+                let votes = (ms * rate..(ms + 1) * rate).map(|n| forged::held(made_up(swarm, !n))).collect();
+                let give = Message::Give(Give { decision: None, votes, holders: Vec::new() });
+                [(1, 2), (2, 1)].into_iter().for_each(|(to, from)| swarm.whisper_to(to, from, &give));
             }
         }
     };
@@ -103,6 +167,17 @@ fn flood_in_its_name(swarm: &mut Swarm, rate: u32) {
     swarm.begin(1);
     // Where this ends it is looked who is counted.
     flood(swarm, 200, 1000);
+}
+
+/// A vote in robot 3's name that it did not cast.
+fn made_up(swarm: &Swarm, n: u32) -> Envelope {
+    let vote = forged::vote(swarm.round(), 4, 16.0);
+    let said = forged::said(3, Stamp { boot: u32::MAX, sequence: n }, vote);
+    let mut bytes = [0x5a; 64];
+    bytes[..4].copy_from_slice(&n.to_le_bytes());
+    // Below the order of the group, so that all of the check is made.
+    bytes[63] = 0x01;
+    Envelope { signature: Some(Signature::from_bytes(bytes)), ..said }
 }
 
 fn third_is_counted(_: &Swarm, war: &Swarm) -> Result<(), String> {
