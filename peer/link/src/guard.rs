@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use gestalt_strategies::{Classify, ClassifyError, Judgement, Vocabulary};
+use gestalt_strategies::{Classify, ClassifyError, Judgement, Observation, Vocabulary};
 
 use crate::failure::Part;
 use crate::panics::said;
@@ -48,6 +48,11 @@ impl Classify for Guarded {
     fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
         let nothing = Judgement { probabilities: Vec::new(), unknown: None, view: None };
         self.ask(|classifier| classifier.judge(features)).unwrap_or(Ok(nothing))
+    }
+
+    fn judge_seen(&self, seen: &Observation) -> Result<Judgement, ClassifyError> {
+        let nothing = Judgement { probabilities: Vec::new(), unknown: None, view: None };
+        self.ask(|classifier| classifier.judge_seen(seen)).unwrap_or(Ok(nothing))
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use thiserror::Error;
 
+use crate::observation::Observation;
 use crate::vocabulary::Vocabulary;
 
 /// A feature vector that a classifier cannot judge. The classifier is unchanged.
@@ -39,7 +40,7 @@ pub struct Judgement {
 /// Tells gestures apart: from a raw feature vector to a probability for each class.
 ///
 /// A trait, so that a researcher's own classifier can sit in a robot; `Classifier` is ours. Only the vocabulary and the probabilities are required.
-/// A robot asks [`Self::judge`]: who finds all three answers on one way gives that too.
+/// A robot asks [`Self::judge_seen`], which asks [`Self::judge`]: who finds all three answers on one way gives that too.
 pub trait Classify: Debug + Send + Sync {
     /// The gestures it can tell.
     fn vocabulary(&self) -> &Vocabulary;
@@ -66,6 +67,15 @@ pub trait Classify: Debug + Send + Sync {
     fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
         let probabilities = self.probabilities(features)?;
         Ok(Judgement { probabilities, unknown: self.unknown(features), view: self.view(features) })
+    }
+
+    /// The same of what perception hands over. Where its quality says how likely it shows a hand at all, a classifier may find what hardly does unknown;
+    /// the others judge the features alone.
+    ///
+    /// # Errors
+    /// As of [`Self::probabilities`].
+    fn judge_seen(&self, seen: &Observation) -> Result<Judgement, ClassifyError> {
+        self.judge(&seen.features)
     }
 
     /// The probabilities of a vector already reduced: coordinates in the feature space it judges in.

@@ -125,7 +125,7 @@ impl Round {
         config: &RoundsConfig,
     ) -> bool {
         let classes = classifier.vocabulary().classes();
-        match classifier.judge(&observation.features) {
+        match classifier.judge_seen(observation) {
             Ok(Judgement { probabilities, unknown, view })
                 if probabilities.len() == classes
                     && probabilities.iter().all(|p| (0.0..=1.0).contains(p)) =>

@@ -9,13 +9,14 @@
 use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
-use gestalt_rounds::{Classify, ClassifyError, Judgement, Vocabulary};
+use gestalt_rounds::{Classify, ClassifyError, Judgement, Observation, Vocabulary};
 
 use crate::calibration::Calibration;
 use crate::familiarity::Familiarity;
 use crate::feature_space::FeatureSpace;
 use crate::head::{Blend, Head, Shown};
 use crate::machine::Machine;
+use crate::no_hand::odds_of_no_hand;
 
 /// The squared distance at which two views are at a distance of 1, in units of the space's variance. Measured on drawn hands
 /// (3,000 frames, sixteen robots, 72 showings): whether two views of one showing are misjudged correlates by .93, .82, .68,
@@ -121,12 +122,13 @@ impl Classifier {
     /// The probability of each gesture that it has not met.
     ///
     /// With as many gestures met as not as the vocabulary has, all as likely beforehand, and r = P(x | unknown) / P(x | one met): r / (met + r · unmet).
-    fn of_unknown(&self, coordinates: &[f32], few: Option<(&Blend, &[f64])>) -> f64 {
+    /// What is unknown is another gesture or, by these odds, no hand: one or the other, so their odds add up.
+    fn of_unknown(&self, coordinates: &[f32], few: Option<(&Blend, &[f64])>, no_hand: f64) -> f64 {
         let (classes, met) = (self.learned.len(), self.met().count());
         let margin = few.and_then(|(blend, logs)| blend.margin(logs));
         let log_ratio = self.familiarity.as_ref().map_or(0.0, |known| known.log_ratio(coordinates, margin));
-        // Who was taught all there is to the list is seldom shown what is not on it.
-        let ratio = log_ratio.exp() * if met == classes { RARE } else { 1.0 };
+        // Who was taught all there is to the list is seldom shown what is not on it; no hand at all is seen as often as before.
+        let ratio = log_ratio.exp() * if met == classes { RARE } else { 1.0 } + no_hand;
         ratio / (met as f64 + ratio * (classes - met).max(usize::from(met == 0)) as f64)
     }
 
@@ -134,12 +136,12 @@ impl Classifier {
         Some(self.head()?.logs(coordinates))
     }
 
-    /// Judges coordinates in its space: the probabilities of all gestures of the list, and that of one beside it.
-    fn judge_in_space(&self, coordinates: &[f32]) -> (Vec<f64>, f64) {
+    /// Judges coordinates in its space, given the odds of no hand: the probabilities of all gestures of the list, and that of one beside it.
+    fn judge_in_space(&self, coordinates: &[f32], no_hand: f64) -> (Vec<f64>, f64) {
         let (classes, met) = (self.learned.len(), self.met().count());
         let logs = self.logs_of_head(coordinates);
         let few = self.blend.as_ref().zip(logs.as_deref());
-        let unmet = self.of_unknown(coordinates, few);
+        let unmet = self.of_unknown(coordinates, few, no_hand);
         let mut probabilities = vec![unmet; classes];
         if met > 0 {
             let mut decisions = Vec::with_capacity(self.machine.offsets.len());
@@ -156,6 +158,13 @@ impl Classifier {
         (probabilities, unmet)
     }
 
+    fn judge_all(&self, features: &[f32], no_hand: f64) -> Result<Judgement, ClassifyError> {
+        let coordinates = self.space.project(features)?;
+        let (probabilities, unknown) = self.judge_in_space(&coordinates, no_hand);
+        let unknown = self.familiarity.is_some().then_some(unknown);
+        Ok(Judgement { probabilities, unknown, view: self.in_view(&coordinates) })
+    }
+
     /// Coordinates in units in which errors about two views correlate by exp(−d²); `None` in a space in which nothing varies.
     fn in_view(&self, coordinates: &[f32]) -> Option<Vec<f32>> {
         let unit = (REPEATS * self.space.variance()).sqrt() as f32;
@@ -169,14 +178,14 @@ impl Classify for Classifier {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        Ok(self.judge_in_space(&self.space.project(features)?).0)
+        Ok(self.judge_in_space(&self.space.project(features)?, 0.0).0)
     }
 
     fn unknown(&self, features: &[f32]) -> Option<f64> {
         self.familiarity.as_ref()?;
         let coordinates = self.space.project(features).ok()?;
         let logs = self.logs_of_head(&coordinates);
-        Some(self.of_unknown(&coordinates, self.blend.as_ref().zip(logs.as_deref())))
+        Some(self.of_unknown(&coordinates, self.blend.as_ref().zip(logs.as_deref()), 0.0))
     }
 
     fn view(&self, features: &[f32]) -> Option<Vec<f32>> {
@@ -184,15 +193,17 @@ impl Classify for Classifier {
     }
 
     fn judge(&self, features: &[f32]) -> Result<Judgement, ClassifyError> {
-        let coordinates = self.space.project(features)?;
-        let (probabilities, unknown) = self.judge_in_space(&coordinates);
-        let unknown = self.familiarity.is_some().then_some(unknown);
-        Ok(Judgement { probabilities, unknown, view: self.in_view(&coordinates) })
+        self.judge_all(features, 0.0)
+    }
+
+    fn judge_seen(&self, seen: &Observation) -> Result<Judgement, ClassifyError> {
+        let tells = self.space.is_of_learned_eyes();
+        self.judge_all(&seen.features, if tells { odds_of_no_hand(seen.quality) } else { 0.0 })
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
         let fits = coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite());
-        fits.then(|| self.judge_in_space(coordinates).0)
+        fits.then(|| self.judge_in_space(coordinates, 0.0).0)
     }
 }
 

@@ -99,6 +99,13 @@ impl FeatureSpace {
         &self.feature_set
     }
 
+    /// Whether it is of the embeddings of learned eyes. The quality of what those see is how likely it is a hand at all; that of others says how far
+    /// an outline is to be trusted.
+    #[must_use]
+    pub fn is_of_learned_eyes(&self) -> bool {
+        self.feature_set.starts_with("embedding-")
+    }
+
     /// How many raw features it takes.
     #[must_use]
     pub fn features(&self) -> usize {

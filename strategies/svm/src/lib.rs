@@ -23,6 +23,7 @@ mod labelled;
 mod learner;
 mod machine;
 mod model_codec;
+mod no_hand;
 mod reduction;
 mod scaling;
 mod scatter;
