@@ -42,7 +42,7 @@ pub use gestalt_rounds::{
 pub use gestalt_svm::{
     CALIBRATION_BINS, Classifier, Components, Discriminant, Evaluation, FeatureSpace, Head, LabelledFeatures,
     LearnError, Learner, LearnerOptions, MAX_MODEL, Machines, ModelError, Pca, Proportion, Ranking,
-    Reduction, Scaling, ScalingMethod, Shown, Teach,
+    Reduction, Scaling, ScalingMethod, SharedKernel, Shown, Teach,
 };
 #[cfg(feature = "offline")]
 pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};

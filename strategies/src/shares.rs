@@ -1,6 +1,7 @@
 //! Whose samples have how much room in a full training set: no author's push out those of the others.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use gestalt_protocol::{MAX_ROBOTS, RobotId};
 
@@ -15,8 +16,10 @@ const LEAST: usize = 5;
 /// that matters when the set is full, and not before.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shares {
-    /// The other robots alive now.
-    alive: BTreeSet<RobotId>,
+    /// Whose set it is, once it was told of others.
+    me: Option<RobotId>,
+    /// The robots alive now, this one among them or not: as the others of its process know them too, one list serves all.
+    alive: Arc<BTreeSet<RobotId>>,
     /// Those that were alive at any time in this life and are not now: with those at most [`MAX_ROBOTS`].
     gone: BTreeSet<RobotId>,
     /// How many samples of strangers are held; `None` before they are counted.
@@ -25,14 +28,15 @@ pub(crate) struct Shares {
 
 impl Shares {
     /// These robots are alive now. Gives those that were not before.
-    pub fn meet(&mut self, me: RobotId, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
-        let new = alive.difference(&self.alive).copied().filter(|robot| *robot != me).collect();
-        let mut alive = alive.clone();
-        alive.remove(&me);
-        self.gone.append(&mut std::mem::replace(&mut self.alive, alive));
+    pub fn meet(&mut self, me: RobotId, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
+        let before = std::mem::replace(&mut self.alive, alive);
+        self.me = Some(me);
+        let others = |robot: &RobotId| *robot != me;
+        let new = self.alive.difference(&before).copied().filter(others).collect();
+        self.gone.extend(before.difference(&self.alive).copied().filter(others));
         self.gone.retain(|robot| !self.alive.contains(robot));
         self.strange = None;
-        if self.alive.len() + self.gone.len() > MAX_ROBOTS {
+        if self.others() + self.gone.len() > MAX_ROBOTS {
             self.gone.clear();
         }
         new
@@ -64,11 +68,16 @@ impl Shares {
 
     /// Whether that robot was alive at any time in this life, as far as is kept.
     fn has_met(&self, robot: RobotId) -> bool {
-        self.alive.contains(&robot) || self.gone.contains(&robot)
+        self.is_alive(robot) || self.gone.contains(&robot)
     }
 
     pub fn is_alive(&self, robot: RobotId) -> bool {
-        self.alive.contains(&robot)
+        self.me != Some(robot) && self.alive.contains(&robot)
+    }
+
+    /// How many other robots are alive.
+    fn others(&self) -> usize {
+        self.alive.len() - usize::from(self.me.is_some_and(|me| self.alive.contains(&me)))
     }
 
     /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
@@ -109,7 +118,7 @@ impl Shares {
 
     /// How many robots there are; `None` for one that knows of no other.
     pub fn robots(&self) -> Option<usize> {
-        (!self.alive.is_empty()).then(|| self.alive.len() + 1)
+        Some(self.others() + 1).filter(|robots| *robots > 1)
     }
 }
 

@@ -119,6 +119,11 @@ impl TrainingSet {
     /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
     /// Gives those that were not alive before.
     pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.meet_all(Arc::new(alive.clone()))
+    }
+
+    /// The same, of a list that other robots of the process hold as well.
+    pub(crate) fn meet_all(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
         self.shares.meet(self.me(), alive)
     }
 

@@ -55,7 +55,7 @@ impl TrainingChange {
     pub fn apply_to(&self, learner: &mut Learner) -> Result<(), LearnError> {
         match self {
             Self::Insert { key, class, vector, showing } => {
-                learner.insert_shown(*key, *class, vector, *showing)
+                learner.insert_held(*key, *class, vector.clone(), *showing)
             }
             Self::Remove(key) => {
                 learner.remove(*key);

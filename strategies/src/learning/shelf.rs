@@ -1,16 +1,16 @@
 //! What robots of one process hold alike, held once.
 
 use std::borrow::Borrow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use gestalt_protocol::{HeldBatch, RoundId, SampleId};
+use gestalt_protocol::{HeldBatch, RobotId, RoundId, SampleId};
 use gestalt_rounds::Testimony;
 
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
 
-/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, the votes of rounds. Each still takes in
+/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, the votes of rounds, who is alive. Each still takes in
 /// what it hears by itself, and what one of them is told otherwise than the others stays its own: only what is equal is held once. So what a robot does is
 /// the same with a shelf and without; a thousand that hold the same thousand samples hold them once.
 ///
@@ -20,6 +20,8 @@ pub struct Shelf {
     vectors: Mutex<Board<SampleId, [f32]>>,
     batches: Mutex<Board<SampleId, HeldBatch>>,
     testimonies: Mutex<Board<RoundId, Testimony>>,
+    /// By how many they are, and the first: those that one part of a swarm sees.
+    alive: Mutex<Board<(usize, Option<RobotId>), BTreeSet<RobotId>>>,
 }
 
 impl Shelf {
@@ -33,6 +35,10 @@ impl Shelf {
 
     pub(super) fn testimony(&self, of: RoundId, testimony: Testimony) -> Arc<Testimony> {
         put(&self.testimonies, of, testimony)
+    }
+
+    pub(super) fn alive(&self, robots: &BTreeSet<RobotId>) -> Arc<BTreeSet<RobotId>> {
+        put(&self.alive, (robots.len(), robots.first().copied()), robots.clone())
     }
 }
 
@@ -73,8 +79,6 @@ fn put<K: Ord, T: PartialEq + ?Sized, V: Borrow<T> + Into<Arc<T>>>(
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::RobotId;
-
     use super::*;
 
     fn id(number: u32) -> SampleId {
@@ -90,6 +94,17 @@ mod tests {
         let other = shelf.vector(id(1), vec![1.0, 3.0]);
         assert_eq!((&*first, &*other), (&[1.0, 2.0][..], &[1.0, 3.0][..]));
         assert!(!Arc::ptr_eq(&first, &shelf.vector(id(2), vec![1.0, 2.0])), "of another name");
+    }
+
+    #[test]
+    fn robots_that_see_the_same_robots_hold_one_list_of_them() {
+        let shelf = Shelf::default();
+        let all: BTreeSet<RobotId> = (1..=50).map(RobotId).collect();
+        let held = shelf.alive(&all);
+        assert!(Arc::ptr_eq(&held, &shelf.alive(&all.clone())));
+        let others: BTreeSet<RobotId> = (1..50).chain([60]).map(RobotId).collect();
+        assert_eq!(*shelf.alive(&others), others, "as many, from the same one on");
+        assert_eq!(*held, all);
     }
 
     #[test]

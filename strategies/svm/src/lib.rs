@@ -37,7 +37,7 @@ pub use evaluation::{CALIBRATION_BINS, Evaluation, Proportion};
 pub use feature_space::FeatureSpace;
 pub use head::{Discriminant, DiscriminantSums, Head, Shown, Teach};
 pub use labelled::LabelledFeatures;
-pub use learner::{LearnError, Learner, LearnerOptions};
+pub use learner::{LearnError, Learner, LearnerOptions, SharedKernel};
 pub use model_codec::{MAX_MODEL, ModelError};
 pub use reduction::{Components, Pca, Ranking, Reduction};
 pub use scaling::{Scaling, ScalingMethod};

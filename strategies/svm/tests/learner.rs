@@ -360,6 +360,52 @@ fn the_same_operations_give_the_same_bytes() {
 }
 
 #[test]
+fn what_a_learner_looks_up_in_a_shared_kernel_makes_no_difference() {
+    let space = space();
+    let kernel = Arc::new(learner(&space).shared_kernel());
+    let mut rng = generator(17);
+    let held: Vec<(ClassId, Arc<[f32]>)> =
+        samples(&space, 120, &mut rng).into_iter().map(|(class, vector)| (class, vector.into())).collect();
+    let mut known = generator(18);
+    for seed in 0..3 {
+        let (mut alone, mut sharing) = (learner(&space), learner(&space).sharing(kernel.clone()));
+        let mut rng = generator(20 + seed);
+        for step in 0..300 {
+            let key = rng.random_range(0..120_u64);
+            let (class, vector) = &held[key as usize];
+            match rng.random_range(0..8) {
+                0 => assert_eq!(alone.remove(key), sharing.remove(key)),
+                1 => {
+                    let class = ClassId((class.0 + 1) % CLASSES as u32);
+                    assert_eq!(alone.relabel(key, class), sharing.relabel(key, class));
+                }
+                _ => {
+                    // Some are known from the first learner on, some only later, some to nobody.
+                    if key % 3 > 0 && known.random_bool(0.5) {
+                        kernel.hold(vector);
+                    }
+                    alone.insert_shown(key, *class, vector, key / 4).unwrap();
+                    sharing.insert_held(key, *class, vector.clone(), key / 4).unwrap();
+                }
+            }
+            if step % 60 == 59 {
+                let (alone, sharing) = (alone.learn().unwrap(), sharing.learn().unwrap());
+                assert_eq!(alone.encode(), sharing.encode());
+                assert_eq!(judge(&alone, vector), judge(&sharing, vector));
+            }
+        }
+    }
+    let options = LearnerOptions { gamma: 2.0, ..LearnerOptions::default() };
+    let other = || Learner::new(space.clone(), vocabulary(), options.clone()).unwrap();
+    let (mut alone, mut sharing) = (other(), other().sharing(kernel));
+    for (key, (class, vector)) in (0..).zip(&held) {
+        alone.insert(key, *class, vector).unwrap();
+        sharing.insert_held(key, *class, vector.clone(), key).unwrap();
+    }
+    assert_eq!(alone.learn().unwrap().encode(), sharing.learn().unwrap().encode(), "of another γ");
+}
+
+#[test]
 fn a_key_names_one_sample() {
     let space = space();
     let pool = samples(&space, 80, &mut generator(9));

@@ -94,8 +94,12 @@ impl Pupil {
 
     /// Gets ready to learn anew, from the samples that its mind holds.
     fn gather(&mut self, mind: Option<&Mind>, school: &School) {
-        let samples = mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
-        self.due = samples.map(TrainingChange::insert).chain(self.guesses.values().cloned()).collect();
+        let samples = || mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
+        // Of a shared sample all robots hold one vector: its kernel with the others is worked out once for all of them.
+        samples()
+            .filter(|sample| sample.id.is_some())
+            .for_each(|sample| school.kernel().hold(&sample.vector));
+        self.due = samples().map(TrainingChange::insert).chain(self.guesses.values().cloned()).collect();
         let mut learner = new_learner(school);
         learner.make_room(self.due.iter().filter_map(|change| match change {
             TrainingChange::Insert { class, .. } => Some(*class),

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
-    Classifier, Components, FeatureSpace, LearnError, Learner, LearnerOptions, ScalingMethod, Vocabulary,
+    Classifier, Components, FeatureSpace, LearnError, Learner, LearnerOptions, ScalingMethod, SharedKernel,
+    Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -18,6 +19,7 @@ pub struct School {
     vocabulary: Vocabulary,
     start: Option<Arc<Classifier>>,
     options: LearnerOptions,
+    kernel: Arc<SharedKernel>,
 }
 
 impl School {
@@ -31,7 +33,8 @@ impl School {
         start: Option<Arc<Classifier>>,
         options: LearnerOptions,
     ) -> Result<Self, LearnError> {
-        let school = Self { space, vocabulary, start, options };
+        let plain = Learner::new(space.clone(), vocabulary.clone(), options.clone())?;
+        let school = Self { space, vocabulary, start, options, kernel: Arc::new(plain.shared_kernel()) };
         school.learner()?;
         Ok(school)
     }
@@ -73,9 +76,20 @@ impl School {
         self.start.as_ref()
     }
 
+    /// The same for a run: what its robots work out together they share with no other run's.
+    pub(super) fn begun(&self) -> Self {
+        Self { kernel: Arc::new(self.kernel.emptied()), ..self.clone() }
+    }
+
+    /// The kernel of what robots of one run hold alike.
+    pub(super) fn kernel(&self) -> &SharedKernel {
+        &self.kernel
+    }
+
     /// The machine of a robot that starts.
     pub(super) fn learner(&self) -> Result<Learner, LearnError> {
-        let mut learner = Learner::new(self.space.clone(), self.vocabulary.clone(), self.options.clone())?;
+        let learner = Learner::new(self.space.clone(), self.vocabulary.clone(), self.options.clone())?;
+        let mut learner = learner.sharing(self.kernel.clone());
         if let Some(start) = &self.start {
             learner.build_on(start)?;
         }

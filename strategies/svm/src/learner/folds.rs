@@ -42,8 +42,7 @@ mod tests {
     }
 
     fn samples(keys: impl Iterator<Item = u64>) -> Vec<KernelRow> {
-        keys.map(|key| KernelRow { key: Key::Inserted(key), vector: Vec::new(), kernel: Vec::new() })
-            .collect()
+        keys.map(|key| KernelRow::new(Key::Inserted(key), [].into(), None)).collect()
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod growing;
 mod options;
 mod pair;
 mod samples;
+mod shared;
 mod simd;
 mod solution;
 #[cfg(test)]
@@ -21,6 +22,7 @@ use folds::folds;
 pub use options::{LearnError, LearnerOptions};
 use pair::Pair;
 use samples::{KernelMatrix, Key, Place};
+pub use shared::SharedKernel;
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
@@ -31,7 +33,7 @@ use crate::machine::{MAX_COORDINATE, Machine, pairs};
 /// Learns from samples that come and go, in one feature space.
 ///
 /// A soft-margin machine for each pair of classes, as the offline trainer makes them. It keeps the kernel of
-/// every two samples (n² · 4 bytes for n samples) and the last solution of each pair, from which a change sets out.
+/// every two samples (up to n² · 4 bytes for n samples: what its machines asked for) and the last solution of each pair, from which a change sets out.
 ///
 /// Beside the machines stands a [`Head`](crate::Head) for few showings: it answers alone for pairs with a class that was shown once, and for the
 /// others together with the machine, in the part that loses least over showings that neither has met.
@@ -124,7 +126,7 @@ impl Learner {
             }
         }
         for (class, vector) in classifier.vectors() {
-            self.put(Key::Support(self.supports), class.index(), vector);
+            self.put(Key::Support(self.supports), class.index(), vector.into());
             self.supports += 1;
         }
         Ok(())
@@ -149,6 +151,20 @@ impl Learner {
         key: u64,
         class: ClassId,
         vector: &[f32],
+        showing: u64,
+    ) -> Result<(), LearnError> {
+        self.insert_held(key, class, vector.into(), showing)
+    }
+
+    /// The same of a vector that others hold as well.
+    ///
+    /// # Errors
+    /// As of [`Self::insert`].
+    pub fn insert_held(
+        &mut self,
+        key: u64,
+        class: ClassId,
+        vector: Arc<[f32]>,
         showing: u64,
     ) -> Result<(), LearnError> {
         if vector.len() != self.space.components() {
@@ -327,7 +343,7 @@ impl Learner {
         let mut vectors = Vec::new();
         for &class in present {
             let kept = self.samples.of(class).iter().zip(&used[class]).filter(|(_, used)| **used);
-            vectors.extend(kept.flat_map(|(sample, _)| &sample.vector));
+            vectors.extend(kept.flat_map(|(sample, _)| sample.vector.iter()));
         }
         Machine {
             gamma: self.gamma,
@@ -353,9 +369,9 @@ impl Learner {
         self.pairs.iter().filter(|pair| !pair.is_empty(&self.samples))
     }
 
-    fn put(&mut self, key: Key, class: usize, vector: &[f32]) {
+    fn put(&mut self, key: Key, class: usize, vector: Arc<[f32]>) {
+        self.few.sums.insert(key, class, self.few.showing(key), &vector);
         let place = self.samples.insert(key, class, vector);
-        self.few.sums.insert(key, class, self.few.showing(key), vector);
         self.join(place);
     }
 

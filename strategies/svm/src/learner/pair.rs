@@ -27,14 +27,14 @@ impl Pair {
     /// Takes in the sample that now stands at the end of its class.
     pub fn insert(&mut self, samples: &KernelMatrix, place: Place) {
         let Some(side) = self.side(place) else { return };
-        self.solution.insert(side, self.row(samples, place));
+        self.solution.insert(side, || row(samples, self.classes, place));
         self.changes += 1;
     }
 
     /// Takes out a sample that still stands in its place.
     pub fn remove(&mut self, samples: &KernelMatrix, place: Place) {
         let Some(side) = self.side(place) else { return };
-        self.solution.remove(side, place.position, self.row(samples, place));
+        self.solution.remove(side, place.position, || row(samples, self.classes, place));
         self.changes += 1;
     }
 
@@ -127,16 +127,17 @@ impl Pair {
     fn side(&self, place: Place) -> Option<usize> {
         self.classes.iter().position(|class| *class == place.class)
     }
-
-    fn row<'a>(&self, samples: &'a KernelMatrix, place: Place) -> [&'a [f32]; 2] {
-        self.classes.map(|class| samples.at(place).kernel[class].as_slice())
-    }
 }
 
 /// The kernel of the samples of a pair with each other.
 fn rows<'a>(samples: &'a KernelMatrix, classes: [usize; 2]) -> impl Fn(usize, usize) -> [&'a [f32]; 2] {
-    let of_side = classes.map(|class| samples.of(class));
-    move |side, position| classes.map(|class| of_side[side][position].kernel[class].as_slice())
+    move |side, position| row(samples, classes, Place { class: classes[side], position })
+}
+
+/// The kernel of a sample with those of a pair.
+fn row(samples: &KernelMatrix, classes: [usize; 2], place: Place) -> [&[f32]; 2] {
+    let row = samples.row(place);
+    classes.map(|class| row[class].as_slice())
 }
 
 #[cfg(test)]
@@ -169,7 +170,7 @@ mod tests {
             let class = key as usize % 2;
             let mut vector = vector.clone();
             vector[0] += class as f32;
-            let place = samples.insert(Key::Inserted(key), class, &vector);
+            let place = samples.insert(Key::Inserted(key), class, vector.into());
             pair.insert(&samples, place);
         }
         pair.solve(&samples, COST);
@@ -192,7 +193,7 @@ mod tests {
                 let place = samples.place(Key::Inserted(key)).unwrap();
                 let kernel = |other: &KernelRow| {
                     let other = samples.place(other.key).unwrap();
-                    f64::from(samples.at(place).kernel[other.class][other.position])
+                    f64::from(samples.row(place)[other.class][other.position])
                 };
                 let sum = |class: usize| -> f64 {
                     let weights = alone.solution.weights(class).iter();

@@ -1,7 +1,9 @@
 //! The samples of a learner by class, and the kernel between every two of them.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
 
+use super::shared::SharedKernel;
 use crate::vector::squared_distance;
 
 /// Names a sample.
@@ -17,10 +19,18 @@ pub(super) enum Key {
 #[derive(Debug)]
 pub(super) struct KernelRow {
     pub key: Key,
-    pub vector: Vec<f32>,
+    pub vector: Arc<[f32]>,
+    /// Its place in the kernel that several learners share, where it is one of theirs.
+    shared: Option<usize>,
     /// For each class, the kernel with its samples, in their order: what a pair of classes needs of the matrix lies
-    /// side by side.
-    pub kernel: Vec<Vec<f32>>,
+    /// side by side. Worked out when it is first asked for: of most samples no machine ever asks.
+    kernel: OnceLock<Vec<Vec<f32>>>,
+}
+
+impl KernelRow {
+    pub fn new(key: Key, vector: Arc<[f32]>, shared: Option<usize>) -> Self {
+        Self { key, vector, shared, kernel: OnceLock::new() }
+    }
 }
 
 /// Where a sample stands.
@@ -31,7 +41,7 @@ pub(super) struct Place {
     pub position: usize,
 }
 
-/// The samples by class. The kernel matrix costs n² · 4 bytes for n samples, and up to an eighth more to grow into.
+/// The samples by class. The kernel matrix costs n² · 4 bytes for n samples if all of it is asked for, and up to an eighth more to grow into.
 #[derive(Debug)]
 pub(super) struct KernelMatrix {
     gamma: f32,
@@ -39,12 +49,22 @@ pub(super) struct KernelMatrix {
     places: BTreeMap<Key, Place>,
     /// As many samples there will be at least, by class.
     room: Vec<usize>,
+    /// What other learners have worked out already.
+    known: Option<Arc<SharedKernel>>,
 }
 
 impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
         let (places, room) = (BTreeMap::new(), vec![0; classes]);
-        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places, room }
+        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places, room, known: None }
+    }
+
+    /// From now on looks there first.
+    pub fn share(&mut self, known: Arc<SharedKernel>) {
+        for sample in self.classes.iter_mut().flatten() {
+            sample.shared = known.place(&sample.vector);
+        }
+        self.known = Some(known);
     }
 
     /// So many samples of each class are about to come: from now on rows are made as long as they will be.
@@ -56,7 +76,8 @@ impl KernelMatrix {
 
     /// Makes room for one more class.
     pub fn add_class(&mut self) {
-        self.classes.iter_mut().flatten().for_each(|sample| sample.kernel.push(Vec::new()));
+        let rows = self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut());
+        rows.for_each(|row| row.push(Vec::new()));
         self.classes.push(Vec::new());
         self.room.push(0);
     }
@@ -70,6 +91,11 @@ impl KernelMatrix {
         &self.classes[place.class][place.position]
     }
 
+    /// The kernel of the sample there with the samples of each class, in their order.
+    pub fn row(&self, place: Place) -> &[Vec<f32>] {
+        self.at(place).kernel.get_or_init(|| self.work_out(place))
+    }
+
     pub fn place(&self, key: Key) -> Option<Place> {
         self.places.get(&key).copied()
     }
@@ -80,29 +106,47 @@ impl KernelMatrix {
     }
 
     /// Puts a sample at the end of its class.
-    pub fn insert(&mut self, key: Key, class: usize, vector: &[f32]) -> Place {
-        let gamma = self.gamma;
-        let mut kernel: Vec<Vec<f32>> = Vec::with_capacity(self.classes.len());
-        for (samples, room) in self.classes.iter_mut().zip(&self.room) {
-            let least = samples.len() + 1;
-            let mut row = Vec::with_capacity(if least <= *room { *room } else { roomy(least) });
+    pub fn insert(&mut self, key: Key, class: usize, vector: Arc<[f32]>) -> Place {
+        let shared = self.known.as_ref().and_then(|known| known.place(&vector));
+        let new = KernelRow::new(key, vector, shared);
+        let lengths: Vec<usize> = self
+            .classes
+            .iter()
+            .zip(&self.room)
+            .map(|(samples, room)| roomy_for(samples.len() + 1, *room))
+            .collect();
+        // Where all others have their rows it has its own at once, from the same products.
+        let mut own = Some(lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
+        let known = self.known.as_ref().map(|known| known.row(shared));
+        for (of, samples) in self.classes.iter_mut().enumerate() {
             for sample in samples {
-                let value = (-gamma * squared_distance(&sample.vector, vector)).exp();
-                row.push(value);
-                push(&mut sample.kernel[class], value);
+                let Some(row) = sample.kernel.get_mut() else {
+                    own = None;
+                    continue;
+                };
+                let known = known.as_ref().and_then(|known| known.with(sample.shared));
+                let value = known.unwrap_or_else(|| kernel(self.gamma, &sample.vector, &new.vector));
+                push(&mut row[class], value);
+                if let Some(own) = &mut own {
+                    own[of].push(value);
+                }
             }
-            kernel.push(row);
         }
-        kernel[class].push(1.0);
-        self.append(class, KernelRow { key, vector: vector.to_vec(), kernel })
+        drop(known);
+        if let Some(mut own) = own {
+            own[class].push(1.0);
+            // It has none yet.
+            let _ = new.kernel.set(own);
+        }
+        self.append(class, new)
     }
 
     /// Takes a sample out.
     pub fn remove(&mut self, place: Place) {
         let Place { class, position } = place;
         let gone = self.classes[class].swap_remove(position);
-        for sample in self.classes.iter_mut().flatten() {
-            sample.kernel[class].swap_remove(position);
+        for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut()) {
+            row[class].swap_remove(position);
         }
         self.places.remove(&gone.key);
         self.moved(place);
@@ -110,9 +154,9 @@ impl KernelMatrix {
 
     /// Moves a sample to the end of another class.
     pub fn relabel(&mut self, place: Place, class: usize) -> Place {
-        for sample in self.classes.iter_mut().flatten() {
-            let value = sample.kernel[place.class].swap_remove(place.position);
-            push(&mut sample.kernel[class], value);
+        for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut()) {
+            let value = row[place.class].swap_remove(place.position);
+            push(&mut row[class], value);
         }
         let sample = self.classes[place.class].swap_remove(place.position);
         self.moved(place);
@@ -132,14 +176,40 @@ impl KernelMatrix {
             self.places.insert(sample.key, place);
         }
     }
+
+    /// The kernel of a sample with all: what others have of it already is looked up.
+    fn work_out(&self, place: Place) -> Vec<Vec<f32>> {
+        let of = self.at(place);
+        let known = self.known.as_ref().map(|known| known.row(of.shared));
+        let with = |other: &KernelRow| {
+            let known = known.as_ref().and_then(|known| known.with(other.shared));
+            let theirs = || other.kernel.get().map(|row| row[place.class][place.position]);
+            known.or_else(theirs).unwrap_or_else(|| kernel(self.gamma, &other.vector, &of.vector))
+        };
+        let of_class = |(samples, room): (&Vec<KernelRow>, &usize)| {
+            let mut row = Vec::with_capacity(roomy_for(samples.len(), *room));
+            row.extend(samples.iter().map(with));
+            row
+        };
+        self.classes.iter().zip(&self.room).map(of_class).collect()
+    }
+}
+
+/// exp(−γ·‖x − y‖²): the same bits whichever of the two comes first.
+pub(super) fn kernel(gamma: f32, x: &[f32], y: &[f32]) -> f32 {
+    (-gamma * squared_distance(x, y)).exp()
 }
 
 /// Pushes into a vector that grows by an eighth, not by the half: there are as many as samples.
-fn push(row: &mut Vec<f32>, value: f32) {
+pub(super) fn push(row: &mut Vec<f32>, value: f32) {
     if row.len() == row.capacity() {
         row.reserve_exact(roomy(row.len()) - row.len());
     }
     row.push(value);
+}
+
+fn roomy_for(length: usize, room: usize) -> usize {
+    if length <= room { room } else { roomy(length) }
 }
 
 fn roomy(length: usize) -> usize {
@@ -165,7 +235,7 @@ mod tests {
             match (rng.random_range(0..5_u64), any.and_then(|key| samples.place(*key))) {
                 (0 | 1, Some(place)) => samples.remove(place),
                 (2, Some(place)) if place.class != class => drop(samples.relabel(place, class)),
-                _ => drop(samples.insert(Key::Inserted(step), class, &vector(class, &mut rng))),
+                _ => drop(samples.insert(Key::Inserted(step), class, vector(class, &mut rng).into())),
             }
             peak = peak.max(samples.places().len());
         }
@@ -175,7 +245,7 @@ mod tests {
             let sample = samples.at(*place);
             assert_eq!(sample.key, *key);
             for class in 0..3 {
-                let row = &sample.kernel[class];
+                let row = &samples.row(*place)[class];
                 held += row.capacity();
                 let expected: Vec<f32> = samples
                     .of(class)

@@ -56,8 +56,8 @@ const LABELS: [f32; 2] = [1.0, -1.0];
 
 impl Solution {
     /// Takes in a sample at the end of a class, with weight 0.
-    pub fn insert(&mut self, side: usize, row: [&[f32]; 2]) {
-        let sum = if self.is_loaded { self.sum(row) } else { 0.0 };
+    pub fn insert<'a>(&mut self, side: usize, row: impl FnOnce() -> [&'a [f32]; 2]) {
+        let sum = if self.is_loaded { self.sum(row()) } else { 0.0 };
         let residual = f64::from(LABELS[side]) - sum;
         let side = &mut self.sides[side];
         side.weights.push(0.0);
@@ -65,7 +65,7 @@ impl Solution {
     }
 
     /// Takes out a sample; the last of its class takes its place. The weights may no longer sum to 0 then.
-    pub fn remove(&mut self, side: usize, position: usize, row: [&[f32]; 2]) {
+    pub fn remove<'a>(&mut self, side: usize, position: usize, row: impl FnOnce() -> [&'a [f32]; 2]) {
         self.release(side, position, row);
         let side = &mut self.sides[side];
         side.weights.swap_remove(position);
@@ -99,8 +99,8 @@ impl Solution {
     pub fn solve<'a>(&mut self, cost: f64, rows: &impl Rows<'a>, held_out: impl Fn(usize, usize) -> bool) {
         for side in 0..2 {
             for position in 0..self.sides[side].weights.len() {
-                if held_out(side, position) && self.sides[side].weights[position] != 0.0 {
-                    self.release(side, position, rows(side, position));
+                if held_out(side, position) {
+                    self.release(side, position, || rows(side, position));
                 }
             }
         }
@@ -119,10 +119,10 @@ impl Solution {
     }
 
     /// Takes the weight off a sample.
-    fn release(&mut self, side: usize, position: usize, row: [&[f32]; 2]) {
+    fn release<'a>(&mut self, side: usize, position: usize, row: impl FnOnce() -> [&'a [f32]; 2]) {
         let weight = std::mem::take(&mut self.sides[side].weights[position]);
         if weight != 0.0 {
-            self.spread(weight, row);
+            self.spread(weight, row());
         }
     }
 
@@ -369,15 +369,15 @@ mod tests {
                     if count > 3 && rng.random_bool(0.3) {
                         let position = rng.random_range(0..count as u64) as usize;
                         let place = super::super::samples::Place { class: side, position };
-                        let kernel = &samples.at(place).kernel;
-                        solution.remove(side, position, [&kernel[0], &kernel[1]]);
+                        let row = || [0, 1].map(|class| samples.row(place)[class].as_slice());
+                        solution.remove(side, position, row);
                         samples.remove(place);
                     } else {
                         // Some are in one place, with different classes.
                         let x = if next % 5 == 4 { vec![0.5; 5] } else { vector(side, &mut rng) };
-                        let place = samples.insert(Key::Inserted(next), side, &x);
-                        let kernel = &samples.at(place).kernel;
-                        solution.insert(side, [&kernel[0], &kernel[1]]);
+                        let place = samples.insert(Key::Inserted(next), side, x.into());
+                        let row = || [0, 1].map(|class| samples.row(place)[class].as_slice());
+                        solution.insert(side, row);
                         next += 1;
                     }
                 }
@@ -385,8 +385,8 @@ mod tests {
                     continue;
                 }
                 let rows = |side: usize, position: usize| -> [&[f32]; 2] {
-                    let kernel = &samples.of(side)[position].kernel;
-                    [&kernel[0], &kernel[1]]
+                    let place = super::super::samples::Place { class: side, position };
+                    [0, 1].map(|class| samples.row(place)[class].as_slice())
                 };
                 solution.solve(cost, &rows, |_, _| false);
                 let violation = violation(&solution, &samples, f64::from(gamma), cost);

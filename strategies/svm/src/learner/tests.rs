@@ -54,7 +54,7 @@ fn its_machines_decide_as_those_of_the_offline_trainer() {
     let mut rng = generator(2);
     let learner = taught(160, &mut rng);
     let members: Vec<Vec<&[f32]>> = (0..CLASSES)
-        .map(|class| learner.samples.of(class).iter().map(|sample| sample.vector.as_slice()).collect())
+        .map(|class| learner.samples.of(class).iter().map(|sample| &*sample.vector).collect())
         .collect();
     let offline = Machine::fit(&members, WIDTH, 10.0, f64::from(learner.gamma)).unwrap();
     let online = learner.machine(&learner.present());

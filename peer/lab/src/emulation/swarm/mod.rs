@@ -98,9 +98,10 @@ impl<'a> Swarm<'a> {
             .collect();
         let size = u32::try_from(robots.len()).unwrap_or(u32::MAX);
         let record = Record::new(robots.iter().map(|robot| robot.lies.is_none()).collect());
+        let begun = |school: Arc<School>| Arc::new(school.begun());
         let mut swarm = Self {
             scenario,
-            school,
+            school: school.map(begun),
             shelf: Arc::default(),
             rules,
             seed,
