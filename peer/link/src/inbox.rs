@@ -294,6 +294,11 @@ impl Inbox {
         untold.into_iter().map(|(_, evidence)| evidence).collect()
     }
 
+    /// Evidence that is to be kept on disk, each once.
+    pub(super) fn unkept(&self) -> Vec<(RobotId, Evidence)> {
+        self.judged(|judge, _| judge.unkept()).unwrap_or_default()
+    }
+
     fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
         let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
         if envelope.author != id {

@@ -113,7 +113,22 @@ impl Inbox {
         let others: BTreeSet<RobotId> = fallen.into_iter().map(|(robot, _)| robot).collect();
         if !others.is_empty() {
             self.expel(others);
+            if let Some(sealed) = &self.sealed {
+                sealed.roll.meet();
+            }
         }
+    }
+
+    /// Hands in again what evidence was kept, so that nobody is believed again who lied before this robot started.
+    pub(super) fn recall(&self) {
+        let Some(sealed) = &self.sealed else { return };
+        for evidence in sealed.roll.kept_evidence() {
+            // It proves nothing against whoever has another key since.
+            let _ = self.judged(|judge, now| judge.evidence(now, evidence));
+        }
+        // It is kept already.
+        self.unkept();
+        self.expel_fallen();
     }
 
     /// Nothing counts that these said, in the midst of a round; nor are they there, unless they are members under another key.

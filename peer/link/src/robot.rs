@@ -151,6 +151,7 @@ impl Robot {
             link.loss,
             sealed,
         ));
+        inbox.recall();
         let mut first_classifier = None;
         let apprentice = match prepared {
             Some(prepared) => {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{InstructorId, RobotId};
-use gestalt_trust::{Judge, PublicKey, Roles, Roster, RosterError};
+use gestalt_trust::{Evidence, Judge, PublicKey, Roles, Roster, RosterError};
 use tokio::sync::Notify;
 
 use crate::account::Account;
@@ -15,6 +15,9 @@ use crate::tls::Door;
 /// How many rosters are looked into in one such span; looking into one may cost milliseconds.
 const MAX_LOOKED_INTO: u32 = 16;
 const SPAN: Duration = Duration::from_secs(2);
+
+/// The folder beside a roster's file with the evidence against robots on it.
+const CONVICTED: &str = "convicted";
 
 /// The newest roster that a robot knows.
 pub(crate) struct Roll {
@@ -119,7 +122,7 @@ impl Roll {
         (members.local, members.instructors.contains_key(by))
     }
 
-    /// A link to a robot has come.
+    /// A link to a robot has come, or evidence that is to be kept.
     pub fn meet(&self) {
         self.news.notify_one();
     }
@@ -139,12 +142,40 @@ impl Roll {
     pub async fn keep(&self) {
         let Some(file) = self.file.clone() else { return };
         let roster = self.held().roster.clone();
-        let written = tokio::task::spawn_blocking(move || roster.write(&file)).await;
-        let failed = match written {
+        self.write("the new roster is gone by", move || roster.write(&file)).await;
+    }
+
+    /// Writes evidence to the folder beside the roster: a robot that starts again must not believe again who was convicted.
+    pub async fn keep_evidence(&self, evidence: Vec<(RobotId, Evidence)>) {
+        let Some(folder) = self.convicted() else { return };
+        let write = move || evidence.iter().try_for_each(|(robot, evidence)| evidence.keep(&folder, *robot));
+        self.write("who was convicted counts no more", write).await;
+    }
+
+    /// The evidence that was kept before.
+    pub fn kept_evidence(&self) -> Vec<Evidence> {
+        let Some(folder) = self.convicted() else { return Vec::new() };
+        Evidence::kept_in(&folder).unwrap_or_else(|error| {
+            let folder = folder.display();
+            self.account.error(&format!("who was convicted before is not known: {folder}: {error}"));
+            Vec::new()
+        })
+    }
+
+    fn convicted(&self) -> Option<PathBuf> {
+        Some(self.file.as_ref()?.with_file_name(CONVICTED))
+    }
+
+    async fn write<E: ToString + Send + 'static>(
+        &self,
+        done: &str,
+        write: impl FnOnce() -> Result<(), E> + Send + 'static,
+    ) {
+        let failed = match tokio::task::spawn_blocking(write).await {
             Ok(Ok(())) => return,
             Ok(Err(error)) => error.to_string(),
             Err(error) => error.to_string(),
         };
-        self.account.error(&format!("the new roster is gone by, but not kept: {failed}"));
+        self.account.error(&format!("{done}, but that is not kept: {failed}"));
     }
 }

@@ -1,4 +1,4 @@
-//! What a robot does about a new roster: hangs up who is on it no more, keeps it on disk, and tells every neighbour.
+//! What a robot does about a new roster: hangs up who is on it no more, keeps it on disk, and tells every neighbour. What convicts somebody on it is kept beside it.
 //!
 //! A roster travels two ways, like everything: whoever changed it says it to all, and each robot passes what it took up on to its neighbours, by
 //! links that stand and by those that come later. So it also reaches who was cut off or away.
@@ -39,6 +39,10 @@ pub(crate) async fn keep_roll(
             node.look_through().await;
             roll.keep().await;
             kept = epoch;
+        }
+        let evidence = inbox.unkept();
+        if !evidence.is_empty() {
+            roll.keep_evidence(evidence).await;
         }
         let links = inbox.links();
         told.retain(|id, _| links.contains_key(id));

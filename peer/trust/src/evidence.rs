@@ -238,7 +238,7 @@ fn decision_in(statement: &[u8]) -> Result<Decision, EvidenceError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{authority, decision, members, robot, roster, vote};
+    use crate::testing::{authority, decision, have, members, robot, roster, vote};
 
     fn signed(statement: Vec<u8>, by: u32) -> Signed {
         let signature = statement::sign(&robot(by), &roster(1).swarm_id(), &statement);
@@ -368,7 +368,43 @@ mod tests {
         statement.push(0);
         assert!(Evidence::decode(&one(&statement).encode()).is_err());
         assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&one(&statement)).unwrap()).is_err());
-        let long = vec![VERSION; Evidence::MAX_LENGTH + 1];
+        let mut long = vec![VERSION; Evidence::MAX_LENGTH + 1];
         assert!(matches!(Evidence::decode(&long), Err(DecodeError::TooLong { .. })));
+        long.pop();
+        assert!(matches!(Evidence::decode(&long), Err(DecodeError::Malformed(_))));
+    }
+
+    #[test]
+    fn a_decision_that_does_not_fit_in_a_message_is_not_looked_into() {
+        let of_length = |length| {
+            let mut statement = vote(2, 5, 1.0);
+            statement.resize(length, 0);
+            Evidence::of_decision(statement, Signature::from_bytes([7; Signature::LENGTH])).heading()
+        };
+        let heading = Heading { author: RobotId(2), stamp: Stamp { boot: 1, sequence: 5 } };
+        assert_eq!(of_length(MAX_SIGNED), Ok(heading));
+        for length in [MAX_SIGNED + 1, MAX_SIGNED + 2] {
+            let too_long = DecodeError::TooLong { length, limit: MAX_SIGNED };
+            assert_eq!(of_length(length), Err(EvidenceError::Malformed(too_long)));
+        }
+    }
+
+    #[test]
+    fn two_statements_are_the_same_evidence_in_whichever_order_they_were_met() {
+        let (one, other) = (signed(vote(2, 5, 1.0), 2), signed(have(2, 5), 2));
+        assert_eq!(
+            Evidence::of_two(one.clone(), other.clone()),
+            Evidence::of_two(other.clone(), one.clone())
+        );
+        let Proof::TwoThings { first, second } = Evidence::of_two(one.clone(), other.clone()).0 else {
+            unreachable!()
+        };
+        assert!(first < second, "by their bytes");
+        let length = one.statement.len() + other.statement.len();
+        assert_eq!(Evidence::of_two(one, other.clone()).length(), length);
+        assert_eq!(
+            Evidence::of_decision(other.statement.clone(), other.signature).length(),
+            other.statement.len()
+        );
     }
 }

@@ -261,6 +261,11 @@ impl<S: Scheme> Judge<S> {
         self.docket.fallen()
     }
 
+    /// The evidence that came in since this was last asked: whoever starts again hands it in again, or forgets who lied.
+    pub fn unkept(&mut self) -> Vec<(RobotId, Evidence)> {
+        self.docket.unkept()
+    }
+
     /// The evidence that is to be told to all now: once what was found here, and once more for those who came since, every five seconds at most.
     pub fn untold(&mut self, now: Duration) -> Vec<(RobotId, Evidence)> {
         self.docket.untold(now)

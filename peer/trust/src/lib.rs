@@ -64,6 +64,7 @@ mod distrust;
 mod docket;
 mod document;
 mod evidence;
+mod evidence_file;
 #[cfg(any(test, feature = "fake"))]
 mod fake;
 mod identity;

@@ -1,0 +1,128 @@
+//! Evidence on disk, so that whoever starts again knows who lied: one file for each robot that was convicted.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use gestalt_protocol::RobotId;
+
+use crate::docket::KEPT_BYTES;
+use crate::evidence::Evidence;
+
+const EXTENSION: &str = "evidence";
+
+impl Evidence {
+    /// Keeps evidence against that robot in a folder, which is made if there is none, in place of other evidence against it: whoever reads meanwhile, or
+    /// after a power cut, finds the whole old one or the whole new one.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn keep(&self, folder: &Path, against: RobotId) -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        let path = folder.join(format!("robot-{against}.{EXTENSION}"));
+        // Several robots of one computer may share the folder, and write the same at once.
+        let beside = folder.join(format!("robot-{against}.{}", std::process::id()));
+        let mut file = File::create(&beside)?;
+        file.write_all(&self.encode())?;
+        file.sync_all()?;
+        fs::rename(&beside, &path)
+    }
+
+    /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What cannot be read as evidence is passed over, and what it
+    /// proves today is found by [`Evidence::check`]: nothing against whoever has a new key.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn kept_in(folder: &Path) -> io::Result<Vec<Self>> {
+        let entries = match fs::read_dir(folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            entries => entries?,
+        };
+        let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+        paths.retain(|path| path.extension().is_some_and(|extension| extension == EXTENSION));
+        paths.sort();
+        let (mut kept, mut bytes) = (Vec::new(), 0);
+        for path in paths {
+            let mut read = Vec::new();
+            File::open(path)?.take(Self::MAX_LENGTH as u64 + 1).read_to_end(&mut read)?;
+            bytes += read.len();
+            if bytes > KEPT_BYTES {
+                break;
+            }
+            kept.extend(Self::decode(&read));
+        }
+        Ok(kept)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::judge::Judge;
+    use crate::statement;
+    use crate::testing::{authority, members, robot, roster, vote};
+    use crate::witness::Witness;
+
+    fn evidence(against: u32) -> Evidence {
+        let mut witness = Witness::new(&roster(5));
+        let both = [vote(against, 1, 1.0), vote(against, 1, -1.0)];
+        let sign = |said: &Vec<u8>| statement::sign(&robot(against), &roster(5).swarm_id(), said);
+        let found = both.each_ref().map(|said| witness.observe(said, &sign(said)));
+        found.into_iter().flatten().next().expect("two things")
+    }
+
+    #[test]
+    fn who_starts_again_knows_who_lied() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("convicted");
+        assert_eq!(Evidence::kept_in(&place).unwrap(), [], "nobody was yet");
+        let mut before = Judge::new(roster(5), |_| false);
+        for robot in [1, 2] {
+            before.evidence(Duration::ZERO, evidence(robot)).unwrap();
+            before.evidence(Duration::ZERO, evidence(robot)).unwrap();
+        }
+        let unkept = before.unkept();
+        assert_eq!(unkept.iter().map(|(robot, _)| robot.0).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(before.unkept(), [], "once each");
+        for (robot, evidence) in unkept {
+            evidence.keep(&place, robot).unwrap();
+            evidence.keep(&place, robot).unwrap();
+        }
+        assert_eq!(fs::read_dir(&place).unwrap().count(), 2, "nothing is left beside them");
+
+        let again = |roster| {
+            let mut judge = Judge::new(roster, |_| false);
+            for evidence in Evidence::kept_in(&place).unwrap() {
+                // It proves nothing against a new key.
+                let _ = judge.evidence(Duration::ZERO, evidence);
+            }
+            judge
+        };
+        let after = again(roster(5));
+        assert!(after.convicts(RobotId(1)) && after.convicts(RobotId(2)) && !after.convicts(RobotId(3)));
+        let mut renewed = members(6);
+        renewed.robots.insert(RobotId(1), robot(11).public_key());
+        let after = again(renewed.sign(&authority()).unwrap());
+        assert!(!after.convicts(RobotId(1)) && after.convicts(RobotId(2)));
+    }
+
+    #[test]
+    fn what_is_no_evidence_is_passed_over_and_so_is_too_much() {
+        let folder = tempfile::tempdir().unwrap();
+        evidence(1).keep(folder.path(), RobotId(1)).unwrap();
+        let whole = fs::read(folder.path().join("robot-1.evidence")).unwrap();
+        fs::write(folder.path().join("robot-0.evidence"), &whole[..whole.len() / 2]).unwrap();
+        fs::write(folder.path().join("robot-2.evidence"), vec![2; Evidence::MAX_LENGTH + 9]).unwrap();
+        // Left by a power cut.
+        fs::write(folder.path().join("robot-3.77"), &whole).unwrap();
+        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [evidence(1)]);
+        for robot in 3..50 {
+            let name = format!("robot-0{robot}.evidence");
+            fs::write(folder.path().join(name), vec![2; Evidence::MAX_LENGTH]).unwrap();
+        }
+        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [], "it comes behind 16 MiB of something else");
+        assert!(Evidence::kept_in(&folder.path().join("robot-1.evidence")).is_err(), "no folder");
+    }
+}
