@@ -4,23 +4,22 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use gestalt_protocol::{Message, RobotId};
+use gestalt_protocol::RobotId;
 use gestalt_strategies::mind::Mind;
-use gestalt_strategies::{Classify, Fuse, Input, Output};
-use tokio::sync::{broadcast, mpsc};
+use gestalt_strategies::{Classify, Fuse, Input};
+use tokio::sync::mpsc;
 
-use crate::account::Account;
 use crate::apprentice::Apprentice;
 use crate::event::Event;
 use crate::guard::Sight;
 use crate::guests::Guests;
+use crate::hands::Hands;
 use crate::identity::{self, fresh_nonce};
 use crate::inbox::Inbox;
 use crate::memory::Found;
 use crate::mind::new_mind;
 use crate::seal::Seal;
 use crate::supervisor::Supervisor;
-use crate::voice::Voice;
 use crate::wake::sleep_until;
 
 /// The mind, and everything around it that its task needs.
@@ -29,18 +28,15 @@ pub(crate) struct Host {
     pub mind: Mind,
     pub started: Instant,
     pub inbox: Arc<Inbox>,
-    pub account: Arc<Account>,
     pub supervisor: Arc<Supervisor>,
     pub commands: mpsc::Receiver<Input>,
     pub guests: Arc<Guests>,
-    pub events: broadcast::Sender<Event>,
     /// Your own fusion rule.
     pub fusion: Option<Arc<dyn Fuse>>,
     pub seal: Option<Arc<Seal>>,
-    pub apprentice: Option<Apprentice>,
     /// For the program around the robot to look at.
     pub classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
-    pub voice: Voice,
+    pub hands: Hands,
     pub sight: Sight,
 }
 
@@ -53,20 +49,20 @@ impl Host {
         self.believe();
         loop {
             let wake = self.mind.next_wake().map(|wake| self.started + wake);
-            let wake = wake.into_iter().chain(self.voice.due()).min();
+            let wake = wake.into_iter().chain(self.hands.voice.due()).min();
             tokio::select! {
                 () = inbox.ready() => {
                     for input in inbox.take() {
                         self.step(input);
                     }
-                    self.voice.accuse();
-                    self.voice.pass_on();
+                    self.hands.voice.accuse();
+                    self.hands.voice.pass_on();
                 }
                 command = self.commands.recv() => match command {
                     Some(input) => self.step(input),
                     None => break,
                 },
-                found = found(&mut self.apprentice) => self.take_up(found),
+                found = found(&mut self.hands.apprentice) => self.take_up(found),
                 () = guests.changed() => self.step(Input::Guests(guests.present())),
                 () = sleep_until(wake) => self.step(Input::Tick),
                 _ = &mut ended => break,
@@ -83,11 +79,11 @@ impl Host {
         if let Some(blind) = self.sight.news() {
             self.handle(Input::Blind(blind));
         }
-        self.voice.publish_hold(&mut self.mind);
+        self.hands.voice.publish_hold(&mut self.mind);
         self.report_learning();
         for (refusal, count) in self.mind.refusals().iter() {
             if count > 0 {
-                self.account.set(refusal.name(), count);
+                self.hands.account.set(refusal.name(), count);
             }
         }
     }
@@ -100,9 +96,9 @@ impl Host {
     }
 
     fn handle(&mut self, input: Input) {
-        for output in self.mind.handle(self.started.elapsed(), input) {
-            self.carry_out(output);
-        }
+        // Each output at once: the program is told of a decision before the robot signs that it holds it.
+        let hands = &mut self.hands;
+        self.mind.handle_into(self.started.elapsed(), input, &mut |output| hands.carry_out(output));
     }
 
     /// Tells the program of what arrives, and says what of it is for the mind.
@@ -116,11 +112,11 @@ impl Host {
                 self.tell_alive(&tokens | guests);
             }
             Input::Neighbours(neighbours) => {
-                self.account.lock().neighbours = neighbours.iter().copied().collect();
-                self.tell(Event::Neighbours(neighbours.clone()));
+                self.hands.account.lock().neighbours = neighbours.iter().copied().collect();
+                self.hands.tell(Event::Neighbours(neighbours.clone()));
             }
-            Input::Announced(announcement) => self.tell(Event::Announced(announcement.clone())),
-            Input::Asked(question) => self.tell(Event::Asked(question.clone())),
+            Input::Announced(announcement) => self.hands.tell(Event::Announced(announcement.clone())),
+            Input::Asked(question) => self.hands.tell(Event::Asked(question.clone())),
             Input::Learned(classifier) => {
                 let guarded = self.sight.guard(classifier.clone())?;
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier.clone());
@@ -131,7 +127,7 @@ impl Host {
                 self.sight.told(*blind);
                 return Some(Input::Tick);
             }
-            Input::Remembered(revision) => self.tell(Event::Remembered(*revision)),
+            Input::Remembered(revision) => self.hands.tell(Event::Remembered(*revision)),
             _ => {}
         }
         Some(input)
@@ -140,7 +136,7 @@ impl Host {
     /// Begins anew with what this robot knew before, on a disk that came late. What it learned since its start was
     /// acknowledged to nobody; of that, what others know comes back from them.
     fn take_up(&mut self, found: Found) {
-        let Some(apprentice) = &self.apprentice else { return };
+        let Some(apprentice) = &self.hands.apprentice else { return };
         let Found { memory, classifier, boot } = found;
         let learning = apprentice.learning().clone();
         // Its rounds are counted anew from what is remembered: another life, by name too.
@@ -163,21 +159,21 @@ impl Host {
                 let why =
                     format!("the memory that came late is not taken up, and nothing is remembered: {error}");
                 apprentice.refuse(&why);
-                return self.account.error(&why);
+                return self.hands.account.error(&why);
             }
         };
         apprentice.take_up();
         self.mind = mind;
         self.believe();
         self.sight.begin_anew();
-        self.account.count("memory_taken_up");
+        self.hands.account.count("memory_taken_up");
         let open = {
-            let mut status = self.account.lock();
+            let mut status = self.hands.account.lock();
             status.boot = boot;
             std::mem::take(&mut status.open).then_some(status.round).flatten()
         };
         if let Some(round) = open {
-            self.tell(Event::Closed(round));
+            self.hands.tell(Event::Closed(round));
         }
         let known = self.classifier.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let classifier =
@@ -192,77 +188,18 @@ impl Host {
 
     fn tell_alive(&self, mut alive: BTreeSet<RobotId>) {
         alive.remove(&self.me);
-        self.account.lock().alive = alive.iter().copied().chain([self.me]).collect();
-        self.tell(Event::Alive(alive));
+        self.hands.account.lock().alive = alive.iter().copied().chain([self.me]).collect();
+        self.hands.tell(Event::Alive(alive));
     }
 
     /// Puts what was learned into the status, when it has changed.
     fn report_learning(&mut self) {
-        if let Some(apprentice) = &mut self.apprentice
+        if let Some(apprentice) = &mut self.hands.apprentice
             && apprentice.has_news(&self.mind)
         {
             let learning = apprentice.status(&self.mind);
-            self.account.lock().learning = learning;
+            self.hands.account.lock().learning = learning;
         }
-    }
-
-    fn carry_out(&mut self, output: Output) {
-        match output {
-            Output::Broadcast(envelope) => {
-                self.voice.broadcast(&envelope);
-                if let Message::Samples(samples) = envelope.message {
-                    self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
-                }
-            }
-            Output::Tell(neighbour, envelope) => self.voice.tell(neighbour, &envelope),
-            Output::Hold(decision) => {
-                let mut status = self.account.lock();
-                status.round = status.round.max(Some(decision.round));
-                drop(status);
-                self.voice.hold(decision.round);
-                self.tell(Event::Held(decision));
-            }
-            Output::Announce(announcement) => {
-                self.voice.announce(&announcement);
-                self.tell(Event::Announced(announcement));
-            }
-            Output::Ask(question) => {
-                self.voice.ask(&question);
-                self.tell(Event::Asked(question));
-            }
-            Output::Opened(round) => {
-                let mut status = self.account.lock();
-                (status.round, status.open) = (Some(round), true);
-                drop(status);
-                self.tell(Event::Opened(round));
-            }
-            Output::Closed(round) => {
-                // Under the name it ended with: it may have merged with one of a smaller name meanwhile.
-                let mut status = self.account.lock();
-                (status.round, status.open) = (Some(round), false);
-                drop(status);
-                self.tell(Event::Closed(round));
-            }
-            Output::Answer(instructor, answer) => {
-                self.voice.answer(&instructor, &answer);
-                self.tell(Event::Answered(instructor, answer));
-            }
-            Output::Train(changes) => {
-                if let Some(apprentice) = &self.apprentice {
-                    apprentice.train(changes);
-                }
-            }
-            Output::Remember { revision, changes } => {
-                if let Some(apprentice) = &self.apprentice {
-                    apprentice.remember(revision, changes);
-                }
-            }
-        }
-    }
-
-    fn tell(&self, event: Event) {
-        // An error says that nobody listens, which is fine.
-        let _ = self.events.send(event);
     }
 }
 

@@ -60,6 +60,12 @@ impl Inbox {
         Some(words.answer(to, answer))
     }
 
+    /// This robot's signature under what it says to whoever asks, in a sealed swarm.
+    pub(super) fn sign_statement(&self, statement: &[u8]) -> Option<Signature> {
+        let words = self.sealed.as_ref()?.words.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(words.statement(statement))
+    }
+
     pub(super) fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {
         let json = payload(sample, MAX_JSON)?;
         let answer: Answer = decode_json(&json)?;

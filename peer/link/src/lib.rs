@@ -24,6 +24,7 @@ mod frames;
 mod guard;
 mod guest;
 mod guests;
+mod hands;
 mod hearing;
 mod host;
 mod identity;

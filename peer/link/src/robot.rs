@@ -23,6 +23,7 @@ use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
 use crate::guard::Sight;
 use crate::guests::Guests;
+use crate::hands::Hands;
 use crate::host::Host;
 use crate::identity::{self, swarm_checksum};
 use crate::inbox::{Inbox, Sealed};
@@ -214,14 +215,11 @@ impl Robot {
             mind,
             started,
             inbox,
-            account: account.clone(),
             supervisor: supervisor.clone(),
             commands: command_queue,
             guests: guests.clone(),
-            events: events.clone(),
-            apprentice,
             classifier: classifier.clone(),
-            voice,
+            hands: Hands { account: account.clone(), events: events.clone(), apprentice, voice },
             sight: Sight::new(supervisor.clone()),
         };
         let robot = Self {

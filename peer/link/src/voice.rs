@@ -64,10 +64,10 @@ impl Voice {
             .express(true)
             .await?;
         let last = Arc::new(Last::default());
-        let of_query = last.clone();
+        let (of_query, of_inbox) = (last.clone(), inbox.clone());
         session
             .declare_queryable(keys.key(&Topic::Decision))
-            .callback(move |query| of_query.on_query(&query))
+            .callback(move |query| of_query.on_query(&query, &of_inbox))
             .background()
             .await?;
         let (session, keys) = (session.clone(), keys.clone());
@@ -216,7 +216,7 @@ fn as_json(said: &impl Serialize) -> String {
         .expect("what is said, with string keys and finite numbers, has a place in JSON")
 }
 
-/// The decision this robot holds, for the queryable on `decision`: written when it is asked for.
+/// The decision this robot holds, for the queryable on `decision`: signed and written when it is asked for.
 #[derive(Default)]
 struct Last(Mutex<Option<(Announcement, Timestamp)>>);
 
@@ -225,9 +225,13 @@ impl Last {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((announcement, at));
     }
 
-    fn on_query(&self, query: &Query) {
+    fn on_query(&self, query: &Query, inbox: &Inbox) {
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        if let Some((announcement, at)) = last {
+        if let Some((mut announcement, at)) = last {
+            if inbox.is_sealed() {
+                let statement = Envelope::from(announcement.clone()).statement();
+                announcement.signature = inbox.sign_statement(&statement);
+            }
             let (key, json) = (query.key_expr().clone(), as_json(&announcement));
             // A client that has gone meanwhile is no error of this robot's.
             let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(Some(at)).wait();

@@ -1,10 +1,10 @@
-//! What a robot of a sealed swarm signs for those who speak on its own computer, and what it answers to instructors.
+//! What a robot of a sealed swarm signs for those who speak on its own computer, and what it answers to instructors and whoever asks.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{InstructorId, Keys, RobotId, Signature, Topic};
-use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, word};
+use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, statement, word};
 
 /// Signs words in the name of a robot.
 pub(crate) struct Words {
@@ -42,6 +42,11 @@ impl Words {
     /// Signs this robot's answer.
     pub fn answer(&self, to: &InstructorId, answer: &[u8]) -> Signature {
         answer::sign(&self.identity, &self.swarm, self.me, to, answer)
+    }
+
+    /// Signs what this robot says to whoever asks.
+    pub fn statement(&self, statement: &[u8]) -> Signature {
+        statement::sign(&self.identity, &self.swarm, statement)
     }
 }
 

@@ -2,8 +2,10 @@
 
 use std::fmt::Debug;
 
-use ed25519_dalek::{Signer, SigningKey, VerifyingKey};
+use ed25519_dalek::hazmat::{ExpandedSecretKey, raw_sign};
+use ed25519_dalek::{SigningKey, VerifyingKey};
 use gestalt_protocol::Signature;
+use sha2::Sha512;
 use zeroize::Zeroizing;
 
 use crate::public_key::PublicKey;
@@ -43,20 +45,30 @@ pub trait Scheme: sealed::Sealed + Clone + Debug + PartialEq + Eq + 'static {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ed25519 {}
 
+/// A secret key, as it is ready to sign with: a signature that expands the key first takes half as long again.
+///
+/// Its parts are made together, and only here: signatures by one secret that name two public keys give the secret away.
+pub struct Ed25519Secret {
+    bytes: Zeroizing<[u8; 32]>,
+    expanded: ExpandedSecretKey,
+    public: VerifyingKey,
+}
+
 impl Scheme for Ed25519 {
-    type Secret = SigningKey;
+    type Secret = Ed25519Secret;
     type Key = VerifyingKey;
 
-    fn secret(bytes: &[u8; 32]) -> SigningKey {
-        SigningKey::from_bytes(bytes)
+    fn secret(bytes: &[u8; 32]) -> Ed25519Secret {
+        let public = SigningKey::from_bytes(bytes).verifying_key();
+        Ed25519Secret { bytes: Zeroizing::new(*bytes), expanded: bytes.into(), public }
     }
 
-    fn secret_bytes(secret: &SigningKey) -> Zeroizing<[u8; 32]> {
-        Zeroizing::new(secret.to_bytes())
+    fn secret_bytes(secret: &Ed25519Secret) -> Zeroizing<[u8; 32]> {
+        secret.bytes.clone()
     }
 
-    fn public(secret: &SigningKey) -> PublicKey {
-        PublicKey::from_bytes(secret.verifying_key().to_bytes())
+    fn public(secret: &Ed25519Secret) -> PublicKey {
+        PublicKey::from_bytes(secret.public.to_bytes())
     }
 
     fn key(public: &PublicKey) -> Option<VerifyingKey> {
@@ -66,8 +78,8 @@ impl Scheme for Ed25519 {
         (shortest && !key.is_weak()).then_some(key)
     }
 
-    fn sign(secret: &SigningKey, message: &[u8]) -> Signature {
-        Signature::from_bytes(secret.sign(message).to_bytes())
+    fn sign(secret: &Ed25519Secret, message: &[u8]) -> Signature {
+        Signature::from_bytes(raw_sign::<Sha512>(&secret.expanded, message, &secret.public).to_bytes())
     }
 
     fn verify(key: &VerifyingKey, message: &[u8], signature: &Signature) -> bool {
@@ -97,6 +109,17 @@ mod tests {
         let signature = "92a009a9f0d4cab8720e820b5f642540a2b27b5416503f8fb3762223ebdb69da\
                          085ac1e43e15996e458f3613d0f11d8c387b2eaeb4302aeeb00d291612bb0c00";
         assert_eq!(Ed25519::sign(&secret, &[0x72]).to_string(), signature);
+    }
+
+    #[test]
+    fn an_expanded_key_signs_as_the_key_itself() {
+        for number in 0..64 {
+            let (bytes, message) = ([number; 32], vec![number; 3 * usize::from(number)]);
+            let signature = ed25519_dalek::Signer::sign(&SigningKey::from_bytes(&bytes), &message);
+            let secret = Ed25519::secret(&bytes);
+            assert_eq!(Ed25519::sign(&secret, &message).as_bytes(), &signature.to_bytes());
+            assert_eq!(*Ed25519::secret_bytes(&secret), bytes);
+        }
     }
 
     /// R is the neutral point and S = H(R ‖ A ‖ M)·a: OpenSSL accepts it, made by the author itself, and so would the lax rule.

@@ -134,6 +134,14 @@ impl Mind {
 
     /// Takes in one input at the time `now` and says what is to be done.
     pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
+        let mut out = Vec::new();
+        self.handle_into(now, input, &mut |output| out.push(output));
+        out
+    }
+
+    /// The same for a host that does not wait for the rest: `carry_out` is given each output as soon as it is known, so that a decision is held before
+    /// this robot signs that it holds it.
+    pub fn handle_into(&mut self, now: Duration, input: Input, carry_out: &mut dyn FnMut(Output)) {
         let now = now.max(self.rounds.now());
         let mut out = Vec::new();
         let about_rounds = match input.concern() {
@@ -145,22 +153,23 @@ impl Mind {
             Concern::Believe(believer) => self.on_believe(believer),
             Concern::Remembered(revision) => self.on_remembered(revision),
         };
+        out.drain(..).for_each(&mut *carry_out);
         let round = self.rounds.round();
-        let done = match &mut self.learning {
+        let follower: &mut dyn Follow = match &mut self.learning {
             Some(learning) => {
                 learning.refresh_digest();
-                self.rounds.handle_with(now, about_rounds, learning)
+                learning
             }
-            None => self.rounds.handle(now, about_rounds),
+            None => &mut (),
         };
+        self.rounds.handle_into(now, about_rounds, follower, &mut |output| carry_out(output.into()));
         if self.rounds.round() != round {
             self.exchanges.forget_declined_lessons();
         }
-        out.extend(done.into_iter().map(Output::from));
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);
         self.carry_on_asking(now, &mut out);
-        out
+        out.into_iter().for_each(carry_out);
     }
 
     /// When the mind wants its next [`Input::Tick`], if nothing else comes before.

@@ -2,6 +2,7 @@
 
 mod failing;
 mod memory;
+mod sealed;
 mod slow;
 
 use std::path::PathBuf;

@@ -121,14 +121,14 @@ impl Rounds {
             && let Some(round) = &self.round
         {
             // Under the name it ended with: it may have merged with one of a smaller name meanwhile.
-            effects.out.push(Output::Closed(round.id));
+            (effects.carry_out)(Output::Closed(round.id));
         }
     }
 
     /// Takes part in a round from now on; an older one that is still open is over.
     pub(super) fn join(&mut self, id: RoundId, effects: &mut Effects<'_>) {
         self.enter(id, true, effects);
-        effects.out.push(Output::Opened(id));
+        (effects.carry_out)(Output::Opened(id));
         self.partners.hurry(self.now, self.config.repair_busy);
         self.speak(effects);
     }

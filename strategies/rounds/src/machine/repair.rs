@@ -195,6 +195,6 @@ impl Rounds {
 
     fn tell(&mut self, robot: RobotId, message: Message, effects: &mut Effects<'_>) {
         let envelope = self.stamped(message);
-        effects.out.push(Output::Tell(robot, envelope));
+        (effects.carry_out)(Output::Tell(robot, envelope));
     }
 }

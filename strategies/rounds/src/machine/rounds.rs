@@ -149,7 +149,8 @@ pub struct Rounds {
 /// What comes of one input: for the host, and for whoever follows the rounds.
 pub(super) struct Effects<'a> {
     pub follower: &'a mut dyn Follow,
-    pub out: Vec<Output>,
+    /// Is given what is to be done as soon as that is known.
+    pub carry_out: &'a mut dyn FnMut(Output),
 }
 
 impl Rounds {
@@ -239,9 +240,23 @@ impl Rounds {
 
     /// The same for a robot whose learning follows the rounds: the same one at every call.
     pub fn handle_with(&mut self, now: Duration, input: Input, follower: &mut dyn Follow) -> Vec<Output> {
+        let mut out = Vec::new();
+        self.handle_into(now, input, follower, &mut |output| out.push(output));
+        out
+    }
+
+    /// The same for a host that does not wait for the rest: `carry_out` is given each output as soon as it is known, so that a decision is held before
+    /// this robot signs that it holds it.
+    pub fn handle_into(
+        &mut self,
+        now: Duration,
+        input: Input,
+        follower: &mut dyn Follow,
+        carry_out: &mut dyn FnMut(Output),
+    ) {
         self.now = now.max(self.now);
         self.began.1.get_or_insert(self.now);
-        let mut effects = Effects { follower, out: Vec::new() };
+        let mut effects = Effects { follower, carry_out };
         match input {
             Input::Tick => {}
             Input::Open => self.on_open(&mut effects),
@@ -260,7 +275,6 @@ impl Rounds {
             Input::Learned(classifier) => self.on_learned(classifier),
         }
         self.advance(&mut effects);
-        effects.out
     }
 
     /// When the machine wants its next [`Input::Tick`], if nothing else comes before.
@@ -336,14 +350,19 @@ impl Rounds {
     /// others are to believe are signed; the rest are hints, and what they lead to is.
     #[must_use]
     pub fn stamped(&mut self, message: Message) -> Envelope {
-        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
         let is_hint = match &message {
             // Who gives a decision stands by it.
             Message::Give(give) => give.decision.is_none(),
             message => matches!(message, Message::Have(_) | Message::Know(_) | Message::Batches(_)),
         };
-        let envelope = Envelope { author: self.me, stamp: self.stamp, message, signature: None };
+        let envelope = self.unsigned(message);
         let signer = self.signer.as_deref().filter(|_| !is_hint);
         Envelope { signature: signer.map(|signer| signer.sign(&envelope.statement())), ..envelope }
+    }
+
+    /// A message as this robot's next, which is yet to be signed.
+    pub(super) fn unsigned(&mut self, message: Message) -> Envelope {
+        self.stamp.sequence = self.stamp.sequence.saturating_add(1);
+        Envelope { author: self.me, stamp: self.stamp, message, signature: None }
     }
 }

@@ -39,7 +39,9 @@ impl Rounds {
         let mut speaker =
             Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
         let said = round.speak(self.now, &mut speaker, &self.config);
-        effects.out.extend(said.map(Output::Broadcast));
+        if let Some(said) = said {
+            (effects.carry_out)(Output::Broadcast(said));
+        }
     }
 
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
@@ -50,7 +52,8 @@ impl Rounds {
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         if let Some(decision) = round.agreement.settle(self.now, or_none) {
             effects.follower.settled(decision, self.config.clip);
-            effects.out.push(Output::Hold(decision.clone()));
+            (effects.carry_out)(Output::Hold(decision.clone()));
+            // Signed when it is held already, for that takes as long as all that is done with a vote.
             self.say_holding(effects);
         }
     }
@@ -91,7 +94,7 @@ impl Rounds {
         if let Some(round) = &mut self.round {
             round.agreement.note_holder(Holder { robot, stamp, holding, signature });
         }
-        effects.out.push(Output::Broadcast(envelope));
+        (effects.carry_out)(Output::Broadcast(envelope));
     }
 
     /// How long this robot leaves to those before it whatever one robot is to say for all: the live robot of the smallest
@@ -117,17 +120,22 @@ impl Rounds {
         let Some(agreement) = self.round.as_mut().map(|round| &mut round.agreement) else { return };
         if let Some(decision) = agreement.held().cloned() {
             agreement.note_announced(self.now, decision.class, is_final);
-            let announcement = self.aloud(Decision { is_final, ..decision });
-            effects.out.extend(announcement.map(Output::Announce));
+            let said = self.aloud(Decision { is_final, ..decision });
+            let announcement = Announcement::of(self.stamped(said));
+            if let Some(announcement) = announcement {
+                (effects.carry_out)(Output::Announce(announcement));
+            }
         }
     }
 
-    /// The decision held as this robot says it to whoever asks; `None` while it holds none.
+    /// The decision held as this robot says it to whoever asks; `None` while it holds none. It has its stamp and no signature yet: few ask, and a
+    /// signature takes longer than all else of it.
     #[must_use]
     pub fn held_aloud(&mut self) -> Option<Announcement> {
         let agreement = &self.round.as_ref()?.agreement;
         let (is_final, decision) = (self.is_final(agreement), agreement.held()?.clone());
-        self.aloud(Decision { is_final, ..decision })
+        let said = self.aloud(Decision { is_final, ..decision });
+        Announcement::of(self.unsigned(said))
     }
 
     /// What its gesture is called, if this robot has the vocabulary that it was decided by.
@@ -139,10 +147,10 @@ impl Rounds {
         vocabulary.label(class).or_else(|| self.names.get(&class).map(String::as_str))
     }
 
-    /// A decision in this robot's own words, which it stands by.
-    fn aloud(&mut self, decision: Decision) -> Option<Announcement> {
+    /// A decision in this robot's own words.
+    fn aloud(&self, decision: Decision) -> Message {
         let label = self.label_of(&decision).map(str::to_owned);
-        Announcement::of(self.stamped(Message::Announced(Announced { decision, label })))
+        Message::Announced(Announced { decision, label })
     }
 
     pub(super) fn is_final(&self, agreement: &Agreement) -> bool {

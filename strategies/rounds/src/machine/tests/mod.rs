@@ -10,6 +10,7 @@ mod opening;
 mod order;
 mod repair;
 mod showing;
+mod signing;
 mod voting;
 
 use std::collections::{BTreeMap, BTreeSet};

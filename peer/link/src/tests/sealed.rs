@@ -1,0 +1,84 @@
+//! A robot of a sealed swarm, and a member that votes and asks.
+
+use gestalt_protocol::{
+    Announcement, Envelope, Keys, Message, RoundId, Stamp, Topic, VocabularyId, Vote, decode_json,
+};
+use gestalt_strategies::is_refuted;
+use gestalt_trust::{Distrust, Identity, Judge, Membership, Roster, statement};
+use zenoh::Session;
+
+use super::*;
+use crate::tls::{Bearer, Certificate, Credentials};
+use crate::{LinkConfig, Seal};
+
+fn key(number: u8) -> Identity {
+    Identity::from_bytes(&[number; 32])
+}
+
+fn roster(swarm: &str) -> Roster {
+    let robots = (0..2).map(|robot| (RobotId(robot.into()), key(robot + 1).public_key())).collect();
+    let members = Membership { swarm: swarm.to_owned(), epoch: 1, robots, ..Membership::default() };
+    members.sign(&key(100)).unwrap()
+}
+
+/// A session of robot 0, which is nothing but a session.
+async fn session(swarm: &str, roster: &Roster, to: &Robot) -> Session {
+    let bearer = Bearer::Robot(RobotId(0));
+    let certificate = Certificate::issue(&key(100), swarm, bearer.clone(), &key(1).public_key()).unwrap();
+    let credentials = Credentials::new(roster, bearer, Arc::new(key(1)), certificate).unwrap();
+    let connect = to.locators().to_vec();
+    let link = LinkConfig { connect, credentials: Some(credentials), ..LinkConfig::default() };
+    zenoh::open(link.client().unwrap()).await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_robot_holds_it_signs_for_whoever_asks() {
+    let swarm = unique();
+    let roster = roster(&swarm);
+    let seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(2))).unwrap();
+    let config = config(1, &swarm, &[]);
+    let link = LinkConfig { listen: vec!["tls/127.0.0.1:0".to_owned()], ..config.link };
+    let robot = Robot::start(RobotConfig { link, seal: Some(seal), ..config }).await.unwrap();
+    let mut events = robot.events();
+    let member = session(&swarm, &roster, &robot).await;
+    let keys = Keys::new(&swarm).unwrap();
+    let vote = Vote {
+        round: RoundId { counter: 1, opener: RobotId(0), life: 0 },
+        vocabulary: VocabularyId(1),
+        evidence: vec![6.0, -6.0],
+        looks: 3.0,
+        unknown: None,
+        named: vec![],
+    };
+    let said = Envelope {
+        author: RobotId(0),
+        stamp: Stamp { boot: 1, sequence: 1 },
+        message: Message::Vote(vote),
+        signature: None,
+    };
+    let signature = Some(statement::sign(&key(1), &roster.swarm_id(), &said.statement()));
+    let vote = Envelope { signature, ..said }.encode();
+    let end = Instant::now() + PATIENCE;
+    let held = loop {
+        assert!(Instant::now() < end, "it decides nothing: {:#?}", robot.status());
+        member.put(keys.key(&Topic::Vote(RobotId(0))), vote.as_slice()).await.unwrap();
+        match timeout(Duration::from_millis(200), events.recv()).await {
+            Ok(Ok(Event::Held(held))) => break held,
+            _ => continue,
+        }
+    };
+    let announcement = loop {
+        assert!(Instant::now() < end, "it does not answer: {:#?}", robot.status());
+        let replies = member.get(keys.key(&Topic::Decision)).await.unwrap();
+        let Ok(reply) = replies.recv_async().await else { continue };
+        break decode_json::<Announcement>(&reply.result().unwrap().payload().to_bytes()).unwrap();
+    };
+    assert_eq!((announcement.announcer, announcement.decision.class), (RobotId(1), held.class));
+    // Signed as it stands there, and so are the votes in it.
+    let mut judge = Judge::new(roster, is_refuted);
+    assert_eq!(judge.announcement(Duration::ZERO, &announcement), Ok(()));
+    let other = Announcement { label: Some("another".to_owned()), ..announcement };
+    assert_eq!(judge.announcement(Duration::ZERO, &other), Err(Distrust::Forged));
+    member.close().await.unwrap();
+    robot.stop().await;
+}
