@@ -66,13 +66,13 @@ test: test-packages
 attack:
 	cargo run -p gestalt-attack --bin attack -- $(ATTACKS)
 
-# Trains the weights of the learned eyes anew, from the pictures in GESTALT_DATA: about an hour on two cores. Then, what they
-# make of each set when trained without it: EYES="--leave-one-out". See peer/vision/weights/README.md.
+# Trains the weights of the learned eyes anew, from the pictures in GESTALT_DATA, one folder or several: about an hour on two
+# cores. Then, what they make of each set when trained without it: EYES="--leave-one-out". See peer/vision/weights/README.md.
 GESTALT_DATA ?= ../shared/data
 eyes: packages
 	mkdir -p out/eyes
 	RUSTFLAGS="-C target-cpu=native" \
-	cargo run --release --manifest-path peer/training/Cargo.toml -- --data $(GESTALT_DATA) --out out/eyes $(EYES)
+	cargo run --release --manifest-path peer/training/Cargo.toml -- $(addprefix --data ,$(GESTALT_DATA)) --out out/eyes $(EYES)
 
 # A Debian package of a release build, in out/. See docs/install.md.
 deb: packages

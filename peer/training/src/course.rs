@@ -5,13 +5,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use gestalt_vision::model_file::Model;
+use gestalt_vision::network::{Counter, FeatureMap};
 
 use crate::networks::encode;
 use crate::photos::Photos;
 use crate::pools::pools;
 use crate::robots::Weights;
 use crate::scenery::{self, Scenery};
-use crate::{frames, mining, model, sheets, train};
+use crate::{counting, frames, mining, model, sheets, train};
 
 /// How to take it.
 #[derive(Clone, Copy)]
@@ -43,7 +44,8 @@ impl Course {
         for (set, all) in photos.by_set() {
             self.tell(&format!("{set}: {} hands", all.len()));
         }
-        self.tell(&format!("{} faces, {} pictures without hands", photos.faces.len(), photos.empty.len()));
+        let nothing: usize = photos.empty.iter().map(|(_, pictures)| pictures.len()).sum();
+        self.tell(&format!("{} faces, {nothing} pictures without hands", photos.faces.len()));
         let scenery = Scenery::new(photos, scenery::drawn_hands(self.some(14_000), self.seed));
         self.tell("hands drawn");
         scenery
@@ -95,13 +97,36 @@ impl Course {
         self.tell("counter trained");
         let weights =
             [finder.weights(), refiner.weights(), counter.weights()].map(|weights| encode(&weights));
-        let name = gestalt_vision::perception::embedding_name(gestalt_vision::network::checksum([
-            &weights[0],
-            &weights[1],
-            &weights[2],
-        ]));
-        let model = model::learn(&mut counter, &pools, &name, images, self.some(2400), seed + 10)?;
+        let embed = |inputs: &[&[f32]]| train::embed(&mut counter, inputs);
+        let model = model::learn(embed, &pools, &name(&weights), images, self.some(2400), seed + 10)?;
         self.tell("classifier trained");
         Ok(Taught { weights, model })
     }
+
+    /// Only the classifier: with networks that are as they are, of pictures that they may never have seen.
+    pub fn classify(&self, photos: Photos, weights: [Vec<u8>; 3]) -> Result<Taught, Box<dyn Error>> {
+        let Self { seed, .. } = *self;
+        let images = photos.fingerprints()?;
+        let scenery = self.scenery(photos);
+        let mut counter = Counter::decode(&weights[2])?;
+        let robots = Weights::new(weights[0].clone(), weights[1].clone());
+        let pools = pools(&scenery, &robots, seed + 8, self.some(8000));
+        let embed = |inputs: &[&[f32]]| {
+            let mut map = FeatureMap::new(2, counting::SIDE, counting::SIDE);
+            let each = inputs.iter().map(|input| {
+                map.values_mut().copy_from_slice(input);
+                counter.run(&map).embedding.to_vec()
+            });
+            each.collect()
+        };
+        let model = model::learn(embed, &pools, &name(&weights), images, self.some(2400), seed + 10)?;
+        self.tell("classifier trained");
+        Ok(Taught { weights, model })
+    }
+}
+
+/// The name of the feature space of these weights.
+fn name(weights: &[Vec<u8>; 3]) -> String {
+    let [finder, refiner, counter] = weights;
+    gestalt_vision::perception::embedding_name(gestalt_vision::network::checksum([finder, refiner, counter]))
 }

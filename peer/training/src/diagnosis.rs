@@ -16,6 +16,7 @@ use crate::photos::{Photo, Photos};
 use crate::places::overlap;
 use crate::pools::{iou, with_truth};
 use crate::robots::{Robot, Weights};
+use crate::sets::Sets;
 
 /// A hand lies where it was found if the squares overlap more than this.
 const NEAR: f32 = 0.3;
@@ -48,7 +49,7 @@ fn highest(values: &[f32; 6]) -> u8 {
 }
 
 /// Prints a row for each set. `folder`: of the weights.
-pub fn print(folder: &Path, data: &Path, photos: &Photos) -> Result<(), Box<dyn Error>> {
+pub fn print(folder: &Path, sets: &Sets, photos: &Photos) -> Result<(), Box<dyn Error>> {
     let read = |name: &str| std::fs::read(folder.join(name));
     let [finder, refiner, counter] = [read(FILES[0])?, read(FILES[1])?, read(FILES[2])?];
     let (mut eyes, mut counter) = (Eyes::new(&finder, &refiner, &counter)?, Counter::decode(&counter)?);
@@ -61,7 +62,7 @@ pub fn print(folder: &Path, data: &Path, photos: &Photos) -> Result<(), Box<dyn 
         let mut tally = Tally::default();
         let counted = |photo: &&Photo| photo.count.is_some_and(|count| count < 6);
         for photo in all.iter().map(|&i| &photos.hands[i]).filter(counted) {
-            tally.add(photo, data, &mut eyes, &mut robot, &mut counter)?;
+            tally.add(photo, sets, &mut eyes, &mut robot, &mut counter)?;
         }
         tally.print(set);
     }
@@ -72,14 +73,14 @@ impl Tally {
     fn add(
         &mut self,
         photo: &Photo,
-        data: &Path,
+        sets: &Sets,
         eyes: &mut Eyes,
         robot: &mut Robot,
         counter: &mut Counter,
     ) -> Result<(), Box<dyn Error>> {
         let right = |said: Option<u8>| usize::from(said == photo.count);
         self.photos += 1;
-        match eyes.look(&imread(data.join(&photo.path), IMREAD_COLOR)?, None) {
+        match eyes.look(&imread(sets.picture(&photo.path), IMREAD_COLOR)?, None) {
             Ok(look) => {
                 let near = overlap(&look.place, &photo.place) > NEAR;
                 let turn = (look.place.up - photo.place.up).to_degrees().rem_euclid(360.0);

@@ -8,15 +8,20 @@ use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, Evaluation, Proportion, Vocabulary};
 use gestalt_vision::dataset::{Dataset, DatasetError, Naming};
 use gestalt_vision::eyes::{Eyes, EyesError};
-use gestalt_vision::perception::NoObservation;
+use gestalt_vision::perception::{NoHand, NoObservation};
 use opencv::imgcodecs::{IMREAD_COLOR, imread};
 use rayon::prelude::*;
 
 use crate::course::Taught;
+use crate::sets::Sets;
 
 /// A row for each set.
 #[derive(Default)]
-pub struct Table(Vec<Row>);
+pub struct Table {
+    rows: Vec<Row>,
+    /// A line for each picture: its path, what it shows, how sure a hand was found, and how likely each count is.
+    pub looks: String,
+}
 
 struct Row {
     set: String,
@@ -37,18 +42,21 @@ fn pictures(folder: &Path, vocabulary: &Vocabulary) -> Result<Vec<(PathBuf, Opti
 
 impl Table {
     /// Looks at all pictures of a set.
-    pub fn judge(&mut self, taught: &Taught, data: &Path, set: &str) -> Result<(), Box<dyn Error>> {
+    pub fn judge(&mut self, taught: &Taught, sets: &Sets, set: &str) -> Result<(), Box<dyn Error>> {
         let [finder, refiner, counter] = &taught.weights;
         let eyes = || Eyes::new(finder, refiner, counter);
-        let pictures = pictures(&data.join(set), taught.model.classifier.vocabulary())?;
+        let pictures = pictures(&sets.picture(set), taught.model.classifier.vocabulary())?;
         let looks = pictures
             .par_iter()
             .map_init(eyes, |eyes: &mut Result<Eyes, EyesError>, (path, _)| {
                 let eyes = eyes.as_mut().map_err(|error| error.to_string())?;
                 let picture = imread(path, IMREAD_COLOR).map_err(|error| error.to_string())?;
                 match eyes.look(&picture, None) {
-                    Ok(look) => Ok(Some(look)),
-                    Err(NoObservation::NoHand(_)) => Ok(None),
+                    Ok(look) => Ok(Ok(look)),
+                    Err(NoObservation::NoHand(NoHand::Unrecognised { confidence, .. })) => {
+                        Ok(Err(confidence))
+                    }
+                    Err(NoObservation::NoHand(_)) => Ok(Err(0.0)),
                     Err(error) => Err(error.to_string()),
                 }
             })
@@ -56,15 +64,23 @@ impl Table {
         let evaluation = Evaluation::new(6);
         let mut row =
             Row { set: set.to_owned(), images: 0, without_hand: 0, evaluation, empty: 0, alarms: 0 };
-        for ((_, count), look) in pictures.iter().zip(looks) {
-            match (count, look) {
-                (None, look) => {
+        for ((path, count), look) in pictures.iter().zip(looks) {
+            let (confidence, look) = match look {
+                Ok(look) => (look.confidence, Some(look)),
+                Err(confidence) => (confidence, None),
+            };
+            let classified = &taught.model.classifier;
+            let p = look.map(|look| classified.probabilities(&look.embedding)).transpose()?;
+            let shown = count.map_or("none".to_owned(), |count| count.index().to_string());
+            let likely: String = p.iter().flatten().map(|p| format!(",{p:.3}")).collect();
+            self.looks += &format!("{},{shown},{confidence:.3}{likely}\n", path.display());
+            match (count, p) {
+                (None, p) => {
                     row.empty += 1;
-                    row.alarms += u64::from(look.is_some());
+                    row.alarms += u64::from(p.is_some());
                 }
-                (Some(count), Some(look)) => {
+                (Some(count), Some(p)) => {
                     row.images += 1;
-                    let p = taught.model.classifier.probabilities(&look.embedding)?;
                     row.evaluation.record(*count, &p);
                 }
                 (Some(_), None) => {
@@ -74,7 +90,7 @@ impl Table {
             }
         }
         println!("{row}");
-        self.0.push(row);
+        self.rows.push(row);
         Ok(())
     }
 }
@@ -114,8 +130,8 @@ impl fmt::Display for Table {
             "| set | pictures | right, of all with a hand | no hand found | calibration error | false alarms |"
         )?;
         writeln!(f, "|---|---|---|---|---|---|")?;
-        self.0.iter().try_for_each(|row| writeln!(f, "{row}"))?;
-        let all: Vec<f64> = self.0.iter().filter_map(|row| Some(row.accuracy()?.value)).collect();
+        self.rows.iter().try_for_each(|row| writeln!(f, "{row}"))?;
+        let all: Vec<f64> = self.rows.iter().filter_map(|row| Some(row.accuracy()?.value)).collect();
         if all.len() > 1 {
             let mean = 100.0 * all.iter().sum::<f64>() / all.len() as f64;
             let least = 100.0 * all.iter().fold(1.0, |a: f64, b| a.min(*b));

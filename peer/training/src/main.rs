@@ -20,19 +20,22 @@ mod places;
 mod pools;
 mod robots;
 mod scenery;
+mod sets;
 mod sheets;
 mod surfaces;
 mod train;
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Parser;
+use gestalt_vision::model_file::Model;
 
 use course::{Course, Taught};
 use judge::Table;
 use photos::Photos;
+use sets::Sets;
 
 /// The names of the weights' files, as the program embeds them.
 const FILES: [&str; 3] = ["finder.net", "refiner.net", "counter.net"];
@@ -43,9 +46,9 @@ const FILES: [&str; 3] = ["finder.net", "refiner.net", "counter.net"];
   gestalt-training --data ../shared/data --out weights
   gestalt-training --data ../shared/data --out weights --leave-one-out --effort 0.5")]
 struct Args {
-    /// Folder of the data sets
-    #[arg(long)]
-    data: PathBuf,
+    /// Folder of data sets; repeatable: each set is looked for in all of them, in order
+    #[arg(long, required = true)]
+    data: Vec<PathBuf>,
     /// Folder for the weights, the classifier, and masks that are kept for the next time
     #[arg(long)]
     out: PathBuf,
@@ -58,6 +61,10 @@ struct Args {
     /// A set to be judged besides; repeatable
     #[arg(long, value_name = "SET")]
     judge: Vec<String>,
+    /// A file for a line about each picture that is judged: path, what it shows (`none`: no hand), how sure a hand is found there, and
+    /// where one is, how likely each count
+    #[arg(long, value_name = "FILE")]
+    looks: Option<PathBuf>,
     /// Share of the usual steps and pictures
     #[arg(long, default_value_t = 1.0)]
     effort: f32,
@@ -70,6 +77,12 @@ struct Args {
     /// Only say where in a look things go wrong, set by set, with the weights that are in the folder
     #[arg(long)]
     diagnose: bool,
+    /// Train nothing: with the weights that are in the folder, look at the sets to be judged
+    #[arg(long, requires = "judge", conflicts_with_all = ["leave_out", "leave_one_out"])]
+    judge_only: bool,
+    /// Train only the classifier, for the networks that are in the folder
+    #[arg(long, conflicts_with_all = ["leave_out", "leave_one_out", "judge_only"])]
+    classifier_only: bool,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -77,34 +90,57 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cache = args.out.join("masks");
     std::fs::create_dir_all(&cache)?;
     let course = Course { effort: args.effort, seed: args.seed, began: Instant::now() };
-    let photos = |left_out: &[String]| Photos::read(&args.data, &cache, left_out);
+    let sets = Sets::in_folders(&args.data)?;
+    let photos = |left_out: &[String]| Photos::read(&sets, &cache, left_out);
     if args.diagnose {
-        return diagnosis::print(&args.out, &args.data, &photos(&args.leave_out)?);
+        return diagnosis::print(&args.out, &sets, &photos(&args.leave_out)?);
     }
     if args.show {
         return course.show(photos(&args.leave_out)?, &args.out);
     }
     let mut table = Table::default();
-    if args.leave_one_out {
-        for set in &photos::SETS[..photos::COUNTED] {
-            let left_out = [(*set).to_owned()];
-            table.judge(&course.take(photos(&left_out)?)?, &args.data, set)?;
+    if args.judge_only {
+        let taught = read(&args.out)?;
+        for set in &args.judge {
+            table.judge(&taught, &sets, set)?;
+        }
+    } else if args.classifier_only {
+        let taught = course.classify(photos(&[])?, read(&args.out)?.weights)?;
+        write(&taught, &args.out)?;
+        for set in &args.judge {
+            table.judge(&taught, &sets, set)?;
+        }
+    } else if args.leave_one_out {
+        for set in sets.counted().filter(|set| sets.folder(set).is_some()) {
+            let left_out = [set.to_owned()];
+            table.judge(&course.take(photos(&left_out)?)?, &sets, set)?;
         }
     } else {
         let taught = course.take(photos(&args.leave_out)?)?;
         write(&taught, &args.out)?;
         for set in args.leave_out.iter().chain(&args.judge) {
-            table.judge(&taught, &args.data, set)?;
+            table.judge(&taught, &sets, set)?;
         }
     }
     print!("{table}");
+    if let Some(file) = args.looks {
+        std::fs::write(file, &table.looks)?;
+    }
     Ok(())
 }
 
-fn write(taught: &Taught, out: &std::path::Path) -> Result<(), Box<dyn Error>> {
+/// The name of the classifier's file.
+const MODEL: &str = "hands.gestalt";
+
+fn write(taught: &Taught, out: &Path) -> Result<(), Box<dyn Error>> {
     for (name, bytes) in FILES.iter().zip(&taught.weights) {
         std::fs::write(out.join(name), bytes)?;
     }
-    taught.model.write(&out.join("hands.gestalt"))?;
+    taught.model.write(&out.join(MODEL))?;
     Ok(())
+}
+
+fn read(out: &Path) -> Result<Taught, Box<dyn Error>> {
+    let [finder, refiner, counter] = FILES.map(|name| std::fs::read(out.join(name)));
+    Ok(Taught { weights: [finder?, refiner?, counter?], model: Model::read(&out.join(MODEL))? })
 }

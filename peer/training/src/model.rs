@@ -10,9 +10,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::counting::{self, Shown};
-use crate::networks::Counter;
 use crate::scenery::DRAWN;
-use crate::train::embed;
 
 /// Drawn hands are of so many parts of the cross-validation; each set of real ones is a part of its own.
 const DRAWN_PARTS: u32 = 2;
@@ -20,7 +18,7 @@ const DRAWN_PARTS: u32 = 2;
 /// Learns the counts from hands of these pools, varied as those that the counter was trained on. `images`: fingerprints of the
 /// pictures they are of.
 pub fn learn(
-    counter: &mut Counter,
+    embed: impl FnOnce(&[&[f32]]) -> Vec<Vec<f32>>,
     pools: &[(f32, Vec<Shown>)],
     feature_set: &str,
     images: Vec<u64>,
@@ -31,12 +29,12 @@ pub fn learn(
     let counted: Vec<_> =
         hands.into_iter().filter(|(_, shown)| shown.hand && shown.count.is_some()).collect();
     let inputs: Vec<&[f32]> = counted.iter().map(|(variation, _)| variation.picture.as_slice()).collect();
-    let embeddings = embed(counter, &inputs);
+    let embeddings = embed(&inputs);
     let samples: Vec<LabelledFeatures> = (0..)
         .zip(counted.iter().zip(embeddings))
         .map(|(i, ((_, shown), features))| LabelledFeatures {
             features,
-            class: ClassId(shown.count.unwrap_or_default()),
+            class: ClassId(shown.count.unwrap_or_default().into()),
             group: Some(if shown.origin == DRAWN { DRAWN + i % DRAWN_PARTS } else { shown.origin }),
         })
         .collect();
@@ -59,7 +57,7 @@ pub fn learn(
         trained.classifier.support_vectors()
     );
     let origin = Origin {
-        dataset: "drawn hands and six sets of pictures: see the model card".to_owned(),
+        dataset: "drawn hands and sets of pictures: see the model card".to_owned(),
         people: Vec::new(),
         images,
         seed,

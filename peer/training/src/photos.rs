@@ -19,24 +19,18 @@ use thiserror::Error;
 
 use crate::image::{Affine, Joints, Outside, Pyramid};
 use crate::places::{MASK, Place, onto_mask};
+use crate::sets::{Damaged, NONE, Set, Sets, Shows};
 
 const HANDS: &str = include_str!("../truth/hands.csv");
 const FACES: &str = include_str!("../truth/faces.csv");
-
-/// The sets, each under a licence that lets weights be shipped.
-pub const SETS: [&str; 6] =
-    ["asl-digits", "asl_letters", "lowres64_cn", "phone_home", "subhi_hands", "ti1k_outdoor"];
-
-/// How many of them, the first ones, show counts of all kinds.
-pub const COUNTED: usize = 5;
 
 /// Why a picture cannot be used.
 #[derive(Debug, Error)]
 pub enum PhotoError {
     #[error("{0}: no picture there: say where the data sets are with --data")]
     Missing(PathBuf),
-    #[error("line {0} of the truth is damaged")]
-    Truth(usize),
+    #[error(transparent)]
+    Truth(#[from] Damaged),
     #[error(transparent)]
     Video(#[from] SourceError),
     #[error(transparent)]
@@ -66,38 +60,52 @@ pub struct Photos {
     pub hands: Vec<Photo>,
     /// Faces, of 96 by 96 pixels each, to be taken for no hand.
     pub faces: Vec<Pyramid>,
-    /// Pictures without any hand.
-    pub empty: Vec<Pyramid>,
+    /// Pictures without any raised hand: of each set, how often they are taken.
+    pub empty: Vec<(f32, Vec<Pyramid>)>,
+    /// The sets that the pictures are of.
+    pub sets: Vec<Set>,
     files: Vec<PathBuf>,
 }
 
 impl Photos {
-    /// Reads all sets but some. Masks are kept in the folder `cache`, for they take minutes.
-    pub fn read(data: &Path, cache: &Path, left_out: &[String]) -> Result<Self, PhotoError> {
-        let kept = |path: &str| left_out.iter().all(|set| set != set_of(path));
-        let lines: Vec<_> =
-            HANDS.lines().enumerate().filter(|(_, l)| !l.starts_with('#') && kept(l)).collect();
-        let hands = lines
-            .par_iter()
-            .map(|(number, text)| {
-                photo(data, cache, text).map_err(|error| error.unwrap_or(PhotoError::Truth(*number)))
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+    /// Reads all sets that are there but some. Masks are kept in the folder `cache`, for they take minutes.
+    pub fn read(sets: &Sets, cache: &Path, left_out: &[String]) -> Result<Self, PhotoError> {
+        let (there, missing): (Vec<_>, Vec<_>) = sets
+            .all
+            .iter()
+            .filter(|set| !left_out.contains(&set.name))
+            .cloned()
+            .partition(|set| sets.folder(&set.name).is_some());
+        for set in missing {
+            println!("{}: not there, passed over", set.name);
+        }
+        let kept = |line: &&str| !line.starts_with('#') && there.iter().any(|set| set.name == set_of(line));
+        let lines: Vec<_> = HANDS.lines().filter(kept).collect();
+        let hands = lines.par_iter().map(|line| photo(sets, cache, line)).collect::<Result<Vec<_>, _>>()?;
         let hands = hands.into_iter().flatten().collect();
         let mut faces = Vec::new();
-        for (number, text) in FACES.lines().enumerate().filter(|(_, l)| !l.starts_with('#') && kept(l)) {
-            let fields: Vec<&str> = text.split(',').collect();
-            let [x, y, w, h] =
-                numbers(&fields[3..]).and_then(|n| n.try_into().ok()).ok_or(PhotoError::Truth(number))?;
-            let picture = read(&data.join(fields[0]))?;
+        for line in FACES.lines().filter(kept) {
+            let fields: Vec<&str> = line.split(',').collect();
+            let [_, _, x, y, w, h] = numbers(&fields[1..])
+                .and_then(|n| n.try_into().ok())
+                .ok_or_else(|| Damaged(line.to_owned()))?;
+            let picture = read(&sets.picture(fields[0]))?;
             // 96 pixels, the face in the middle 75.
             let scale = 75.0 / f32::max(w, h);
             let map = Affine::similar((x + w / 2.0, y + h / 2.0), (48.0, 50.0), 0.0, scale, 1.0, 1.0);
             faces.push(picture.warp(&map, 96, 96, Outside::Nearest).to_pyramid());
         }
-        let files = lines.iter().map(|(_, text)| data.join(path_of(text))).collect();
-        let empty = if kept("video") { empty(&data.join("video"))? } else { Vec::new() };
-        Ok(Self { hands, faces, empty, files })
+        let mut files: Vec<PathBuf> = lines.iter().map(|line| sets.picture(path_of(line))).collect();
+        let mut empty = Vec::new();
+        for set in &there {
+            let folder = sets.picture(&set.name);
+            let folder = if set.shows == Shows::Nothing { folder } else { folder.join(NONE) };
+            let pictures = without_hands(&folder, &mut files)?;
+            if !pictures.is_empty() {
+                empty.push((set.scenes, pictures));
+            }
+        }
+        Ok(Self { hands, faces, empty, sets: there, files })
     }
 
     /// What tells its pictures from others, ascending: whoever judges with them is to know.
@@ -118,16 +126,27 @@ impl Photos {
     }
 }
 
-/// Pictures in which no hand is raised: a room in which people come and go, and people before they begin to sign.
-fn empty(folder: &Path) -> Result<Vec<Pyramid>, PhotoError> {
-    let entries = std::fs::read_dir(folder).map_err(|_| PhotoError::Missing(folder.into()))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+/// The pictures of a folder and of those in it, and of its films one in ten seconds; of films of those who sign, the first, before
+/// they begin. Adds the pictures to `files`.
+fn without_hands(folder: &Path, files: &mut Vec<PathBuf>) -> Result<Vec<Pyramid>, PhotoError> {
+    let mut open = vec![folder.to_owned()];
+    let mut paths = Vec::new();
+    while let Some(folder) = open.pop() {
+        for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() { open.push(path) } else { paths.push(path) }
+        }
+    }
     paths.sort();
     let mut all = Vec::new();
     for path in paths {
         let frames = match path.extension().and_then(|extension| extension.to_str()) {
             Some("mkv") => 1,
             Some("mp4") => usize::MAX,
+            Some("jpg" | "jpeg" | "png") => {
+                all.push(read(&path)?);
+                files.push(path);
+                continue;
+            }
             _ => continue,
         };
         let mut video = Video::open(&path, false)?;
@@ -179,14 +198,17 @@ pub fn place(joints: &[(f32, f32)]) -> Place {
     Place { x: (x0 + x1) / 2.0, y: (y0 + y1) / 2.0, side, up: dx.atan2(-dy) }
 }
 
-/// `None` where no mask can be had; the error `None` stands for a damaged line.
-fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<PhotoError>> {
+/// `None` where no mask can be had.
+fn photo(sets: &Sets, cache: &Path, text: &str) -> Result<Option<Photo>, PhotoError> {
     let fields: Vec<&str> = text.split(',').collect();
     let path = fields[0];
-    let all = numbers(&fields[1..]).filter(|all| all.len() == 44).ok_or(None)?;
+    let damaged = || Damaged(text.to_owned());
+    let all = numbers(&fields[1..]).filter(|all| all.len() == 44).ok_or_else(damaged)?;
+    let set = set_of(path).to_owned();
+    let origin = sets.number(&set).ok_or_else(damaged)? as u32;
     let joint = |k: usize| (all[2 + 2 * k] / 1000.0 * all[0], all[3 + 2 * k] / 1000.0 * all[1]);
     let joints: Joints = std::array::from_fn(joint);
-    let picture = read(&data.join(path)).map_err(Some)?;
+    let picture = read(&sets.picture(path))?;
     let place = place(&joints);
     let kept = cache.join(format!("{:08x}.mask", crc32fast::hash(text.as_bytes())));
     let masks = match std::fs::read(&kept) {
@@ -196,7 +218,7 @@ fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<
             Some([hand, arm].map(|mask| Pyramid::new(MASK, MASK, 1, mask.to_vec())).into())
         }
         _ => {
-            let made = masks(&picture, &joints, &place).map_err(|error| Some(error.into()))?;
+            let made = masks(&picture, &joints, &place)?;
             let bytes = made
                 .iter()
                 .flat_map(|(hand, arm)| [hand.pixels(), arm.pixels()].concat())
@@ -209,42 +231,9 @@ fn photo(data: &Path, cache: &Path, text: &str) -> Result<Option<Photo>, Option<
     let Some((mask, arm)) = masks else {
         return Ok(None);
     };
-    let set = set_of(path).to_owned();
     let folder = path.split('/').nth(1).unwrap_or_default();
-    let (count, fingers) = meaning(&set, folder);
-    let origin = SETS.iter().position(|known| *known == set).unwrap_or(SETS.len()) as u32;
+    let (count, fingers) = sets.meaning(&set, folder);
     Ok(Some(Photo { set, origin, path: path.to_owned(), picture, place, joints, mask, arm, count, fingers }))
-}
-
-/// What a folder of a set shows.
-fn meaning(set: &str, folder: &str) -> (Option<u8>, Option<[bool; 5]>) {
-    let digit = folder.bytes().next().filter(u8::is_ascii_digit).map(|byte| byte - b'0');
-    let fingers = |bits: [u8; 5]| Some(bits.map(|bit| bit == 1));
-    if set == "asl-digits" {
-        let bits = match digit {
-            Some(0) => [0, 0, 0, 0, 0],
-            Some(1) => [0, 1, 0, 0, 0],
-            Some(2) => [0, 1, 1, 0, 0],
-            Some(3) => [1, 1, 1, 0, 0],
-            Some(4) => [0, 1, 1, 1, 1],
-            Some(5) => [1, 1, 1, 1, 1],
-            Some(6) => [0, 1, 1, 1, 0],
-            Some(7) => [0, 1, 1, 0, 1],
-            Some(8) => [0, 1, 0, 1, 1],
-            _ => [0, 0, 1, 1, 1],
-        };
-        return (Some(bits.iter().sum()), fingers(bits));
-    }
-    let known = match folder {
-        "0" | "0_thumb_side" => fingers([0, 0, 0, 0, 0]),
-        "1_little" => fingers([0, 0, 0, 0, 1]),
-        "2_thumb_index" => fingers([1, 1, 0, 0, 0]),
-        "2_together" => fingers([0, 1, 1, 0, 0]),
-        "4_together" => fingers([0, 1, 1, 1, 1]),
-        "5" => fingers([1, 1, 1, 1, 1]),
-        _ => None,
-    };
-    (digit.filter(|digit| *digit < 6), known)
 }
 
 const BONES: [(usize, usize); 23] = [

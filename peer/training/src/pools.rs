@@ -55,18 +55,11 @@ pub fn drawn(hand: &Drawn) -> Option<Shown> {
 
 /// What the counter is shown, by shares: real hands with good masks and with those that robots get, and drawn ones.
 pub fn pools(scenery: &Scenery, weights: &Weights, seed: u64, scenes: usize) -> Vec<(f32, Vec<Shown>)> {
-    let shares = [
-        ("asl-digits", 1.2),
-        ("subhi_hands", 0.6),
-        ("phone_home", 0.6),
-        ("asl_letters", 0.5),
-        ("lowres64_cn", 0.5),
-        ("ti1k_outdoor", 0.1),
-    ];
     let mut pools = Vec::new();
     let by_set = scenery.photos.by_set();
-    for (set, share) in shares {
-        let Some(all) = by_set.get(set) else { continue };
+    for set in &scenery.photos.sets {
+        let Some(all) = by_set.get(set.name.as_str()) else { continue };
+        let share = set.counter;
         let good: Vec<Shown> = all.par_iter().filter_map(|&i| with_truth(&scenery.photos.hands[i])).collect();
         pools.push((0.5 * share, good));
         let all: Vec<&Photo> = all.iter().map(|&i| &scenery.photos.hands[i]).collect();
@@ -78,7 +71,7 @@ pub fn pools(scenery: &Scenery, weights: &Weights, seed: u64, scenes: usize) -> 
     let (hands, wrong): (Vec<_>, Vec<_>) = mined.shown.into_iter().partition(|shown| shown.hand);
     pools.push((2.6, hands));
     pools.push((1.0, wrong));
-    pools.retain(|(_, pool): &(f32, Vec<Shown>)| !pool.is_empty());
+    pools.retain(|(share, pool): &(f32, Vec<Shown>)| *share > 0.0 && !pool.is_empty());
     pools
 }
 

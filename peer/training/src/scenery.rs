@@ -8,17 +8,12 @@ use crate::drawn::{Drawn, HAND, SIDE, draw, fingers};
 use crate::image::{Affine, Canvas, Joints, Outside, Pyramid};
 use crate::photos::{Photo, Photos};
 use crate::places::{COVERED, MASK, Place};
+use crate::sets::Set;
 use crate::surfaces::{cloth, limb, skin, smooth_noise, texture};
 
-/// How often pictures of each set are taken: by how much there is to see in them.
-const SHARES: [(&str, f32); 6] = [
-    ("asl-digits", 0.12),
-    ("subhi_hands", 0.44),
-    ("phone_home", 0.26),
-    ("asl_letters", 0.2),
-    ("ti1k_outdoor", 0.06),
-    ("lowres64_cn", 0.14),
-];
+/// What backgrounds are: invented below this, pictures without hands below the next, else parts of pictures beside a hand.
+const TEXTURES: f32 = 0.25;
+const NOTHING: f32 = 0.45;
 
 /// The origin of drawn hands.
 pub const DRAWN: u32 = 1000;
@@ -43,45 +38,31 @@ pub struct Pasted {
 
 impl Scenery {
     pub fn new(photos: Photos, drawn: Vec<Drawn>) -> Self {
-        let sets = photos.by_set();
-        let of = |pick: &dyn Fn(&str) -> bool| -> Vec<(f32, Vec<usize>)> {
-            let shares = SHARES.iter().filter(|(set, _)| pick(set));
-            shares.filter_map(|(set, share)| sets.get(set).map(|all| (*share, all.clone()))).collect()
+        let by_set = photos.by_set();
+        let of = |pick: &dyn Fn(&Set) -> bool| -> Vec<(f32, Vec<usize>)> {
+            let sets = photos.sets.iter().filter(|set| pick(set));
+            sets.filter_map(|set| Some((set.scenes, by_set.get(set.name.as_str())?.clone()))).collect()
         };
-        let rooms = of(&|set| set != "lowres64_cn");
+        let rooms = of(&|set| set.surroundings);
         let cuts = of(&|_| true);
         Self { photos, drawn, rooms, cuts }
     }
 
-    fn pick<'a>(&'a self, sets: &[(f32, Vec<usize>)], rng: &mut impl Rng) -> &'a Photo {
-        let total: f32 = sets.iter().map(|(share, _)| share).sum();
-        let mut at = uniform(rng, 0.0, total);
-        for (share, all) in sets {
-            at -= share;
-            if at <= 0.0 {
-                return &self.photos.hands[all[rng.random_range(0..all.len())]];
-            }
-        }
-        &self.photos.hands[sets[0].1[0]]
-    }
-
     /// A picture with its surroundings.
     pub fn room(&self, rng: &mut impl Rng) -> &Photo {
-        self.pick(&self.rooms, rng)
+        &self.photos.hands[*pick(&self.rooms, rng).expect("there are pictures of rooms")]
     }
 
     fn cut(&self, rng: &mut impl Rng) -> &Photo {
-        self.pick(&self.cuts, rng)
+        &self.photos.hands[*pick(&self.cuts, rng).expect("there are pictures of hands")]
     }
 
     /// Something without a hand.
     pub fn background(&self, rng: &mut impl Rng, w: usize, h: usize) -> Canvas {
         let kind: f32 = rng.random();
         let centre = (w as f32 / 2.0 - 0.5, h as f32 / 2.0 - 0.5);
-        let mut canvas = if kind < 0.25 || (self.photos.empty.is_empty() && kind < 0.45) {
-            texture(rng, w, h)
-        } else if kind < 0.45 {
-            let picture = &self.photos.empty[rng.random_range(0..self.photos.empty.len())];
+        let nothing = if kind < NOTHING { pick(&self.photos.empty, rng) } else { None };
+        let mut canvas = if let Some(picture) = nothing.filter(|_| kind >= TEXTURES) {
             let (pw, ph) = (picture.width() as f32, picture.height() as f32);
             let scale = (w as f32 / pw).max(h as f32 / ph) * uniform(rng, 0.0, 1.1).exp();
             let from = (
@@ -90,12 +71,14 @@ impl Scenery {
             );
             let map = Affine::similar(from, centre, 0.15 * normal(rng), scale, sign(rng), 1.0);
             picture.warp(&map, w, h, Outside::Mirrored)
+        } else if kind < NOTHING {
+            texture(rng, w, h)
         } else {
             self.beside_a_hand(rng, w, h).unwrap_or_else(|| texture(rng, w, h))
         };
-        if chance(rng, 0.35) && !self.photos.empty.is_empty() {
+        if chance(rng, 0.35) {
             for _ in 0..rng.random_range(0..3) {
-                let picture = &self.photos.empty[rng.random_range(0..self.photos.empty.len())];
+                let Some(picture) = pick(&self.photos.empty, rng) else { break };
                 let (bw, bh) = (uniform(rng, 15.0, 80.0), uniform(rng, 15.0, 80.0));
                 let (x, y) = (uniform(rng, -20.0, w as f32), uniform(rng, -20.0, h as f32));
                 let scale = (bw / picture.width() as f32).max(bh / picture.height() as f32);
@@ -288,6 +271,18 @@ impl Scenery {
         canvas.blend(&picture, &soft.values.iter().map(|v| v / 255.0).collect::<Vec<_>>());
         Pasted { mask, count, fingers, joints, origin }
     }
+}
+
+/// One of any set, each set by its share.
+fn pick<'a, T>(sets: &'a [(f32, Vec<T>)], rng: &mut impl Rng) -> Option<&'a T> {
+    let total: f32 = sets.iter().map(|(share, _)| share).sum();
+    let mut at = uniform(rng, 0.0, total);
+    let taken = sets.iter().find(|(share, _)| {
+        at -= share;
+        at <= 0.0
+    });
+    let (_, all) = taken.or(sets.first())?;
+    all.get(rng.random_range(0..all.len()))
 }
 
 /// So many drawn hands.

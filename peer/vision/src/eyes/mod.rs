@@ -48,6 +48,8 @@ const STILL_THERE: f32 = 0.6;
 const UNSURE: f32 = 0.5;
 /// The finer look is for hands up to this size, in pixels of a frame 160 wide: of larger ones it finds parts.
 const SMALL: f32 = 28.0;
+/// A count that is less likely than this is read once more, mirrored.
+const SURE: f32 = 0.95;
 /// The hand is read in a square this much larger than its pixels.
 const MARGIN: f64 = 1.18;
 /// What one close look corrects at most: the centre in sides of the square, the size in nats.
@@ -218,7 +220,11 @@ impl Eyes {
         let hand = Place { x: x as f32, y: y as f32, side, up: place.up };
         let onto = Affine::onto(hand, 1.0, Counter::SIDE);
         let picture = self.reading.cut((&mut self.pyramid, frame), &onto, (self.mask.image(), &onto_mask))?;
-        let count = self.counter.run(picture);
+        let mut count = self.counter.run(picture);
+        if probability::among(count.counts).iter().all(|likely| *likely < SURE) {
+            // A hand's mirror image shows as many fingers.
+            count = count.mean(&self.counter.run(self.reading.mirrored()));
+        }
         let confidence = found * probability::alone(count.hand);
         if confidence < MINIMUM {
             return Err(unrecognised(confidence));

@@ -18,6 +18,7 @@ pub struct Reading {
     mask: Mat,
     grey: Vec<f32>,
     picture: FeatureMap,
+    mirrored: FeatureMap,
     crop: Mat,
 }
 
@@ -29,6 +30,7 @@ impl Reading {
             mask: Mat::default(),
             grey: vec![0.0; SIDE * SIDE],
             picture: FeatureMap::default(),
+            mirrored: FeatureMap::default(),
             crop: Mat::new_rows_cols_with_default(side, side, CV_8U, Scalar::all(0.0))?,
         })
     }
@@ -57,5 +59,43 @@ impl Reading {
         }
         standardise_within(&self.grey, mask, SIDE, &mut self.picture);
         Ok(&self.picture)
+    }
+
+    /// What was cut out last, left to right.
+    pub fn mirrored(&mut self) -> &FeatureMap {
+        let (channels, height, width) = self.picture.shape();
+        self.mirrored.reshape(channels, height, width);
+        let rows = self.picture.values().chunks_exact(width.max(1));
+        for (to, from) in self.mirrored.values_mut().chunks_exact_mut(width.max(1)).zip(rows) {
+            to.copy_from_slice(from);
+            to.reverse();
+        }
+        &self.mirrored
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use opencv::core::{CV_8UC3, CV_32F};
+
+    use super::*;
+    use crate::eyes::place::Place;
+
+    #[test]
+    fn mirrored_means_left_to_right_row_by_row() {
+        let mut frame = Mat::new_rows_cols_with_default(48, 48, CV_8UC3, Scalar::all(0.0)).unwrap();
+        for (i, byte) in frame.data_bytes_mut().unwrap().iter_mut().enumerate() {
+            *byte = (i * 31 % 251) as u8;
+        }
+        let mask = Mat::new_rows_cols_with_default(48, 48, CV_32F, Scalar::all(1.0)).unwrap();
+        let onto = Affine::onto(Place { x: 23.5, y: 23.5, side: 48.0, up: 0.0 }, 1.0, SIDE);
+        let mut reading = Reading::new().unwrap();
+        let picture = reading.cut((&mut Pyramid::default(), &frame), &onto, (&mask, &onto)).unwrap().clone();
+        let mirrored = reading.mirrored();
+        assert_eq!(mirrored.shape(), (2, SIDE, SIDE));
+        assert_ne!(mirrored.values(), picture.values());
+        for (one, other) in picture.values().chunks(SIDE).zip(mirrored.values().chunks(SIDE)) {
+            assert!(one.iter().eq(other.iter().rev()));
+        }
     }
 }

@@ -25,6 +25,20 @@ pub struct Count {
     pub hand: f32,
 }
 
+impl Count {
+    /// Between two readings of one hand. The heads being linear, it is what follows from the mean embedding.
+    #[must_use]
+    pub fn mean(mut self, other: &Self) -> Self {
+        let mean =
+            |a: &mut [f32], b: &[f32]| a.iter_mut().zip(b).for_each(|(a, b)| *a = f32::midpoint(*a, *b));
+        mean(&mut self.embedding, &other.embedding);
+        mean(&mut self.counts, &other.counts);
+        mean(&mut self.fingers, &other.fingers);
+        self.hand = f32::midpoint(self.hand, other.hand);
+        self
+    }
+}
+
 /// Reads a hand.
 pub struct Counter {
     layers: [Convolution; 4],

@@ -353,6 +353,27 @@ fn other_weights_have_another_checksum() {
 }
 
 #[test]
+fn between_two_readings_everything_is_halfway() {
+    let mut counter = Counter::decode(shipped::COUNTER).unwrap();
+    let read = |counter: &mut Counter, level: f32| {
+        let mut picture = FeatureMap::new(2, Counter::SIDE, Counter::SIDE);
+        picture.values_mut().fill(level);
+        counter.run(&picture)
+    };
+    let (one, other) = (read(&mut counter, 0.2), read(&mut counter, -0.7));
+    let mean = one.mean(&other);
+    assert_ne!(one.embedding, other.embedding);
+    let halfway = |mean: &[f32], a: &[f32], b: &[f32]| {
+        assert!(mean.iter().zip(a).zip(b).all(|((m, a), b)| (2.0 * m - a - b).abs() < 1e-4 * (1.0 + a.abs())));
+    };
+    halfway(&mean.embedding, &one.embedding, &other.embedding);
+    halfway(&mean.counts, &one.counts, &other.counts);
+    halfway(&mean.fingers, &one.fingers, &other.fingers);
+    halfway(&[mean.hand], &[one.hand], &[other.hand]);
+    assert_eq!(one.mean(&one), one);
+}
+
+#[test]
 fn the_shipped_weights_fit() {
     Finder::decode(shipped::FINDER).unwrap();
     Refiner::decode(shipped::REFINER).unwrap();
