@@ -5,7 +5,7 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 use gestalt_vision::human::Human;
 use gestalt_vision::source::{
-    Device, Glove, ImageFolder, Pipe, RenderedSource, ScheduledSource, Source, SourceError, Video,
+    Device, ImageFolder, Pipe, RenderedSource, ScheduledSource, Source, SourceError, Video,
 };
 
 use crate::config::{CameraSection, SourceSection};
