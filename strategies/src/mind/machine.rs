@@ -14,6 +14,7 @@ use super::asks::Asks;
 use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
+use super::questions::Passed;
 use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory, Shelf};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.
@@ -162,13 +163,17 @@ impl Mind {
             }
             None => &mut (),
         };
-        self.rounds.handle_into(now, about_rounds, follower, &mut |output| carry_out(output.into()));
+        let mut passed = Passed::default();
+        self.rounds.handle_into(now, about_rounds, follower, &mut |output| {
+            passed.note(&output);
+            carry_out(output.into());
+        });
         if self.rounds.round() != round {
             self.exchanges.forget_declined_lessons();
         }
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);
-        self.carry_on_asking(now, &mut out);
+        self.carry_on_asking(now, passed, &mut out);
         out.into_iter().for_each(carry_out);
     }
 

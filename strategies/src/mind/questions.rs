@@ -3,13 +3,29 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Ask, Asked, ClassId, Message, Question, Reason};
-use gestalt_rounds::{Doubt, Input as AboutRounds, outcome};
+use gestalt_rounds::{Doubt, Input as AboutRounds, Output as OfRounds, outcome};
 
 use super::machine::Mind;
 use super::output::Output;
 use crate::asking::{Occasion, is_unknown, worth_asking};
 use crate::learning::Learning;
 use crate::lessons::Verdict;
+
+/// What came of one input for the rounds that this robot lives through.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Passed {
+    /// It announced a decision.
+    announced: bool,
+    /// It looks at a round no more.
+    closed: bool,
+}
+
+impl Passed {
+    pub(super) fn note(&mut self, output: &OfRounds) {
+        self.announced |= matches!(output, OfRounds::Announce(_));
+        self.closed |= matches!(output, OfRounds::Closed(_));
+    }
+}
 
 impl Mind {
     /// The swarm's question that waits for its answer.
@@ -27,14 +43,13 @@ impl Mind {
     }
 
     /// Follows the rounds that this robot lives through, and asks when it is to.
-    pub(super) fn carry_on_asking(&mut self, now: Duration, out: &mut Vec<Output>) {
+    pub(super) fn carry_on_asking(&mut self, now: Duration, passed: Passed, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
         self.asks.enter(now, self.rounds.round());
-        let announced = out.iter().any(|output| matches!(output, Output::Announce(_)));
-        if announced {
+        if passed.announced {
             self.asks.due.get_or_insert(now.saturating_add(learning.config().questions.after));
         }
-        if out.iter().any(|output| matches!(output, Output::Closed(_))) {
+        if passed.closed {
             self.asks.put_off(now, learning.config().questions.after);
         }
         // What is said of its round settles a question, by whomever and whichever way it was heard; silence does not answer it.
