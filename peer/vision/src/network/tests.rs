@@ -364,7 +364,9 @@ fn between_two_readings_everything_is_halfway() {
     let mean = one.mean(&other);
     assert_ne!(one.embedding, other.embedding);
     let halfway = |mean: &[f32], a: &[f32], b: &[f32]| {
-        assert!(mean.iter().zip(a).zip(b).all(|((m, a), b)| (2.0 * m - a - b).abs() < 1e-4 * (1.0 + a.abs())));
+        assert!(
+            mean.iter().zip(a).zip(b).all(|((m, a), b)| (2.0 * m - a - b).abs() < 1e-4 * (1.0 + a.abs()))
+        );
     };
     halfway(&mean.embedding, &one.embedding, &other.embedding);
     halfway(&mean.counts, &one.counts, &other.counts);
