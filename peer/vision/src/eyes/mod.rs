@@ -41,7 +41,7 @@ use reading::Reading;
 use standard::standardise;
 
 /// The least confidence that a hand is one.
-pub const MINIMUM: f32 = 0.35;
+pub const MINIMUM: f32 = 0.4;
 /// A hand that is this likely where the last one was is the same.
 const STILL_THERE: f32 = 0.6;
 /// A first look that convinces less than this is followed by a finer one.
