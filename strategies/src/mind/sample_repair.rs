@@ -219,7 +219,7 @@ impl Mind {
     pub(super) fn on_lessons(&mut self, from: RobotId, lessons: &[Lesson]) {
         let is_neighbour = self.compares_with(from);
         let Some(learning) = &mut self.learning else { return };
-        let (mut news, mut unproven) = (None, 0);
+        let (mut news, mut unproven) = (false, 0);
         for of_round in lessons.chunk_by(|a, b| a.round == b.round) {
             if unproven >= MAX_UNPROVEN {
                 break;
@@ -227,7 +227,7 @@ impl Mind {
             let mut refused = false;
             for lesson in of_round {
                 match learning.hear(lesson) {
-                    LessonReceipt::New => news = news.max(Some(lesson.round.counter)),
+                    LessonReceipt::New => news = true,
                     LessonReceipt::Known => {}
                     LessonReceipt::Full => {
                         refused = true;
@@ -247,8 +247,7 @@ impl Mind {
                 self.exchanges.decline_lessons(from, of_round.iter());
             }
         }
-        if let Some(newest) = news {
-            self.rounds.count_past(newest);
+        if news {
             self.rounds.hurry_repair();
             self.share();
         }

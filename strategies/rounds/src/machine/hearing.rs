@@ -149,7 +149,9 @@ impl Rounds {
         by: Option<RobotId>,
         effects: &mut Effects<'_>,
     ) -> Result<Ordering, Refusal> {
-        if self.is_far_ahead(id.counter) {
+        let (first, began) = self.began;
+        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
+        if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
         }
@@ -167,21 +169,6 @@ impl Rounds {
             round.merge(id);
         }
         Ok(order)
-    }
-
-    /// Whether no round can have that counter yet.
-    fn is_far_ahead(&self, counter: u32) -> bool {
-        let (first, began) = self.began;
-        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
-        u64::from(counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived
-    }
-
-    /// There was a round with that counter, as somebody said who is believed: those that this robot opens come after it, so that no vote of that one
-    /// counts in them. Who lost its memory is told so by whoever kept theirs.
-    pub fn count_past(&mut self, counter: u32) {
-        if !self.is_far_ahead(counter) {
-            self.highest = self.highest.max(Some(counter));
-        }
     }
 
     /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.

@@ -104,22 +104,6 @@ fn rounds_are_counted_on_after_all_were_off() {
 }
 
 #[test]
-fn who_lost_its_memory_counts_on_from_what_it_is_told_of_by_who_kept_theirs() {
-    let mut swarm = Swarm::new(3, config(2, 1.0), 12);
-    let mut last = swarm.show(1);
-    for class in 2..5 {
-        last = swarm.show(class);
-        swarm.was(last, class);
-    }
-    // Robots 1 and 2 are new again, and hear of what was; a round that one of them opens is no earlier one.
-    swarm.disks[..2].iter_mut().for_each(BTreeMap::clear);
-    swarm.restart_all();
-    swarm.pass(Duration::from_secs(10));
-    swarm.input(0, Input::Open);
-    assert_eq!(swarm.minds[0].round().unwrap().counter, last.counter + 1);
-}
-
-#[test]
 fn what_is_said_of_a_round_holds_for_all_its_names() {
     let mut swarm = Swarm::new(3, config(3, 1.0), 13);
     // All open at once, before they hear of each other.

@@ -68,20 +68,6 @@ fn a_vote_under_another_name_of_a_round_begins_no_other_however_late() {
 }
 
 #[test]
-fn rounds_that_are_told_of_are_counted_past_but_not_those_that_cannot_be() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), Input::Tick);
-    mind.count_past(40);
-    mind.count_past(12);
-    mind.count_past((1 << 24) + 1);
-    mind.handle(ms(1), Input::Open);
-    assert_eq!(mind.round(), Some(round(41, 7)));
-    // A vote of an earlier one counts nowhere.
-    mind.handle(ms(2), votes(3, 1, vote(40, 0, LEANING)));
-    assert_eq!((mind.round(), mind.ballot().unwrap().len()), (Some(round(41, 7)), 1));
-}
-
-#[test]
 fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
     let mut mind = mind(7).counting_from(Some(1000));
     let ahead = 1000 + (1 << 24);
