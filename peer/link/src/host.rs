@@ -10,10 +10,10 @@ use gestalt_strategies::{Classify, Fuse, Input};
 use tokio::sync::mpsc;
 
 use crate::apprentice::Apprentice;
+use crate::effector::Effector;
 use crate::event::Event;
 use crate::guard::Sight;
 use crate::guests::Guests;
-use crate::hands::Hands;
 use crate::identity::{self, fresh_nonce};
 use crate::inbox::Inbox;
 use crate::memory::Found;
@@ -36,7 +36,7 @@ pub(crate) struct Host {
     pub seal: Option<Arc<Seal>>,
     /// For the program around the robot to look at.
     pub classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
-    pub hands: Hands,
+    pub effector: Effector,
     pub sight: Sight,
 }
 
@@ -49,20 +49,20 @@ impl Host {
         self.believe();
         loop {
             let wake = self.mind.next_wake().map(|wake| self.started + wake);
-            let wake = wake.into_iter().chain(self.hands.voice.due()).min();
+            let wake = wake.into_iter().chain(self.effector.voice.due()).min();
             tokio::select! {
                 () = inbox.ready() => {
                     for input in inbox.take() {
                         self.step(input);
                     }
-                    self.hands.voice.accuse();
-                    self.hands.voice.pass_on();
+                    self.effector.voice.accuse();
+                    self.effector.voice.pass_on();
                 }
                 command = self.commands.recv() => match command {
                     Some(input) => self.step(input),
                     None => break,
                 },
-                found = found(&mut self.hands.apprentice) => self.take_up(found),
+                found = found(&mut self.effector.apprentice) => self.take_up(found),
                 () = guests.changed() => self.step(Input::Guests(guests.present())),
                 () = sleep_until(wake) => self.step(Input::Tick),
                 _ = &mut ended => break,
@@ -79,11 +79,11 @@ impl Host {
         if let Some(blind) = self.sight.news() {
             self.handle(Input::Blind(blind));
         }
-        self.hands.voice.publish_hold(&mut self.mind);
+        self.effector.voice.publish_hold(&mut self.mind);
         self.report_learning();
         for (refusal, count) in self.mind.refusals().iter() {
             if count > 0 {
-                self.hands.account.set(refusal.name(), count);
+                self.effector.account.set(refusal.name(), count);
             }
         }
     }
@@ -97,8 +97,8 @@ impl Host {
 
     fn handle(&mut self, input: Input) {
         // Each output at once: the program is told of a decision before the robot signs that it holds it.
-        let hands = &mut self.hands;
-        self.mind.handle_into(self.started.elapsed(), input, &mut |output| hands.carry_out(output));
+        let effector = &mut self.effector;
+        self.mind.handle_into(self.started.elapsed(), input, &mut |output| effector.carry_out(output));
     }
 
     /// Tells the program of what arrives, and says what of it is for the mind.
@@ -112,11 +112,11 @@ impl Host {
                 self.tell_alive(&tokens | guests);
             }
             Input::Neighbours(neighbours) => {
-                self.hands.account.lock().neighbours = neighbours.iter().copied().collect();
-                self.hands.tell(Event::Neighbours(neighbours.clone()));
+                self.effector.account.lock().neighbours = neighbours.iter().copied().collect();
+                self.effector.tell(Event::Neighbours(neighbours.clone()));
             }
-            Input::Announced(announcement) => self.hands.tell(Event::Announced(announcement.clone())),
-            Input::Asked(question) => self.hands.tell(Event::Asked(question.clone())),
+            Input::Announced(announcement) => self.effector.tell(Event::Announced(announcement.clone())),
+            Input::Asked(question) => self.effector.tell(Event::Asked(question.clone())),
             Input::Learned(classifier) => {
                 let guarded = self.sight.guard(classifier.clone())?;
                 *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier.clone());
@@ -127,7 +127,7 @@ impl Host {
                 self.sight.told(*blind);
                 return Some(Input::Tick);
             }
-            Input::Remembered(revision) => self.hands.tell(Event::Remembered(*revision)),
+            Input::Remembered(revision) => self.effector.tell(Event::Remembered(*revision)),
             _ => {}
         }
         Some(input)
@@ -136,7 +136,7 @@ impl Host {
     /// Begins anew with what this robot knew before, on a disk that came late. What it learned since its start was
     /// acknowledged to nobody; of that, what others know comes back from them.
     fn take_up(&mut self, found: Found) {
-        let Some(apprentice) = &self.hands.apprentice else { return };
+        let Some(apprentice) = &self.effector.apprentice else { return };
         let Found { memory, classifier, boot } = found;
         let learning = apprentice.learning().clone();
         // Its rounds are counted anew from what is remembered: another life, by name too.
@@ -159,21 +159,21 @@ impl Host {
                 let why =
                     format!("the memory that came late is not taken up, and nothing is remembered: {error}");
                 apprentice.refuse(&why);
-                return self.hands.account.error(&why);
+                return self.effector.account.error(&why);
             }
         };
         apprentice.take_up();
         self.mind = mind;
         self.believe();
         self.sight.begin_anew();
-        self.hands.account.count("memory_taken_up");
+        self.effector.account.count("memory_taken_up");
         let open = {
-            let mut status = self.hands.account.lock();
+            let mut status = self.effector.account.lock();
             status.boot = boot;
             std::mem::take(&mut status.open).then_some(status.round).flatten()
         };
         if let Some(round) = open {
-            self.hands.tell(Event::Closed(round));
+            self.effector.tell(Event::Closed(round));
         }
         let known = self.classifier.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let classifier =
@@ -188,17 +188,17 @@ impl Host {
 
     fn tell_alive(&self, mut alive: BTreeSet<RobotId>) {
         alive.remove(&self.me);
-        self.hands.account.lock().alive = alive.iter().copied().chain([self.me]).collect();
-        self.hands.tell(Event::Alive(alive));
+        self.effector.account.lock().alive = alive.iter().copied().chain([self.me]).collect();
+        self.effector.tell(Event::Alive(alive));
     }
 
     /// Puts what was learned into the status, when it has changed.
     fn report_learning(&mut self) {
-        if let Some(apprentice) = &mut self.hands.apprentice
+        if let Some(apprentice) = &mut self.effector.apprentice
             && apprentice.has_news(&self.mind)
         {
             let learning = apprentice.status(&self.mind);
-            self.hands.account.lock().learning = learning;
+            self.effector.account.lock().learning = learning;
         }
     }
 }

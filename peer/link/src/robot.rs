@@ -18,12 +18,12 @@ use crate::apprentice::{Apprentice, Prepared, RobotLearning};
 use crate::census::take_census;
 use crate::config::LinkConfig;
 use crate::deafness::mend_deafness;
+use crate::effector::Effector;
 use crate::error::LinkError;
 use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
 use crate::guard::Sight;
 use crate::guests::Guests;
-use crate::hands::Hands;
 use crate::host::Host;
 use crate::identity::{self, swarm_checksum};
 use crate::inbox::{Inbox, Sealed};
@@ -219,7 +219,7 @@ impl Robot {
             commands: command_queue,
             guests: guests.clone(),
             classifier: classifier.clone(),
-            hands: Hands { account: account.clone(), events: events.clone(), apprentice, voice },
+            effector: Effector { account: account.clone(), events: events.clone(), apprentice, voice },
             sight: Sight::new(supervisor.clone()),
         };
         let robot = Self {

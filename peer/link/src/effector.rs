@@ -12,14 +12,14 @@ use crate::event::Event;
 use crate::voice::Voice;
 
 /// By which a mind acts on the world. Nothing of it waits for another robot.
-pub(crate) struct Hands {
+pub(crate) struct Effector {
     pub account: Arc<Account>,
     pub events: broadcast::Sender<Event>,
     pub apprentice: Option<Apprentice>,
     pub voice: Voice,
 }
 
-impl Hands {
+impl Effector {
     /// Does what the mind wants done.
     pub fn carry_out(&mut self, output: Output) {
         match output {
