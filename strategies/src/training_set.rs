@@ -6,6 +6,7 @@
 //!                     └──────────────────┴───── forget when full ─────┘
 //! ```
 
+mod changes;
 mod restore_error;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,6 +17,7 @@ use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId, SampleSeries};
 use gestalt_rounds::Classify;
 use rand::Rng;
 
+pub use changes::{SampleReceipt, SetChange};
 pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
@@ -28,32 +30,6 @@ const YOUNG: usize = 20;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
-
-/// What an operation changed, in order: the caller stores, trains and broadcasts from it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SetChange {
-    /// The sample with this key came in. It may be among those removed later in the same list.
-    Added(u64),
-    /// This sample went.
-    Removed(HeldSample),
-    /// The sample with this key has another class.
-    Relabelled(u64),
-    /// The sample with this key went from personal to shared under this name; its vector is now what travels.
-    Shared(u64, SampleId),
-    /// Nothing is known any more of what was seen of this series: another took its place.
-    Unseen(SampleSeries),
-}
-
-/// What became of a received sample.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SampleReceipt {
-    /// It was taken in.
-    New(Vec<SetChange>),
-    /// It was seen before, whether it is still held or not: nothing changed.
-    Known,
-    /// Its name cannot be remembered within the bounds: nothing changed.
-    Refused(SeenError),
-}
 
 /// The bounded set of samples of one robot.
 ///

@@ -4,11 +4,28 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use gestalt_protocol::{Question, RoundId};
+use gestalt_rounds::Output as OfRounds;
 
 use crate::asking::{QuestionBudget, QuestionsConfig};
 
 /// With how many rounds before it a round is compared.
 const COMPARED: usize = 6;
+
+/// What came of one input for the rounds that this robot lives through.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Passed {
+    /// It announced a decision.
+    pub announced: bool,
+    /// It looks at a round no more.
+    pub closed: bool,
+}
+
+impl Passed {
+    pub fn note(&mut self, output: &OfRounds) {
+        self.announced |= matches!(output, OfRounds::Announce(_));
+        self.closed |= matches!(output, OfRounds::Closed(_));
+    }
+}
 
 /// What this robot knows of the swarm's questions.
 #[derive(Clone, Debug, Default)]

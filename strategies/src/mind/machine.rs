@@ -10,11 +10,10 @@ use gestalt_rounds::{
 };
 
 use super::answers::Answers;
-use super::asks::Asks;
+use super::asks::{Asks, Passed};
 use super::exchanges::Exchanges;
 use super::input::{Concern, Input};
 use super::output::Output;
-use super::questions::Passed;
 use crate::learning::{Learning, LearningError, LearningSetup, RobotMemory, Shelf};
 
 /// The state machine in every robot: what the world tells it goes in, what it wants done comes out.

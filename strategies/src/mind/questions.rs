@@ -3,29 +3,14 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Ask, Asked, ClassId, Message, Question, Reason};
-use gestalt_rounds::{Doubt, Input as AboutRounds, Output as OfRounds, outcome};
+use gestalt_rounds::{Doubt, Input as AboutRounds, outcome};
 
+use super::asks::Passed;
 use super::machine::Mind;
 use super::output::Output;
 use crate::asking::{Occasion, is_unknown, worth_asking};
 use crate::learning::Learning;
 use crate::lessons::Verdict;
-
-/// What came of one input for the rounds that this robot lives through.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Passed {
-    /// It announced a decision.
-    announced: bool,
-    /// It looks at a round no more.
-    closed: bool,
-}
-
-impl Passed {
-    pub(super) fn note(&mut self, output: &OfRounds) {
-        self.announced |= matches!(output, OfRounds::Announce(_));
-        self.closed |= matches!(output, OfRounds::Closed(_));
-    }
-}
 
 impl Mind {
     /// The swarm's question that waits for its answer.

@@ -3,6 +3,7 @@
 mod few;
 mod folds;
 mod growing;
+mod kernel;
 mod options;
 mod pair;
 mod samples;

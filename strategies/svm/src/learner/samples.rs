@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
+use super::kernel::{kernel, push, roomy};
 use super::shared::SharedKernel;
-use crate::vector::squared_distance;
 
 /// Names a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -195,25 +195,8 @@ impl KernelMatrix {
     }
 }
 
-/// exp(−γ·‖x − y‖²): the same bits whichever of the two comes first.
-pub(super) fn kernel(gamma: f32, x: &[f32], y: &[f32]) -> f32 {
-    (-gamma * squared_distance(x, y)).exp()
-}
-
-/// Pushes into a vector that grows by an eighth, not by the half: there are as many as samples.
-pub(super) fn push(row: &mut Vec<f32>, value: f32) {
-    if row.len() == row.capacity() {
-        row.reserve_exact(roomy(row.len()) - row.len());
-    }
-    row.push(value);
-}
-
 fn roomy_for(length: usize, room: usize) -> usize {
     if length <= room { room } else { roomy(length) }
-}
-
-fn roomy(length: usize) -> usize {
-    length + length / 8 + 4
 }
 
 #[cfg(test)]
@@ -222,6 +205,7 @@ mod tests {
 
     use super::super::tests::{generator, vector};
     use super::*;
+    use crate::vector::squared_distance;
 
     #[test]
     fn the_matrix_stays_true_and_small_whatever_comes_and_goes() {

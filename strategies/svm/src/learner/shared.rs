@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard};
 
 use super::Learner;
-use super::samples::{kernel, push};
+use super::kernel::{kernel, push};
 
 /// How many vectors there are at least before those that nobody holds any more are looked for.
 const FEW: usize = 1024;
