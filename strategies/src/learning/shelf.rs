@@ -7,6 +7,9 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use gestalt_protocol::{HeldBatch, RobotId, RoundId, SampleId};
 use gestalt_rounds::Testimony;
 
+/// By which lists of who is alive are found: how many they are, and the first.
+type Alive = (usize, Option<RobotId>);
+
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
 
@@ -20,8 +23,7 @@ pub struct Shelf {
     vectors: Mutex<Board<SampleId, [f32]>>,
     batches: Mutex<Board<SampleId, HeldBatch>>,
     testimonies: Mutex<Board<RoundId, Testimony>>,
-    /// By how many they are, and the first: those that one part of a swarm sees.
-    alive: Mutex<Board<(usize, Option<RobotId>), BTreeSet<RobotId>>>,
+    alive: Mutex<Board<Alive, BTreeSet<RobotId>>>,
 }
 
 impl Shelf {
