@@ -99,7 +99,8 @@ impl Rendered {
                 continue;
             }
             if name == "glove" {
-                read.glove = Some(value.parse().map_err(|_| wrong())?);
+                // As a configuration file says it.
+                read.glove = Some(serde_json::from_value(value.into()).map_err(|_| wrong())?);
                 continue;
             }
             let value = value.parse().map_err(|_| wrong())?;

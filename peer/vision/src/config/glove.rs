@@ -1,9 +1,6 @@
 //! What a synthetic hand wears.
 
-use std::str::FromStr;
-
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// What covers the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,22 +13,4 @@ pub enum Glove {
     Orange,
     /// None: skin, from fair to dark.
     Skin,
-}
-
-/// A glove that nobody can draw.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("'{0}' is no glove: cyan, orange, or skin for a bare hand")]
-pub struct NoSuchGlove(String);
-
-impl FromStr for Glove {
-    type Err = NoSuchGlove;
-
-    fn from_str(text: &str) -> Result<Self, NoSuchGlove> {
-        match text {
-            "cyan" => Ok(Self::Cyan),
-            "orange" => Ok(Self::Orange),
-            "skin" => Ok(Self::Skin),
-            _ => Err(NoSuchGlove(text.to_owned())),
-        }
-    }
 }

@@ -7,7 +7,7 @@ mod motion;
 mod schedule;
 
 pub use device::DeviceSettings;
-pub use glove::{Glove, NoSuchGlove};
+pub use glove::Glove;
 pub use layer::LayerConfig;
 pub use motion::{MotionConfig, MotionConfigError};
 pub use schedule::Schedule;
