@@ -126,7 +126,7 @@ impl<S: Scheme> Answers<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{robot, roster};
+    use crate::testing::{authority, members, robot, roster};
 
     const NOW: Duration = Duration::from_secs(1000);
 
@@ -153,13 +153,8 @@ mod tests {
         assert_eq!(check(1, "bob", b"yes", Some(&true_one)), Err(Distrust::Forged));
         assert_eq!(check(1, "ada", b"no", Some(&true_one)), Err(Distrust::Forged));
         assert_eq!(check(9, "ada", b"yes", Some(&true_one)), Err(Distrust::Stranger));
-        let elsewhere = sign(
-            &robot(1),
-            &crate::testing::members(1).sign(&robot(77)).unwrap().swarm_id(),
-            RobotId(1),
-            &ada(),
-            b"yes",
-        );
+        let other_swarm = members(1).sign(&robot(77)).unwrap().swarm_id();
+        let elsewhere = sign(&robot(1), &other_swarm, RobotId(1), &ada(), b"yes");
         assert_eq!(check(1, "ada", b"yes", Some(elsewhere.as_bytes())), Err(Distrust::Forged));
     }
 
@@ -178,5 +173,21 @@ mod tests {
             assert_eq!(check(stranger, &signed(1)), Err(Distrust::Stranger));
         }
         assert_eq!(answers.budgets.len(), 2);
+    }
+
+    #[test]
+    fn a_new_key_has_a_budget_of_its_own_and_an_old_one_goes_on_with_its() {
+        let (mut answers, before) = (Answers::default(), roster(1));
+        let forged = signed(9);
+        for robot in [1, 2].repeat(33) {
+            assert!(answers.check(NOW, &before, RobotId(robot), &ada(), b"yes", Some(&forged)).is_err());
+        }
+        let mut after = members(2);
+        after.robots.insert(RobotId(1), robot(11).public_key());
+        let after = after.sign(&authority()).unwrap();
+        answers.follow(&before, &after);
+        let mut check = |robot| answers.check(NOW, &after, RobotId(robot), &ada(), b"yes", Some(&forged));
+        assert_eq!(check(1), Err(Distrust::Forged));
+        assert_eq!(check(2), Err(Distrust::TooFast));
     }
 }

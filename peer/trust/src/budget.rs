@@ -79,17 +79,27 @@ pub(crate) enum Way {
 
 /// What is left of a [`Budget`] by each way.
 #[derive(Clone, Debug)]
-pub(crate) struct Ways([Bucket; 3]);
+pub(crate) struct Ways {
+    said: Bucket,
+    passed_on: Bucket,
+    evidence: Bucket,
+}
 
 impl Ways {
     /// Full ones.
     pub(crate) fn new(budget: &Budget, now: Duration) -> Self {
-        Self(std::array::from_fn(|_| Bucket::new(budget, now)))
+        let full = Bucket::new(budget, now);
+        Self { said: full.clone(), passed_on: full.clone(), evidence: full }
     }
 
     /// Takes one check out by that way, if there is one.
     pub(crate) fn take(&mut self, way: Way, budget: &Budget, now: Duration) -> bool {
-        self.0[way as usize].take(budget, now)
+        let bucket = match way {
+            Way::Said => &mut self.said,
+            Way::PassedOn => &mut self.passed_on,
+            Way::Evidence => &mut self.evidence,
+        };
+        bucket.take(budget, now)
     }
 }
 

@@ -86,6 +86,7 @@ mod tests {
     use gestalt_protocol::{Signature, Stamp};
 
     use super::*;
+    use crate::signed::MAX_SIGNED;
     use crate::testing::robot;
 
     /// Enters evidence of that length against that robot.
@@ -119,6 +120,7 @@ mod tests {
         assert_eq!(robots(docket.untold(NOW)), [1, 2]);
         assert_eq!(robots(docket.untold(NOW + 2 * AGAIN)), [0; 0], "once");
         docket.tell_again();
+        assert_eq!(robots(docket.untold(NOW)), [0; 0], "not twice at once");
         let soon = NOW + AGAIN - Duration::from_millis(1);
         assert_eq!(robots(docket.untold(soon)), [0; 0]);
         enter(&mut docket, 3, 10, true);
@@ -140,6 +142,13 @@ mod tests {
         docket.retain(|_| false);
         docket.tell_again();
         assert_eq!(robots(docket.untold(NOW)), [0; 0]);
+    }
+
+    #[test]
+    fn the_longest_evidence_against_thirty_two_robots_is_kept() {
+        let mut docket = Docket::default();
+        (0..32).for_each(|against| enter(&mut docket, against, MAX_SIGNED, false));
+        assert_eq!(docket.unkept().len(), 32);
     }
 
     #[test]

@@ -250,6 +250,13 @@ mod tests {
     }
 
     #[test]
+    fn whoever_reads_of_a_lie_reads_which_it_is() {
+        let told = [Lie::TwoThings, Lie::Unfounded].map(|lie| lie.to_string());
+        assert!(told[0].contains("two things under one stamp"), "{told:?}");
+        assert!(told[1].contains("does not follow from its votes"), "{told:?}");
+    }
+
+    #[test]
     fn it_convicts_the_key_that_lied() {
         let stamp = Stamp { boot: 1, sequence: 5 };
         let key = robot(2).public_key();

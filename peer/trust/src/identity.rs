@@ -100,6 +100,12 @@ mod tests {
             assert_eq!(identity.sign_certificate(&body), None);
         }
         assert_eq!(identity.sign_certificate(&[0x30, 0x82]), None);
+        // The shortest whose length takes more than a byte to say; and one that does not say it, which no certificate may leave out.
+        body[..2].copy_from_slice(&[0x30, 0x81]);
+        assert!(identity.sign_certificate(&body[..0x81]).is_some());
+        assert_eq!(identity.sign_certificate(&body[..0x80]), None);
+        body[1] = 0x80;
+        assert_eq!(identity.sign_certificate(&body), None);
     }
 
     #[test]

@@ -59,7 +59,7 @@ mod tests {
     fn a_key_has_one_spelling() {
         let text = "d75a980182b10ab7d54bfed3c964073a0ee172f3daa62325af021a68f707511a";
         let key: PublicKey = text.parse().unwrap();
-        assert_eq!(key.to_string(), text);
+        assert_eq!((key.to_string(), format!("{key:?}")), (text.to_owned(), format!("PublicKey({text})")));
         assert_eq!(serde_json::to_string(&key).unwrap(), format!("\"{text}\""));
         assert_eq!(serde_json::from_str::<PublicKey>(&format!("\"{text}\"")).unwrap(), key);
         assert_eq!(postcard::to_allocvec(&key).unwrap(), key.as_bytes());

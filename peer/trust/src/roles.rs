@@ -163,16 +163,19 @@ mod tests {
         for bad in [r#"["teach","open"]"#, r#"["open","open"]"#, r#"["reign"]"#, "7", r#""open""#] {
             assert!(serde_json::from_str::<Roles>(bad).is_err(), "{bad}");
         }
+        let why = serde_json::from_str::<Roles>("7").unwrap_err().to_string();
+        assert!(why.contains("a list of roles: open, teach, overrule, in this order"), "{why}");
     }
 
     #[test]
     fn a_role_is_read_as_it_is_written() {
         for role in Role::ALL {
-            assert_eq!(role.name().parse(), Ok(role));
+            assert_eq!((role.name().parse(), role.to_string()), (Ok(role), role.name().to_owned()));
             assert!(Roles::up_to(role).has(role));
         }
         assert!("reign".parse::<Role>().unwrap_err().to_string().contains("overrule"));
         assert_eq!(Roles::up_to(Role::Teach).to_string(), "open, teach");
         assert_eq!(Roles::NONE.to_string(), "nothing");
+        assert!(Roles::from_iter([Role::Teach, Role::Teach]).has(Role::Teach), "said twice it is said");
     }
 }

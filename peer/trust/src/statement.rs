@@ -124,6 +124,7 @@ mod tests {
         let bytes = signed_bytes(&swarm, b"said");
         assert_eq!(bytes, [b"gestalt-statement-1\0".as_slice(), swarm.as_bytes(), b"said"].concat());
         // sha256 of the text, 32 bytes of 7 and the name, by another program: what is signed never changes.
+        assert_eq!(format!("{swarm:?}"), format!("SwarmId({swarm})"));
         assert_eq!(swarm.to_string(), "676f09d996cb08995de9910895303efa50eea6cd9765a4f5282f2338c24593b7");
         assert_eq!(
             sign(&robot(0), &swarm, b"said").to_string(),

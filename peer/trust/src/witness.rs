@@ -171,7 +171,9 @@ mod tests {
         for length in [MAX_EVIDENT, MAX_EVIDENT + 1] {
             witness.observe(&long(2, length as u32, length), &signature);
         }
-        assert_eq!(witness.authors[&RobotId(2)].statements.len(), 1, "the other is too long");
+        let remembered = &witness.authors[&RobotId(2)].statements;
+        let lengths: Vec<usize> = remembered.iter().map(|(_, signed)| signed.statement.len()).collect();
+        assert_eq!(lengths, [MAX_EVIDENT], "the other is too long");
         let mut witness = Witness::of(MAX_ROBOTS);
         for author in 0..2 * MAX_ROBOTS as u32 {
             for sequence in 0..3 {
@@ -183,6 +185,28 @@ mod tests {
             witness.authors.values().map(|heard| heard.statements.len()).sum::<usize>(),
             2 * MAX_ROBOTS
         );
+    }
+
+    #[test]
+    fn what_fills_a_share_to_the_last_byte_is_remembered() {
+        let share = TOTAL_BYTES / MAX_ROBOTS;
+        let beside = size_of::<(Stamp, Signed)>();
+        let of_length = |sequence: u32, cost: usize| {
+            let mut statement = have(1, sequence);
+            statement.resize(cost - beside, 0);
+            statement
+        };
+        let bytes_of = |costs: &[usize]| {
+            let mut witness = Witness::of(MAX_ROBOTS);
+            for (sequence, cost) in (1..).zip(costs) {
+                witness.observe(&of_length(sequence, *cost), &Signature::from_bytes([0; 64]));
+            }
+            witness.bytes()
+        };
+        assert_eq!(bytes_of(&[share]), share);
+        assert_eq!(bytes_of(&[share + 1]), 0, "longer than all that is remembered of one author");
+        assert_eq!(bytes_of(&[share - 1000, 1000]), share);
+        assert_eq!(bytes_of(&[share - 1000, 1001]), 1001, "the older one makes room");
     }
 
     #[test]

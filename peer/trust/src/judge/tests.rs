@@ -28,6 +28,28 @@ fn who_says_two_things_is_told_of_once_and_again_to_those_who_come() {
     assert_eq!(there.untold(NOW), told);
 }
 
+#[test]
+fn evidence_is_handed_out_once_to_be_kept_whoever_found_it() {
+    let (mut here, mut there) = (Judge::new(roster(5), |_| false), Judge::new(roster(5), |_| false));
+    assert_eq!((here.envelope(NOW, &said(1, 1, 1.0)), here.unkept()), (Ok(()), vec![]));
+    assert_eq!(here.envelope(NOW, &said(1, 1, -1.0)), Err(Distrust::Convicted));
+    let kept = here.unkept();
+    assert_eq!((kept.len(), here.unkept()), (1, vec![]));
+    assert_eq!(there.evidence(NOW, kept[0].1.clone()), Ok(()));
+    assert_eq!((there.unkept(), there.convicts(RobotId(1))), (kept, true));
+}
+
+#[test]
+fn an_answer_is_its_robots() {
+    let mut judge = Judge::new(roster(5), |_| false);
+    let ada = "ada".parse().unwrap();
+    let signature = crate::answer::sign(&robot(1), &roster(5).swarm_id(), RobotId(1), &ada, b"yes");
+    let mut hear =
+        |robot, said: &[u8]| judge.answer(NOW, RobotId(robot), &ada, said, Some(signature.as_bytes()));
+    assert_eq!(hear(1, b"yes"), Ok(()));
+    assert_eq!((hear(1, b"no"), hear(2, b"yes")), (Err(Distrust::Forged), Err(Distrust::Forged)));
+}
+
 /// That robot's word that it holds something, signed by that one.
 fn word(author: u32, by: u32) -> Envelope {
     let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
