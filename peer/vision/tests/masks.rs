@@ -1,6 +1,7 @@
 //! The masks of learned eyes against outlines of bare hands that were checked by eye. The outlines are in `truth/masks.csv`; the
 //! pictures are not part of the project: `GESTALT_DATA`, or `../shared/data` seen from the workspace; skipped where there are
-//! none.
+//! none. Most of them but the plain walls' had a part in making the weights, there with masks that were made without an eye on
+//! them: only what is said of plain walls is said of a camera and a person never seen.
 //!
 //! `cargo test -p gestalt-vision --test masks -- --nocapture` prints the figures.
 
