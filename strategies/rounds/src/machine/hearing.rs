@@ -155,14 +155,15 @@ impl Rounds {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
         }
-        if self.is_too_soon(id, by, effects) {
+        if !this && self.is_too_soon(id, by, effects) {
             self.refusals.add(Refusal::TooSoon);
             return Err(Refusal::TooSoon);
         }
         self.highest = self.highest.max(Some(id.counter));
         let order = match &self.round {
-            Some(round) if !this => id.cmp(&round.id),
-            _ => self.compare(id),
+            None => Ordering::Greater,
+            Some(_) if this => Ordering::Equal,
+            Some(round) => id.cmp(&round.id),
         };
         if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
             effects.follower.merged(round.id, id);
@@ -177,6 +178,17 @@ impl Rounds {
         self.round.as_ref().is_some_and(|round| {
             round.id == decision.round
                 || self.now >= (round.since + took).saturating_sub(self.config.patience)
+        })
+    }
+
+    /// Whether a decision counts votes that were cast under a name of the round known here: then it is of that round, whatever it calls it. Whoever heard
+    /// those while its own round began took both for one; those who opened first heard of the other name too late to tell.
+    fn is_counted_in(&self, decision: &Decision) -> bool {
+        let Certificate { votes, others, .. } = &decision.certificate;
+        let mut names =
+            votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
+        self.round.as_ref().is_some_and(|round| {
+            round.id.counter == decision.round.counter && names.any(|name| round.is_named(name))
         })
     }
 
@@ -278,7 +290,8 @@ impl Rounds {
             self.refusals.add(Refusal::Impossible);
             return Heard::Refused;
         }
-        let this = self.is_this_round(decision.round) && self.is_as_old(&decision);
+        let opened_at_once = self.is_this_round(decision.round) && self.is_as_old(&decision);
+        let this = opened_at_once || self.is_counted_in(&decision);
         let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
         if held == Some(&decision) {
             return Heard::Known;

@@ -68,6 +68,32 @@ fn a_vote_under_another_name_of_a_round_begins_no_other_however_late() {
 }
 
 #[test]
+fn a_decision_that_counts_votes_of_a_round_is_of_it_however_late_its_other_name_comes() {
+    let mut mind = mind(7);
+    let counted = [(1, 1), (2, 1), (9, 9)].map(|(robot, opener)| CountedVote {
+        robot: RobotId(robot),
+        stamp: Stamp { boot: 1, sequence: 1 },
+        class: ClassId(0),
+        weight: 1.0,
+        vote: Vote { round: round(1, opener), ..vote(1, 0, SURE) },
+        signature: None,
+    });
+    mind.handle(ms(0), votes(9, 1, counted[2].vote.clone()));
+    // Robot 1 opened it too, heard robot 9 in time, and was heard here after that.
+    let late = adding_up().deadline + ms(2000);
+    live(&mut mind, late);
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), false));
+    mind.handle(late, gives(1, decided(round(1, 1), Some(0), counted[..2].to_vec(), 1)));
+    assert_eq!(mind.round(), Some(round(1, 9)), "as far as can be told, that was another showing");
+    mind.handle(late + ms(1), gives(1, decided(round(1, 1), Some(0), counted.to_vec(), 1)));
+    assert_eq!(mind.round(), Some(round(1, 1)));
+    assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(0)));
+    // One name of it is as good as another.
+    mind.handle(late + ms(2), votes(9, 2, Vote { round: round(1, 9), ..null(1) }));
+    assert_eq!(mind.round(), Some(round(1, 1)));
+}
+
+#[test]
 fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
     let mut mind = mind(7).counting_from(Some(1000));
     let ahead = 1000 + (1 << 24);
