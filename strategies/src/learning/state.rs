@@ -248,7 +248,10 @@ impl Learning {
         let (heard, forgotten) = self.lessons.hear_among(lesson, standing, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.judged.doubt();
-            self.dirty.insert(Item::Lessons(lesson.round));
+            // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
+            if self.newest.is_some() || standing.is_some() {
+                self.dirty.insert(Item::Lessons(lesson.round));
+            }
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
         }
@@ -271,7 +274,7 @@ impl Learning {
             // Under this key stands what was known when it was drawn.
             self.digest();
             let forgotten = self.lessons.forget_beyond(self.furthest());
-            self.dirty.extend(forgotten.into_iter().map(Item::Lessons));
+            self.dirty.extend(forgotten.into_iter().chain(self.lessons.all_rounds()).map(Item::Lessons));
         }
     }
 

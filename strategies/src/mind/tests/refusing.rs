@@ -122,6 +122,28 @@ fn what_a_newborn_was_told_of_rounds_to_come_is_forgotten_when_it_knows_better()
 }
 
 #[test]
+fn a_newborn_that_starts_again_counts_from_no_round_that_it_was_only_told_of() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 36);
+    let told = |counter| {
+        let round = RoundId { counter, opener: RobotId(1), life: 0 };
+        forged(round, "eve", 1, Word::Was(ClassId(1)))
+    };
+    lessons(&mut swarm, 0, vec![told(900_000), told(3)]);
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect::<Vec<_>>(), [2, 2]);
+    swarm.restart_all();
+    lessons(&mut swarm, 0, vec![told(900_000), told(3)]);
+    let round = swarm.show(1);
+    assert_eq!(round.counter, 1);
+    swarm.was(round, 1);
+    // What it was told that can be true is kept from then on.
+    swarm.pass(Duration::from_secs(10));
+    swarm.restart_all();
+    assert_eq!(swarm.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect::<Vec<_>>(), [2, 2]);
+    assert!(swarm.show(2).counter <= 4);
+}
+
+#[test]
 fn an_instructor_can_correct_whatever_was_said_in_its_name() {
     let mut swarm = Swarm::new(3, config(2, 1.0), 33);
     let round = swarm.show(1);
