@@ -1,5 +1,6 @@
 //! An honest robot's mind, that signs its votes and learns.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -8,7 +9,8 @@ use gestalt_protocol::{Decision, Envelope, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS,
 use gestalt_strategies::sample::MAX_SERIES;
 use gestalt_strategies::{
     Classify, ClassifyError, Components, FeatureSpace, Input, LearningConfig, LearningSetup, Life, Mind,
-    MindConfig, Observation, Output, OwnRules, Refusals, ScalingMethod, Vocabulary, is_refuted,
+    MindConfig, Observation, Output, OwnRules, RecordChange, Refusals, RobotMemory, ScalingMethod,
+    Vocabulary, is_refuted,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -93,32 +95,53 @@ fn given(output: &Output) -> Option<&Decision> {
 pub struct Robot {
     mind: Mind,
     refusals: Refusals,
+    /// How often it was started.
+    boot: u32,
+    /// What it has written, if it learns.
+    disk: Option<Records>,
     /// Whether it has ever had as many samples as it holds at most, so that it forgot some.
     full: bool,
 }
 
+/// What is on a disk.
+type Records = BTreeMap<Vec<u8>, Vec<u8>>;
+
+/// The mind of a member of the swarm in its life of that number, with what is on its disk. One that does not learn is made in no time.
+fn mind(me: RobotId, boot: u32, disk: Option<&Records>) -> Mind {
+    // Drawn at random: no stranger guesses it.
+    let nonce = 0x9E37_79B9_u32.wrapping_mul(me.0).wrapping_add(0x85EB_CA6B_u32.wrapping_mul(boot - 1));
+    let mind = Mind::new(me, Life { boot, nonce }, MindConfig::default()).expect("the default is sound");
+    let mind = mind.signed_by(Arc::new(Signer(me)));
+    let Some(disk) = disk else { return mind };
+    let records = disk.iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
+    let setup = LearningSetup {
+        config: LearningConfig::default(),
+        space: space(),
+        vocabulary: vocabulary().clone(),
+        rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(nonce))),
+        memory: Some(RobotMemory::read(records).expect("it reads what it wrote")),
+        rules: OwnRules::default(),
+    };
+    mind.learning(setup).expect("a sound setup")
+}
+
 impl Robot {
-    /// The mind of a member of the swarm. One that does not learn is made in no time.
+    /// A member of the swarm, which was never started before.
     pub fn new(me: RobotId, learns: bool) -> Self {
-        // Drawn at random: no stranger guesses it.
-        let life = Life { boot: 1, nonce: 0x9E37_79B9_u32.wrapping_mul(me.0) };
-        let mind = Mind::new(me, life, MindConfig::default()).expect("the default is sound");
-        let mut mind = mind.signed_by(Arc::new(Signer(me)));
-        if learns {
-            let setup = LearningSetup {
-                config: LearningConfig::default(),
-                space: space(),
-                vocabulary: vocabulary().clone(),
-                rng: Box::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
-                memory: None,
-                rules: OwnRules::default(),
-            };
-            mind = mind.learning(setup).expect("a sound setup");
-        }
+        let disk = learns.then(Records::new);
+        let mind = mind(me, 1, disk.as_ref());
         let refusals = mind.refusals().clone();
-        let mut robot = Self { mind, refusals, full: false };
+        let mut robot = Self { mind, refusals, boot: 1, disk, full: false };
         robot.handle(Duration::ZERO, Input::Learned(Arc::new(ByFirst)));
         robot
+    }
+
+    /// Ends it, and starts it again with what is on its disk, or with an empty one. It has no classifier yet.
+    pub fn restart(&mut self, keeps_disk: bool) {
+        self.boot += 1;
+        self.disk.iter_mut().filter(|_| !keeps_disk).for_each(Records::clear);
+        self.mind = mind(self.mind.me(), self.boot, self.disk.as_ref());
+        self.refusals = self.mind.refusals().clone();
     }
 
     /// The mind.
@@ -131,13 +154,13 @@ impl Robot {
         self.full
     }
 
-    /// Lets it take in one input.
+    /// Lets it take in one input, and writes to its disk what it wants remembered.
     ///
     /// # Panics
     /// If it wants more done than one input is worth, or says what others could not read or would convict it of, or forgets what it refused.
     pub fn handle(&mut self, now: Duration, input: Input) -> Vec<Output> {
         TAKEN_IN.fetch_add(1, Ordering::Relaxed);
-        let outputs = self.mind.handle(now, input);
+        let mut outputs = self.mind.handle(now, input);
         assert!(outputs.len() <= MOST_OUTPUTS, "{} outputs for one input", outputs.len());
         for output in &outputs {
             if let Output::Broadcast(envelope) | Output::Tell(_, envelope) = output {
@@ -155,7 +178,24 @@ impl Robot {
         }
         self.refusals = refusals.clone();
         self.full |= self.mind.training_set().is_some_and(|set| set.len() >= set.capacity());
+        let written = outputs.iter().filter_map(|output| self.write(output)).max();
+        if let Some(revision) = written {
+            outputs.extend(self.handle(now, Input::Remembered(revision)));
+        }
         outputs
+    }
+
+    /// What it wants remembered is on its disk at once, all of it.
+    fn write(&mut self, output: &Output) -> Option<u64> {
+        let Output::Remember { revision, changes } = output else { return None };
+        let disk = self.disk.as_mut()?;
+        for RecordChange { key, value } in changes {
+            match value {
+                Some(value) => drop(disk.insert(key.clone(), value.clone())),
+                None => drop(disk.remove(key)),
+            }
+        }
+        Some(*revision)
     }
 
     /// Says so if a table is larger than it may be, or holds a vote that its author never signed.

@@ -93,7 +93,11 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
         10 => world.arrive_all(),
         11 => {
             let (one, other) = (events.robot(), events.place());
-            world.cut(one, other / 2 % ROBOTS, other & 1 == 1);
+            match other / 2 % ROBOTS {
+                // Nobody has a link with itself.
+                itself if itself == one => world.restart(one, other & 1 == 0),
+                another => world.cut(one, another, other & 1 == 1),
+            }
         }
         12 => {
             let (robot, who) = (events.robot(), events.byte());

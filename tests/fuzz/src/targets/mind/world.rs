@@ -1,19 +1,24 @@
 //! Three honest robots of a sealed swarm, and the network between them, which may lose, delay, repeat and reorder.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, InstructorId, Question, RobotId, RoundId};
 use gestalt_strategies::{Input, Output};
 
 use crate::gate::Gate;
-use crate::robot::Robot;
+use crate::robot::{ByFirst, Robot};
 
 /// Robots 1 to so many are honest.
 pub const ROBOTS: usize = 3;
 
 /// The most messages that are on their way, and the most that are remembered to be said again.
 const MOST: usize = 256;
+
+fn everybody() -> BTreeSet<RobotId> {
+    (1..=ROBOTS as u32).map(RobotId).collect()
+}
 
 /// What travels.
 #[derive(Clone, Debug)]
@@ -67,11 +72,24 @@ impl World {
     /// All links are whole, and all robots know of each other.
     pub fn introduce(&mut self) {
         self.cut.clear();
-        let all: BTreeSet<RobotId> = (1..=ROBOTS as u32).map(RobotId).collect();
-        for robot in 0..ROBOTS {
-            self.input(robot, Input::Alive(all.clone()));
-            self.input(robot, Input::Neighbours(all.clone()));
-        }
+        let all = everybody();
+        (0..ROBOTS).for_each(|robot| self.introduce_to(robot, &all));
+    }
+
+    fn introduce_to(&mut self, robot: usize, all: &BTreeSet<RobotId>) {
+        self.input(robot, Input::Alive(all.clone()));
+        self.input(robot, Input::Neighbours(all.clone()));
+    }
+
+    /// A robot is ended and started again with what is on its disk, or with an empty one. What is on its way to it arrives.
+    ///
+    /// # Panics
+    /// If it cannot read its disk.
+    pub fn restart(&mut self, robot: usize, keeps_disk: bool) {
+        self.robots[robot].restart(keeps_disk);
+        self.gates[robot] = Gate::default();
+        self.input(robot, Input::Learned(Arc::new(ByFirst)));
+        self.introduce_to(robot, &everybody());
     }
 
     pub fn robots(&self) -> &[Robot] {
