@@ -19,6 +19,10 @@ pub const CELLS: (usize, usize) = (40, 30);
 /// Two hands of each tenth frame are all.
 pub const MOST: usize = 2;
 
+/// Shares of frames that are real pictures as they are: without a hand, and with one. The others are composed.
+const NOTHING: f32 = 0.13;
+const REAL: f32 = 0.4;
+
 /// One frame, where its hands are, and which share of each cell is hand.
 pub struct Frame {
     pub picture: Vec<u8>,
@@ -73,7 +77,11 @@ impl Scene {
         let mut mask = Canvas::new(width, height, 1);
         let mut hands: Vec<Hand> = Vec::new();
         let mut canvas;
-        if rng.random::<f32>() < 0.4 {
+        let kind: f32 = rng.random();
+        let nothing = if kind < NOTHING { scenery.nothing(rng, width, height, 2.0) } else { None };
+        if let Some(nothing) = nothing {
+            canvas = nothing;
+        } else if kind < NOTHING + REAL {
             let hand;
             (canvas, mask, hand) = real_frame(scenery, rng, times);
             if rng.random::<f32>() < 0.15 {
@@ -88,7 +96,7 @@ impl Scene {
             canvas = scenery.background(rng, width, height);
             scenery.distract(&mut canvas, rng, (10.0 * k, 70.0 * k), (k, 16.0 * k));
             let count = match rng.random::<f32>() {
-                x if x < 0.28 => 0,
+                x if x < 0.2 => 0,
                 x if x < 0.9 => 1,
                 _ => MOST,
             };
@@ -174,7 +182,7 @@ fn shrunk_mask(mask: &Canvas) -> Vec<u8> {
 
 fn somewhere(rng: &mut ChaCha8Rng, k: f32) -> Place {
     let side = uniform(rng, 7.0_f32.ln(), 120.0_f32.ln()).exp() * k;
-    let up = if rng.random::<f32>() < 0.75 { 0.45 * normal(rng) } else { uniform(rng, -PI, PI) };
+    let up = if rng.random::<f32>() < 0.65 { 0.6 * normal(rng) } else { uniform(rng, -PI, PI) };
     let edge = (0.35 * side).min(50.0 * k);
     let x = uniform(rng, edge, WIDTH as f32 * k - edge);
     let y = uniform(rng, edge.min(45.0 * k), HEIGHT as f32 * k - edge.min(45.0 * k));
@@ -188,7 +196,7 @@ fn real_frame(scenery: &Scenery, rng: &mut ChaCha8Rng, times: usize) -> (Canvas,
     let (w, h, k) = (width as f32, height as f32, times as f32);
     let (pw, ph) = (photo.picture.width() as f32, photo.picture.height() as f32);
     let mirror = if rng.random() { 1.0 } else { -1.0 };
-    let turn = 0.25 * normal(rng);
+    let turn = 0.3 * normal(rng);
     let (fit, fill) = ((w / pw).min(h / ph), (w / pw).max(h / ph));
     let scale = if rng.random::<f32>() < 0.6 {
         fill * uniform(rng, -0.1, 0.5).exp()

@@ -12,8 +12,8 @@ use crate::sets::Set;
 use crate::surfaces::{cloth, limb, skin, smooth_noise, texture};
 
 /// What backgrounds are: invented below this, pictures without hands below the next, else parts of pictures beside a hand.
-const TEXTURES: f32 = 0.25;
-const NOTHING: f32 = 0.45;
+const TEXTURES: f32 = 0.15;
+const NOTHING: f32 = 0.55;
 
 /// The origin of drawn hands.
 pub const DRAWN: u32 = 1000;
@@ -57,25 +57,29 @@ impl Scenery {
         &self.photos.hands[*pick(&self.cuts, rng).expect("there are pictures of hands")]
     }
 
+    /// A real picture without a hand, or a part of it: from the whole to an area `closest` squared times as small.
+    pub fn nothing(&self, rng: &mut impl Rng, w: usize, h: usize, closest: f32) -> Option<Canvas> {
+        let picture = pick(&self.photos.empty, rng)?;
+        let centre = (w as f32 / 2.0 - 0.5, h as f32 / 2.0 - 0.5);
+        let (pw, ph) = (picture.width() as f32, picture.height() as f32);
+        let scale = (w as f32 / pw).max(h as f32 / ph) * uniform(rng, 0.0, closest.ln()).exp();
+        let from = (
+            pw / 2.0 + uniform(rng, -0.5, 0.5) * (pw - w as f32 / scale),
+            ph / 2.0 + uniform(rng, -0.5, 0.5) * (ph - h as f32 / scale),
+        );
+        let map = Affine::similar(from, centre, 0.15 * normal(rng), scale, sign(rng), 1.0);
+        Some(picture.warp(&map, w, h, Outside::Mirrored))
+    }
+
     /// Something without a hand.
     pub fn background(&self, rng: &mut impl Rng, w: usize, h: usize) -> Canvas {
         let kind: f32 = rng.random();
-        let centre = (w as f32 / 2.0 - 0.5, h as f32 / 2.0 - 0.5);
-        let nothing = if kind < NOTHING { pick(&self.photos.empty, rng) } else { None };
-        let mut canvas = if let Some(picture) = nothing.filter(|_| kind >= TEXTURES) {
-            let (pw, ph) = (picture.width() as f32, picture.height() as f32);
-            let scale = (w as f32 / pw).max(h as f32 / ph) * uniform(rng, 0.0, 1.1).exp();
-            let from = (
-                pw / 2.0 + uniform(rng, -0.5, 0.5) * (pw - w as f32 / scale),
-                ph / 2.0 + uniform(rng, -0.5, 0.5) * (ph - h as f32 / scale),
-            );
-            let map = Affine::similar(from, centre, 0.15 * normal(rng), scale, sign(rng), 1.0);
-            picture.warp(&map, w, h, Outside::Mirrored)
-        } else if kind < NOTHING {
-            texture(rng, w, h)
-        } else {
-            self.beside_a_hand(rng, w, h).unwrap_or_else(|| texture(rng, w, h))
+        let real = match kind {
+            k if k < TEXTURES => None,
+            k if k < NOTHING => self.nothing(rng, w, h, 3.0),
+            _ => self.beside_a_hand(rng, w, h),
         };
+        let mut canvas = real.unwrap_or_else(|| texture(rng, w, h));
         if chance(rng, 0.35) {
             for _ in 0..rng.random_range(0..3) {
                 let Some(picture) = pick(&self.photos.empty, rng) else { break };
