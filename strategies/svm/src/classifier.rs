@@ -107,8 +107,8 @@ impl Classifier {
         self.machine.counts.iter().sum()
     }
 
-    /// The support vectors with their classes.
-    pub(crate) fn vectors(&self) -> impl Iterator<Item = (ClassId, &[f32])> {
+    /// The support vectors, in its space, with their classes.
+    pub fn vectors(&self) -> impl Iterator<Item = (ClassId, &[f32])> {
         let classes = self.met().zip(&self.machine.counts);
         let classes = classes.flat_map(|(class, &count)| std::iter::repeat_n(ClassId(class as u32), count));
         classes.zip(self.machine.vectors.chunks_exact(self.machine.width))

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use gestalt_strategies::LearnError;
 use gestalt_vision::dataset::DatasetError;
+use gestalt_vision::model::ModelError;
 use gestalt_vision::perception::PerceptionError;
 use gestalt_vision::source::SourceError;
 use thiserror::Error;
@@ -40,6 +41,9 @@ pub enum ExperimentError {
     /// A picture that cannot be read, or a camera that cannot be.
     #[error(transparent)]
     Source(#[from] SourceError),
+    /// A shipped model that cannot be read.
+    #[error(transparent)]
+    Model(#[from] ModelError),
     /// Eyes that cannot see.
     #[error(transparent)]
     Perception(#[from] PerceptionError),

@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
-use gestalt_vision::perception::{HandConfig, Perception};
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::source::Glove;
 use gestalt_vision::source::rendered::TrainingFrames;
 
 use super::error::ExperimentError;
-use super::pool::FEATURES;
 use super::program::Program;
 use crate::emulation::{self, Group, LinkModel, Order, Scenario, Teaching, Trace, View};
 use crate::shape::NetworkShape;
@@ -15,18 +14,18 @@ use crate::shape::NetworkShape;
 /// Frames that the eyes are tried on: each gesture by three people and all cameras.
 const FRAMES: usize = 18;
 
-/// This program: looks at a few rendered hands and lets a small swarm learn, which takes a fraction of a second.
+/// This program with the eyes for these features: looks at a few rendered hands and lets a small swarm learn, which takes a fraction of a second.
 ///
 /// # Errors
 /// Hands that cannot be rendered or seen, or a swarm that cannot be emulated.
-pub fn this_program() -> Result<Program, ExperimentError> {
-    Ok(Program { version: env!("CARGO_PKG_VERSION").to_owned(), eyes: eyes()?, minds: minds()? })
+pub fn this_program(features: FeatureSet) -> Result<Program, ExperimentError> {
+    Ok(Program { version: env!("CARGO_PKG_VERSION").to_owned(), eyes: eyes(features)?, minds: minds()? })
 }
 
-fn eyes() -> Result<u32, ExperimentError> {
-    let mut perception = Perception::new(FEATURES, HandConfig::default())?;
+fn eyes(features: FeatureSet) -> Result<u32, ExperimentError> {
+    let mut perception = Perception::new(features, HandConfig::default())?;
     let mut seen = crc32fast::Hasher::new();
-    seen.update(FEATURES.name().as_bytes());
+    seen.update(features.name().as_bytes());
     for frame in TrainingFrames::new(Vec::new(), Glove::Cyan, 60.0, 1).take(FRAMES) {
         match perception.observe(&frame?.image) {
             Ok(observation) => {
@@ -74,10 +73,11 @@ mod tests {
 
     #[test]
     fn a_program_is_like_itself_and_sees_and_learns() {
-        let this = this_program().unwrap();
-        assert_eq!(this, this_program().unwrap());
+        let this = this_program(FeatureSet::Shape).unwrap();
+        assert_eq!(this, this_program(FeatureSet::Shape).unwrap());
+        assert_ne!(this.eyes, this_program(FeatureSet::Embedding).unwrap().eyes);
         // Were no hand seen or nothing learned, every program would look like every other.
-        let mut perception = Perception::new(FEATURES, HandConfig::default()).unwrap();
+        let mut perception = Perception::new(FeatureSet::Shape, HandConfig::default()).unwrap();
         let frames = TrainingFrames::new(Vec::new(), Glove::Cyan, 60.0, 1).take(FRAMES);
         let seen = frames.filter(|frame| perception.observe(&frame.as_ref().unwrap().image).is_ok()).count();
         assert!(seen > FRAMES / 2, "{seen} of {FRAMES}");

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use super::error::ExperimentError;
 use super::setting::{Drift, Method, Setting, Start};
 use gestalt_vision::camera_model::CameraModel;
+use gestalt_vision::perception::FeatureSet;
 use gestalt_vision::pose::Placement;
 use gestalt_vision::source::Glove;
 use gestalt_vision::vocabulary::GestureBook;
@@ -70,6 +71,9 @@ pub struct Hands {
     pub placement: Placement,
     /// The robots' camera: `footbot`, `parrot` or `laptop`.
     pub camera: String,
+    /// What robots learn from: `shape`, `hog` or `embedding`. Embeddings are of learned eyes, which know bare hands.
+    #[serde(skip_serializing_if = "is_shape")]
+    pub features: FeatureSet,
     /// What the rendered hands wear.
     pub glove: Glove,
     /// A ready vocabulary that rendered hands show, by name: `spatial`, `rescue`. `None`: they count 0 to 5.
@@ -81,6 +85,10 @@ pub struct Hands {
     pub pictures: usize,
     /// How many metres a dataset's picture is high.
     pub picture_height_m: f64,
+}
+
+fn is_shape(features: &FeatureSet) -> bool {
+    *features == FeatureSet::Shape
 }
 
 impl Hands {
@@ -121,6 +129,7 @@ impl Default for Hands {
             places: 24,
             placement: Placement::default(),
             camera: "footbot".to_owned(),
+            features: FeatureSet::Shape,
             glove: Glove::Cyan,
             vocabulary: None,
             people: 36,
@@ -194,6 +203,12 @@ impl Experiment {
             );
         }
         cells.iter().try_for_each(|cell| cell.setting.scenario(2).map(drop))
+    }
+
+    /// What robots see: the photographs of a dataset where there is one.
+    #[must_use]
+    pub fn seen(&self, dataset: Option<&Path>) -> &Hands {
+        if dataset.is_some() { &self.photographs } else { &self.hands }
     }
 
     /// All that is run, line by line.

@@ -18,13 +18,10 @@ use super::replace::replace;
 use super::setting::Drift;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::dataset::Dataset;
-use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::perception::{HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{EmulatedView, RenderedSource, Scene, Source, read_image};
 use gestalt_vision::vocabulary::HandPose;
-
-/// The features robots learn from.
-pub const FEATURES: FeatureSet = FeatureSet::Shape;
 
 /// How often each person shows a gesture where the people themselves change half-way, and how many do before and
 /// after.
@@ -94,12 +91,12 @@ impl Pool {
         step: impl Fn(usize, usize) + Sync,
     ) -> Result<Self, ExperimentError> {
         let drift = experiment.drift();
-        let hands = if dataset.is_some() { &experiment.photographs } else { &experiment.hands };
+        let hands = experiment.seen(dataset);
         let (gestures, takes) = match dataset {
             None => rendered(hands, drift)?,
             Some(folder) => pictured(hands, drift, folder)?,
         };
-        let made_of = serde_json::to_string(&(FEATURES.name(), eyes, hands, drift, &gestures, &takes))
+        let made_of = serde_json::to_string(&(hands.features.name(), eyes, hands, drift, &gestures, &takes))
             .expect("names and numbers can be written as JSON");
         let made_of = crc32fast::hash(made_of.as_bytes());
         let kept = folder.join(format!("observations-{made_of:08x}.bin"));
@@ -237,7 +234,7 @@ fn look_at(
     let cameras = cameras(hands)?;
     let done = AtomicUsize::new(0);
     let look = |(n, take): (usize, &Take)| -> Result<Views, ExperimentError> {
-        let mut perception = Perception::new(FEATURES, HandConfig::default())?;
+        let mut perception = Perception::new(hands.features, HandConfig::default())?;
         let views = look_from_all(n, take, &cameras, hands, &mut perception)?;
         step(done.fetch_add(1, Ordering::Relaxed) + 1, takes.len());
         Ok(views)

@@ -62,13 +62,14 @@ pub fn conduct_by(
     let cells = experiment.cells()?;
     let rules = cells.iter().map(|cell| rules_of(cell, rules)).collect::<Result<Vec<_>, _>>()?;
     let seeds = seeds.unwrap_or(experiment.seeds);
-    let program = this_program()?;
+    let hands = experiment.seen(materials.dataset.as_deref());
+    let program = this_program(hands.features)?;
     folder::claim(folder, text, materials, seeds, &program)?;
     let looked = |done, total| progress(Progress::Looked(done, total));
     let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);
     let ready = materials.dataset.is_none() && experiment.hands.vocabulary.is_some();
-    let mut schools = Schools::new(pool.vocabulary()?, ready, materials.start.as_deref())?;
+    let mut schools = Schools::new(pool.vocabulary()?, (hands.features, ready), materials.start.as_deref())?;
     let taught: Vec<Taught<'_>> = cells
         .iter()
         .zip(rules)

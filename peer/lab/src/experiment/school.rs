@@ -6,18 +6,19 @@ use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
-    Classifier, Components, FeatureSpace, LabelledFeatures, Learner, LearnerOptions, ScalingMethod,
+    Classifier, Classify, Components, FeatureSpace, LabelledFeatures, Learner, LearnerOptions, ScalingMethod,
     Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::error::ExperimentError;
-use super::pool::FEATURES;
 use super::setting::{Method, Setting, Start};
 use crate::emulation::School;
 use gestalt_vision::dataset::Dataset;
-use gestalt_vision::perception::{HandConfig, Perception};
+use gestalt_vision::model::RobotModel;
+use gestalt_vision::network::EMBEDDING;
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::source::Glove;
 use gestalt_vision::source::rendered::TrainingFrames;
 use gestalt_vision::survey::Survey;
@@ -31,10 +32,14 @@ const BEARING_DEG: f64 = 75.0;
 const MODEL_PEOPLE: usize = 8;
 const MODEL_BEARING_DEG: f64 = 10.0;
 
+/// A feature space, and the classifier that robots start from, if from any.
+type Beginning = (Arc<FeatureSpace>, Option<Arc<Classifier>>);
+
 /// Labelled hands, other than those that robots see.
 #[derive(Debug)]
 pub struct Schools {
     vocabulary: Vocabulary,
+    features: FeatureSet,
     nothing: Vec<LabelledFeatures>,
     model: Vec<LabelledFeatures>,
     made: BTreeMap<String, Arc<School>>,
@@ -43,27 +48,39 @@ pub struct Schools {
 impl Schools {
     /// Looks at rendered hands and, for the model that robots may start from, at the pictures of `dataset` if there is
     /// one. Where robots see a ready vocabulary (`ready`), their feature space is fitted on hands that count, of which no
-    /// gesture is theirs.
+    /// gesture is theirs. Embeddings (`features`) have a space already, and no rendered hands.
     ///
     /// # Errors
     /// A dataset that cannot be read, or has not all gestures of the vocabulary.
-    pub fn new(vocabulary: Vocabulary, ready: bool, dataset: Option<&Path>) -> Result<Self, ExperimentError> {
-        let mut perception = Perception::new(FEATURES, HandConfig::default())?;
-        if ready {
+    pub fn new(
+        vocabulary: Vocabulary,
+        (features, ready): (FeatureSet, bool),
+        dataset: Option<&Path>,
+    ) -> Result<Self, ExperimentError> {
+        let mut perception = Perception::new(features, HandConfig::default())?;
+        let pictured = |perception: &mut Perception| {
+            let survey = |folder| -> Result<_, ExperimentError> {
+                let dataset = Dataset::list(folder, Some(vocabulary.labels()))?;
+                Ok(Survey::of(&dataset.images, perception, || ()).samples())
+            };
+            dataset.map(survey).transpose()
+        };
+        let (nothing, model) = if features == FeatureSet::Embedding {
+            // Their space is there already.
+            (Vec::new(), pictured(&mut perception)?.unwrap_or_default())
+        } else if ready {
             let counts = Vocabulary::new((0..6).map(|n| n.to_string()));
             let counts = counts.map_err(|error| ExperimentError::Setting(error.to_string()))?;
-            let nothing = rendered(&counts, PEOPLE, BEARING_DEG, &mut perception)?;
-            return Ok(Self { vocabulary, nothing, model: Vec::new(), made: BTreeMap::new() });
-        }
-        let nothing = rendered(&vocabulary, PEOPLE, BEARING_DEG, &mut perception)?;
-        let model = match dataset {
-            None => rendered(&vocabulary, MODEL_PEOPLE, MODEL_BEARING_DEG, &mut perception)?,
-            Some(folder) => {
-                let dataset = Dataset::list(folder, Some(vocabulary.labels()))?;
-                Survey::of(&dataset.images, &mut perception, || ()).samples()
-            }
+            (rendered(&counts, PEOPLE, BEARING_DEG, &mut perception)?, Vec::new())
+        } else {
+            let nothing = rendered(&vocabulary, PEOPLE, BEARING_DEG, &mut perception)?;
+            let model = match pictured(&mut perception)? {
+                Some(samples) => samples,
+                None => rendered(&vocabulary, MODEL_PEOPLE, MODEL_BEARING_DEG, &mut perception)?,
+            };
+            (nothing, model)
         };
-        Ok(Self { vocabulary, nothing, model, made: BTreeMap::new() })
+        Ok(Self { vocabulary, features, nothing, model, made: BTreeMap::new() })
     }
 
     /// The school of a setting.
@@ -76,18 +93,56 @@ impl Schools {
         if let Some(school) = self.made.get(&key) {
             return Ok(school.clone());
         }
-        let samples = match setting.start {
-            Start::Nothing => &self.nothing,
-            Start::Model => &self.model,
-        };
-        let space = Arc::new(space(samples, setting.reduction, setting.components));
-        let start = match setting.start {
-            Start::Nothing => None,
-            Start::Model => Some(self.train(&space, options)?),
+        let (space, start) = match self.features {
+            FeatureSet::Embedding => self.embedded(setting)?,
+            _ => self.measured(setting)?,
         };
         let school = Arc::new(School::new(space, self.vocabulary.clone(), start, options.clone())?);
         self.made.insert(key, school.clone());
         Ok(school)
+    }
+
+    /// A space fitted on the hands that robots start from, and what they start from.
+    fn measured(&self, setting: &Setting) -> Result<Beginning, ExperimentError> {
+        let samples = match setting.start {
+            Start::Nothing => &self.nothing,
+            Start::Model => &self.model,
+            Start::Shipped => {
+                return wrong("start: the shipped model is of learned eyes: say features: 'embedding'");
+            }
+        };
+        let space = Arc::new(space(self.features, samples, setting.reduction, setting.components));
+        let start = match setting.start {
+            Start::Nothing => None,
+            _ => Some(self.train(&space, &setting.learning.learner)?),
+        };
+        Ok((space, start))
+    }
+
+    /// The space of the shipped model, and what robots start from.
+    fn embedded(&self, setting: &Setting) -> Result<Beginning, ExperimentError> {
+        if (setting.reduction, setting.components) != (Method::Pca, EMBEDDING) {
+            return wrong(
+                "features: an embedding keeps all its 24 numbers: leave reduction and components out",
+            );
+        }
+        let shipped = RobotModel::hands()?.classifier;
+        let options = &setting.learning.learner;
+        let start = match setting.start {
+            Start::Nothing => None,
+            Start::Model if self.model.is_empty() => {
+                return wrong("start: learned eyes know bare hands only: say of which with --start-dataset");
+            }
+            Start::Model => Some(self.train(shipped.space(), options)?),
+            Start::Shipped => {
+                let known = shipped.vectors().filter_map(|(class, vector)| {
+                    let label = shipped.vocabulary().labels().get(class.index())?;
+                    Some((self.vocabulary.class(label)?, vector.to_vec()))
+                });
+                Some(self.learn(shipped.space(), options, known)?)
+            }
+        };
+        Ok((shipped.space().clone(), start))
     }
 
     fn train(
@@ -95,28 +150,48 @@ impl Schools {
         space: &Arc<FeatureSpace>,
         options: &LearnerOptions,
     ) -> Result<Arc<Classifier>, ExperimentError> {
+        let in_space = self.model.iter().filter_map(|sample| {
+            let coordinates = space.project(&sample.features).ok()?;
+            Some((sample.class, coordinates))
+        });
+        self.learn(space, options, in_space)
+    }
+
+    fn learn(
+        &self,
+        space: &Arc<FeatureSpace>,
+        options: &LearnerOptions,
+        samples: impl Iterator<Item = (ClassId, Vec<f32>)>,
+    ) -> Result<Arc<Classifier>, ExperimentError> {
         let mut learner = Learner::new(space.clone(), self.vocabulary.clone(), options.clone())?;
-        for (key, sample) in (0..).zip(&self.model) {
-            if let Ok(coordinates) = space.project(&sample.features) {
-                learner.insert(key, sample.class, &coordinates)?;
-            }
+        for (key, (class, coordinates)) in (0..).zip(samples) {
+            learner.insert(key, class, &coordinates)?;
         }
         Ok(learner.learn()?)
     }
 }
 
-fn space(samples: &[LabelledFeatures], method: Method, components: usize) -> FeatureSpace {
+fn wrong<T>(what: &str) -> Result<T, ExperimentError> {
+    Err(ExperimentError::Setting(what.to_owned()))
+}
+
+fn space(
+    features: FeatureSet,
+    samples: &[LabelledFeatures],
+    method: Method,
+    components: usize,
+) -> FeatureSpace {
     let scaling = ScalingMethod::PerComponent;
     match method.ranking() {
         None => {
             let rows = samples.iter().map(|sample| sample.features.as_slice());
             let mut rng = ChaCha8Rng::seed_from_u64(1);
-            FeatureSpace::fit(FEATURES.name(), rows, scaling, Components::Count(components), &mut rng)
+            FeatureSpace::fit(features.name(), rows, scaling, Components::Count(components), &mut rng)
         }
         Some(ranking) => {
             let samples: Vec<(&[f32], ClassId)> =
                 samples.iter().map(|sample| (sample.features.as_slice(), sample.class)).collect();
-            FeatureSpace::fit_ranked(FEATURES.name(), &samples, scaling, ranking, components)
+            FeatureSpace::fit_ranked(features.name(), &samples, scaling, ranking, components)
         }
     }
 }

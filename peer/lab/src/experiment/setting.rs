@@ -70,6 +70,8 @@ pub enum Start {
     Nothing,
     /// A classifier, trained on other hands; their feature space is fitted on these too.
     Model,
+    /// The shipped model of learned eyes, as far as its gestures are shown.
+    Shipped,
 }
 
 /// How many features become few.

@@ -106,3 +106,24 @@ fn a_recognition_experiment_goes_on_where_it_stopped() {
     let refused = recognition::conduct((&changed, Path::new("one")), folder.path(), None, |_| ());
     assert!(matches!(refused, Err(ExperimentError::Other(_))));
 }
+
+#[test]
+fn learned_eyes_start_from_the_shipped_model_or_say_what_they_miss() {
+    const LEARNED: &str = "{ title: 'bare hands', base: { rounds: 4, robots: 2, start: 'shipped' },
+        axis: { name: 'B', values: [ { name: '1', set: {} } ] },
+        hands: { places: 2, people: 4, glove: 'skin', features: 'embedding' }, seeds: 1 }";
+    let conduct = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        conduct((text, Path::new("learned")), &Materials::default(), folder.path(), None, |_| ())
+    };
+    let table = conduct(LEARNED).unwrap();
+    assert!(table.contains("| 1 |"), "{table}");
+    for (from, to, named) in [
+        (", features: 'embedding'", "", "features: 'embedding'"),
+        ("start: 'shipped'", "start: 'shipped', components: 8", "all its 24 numbers"),
+        ("start: 'shipped'", "start: 'model'", "--start-dataset"),
+    ] {
+        let error = conduct(&LEARNED.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    }
+}

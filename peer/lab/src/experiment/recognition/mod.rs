@@ -21,6 +21,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+use gestalt_vision::perception::FeatureSet;
 use rayon::prelude::*;
 
 pub use plan::{Kind, Recognition, SwarmPlan, Where};
@@ -55,7 +56,7 @@ pub fn conduct(
 ) -> Result<String, ExperimentError> {
     let plan = Recognition::parse(text, origin)?;
     let seeds = seeds.unwrap_or(plan.seeds);
-    folder::claim(folder, text, &Materials::default(), seeds, &this_program()?)?;
+    folder::claim(folder, text, &Materials::default(), seeds, &this_program(FeatureSet::Shape)?)?;
     let results = RecognitionResults::open(folder, &plan)?;
     let runs = run_what_is_left(&plan, results, seeds, &progress)?.finish()?;
 
