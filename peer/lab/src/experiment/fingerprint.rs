@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
-use gestalt_vision::source::Glove;
-use gestalt_vision::source::rendered::TrainingFrames;
+use gestalt_vision::source::rendered::{LabelledFrame, TrainingFrames};
+use gestalt_vision::source::{Glove, SourceError};
 
 use super::error::ExperimentError;
 use super::program::Program;
@@ -26,7 +26,7 @@ fn eyes(features: FeatureSet) -> Result<u32, ExperimentError> {
     let mut perception = Perception::new(features, HandConfig::default())?;
     let mut seen = crc32fast::Hasher::new();
     seen.update(features.name().as_bytes());
-    for frame in TrainingFrames::new(Vec::new(), Glove::Cyan, 60.0, 1).take(FRAMES) {
+    for frame in frames(features) {
         match perception.observe(&frame?.image) {
             Ok(observation) => {
                 seen.update(&observation.quality.to_le_bytes());
@@ -36,6 +36,12 @@ fn eyes(features: FeatureSet) -> Result<u32, ExperimentError> {
         }
     }
     Ok(seen.finalize())
+}
+
+/// Hands that these eyes can see: learned ones know bare hands only.
+fn frames(features: FeatureSet) -> impl Iterator<Item = Result<LabelledFrame, SourceError>> {
+    let glove = if features == FeatureSet::Embedding { Glove::Skin } else { Glove::Cyan };
+    TrainingFrames::new(Vec::new(), glove, 60.0, 1).take(FRAMES)
 }
 
 fn minds() -> Result<u32, ExperimentError> {
@@ -77,9 +83,12 @@ mod tests {
         assert_eq!(this, this_program(FeatureSet::Shape).unwrap());
         assert_ne!(this.eyes, this_program(FeatureSet::Embedding).unwrap().eyes);
         // Were no hand seen or nothing learned, every program would look like every other.
-        let mut perception = Perception::new(FeatureSet::Shape, HandConfig::default()).unwrap();
-        let frames = TrainingFrames::new(Vec::new(), Glove::Cyan, 60.0, 1).take(FRAMES);
-        let seen = frames.filter(|frame| perception.observe(&frame.as_ref().unwrap().image).is_ok()).count();
-        assert!(seen > FRAMES / 2, "{seen} of {FRAMES}");
+        for features in FeatureSet::ALL {
+            let mut perception = Perception::new(features, HandConfig::default()).unwrap();
+            let seen = frames(features)
+                .filter(|frame| perception.observe(&frame.as_ref().unwrap().image).is_ok())
+                .count();
+            assert!(seen > FRAMES / 2, "{seen} of {FRAMES}");
+        }
     }
 }
