@@ -202,6 +202,10 @@ impl Affine {
     }
 }
 
+fn add(to: &mut [f32], from: &[f32], weight: f32) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
+}
+
 /// A picture being made.
 #[derive(Clone, Debug)]
 pub struct Canvas {
@@ -232,27 +236,29 @@ impl Canvas {
         }
     }
 
-    /// Smoothed by a separable kernel, its middle one in the middle.
+    /// Smoothed by a separable kernel, its middle one in the middle; the outermost pixels go on outside.
     pub fn smoothed(&self, kernel: &[f32]) -> Self {
-        let reach = kernel.len() / 2;
-        let pass = |source: &Self, step: (usize, usize)| {
-            let mut out = Self::new(self.width, self.height, self.channels);
-            for y in 0..self.height {
-                for x in 0..self.width {
-                    for (k, weight) in kernel.iter().enumerate() {
-                        let px = (x + step.0 * k).saturating_sub(step.0 * reach).min(self.width - 1);
-                        let py = (y + step.1 * k).saturating_sub(step.1 * reach).min(self.height - 1);
-                        let (to, from) =
-                            ((y * self.width + x) * self.channels, (py * self.width + px) * self.channels);
-                        for c in 0..self.channels {
-                            out.values[to + c] += weight * source.values[from + c];
-                        }
-                    }
-                }
+        let (reach, c, row) = (kernel.len() / 2, self.channels, self.width * self.channels);
+        let mut across = Self::new(self.width, self.height, c);
+        let mut wide = vec![0.0; row + 2 * reach * c];
+        for (out, line) in across.values.chunks_exact_mut(row).zip(self.values.chunks_exact(row)) {
+            wide[reach * c..][..row].copy_from_slice(line);
+            for k in 0..reach {
+                wide[k * c..][..c].copy_from_slice(&line[..c]);
+                wide[reach * c + row + k * c..][..c].copy_from_slice(&line[row - c..]);
             }
-            out
-        };
-        pass(&pass(self, (1, 0)), (0, 1))
+            for (k, weight) in kernel.iter().enumerate() {
+                add(out, &wide[k * c..], *weight);
+            }
+        }
+        let mut out = Self::new(self.width, self.height, c);
+        for (y, to) in out.values.chunks_exact_mut(row).enumerate() {
+            for (k, weight) in kernel.iter().enumerate() {
+                let from = (y + k).saturating_sub(reach).min(self.height - 1);
+                add(to, &across.values[from * row..], *weight);
+            }
+        }
+        out
     }
 
     pub fn blurred(&self, sigma: f32) -> Self {

@@ -129,11 +129,11 @@ impl Decoder {
     /// Channels of the finest maps.
     const FINE: usize = 16;
 
-    /// `coarse`, `middle`: channels of the trunk; `mixed`: channels of its middle once mixed; `matched`: whether its finest result is
-    /// matched first; `maps`: channels of the result.
+    /// `coarse`, `middle`: channels of the trunk; `mixed`: channels of its middle once mixed; `fine`: channels of its finest result
+    /// when they are matched first; `maps`: channels of the result.
     fn new(
         [coarse, middle, mixed]: [usize; 3],
-        matched: bool,
+        fine: Option<usize>,
         maps: usize,
         parameters: &mut Parameters,
     ) -> Self {
@@ -142,7 +142,7 @@ impl Decoder {
             l5: Plain::new(coarse, middle, p),
             m4: Block::new(Shape::usual(middle, mixed), 1, p),
             l4: Plain::new(mixed, Self::FINE, p),
-            l3: matched.then(|| Plain::new(Self::FINE, Self::FINE, p)),
+            l3: fine.map(|fine| Plain::new(fine, Self::FINE, p)),
             m3: Block::new(Shape::usual(Self::FINE, Self::FINE), 1, p),
             h: Plain::new(Self::FINE, maps, p),
         }
@@ -192,8 +192,8 @@ impl Finder {
         let mut all = Parameters::new(seed);
         let p = &mut all;
         let layers = FinderLayers {
-            trunk: Trunk::new([8, 16, 32, 48], 2, p),
-            decoder: Decoder::new([48, 32, 32], true, Self::FIRST.len(), p),
+            trunk: Trunk::new([12, 24, 48, 64], 2, p),
+            decoder: Decoder::new([64, 48, 32], Some(24), Self::FIRST.len(), p),
         };
         p.get_mut(layers.decoder.h.bias).copy_from_slice(&Self::FIRST);
         Self { parameters: all, layers }
@@ -238,11 +238,11 @@ impl Refiner {
         let mut all = Parameters::new(seed);
         let p = &mut all;
         let layers = RefinerLayers {
-            trunk: Trunk::new([12, 16, 28, 44], 1, p),
-            g1: Plain::new(44, 12, p),
+            trunk: Trunk::new([12, 16, 40, 64], 1, p),
+            g1: Plain::new(64, 12, p),
             g2: Plain::new(12 * (CROP / 8).pow(2), 32, p),
             g3: Plain::new(32, 6, p),
-            decoder: Decoder::new([44, 28, 24], false, 4, p),
+            decoder: Decoder::new([64, 40, 24], None, 4, p),
         };
         Self { parameters: all, layers }
     }

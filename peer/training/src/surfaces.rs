@@ -41,18 +41,22 @@ pub fn smooth_noise(
     let grid: Vec<f32> = (0..cells * cells * channels).map(|_| normal(rng)).collect();
     let mut canvas = Canvas::new(width, height, channels);
     let last = cells - 1;
-    for y in 0..height {
-        let gy = ((y as f32 + 0.5) / height as f32 * cells as f32 - 0.5).clamp(0.0, last as f32);
-        let (y0, fy) = (gy as usize, gy.fract());
-        for x in 0..width {
-            let gx = ((x as f32 + 0.5) / width as f32 * cells as f32 - 0.5).clamp(0.0, last as f32);
-            let (x0, fx) = (gx as usize, gx.fract());
-            let (x1, y1) = ((x0 + 1).min(last), (y0 + 1).min(last));
-            for c in 0..channels {
-                let at = |x: usize, y: usize| grid[(y * cells + x) * channels + c];
-                let top = at(x0, y0) * (1.0 - fx) + at(x1, y0) * fx;
-                let bottom = at(x0, y1) * (1.0 - fx) + at(x1, y1) * fx;
-                canvas.values[(y * width + x) * channels + c] = top * (1.0 - fy) + bottom * fy;
+    // Between which two cells a pixel lies, and how far from the first.
+    let between = |at: usize, size: usize| {
+        let g = ((at as f32 + 0.5) / size as f32 * cells as f32 - 0.5).clamp(0.0, last as f32);
+        (g as usize, (g as usize + 1).min(last), g.fract())
+    };
+    let across: Vec<_> = (0..width).map(|x| between(x, width)).collect();
+    let mut row = vec![0.0; cells * channels];
+    for (y, out) in canvas.values.chunks_exact_mut(width * channels).enumerate() {
+        let (above, below, share) = between(y, height);
+        let line = |y: usize| &grid[y * cells * channels..][..cells * channels];
+        for (value, (a, b)) in row.iter_mut().zip(line(above).iter().zip(line(below))) {
+            *value = a * (1.0 - share) + b * share;
+        }
+        for (out, (left, right, share)) in out.chunks_exact_mut(channels).zip(&across) {
+            for (c, out) in out.iter_mut().enumerate() {
+                *out = row[left * channels + c] * (1.0 - share) + row[right * channels + c] * share;
             }
         }
     }

@@ -6,7 +6,7 @@ use super::planes::Planes;
 
 /// Channels that are computed at a time, and values of each: as many sums as a processor has registers for.
 const CHANNELS: usize = 4;
-const WIDE: usize = 24;
+const WIDE: usize = if cfg!(target_feature = "avx512f") { 48 } else { 24 };
 const NARROW: usize = 8;
 /// Inputs that are summed at a time for the gradient of weights.
 const TAPS: usize = 3;

@@ -24,8 +24,8 @@ impl Finder {
     pub fn decode(bytes: &[u8]) -> Result<Self, WeightsError> {
         let tensors = &mut Tensors::decode(bytes, TENSORS)?;
         Ok(Self {
-            trunk: Trunk::decode([3, 8, 16, 32, 48], Shape::halving, tensors)?,
-            decoder: Decoder::decode((48, 32, 32), Some(16), 5, tensors)?,
+            trunk: Trunk::decode([3, 12, 24, 48, 64], Shape::halving, tensors)?,
+            decoder: Decoder::decode((64, 48, 32), Some(24), 5, tensors)?,
             patches: Vec::new(),
         })
     }

@@ -51,11 +51,11 @@ impl Refiner {
     pub fn decode(bytes: &[u8]) -> Result<Self, WeightsError> {
         let tensors = &mut Tensors::decode(bytes, TENSORS)?;
         Ok(Self {
-            trunk: Trunk::decode([3, 12, 16, 28, 44], Shape::usual, tensors)?,
-            squeeze: Convolution::decode(Shape { rectified: true, ..Shape::point(44, 12) }, tensors)?,
+            trunk: Trunk::decode([3, 12, 16, 40, 64], Shape::usual, tensors)?,
+            squeeze: Convolution::decode(Shape { rectified: true, ..Shape::point(64, 12) }, tensors)?,
             dense: Dense::decode((12 * 64, 32), true, tensors)?,
             head: Dense::decode((32, 6), false, tensors)?,
-            decoder: Decoder::decode((44, 28, 24), None, 4, tensors)?,
+            decoder: Decoder::decode((64, 40, 24), None, 4, tensors)?,
             squeezed: FeatureMap::default(),
             mask: FeatureMap::default(),
             patches: Vec::new(),

@@ -12,33 +12,33 @@ use super::tensors::Tensors;
 use super::*;
 
 const FINDER: [(usize, usize, usize); 13] = [
-    (3, 8, 3),
-    (8, 16, 3),
-    (16, 32, 3),
-    (32, 32, 3),
-    (32, 48, 3),
+    (3, 12, 3),
+    (12, 24, 3),
+    (24, 48, 3),
     (48, 48, 3),
-    (48, 48, 3),
-    (48, 32, 1),
-    (32, 32, 3),
+    (48, 64, 3),
+    (64, 64, 3),
+    (64, 64, 3),
+    (64, 48, 1),
+    (48, 32, 3),
     (32, 16, 1),
-    (16, 16, 1),
+    (24, 16, 1),
     (16, 16, 3),
     (16, 5, 1),
 ];
 const REFINER: [(usize, usize, usize); 15] = [
     (3, 12, 3),
     (12, 16, 3),
-    (16, 28, 3),
-    (28, 28, 3),
-    (28, 44, 3),
-    (44, 44, 3),
-    (44, 44, 3),
-    (44, 12, 1),
+    (16, 40, 3),
+    (40, 40, 3),
+    (40, 64, 3),
+    (64, 64, 3),
+    (64, 64, 3),
+    (64, 12, 1),
     (768, 32, 1),
     (32, 6, 1),
-    (44, 28, 1),
-    (28, 24, 3),
+    (64, 40, 1),
+    (40, 24, 3),
     (24, 16, 1),
     (16, 16, 3),
     (16, 4, 1),
@@ -268,11 +268,11 @@ fn the_finder_is_its_definition_at_both_sizes_and_any_other() {
     for (height, width) in [(120, 160), (240, 320), (50, 31), (1, 1)] {
         let picture = picture(3, height, width, 9);
         let mut plain = Plain(tensors.iter());
-        let [fine, middle, coarse] = plain.trunk([3, 8, 16, 32, 48], Shape::halving(8, 16), &picture);
-        let y = climb(&middle, &plain.convolve(Shape::point(48, 32), &coarse));
-        let y = plain.convolve(Shape::usual(32, 32), &y);
+        let [fine, middle, coarse] = plain.trunk([3, 12, 24, 48, 64], Shape::halving(12, 24), &picture);
+        let y = climb(&middle, &plain.convolve(Shape::point(64, 48), &coarse));
+        let y = plain.convolve(Shape::usual(48, 32), &y);
         let low = plain.convolve(Shape::point(32, 16), &y);
-        let y = climb(&plain.convolve(Shape::point(16, 16), &fine), &low);
+        let y = climb(&plain.convolve(Shape::point(24, 16), &fine), &low);
         let y = plain.convolve(Shape::usual(16, 16), &y);
         let maps = plain.convolve(Shape::point(16, 5), &y);
         let found = finder.run(&picture);
@@ -288,12 +288,12 @@ fn the_refiner_is_its_definition_with_and_without_its_mask() {
     for seed in 0..2 {
         let picture = picture(3, 64, 64, seed);
         let mut plain = Plain(tensors.iter());
-        let [fine, middle, coarse] = plain.trunk([3, 12, 16, 28, 44], Shape::usual(12, 16), &picture);
-        let squeezed = plain.convolve(Shape { rectified: true, ..Shape::point(44, 12) }, &coarse);
+        let [fine, middle, coarse] = plain.trunk([3, 12, 16, 40, 64], Shape::usual(12, 16), &picture);
+        let squeezed = plain.convolve(Shape { rectified: true, ..Shape::point(64, 12) }, &coarse);
         let hidden = plain.dense(32, true, squeezed.values());
         let said = plain.dense(6, false, &hidden);
-        let y = climb(&middle, &plain.convolve(Shape::point(44, 28), &coarse));
-        let y = plain.convolve(Shape::usual(28, 24), &y);
+        let y = climb(&middle, &plain.convolve(Shape::point(64, 40), &coarse));
+        let y = plain.convolve(Shape::usual(40, 24), &y);
         let y = climb(&fine, &plain.convolve(Shape::point(24, 16), &y));
         let y = plain.convolve(Shape::usual(16, 16), &y);
         let mut logits = FeatureMap::default();
@@ -334,7 +334,7 @@ fn weights_of_another_network_are_refused_by_their_cause() {
     assert_eq!(Finder::decode(&other).err(), Some(WeightsError::Count { expected: 26, found: 18 }));
     let mut wide = random(&FINDER, 1);
     wide[2].push(0.0);
-    let wrong = WeightsError::Length { tensor: 2, expected: 8 * 16 * 9, found: 8 * 16 * 9 + 1 };
+    let wrong = WeightsError::Length { tensor: 2, expected: 12 * 24 * 9, found: 12 * 24 * 9 + 1 };
     assert_eq!(Finder::decode(&file(&wide)).err(), Some(wrong));
     let mut infinite = random(&FINDER, 1);
     infinite[7][3] = f32::INFINITY;
