@@ -66,9 +66,11 @@ impl Course {
         let mut frames = frames::frames(&scenery, seed + 1, self.some(16_000));
         let mut crops = frames::crops(&scenery, seed + 2, self.some(24_000));
         self.tell(&format!("{} frames and {} crops made", frames.len(), crops.len()));
+        // Of finder and refiner, each time.
+        let steps = self.some(5000);
         let (finder, refiner) = rayon::join(
-            || train::finder(&frames, None, self.some(5000), 4e-3, seed + 3),
-            || train::refiner(&crops, None, self.some(5000), 4e-3, seed + 4),
+            || train::finder(&frames, None, steps, 4e-3, seed + 3),
+            || train::refiner(&crops, None, steps, 4e-3, seed + 4),
         );
         self.tell("finder and refiner trained");
         let mut mined = mining::mine(&scenery, &Weights::of(&finder, &refiner), seed + 5, self.some(7000));
@@ -84,8 +86,8 @@ impl Course {
         frames.extend(std::mem::take(&mut mined.frames));
         crops.extend(mined.crops());
         let (finder, refiner) = rayon::join(
-            || train::finder(&frames, Some(finder), self.some(5000), 2e-3, seed + 6),
-            || train::refiner(&crops, Some(refiner), self.some(5000), 2.5e-3, seed + 7),
+            || train::finder(&frames, Some(finder), steps, 2e-3, seed + 6),
+            || train::refiner(&crops, Some(refiner), steps, 2.5e-3, seed + 7),
         );
         self.tell("finder and refiner trained again");
         drop((frames, crops));

@@ -202,6 +202,7 @@ impl Affine {
     }
 }
 
+/// Adds so much of each value.
 fn add(to: &mut [f32], from: &[f32], weight: f32) {
     to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
 }
