@@ -96,6 +96,8 @@ pub(crate) struct Learning {
     /// From which the keys of the digest follow, and how many were drawn.
     secret: u64,
     drawn: u64,
+    /// Something was said that does not go to the disk yet.
+    heard: bool,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
     /// What was shared in the newest round, of the swarm's budget.
@@ -158,6 +160,7 @@ impl Learning {
             digest: OnceCell::new(),
             secret,
             drawn: 0,
+            heard: false,
             aside: Unresolved::new(aside, counters.next_aside, config.aside),
             config,
             me,
@@ -248,6 +251,7 @@ impl Learning {
         let (heard, forgotten) = self.lessons.hear_among(lesson, standing, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.judged.doubt();
+            self.heard = true;
             // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
             if self.newest.is_some() || standing.is_some() {
                 self.dirty.insert(Item::Lessons(lesson.round));
@@ -410,7 +414,8 @@ impl Learning {
     /// Draws another key if what it knows has changed since the changes were last taken. Whoever made it change did not
     /// know that key.
     pub fn refresh_digest(&mut self) {
-        if self.dirty.iter().any(|item| matches!(item, Item::Seen(_) | Item::Lessons(_) | Item::Naming(_))) {
+        let told = |item: &Item| matches!(item, Item::Seen(_) | Item::Lessons(_) | Item::Naming(_));
+        if std::mem::take(&mut self.heard) || self.dirty.iter().any(told) {
             self.drawn += 1;
             let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
             sip.write(&self.drawn.to_le_bytes());

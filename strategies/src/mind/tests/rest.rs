@@ -64,6 +64,22 @@ fn robots_that_can_never_know_the_same_stop_telling_each_other() {
 }
 
 #[test]
+fn a_newborn_that_meets_no_round_says_what_it_was_told() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 24);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    // Nobody holds the decision any more, and what the second hears does not go to its disk.
+    swarm.spaces[1] = other_space();
+    swarm.disks[1].clear();
+    swarm.restart_all();
+    swarm.pass(Duration::from_secs(10));
+    let digests = swarm.minds.iter().map(|mind| mind.learning.as_ref().unwrap().digest_under(7).lessons);
+    let digests: Vec<u64> = digests.collect();
+    assert!(digests[0] == digests[1] && digests[0] != 0, "{digests:?}");
+    swarm.check_rest();
+}
+
+#[test]
 fn what_is_left_in_scattered_places_is_all_given() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 22);
     let sample = |number| SharedSample {
