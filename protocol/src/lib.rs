@@ -64,7 +64,7 @@ pub use sample::{
 };
 pub use signature::Signature;
 pub use status::{
-    Camera, CameraState, LearningStatus, Motion, MotionState, NamedGesture, Opinion, Reported, Status,
+    Camera, CameraState, Heeded, LearningStatus, Motion, MotionState, NamedGesture, Opinion, Reported, Status,
 };
 pub use terms::Terms;
 pub use vote::{HeldVote, Vote};

@@ -183,6 +183,20 @@ pub struct LearningStatus {
     pub memory: String,
     /// How often it has trained.
     pub trainings: u64,
+    /// Other robots whose samples it does not all train on, for they contradict what it and others saw, or are too many.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubted: Vec<Heeded>,
+}
+
+/// How much a robot makes of the samples of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Heeded {
+    /// Whose samples.
+    pub robot: RobotId,
+    /// How many of them it holds.
+    pub held: usize,
+    /// How many of these it trains on.
+    pub trained: usize,
 }
 
 /// A gesture that an instructor named.

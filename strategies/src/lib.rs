@@ -20,11 +20,13 @@ mod believe;
 mod candidates;
 pub mod forgetting;
 pub mod geometry;
+mod groups;
 mod learning;
 mod lessons;
 pub mod mind;
 mod names;
 pub mod sample;
+mod scrutiny;
 pub mod selection;
 mod shares;
 mod training_set;
@@ -40,9 +42,9 @@ pub use gestalt_rounds::{
     outcome,
 };
 pub use gestalt_svm::{
-    CALIBRATION_BINS, Classifier, Components, Discriminant, Evaluation, FeatureSpace, Head, LabelledFeatures,
-    LearnError, Learner, LearnerOptions, MAX_MODEL, Machines, ModelError, Pca, Proportion, Ranking,
-    Reduction, Scaling, ScalingMethod, SharedKernel, Shown, Teach,
+    CALIBRATION_BINS, Certified, Classifier, Components, Discriminant, Evaluation, FeatureSpace, Head,
+    LabelledFeatures, LearnError, Learner, LearnerOptions, MAX_MODEL, Machines, ModelError, Pca, Proportion,
+    Ranking, Reduction, Scaling, ScalingMethod, SharedKernel, Shown, Teach,
 };
 #[cfg(feature = "offline")]
 pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};
@@ -54,6 +56,7 @@ pub use lessons::{LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};
 pub use names::{NameBook, NamingReceipt};
 pub use sample::{HeldSample, HeldSamples, SeenError, SeenSamples, SetPart};
+pub use scrutiny::PoisonDefence;
 pub use selection::{Selection, SelectionRule};
 pub use training_set::{RestoreError, SampleReceipt, SetChange, TrainingSet};
 pub use vector_codec::{Precision, VectorError, decode_vector};

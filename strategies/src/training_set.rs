@@ -21,6 +21,7 @@ pub use changes::{SampleReceipt, SetChange};
 pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
+use crate::groups::Groups;
 use crate::sample::{HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart};
 use crate::selection::Selection;
 use crate::shares::Shares;
@@ -50,6 +51,7 @@ pub struct TrainingSet {
     samples: HeldSamples,
     seen: SeenSamples,
     shares: Shares,
+    groups: Option<Groups>,
     next_key: u64,
 }
 
@@ -78,6 +80,7 @@ impl TrainingSet {
             samples: HeldSamples::default(),
             seen: SeenSamples::default(),
             shares: Shares::default(),
+            groups: None,
             next_key: 1,
         }
     }
@@ -87,6 +90,14 @@ impl TrainingSet {
     #[must_use]
     pub fn in_life(mut self, life: u32) -> Self {
         self.series.life = life;
+        self
+    }
+
+    /// The same set with room of its own for each of so many groups of authors, and for this robot: what is held of one does not depend on what others send. The
+    /// oldest sample of the gesture that a group has most of goes; the rule of forgetting is not asked.
+    #[must_use]
+    pub(crate) fn in_groups(mut self, groups: Option<Groups>) -> Self {
+        self.groups = groups;
         self
     }
 
@@ -321,6 +332,14 @@ impl TrainingSet {
     /// The bound stands whatever the rule says: if it names no sample that is held, the oldest goes.
     pub fn trim(&mut self, rng: &mut dyn Rng) -> Vec<SetChange> {
         let mut changes = Vec::new();
+        if let Some(groups) = self.groups {
+            while let Some(victim) = groups.above(&self.samples, self.capacity)
+                && let Some(victim) = self.remove(victim)
+            {
+                changes.push(SetChange::Removed(victim));
+            }
+            return changes;
+        }
         while self.samples.len() > self.capacity {
             let oldest = self.samples.iter().next().map(|sample| sample.key);
             let victim = self.shares.above(&self.samples, self.capacity).or_else(|| {

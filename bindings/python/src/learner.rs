@@ -27,7 +27,7 @@ pub(crate) struct Learner {
 }
 
 fn options(cost: f64, gamma: f64, folds: usize, staleness: f64) -> PyResult<LearnerOptions> {
-    let options = LearnerOptions { cost, gamma, folds, staleness };
+    let options = LearnerOptions { cost, gamma, folds, staleness, ..LearnerOptions::default() };
     options.validate().map_err(settings)?;
     Ok(options)
 }

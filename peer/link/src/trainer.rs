@@ -21,8 +21,8 @@ const MAX_RETRY: Duration = Duration::from_secs(30);
 /// until the training under way is over; what still waits is not trained.
 pub(super) struct Trainer(Worker<Samples>);
 
-/// What a sample shows, where it lies, and of which showing it is.
-type Sample = (ClassId, Arc<[f32]>, u64);
+/// What a sample shows, where it lies, of which showing it is, and of which group of authors.
+type Sample = (ClassId, Arc<[f32]>, u64, Option<usize>);
 
 /// All samples there are to train on, so that training can begin anew; and those that changed since the last time.
 #[derive(Default)]
@@ -36,8 +36,8 @@ struct Samples {
 impl Samples {
     fn apply(&mut self, change: TrainingChange) {
         let key = match change {
-            TrainingChange::Insert { key, class, vector, showing } => {
-                self.all.insert(key, (class, vector, showing));
+            TrainingChange::Insert { key, class, vector, showing, group } => {
+                self.all.insert(key, (class, vector, showing, group));
                 key
             }
             TrainingChange::Remove(key) => {
@@ -151,9 +151,9 @@ fn train_all(
 fn follow(learner: &mut Learner, key: u64, sample: Option<&Sample>) -> Result<(), LearnError> {
     match sample {
         // A sample that only changed its class keeps its place, which spares its row of the kernel.
-        Some((class, vector, showing)) => {
+        Some((class, vector, showing, group)) => {
             learner.relabel(key, *class)?;
-            learner.insert_shown(key, *class, vector, *showing)
+            learner.insert_of(*group, key, *class, vector.clone(), *showing)
         }
         None => {
             learner.remove(key);

@@ -312,6 +312,11 @@ fn status() -> Vec<Field> {
         must("label", text("What it is called.")),
         must("samples", count("The samples that show it.")),
     ];
+    let doubted = vec![
+        must("robot", robot()),
+        must("held", count("How many samples of it are held.")),
+        must("trained", count("How many of these are trained on.")),
+    ];
     let learning = vec![
         must("space", text("The feature space of its samples.")),
         must("capacity", count("T: how many samples it may hold.")),
@@ -324,6 +329,10 @@ fn status() -> Vec<Field> {
         must("memory", text("Where it keeps all this.")),
         must("named", list("The gestures that were named since, and are in use.", object("One.", titled))),
         must("trainings", count("How often it has trained.")),
+        may(
+            "doubted",
+            list("Other robots whose samples it does not all train on.", object("One of them.", doubted)),
+        ),
     ];
     let error = vec![must("at_ms", count("Since the robot's start.")), must("what", text("Cause and mend."))];
     vec![
@@ -402,48 +411,4 @@ fn recorder() -> Vec<Field> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What is wrong with a schema in the eyes of Foxglove's and Lichtblick's reader.
-    fn refused(schema: &Value, path: &str) -> Vec<String> {
-        let Some(properties) = schema["properties"].as_object() else {
-            return vec![format!("{path} has no properties")];
-        };
-        let each = |(name, field): (&String, &Value)| {
-            let path = format!("{path}.{name}");
-            let inner = if field["type"] == "array" { &field["items"] } else { field };
-            match inner["type"].as_str() {
-                Some("object") => refused(inner, &path),
-                Some("boolean" | "string" | "number" | "integer") => Vec::new(),
-                other => vec![format!("{path} is of type {other:?}")],
-            }
-        };
-        properties.iter().flat_map(each).collect()
-    }
-
-    #[test]
-    fn viewers_can_read_every_schema() {
-        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_json()) {
-            let schema = schema(kind).expect("JSON has a schema");
-            assert_eq!(schema["type"], "object");
-            assert_eq!(refused(&schema, kind.schema()), Vec::<String>::new());
-        }
-    }
-
-    #[test]
-    fn the_published_schemas_are_these() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas");
-        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_json()) {
-            let file = folder.join(format!("{}.json", kind.schema()));
-            let schema = schema(kind).expect("JSON has a schema");
-            if std::env::var_os("GESTALT_BLESS").is_some() {
-                std::fs::create_dir_all(&folder).unwrap();
-                std::fs::write(&file, format!("{schema:#}\n")).unwrap();
-            }
-            let published = std::fs::read(&file).unwrap_or_default();
-            let published: Value = serde_json::from_slice(&published).unwrap_or_default();
-            assert_eq!(published, schema, "run this test with GESTALT_BLESS=1 to write {}", file.display());
-        }
-    }
-}
+mod tests;

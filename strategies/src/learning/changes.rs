@@ -5,9 +5,6 @@ use std::sync::Arc;
 use gestalt_protocol::{ClassId, Fnv1a, RoundId};
 use gestalt_svm::{LearnError, Learner};
 
-use super::unresolved;
-use crate::sample::HeldSample;
-
 /// One change of the samples that a classifier is to be trained on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrainingChange {
@@ -21,6 +18,8 @@ pub enum TrainingChange {
         vector: Arc<[f32]>,
         /// Names the round it was seen in: samples of one repeat each other.
         showing: u64,
+        /// Where groups of authors are learned from apart: of which its author is; `None` for this robot itself.
+        group: Option<usize>,
     },
     /// That sample is gone.
     Remove(u64),
@@ -34,28 +33,14 @@ pub enum TrainingChange {
 }
 
 impl TrainingChange {
-    /// A sample of the training set as one that is new to a learner.
-    #[must_use]
-    pub fn insert(sample: &HeldSample) -> Self {
-        let HeldSample { key, class, round, vector, .. } = sample;
-        Self::Insert { key: *key, class: *class, vector: vector.clone(), showing: showing(*round) }
-    }
-
-    /// Whether it is about a sample of which it is open what it shows, and which is not of the training set: one that the robot has guessed.
-    #[must_use]
-    pub fn is_guess(&self) -> bool {
-        let (Self::Insert { key, .. } | Self::Relabel { key, .. } | Self::Remove(key)) = self;
-        *key >= unresolved::FIRST_KEY
-    }
-
     /// Makes a learner follow it.
     ///
     /// # Errors
     /// [`LearnError`] for a sample that cannot be trained on; the learner is unchanged.
     pub fn apply_to(&self, learner: &mut Learner) -> Result<(), LearnError> {
         match self {
-            Self::Insert { key, class, vector, showing } => {
-                learner.insert_held(*key, *class, vector.clone(), *showing)
+            Self::Insert { key, class, vector, showing, group } => {
+                learner.insert_of(*group, *key, *class, vector.clone(), *showing)
             }
             Self::Remove(key) => {
                 learner.remove(*key);
@@ -72,9 +57,13 @@ pub(super) fn inserted_as(
     key: u64,
     vector: &Arc<[f32]>,
     round: RoundId,
+    group: Option<usize>,
 ) -> TrainingChange {
     match class {
-        Some(class) => TrainingChange::Insert { key, class, vector: vector.clone(), showing: showing(round) },
+        Some(class) => {
+            let (vector, showing) = (vector.clone(), showing(round));
+            TrainingChange::Insert { key, class, vector, showing, group }
+        }
         None => TrainingChange::Remove(key),
     }
 }

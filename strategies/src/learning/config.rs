@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::asking::{QuestionsConfig, QuestionsConfigError};
 use crate::forgetting::ForgettingRule;
+use crate::scrutiny::PoisonDefence;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
 
@@ -42,6 +43,19 @@ pub enum LearningConfigError {
         "share_bytes is {0}: one sample takes up to 128 bytes and more; choose at least 128, or leave it out"
     )]
     Bytes(u32),
+    /// A weight in the defence against poison that is none.
+    #[error("poison.{field} is {value}: choose it from {least} to 100, or 0 to do without")]
+    Weight {
+        /// The field.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// The least it may be, beside 0.
+        least: f64,
+    },
+    /// Which samples of one author are trained on follows from those of the others, so nothing is certain of a majority of groups.
+    #[error("poison and learner.groups exclude each other: leave one of them out")]
+    Groups,
     /// An unlikely time between looks.
     #[error("spacing is longer than a minute: choose a shorter duration, for example 400ms")]
     Spacing,
@@ -66,6 +80,7 @@ pub enum LearningConfigError {
 /// | `selection` | k_center | which samples are shared | |
 /// | `forgetting` | redundancy | which samples go when there are more than T | |
 /// | `sure` | 0.95 | probability from which a sample of several possible gestures is labelled by the robot itself | 0.5–1 |
+/// | `poison` | | how samples of others are met that would teach wrongly: see [`PoisonDefence`] |  |
 /// | `aside` | 256 | the most samples kept aside until it is known what they show | 0–100,000 |
 /// | `learner` | | how the support vector machines are trained | |
 /// | `questions` | | when the swarm asks its instructor, see [`QuestionsConfig`] | |
@@ -102,6 +117,8 @@ pub struct LearningConfig {
     pub sure: f64,
     /// The most samples kept aside until it is known what they show.
     pub aside: usize,
+    /// How samples of others are met that would teach wrongly.
+    pub poison: PoisonDefence,
     /// How the support vector machines are trained.
     pub learner: LearnerOptions,
     /// When the swarm asks its instructor, and what.
@@ -123,6 +140,7 @@ impl Default for LearningConfig {
             forgetting: ForgettingRule::default(),
             sure: 0.95,
             aside: 256,
+            poison: PoisonDefence::default(),
             learner: LearnerOptions::default(),
             questions: QuestionsConfig::default(),
         }
@@ -150,6 +168,15 @@ impl LearningConfig {
                 return Err(LearningConfigError::Part { field, value, least });
             }
         }
+        let PoisonDefence { influence, agreement } = self.poison;
+        for (field, value, least) in [("influence", influence, 1.0), ("agreement", agreement, 0.0)] {
+            if value != 0.0 && !(least..=100.0).contains(&value) {
+                return Err(LearningConfigError::Weight { field, value, least });
+            }
+        }
+        if self.learner.groups > 0 && self.poison != PoisonDefence::default() {
+            return Err(LearningConfigError::Groups);
+        }
         if let Some(bytes) = self.share_bytes.filter(|bytes| *bytes < 128) {
             return Err(LearningConfigError::Bytes(bytes));
         }
@@ -175,6 +202,20 @@ mod tests {
             (LearningConfig { share_fraction: f64::NAN, ..default() }, "share_fraction"),
             (LearningConfig { share_bytes: Some(10), ..default() }, "share_bytes"),
             (LearningConfig { sure: 0.2, ..default() }, "sure"),
+            (
+                LearningConfig {
+                    poison: PoisonDefence { influence: 0.5, ..Default::default() },
+                    ..default()
+                },
+                "influence",
+            ),
+            (
+                LearningConfig {
+                    poison: PoisonDefence { agreement: f64::NAN, ..Default::default() },
+                    ..default()
+                },
+                "agreement",
+            ),
             (LearningConfig { spacing: Duration::MAX, ..default() }, "spacing"),
         ] {
             let error = config.validate().unwrap_err().to_string();

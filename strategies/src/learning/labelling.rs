@@ -100,7 +100,7 @@ impl Learning {
         let key = unresolved::training_key(number);
         let class = class.and_then(|class| self.trained_as(class));
         self.training.push(match self.aside.get(number) {
-            Some(aside) => inserted_as(class, key, &aside.vector, aside.round),
+            Some(aside) => inserted_as(class, key, &aside.vector, aside.round, None),
             None => TrainingChange::Remove(key),
         });
     }

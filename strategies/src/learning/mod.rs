@@ -12,6 +12,7 @@ mod memory;
 mod naming;
 mod own_rules;
 mod recent_rounds;
+mod scrutinising;
 mod setup;
 mod sharing;
 mod shelf;

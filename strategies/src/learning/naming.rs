@@ -45,6 +45,7 @@ impl Learning {
         self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
         self.gestures = self.all_gestures();
         self.judged.doubt();
+        self.doubt_samples();
         for (class, trained_as) in before {
             if self.trained_as(class) != trained_as {
                 self.train_anew(class);
@@ -82,16 +83,18 @@ impl Learning {
         self.set.iter().map(|sample| sample.class).chain(guessed)
     }
 
-    /// Trains on all that is held.
-    pub(super) fn train_on_all(&mut self) {
-        let changes = self.changes_for(|_| true);
-        self.training.extend(changes);
+    /// What makes a new learner train on all that is held.
+    pub fn training_anew(&self) -> Vec<TrainingChange> {
+        let changes = self.changes_for(|_| true).into_iter();
+        changes.filter(|change| matches!(change, TrainingChange::Insert { .. })).collect()
     }
 
     /// Trains on a sample of the set.
     pub(super) fn train_on(&mut self, key: u64) {
         if let Some(sample) = self.set.get(key) {
-            let change = inserted_as(self.trained_as(sample.class), key, &sample.vector, sample.round);
+            let class = self.trained_as(sample.class).filter(|_| self.trusts(key));
+            let group = self.groups().and_then(|groups| groups.of(sample));
+            let change = inserted_as(class, key, &sample.vector, sample.round, group);
             self.training.push(change);
         }
     }
@@ -99,7 +102,7 @@ impl Learning {
     /// Trains on a sample of the set as what it now shows.
     pub(super) fn train_as_another(&mut self, key: u64) {
         match self.set.get(key).map(|sample| sample.class) {
-            Some(class) if self.names.is_empty() => {
+            Some(class) if self.names.is_empty() && self.scrutiny.is_none() => {
                 self.training.push(TrainingChange::Relabel { key, class })
             }
             // It may not have been trained on before.
@@ -133,13 +136,20 @@ impl Learning {
 
     /// What makes a learner train on all samples of these classes as what they now are.
     fn changes_for(&self, is_wanted: impl Fn(ClassId) -> bool) -> Vec<TrainingChange> {
-        let held = self.set.iter().map(|sample| (sample.class, sample.key, &sample.vector, sample.round));
+        let groups = self.groups();
+        let held = self.set.iter().map(|sample| {
+            let group = groups.and_then(|groups| groups.of(sample));
+            (sample.class, sample.key, &sample.vector, sample.round, group)
+        });
         let guessed = self.aside.iter().filter_map(|(number, aside)| {
-            Some((aside.guess?, unresolved::training_key(number), &aside.vector, aside.round))
+            Some((aside.guess?, unresolved::training_key(number), &aside.vector, aside.round, None))
         });
         held.chain(guessed)
             .filter(|(class, ..)| is_wanted(*class))
-            .map(|(class, key, vector, round)| inserted_as(self.trained_as(class), key, vector, round))
+            .map(|(class, key, vector, round, group)| {
+                let class = self.trained_as(class).filter(|_| self.trusts(key));
+                inserted_as(class, key, vector, round, group)
+            })
             .collect()
     }
 }

@@ -1,15 +1,13 @@
 //! What a robot makes of what it saw and was told: samples, labelled, kept, shared and forgotten.
 
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use std::hash::Hasher;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{
-    Digest, FeatureSpaceId, Fnv1a, LearningStatus, Lesson, RobotId, RoundId, SampleId, SharedSample,
-};
+use gestalt_protocol::{Digest, FeatureSpaceId, Lesson, RobotId, RoundId, SampleId, SharedSample};
 use gestalt_rounds::Vocabulary;
 use gestalt_svm::FeatureSpace;
 use rand::Rng;
@@ -26,9 +24,11 @@ use super::shelf::Shelf;
 use super::unresolved::Unresolved;
 use crate::believe::{Believe, Standing};
 use crate::candidates::Candidates;
+use crate::groups::Groups;
 use crate::lessons::{LessonBook, LessonReceipt, Verdict};
 use crate::names::NameBook;
-use crate::sample::{Batches, SetPart};
+use crate::sample::Batches;
+use crate::scrutiny::{PoisonDefence, Scrutiny};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
@@ -77,6 +77,8 @@ pub(crate) struct Learning {
     pub(super) vocabulary: Vocabulary,
     pub(super) rng: Box<dyn rand::Rng + Send>,
     pub(super) set: TrainingSet,
+    /// Unless all are believed: which samples of others are trained on.
+    pub(super) scrutiny: Option<Scrutiny>,
     pub(super) lessons: LessonBook,
     pub(super) names: NameBook,
     /// In a sealed swarm: who knows who may teach.
@@ -137,6 +139,7 @@ impl Learning {
         memory.check(owner, space.components(), vocabulary.labels().len())?;
         let (selection, forgetting) = rules.make(&config);
         let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
+        set = set.in_groups(Groups::new(config.learner.groups));
         let fresh = memory.is_empty();
         let RobotMemory { counters, samples, seen, lessons: heard, namings, aside, batches: told, .. } =
             memory;
@@ -153,6 +156,8 @@ impl Learning {
         let dirty = if durable && fresh { [Item::Owner, Item::Counters].into() } else { BTreeSet::new() };
         let mut batches = Batches::default();
         let thinned = told.into_iter().filter_map(|batch| batches.keep(batch)).collect();
+        let is_on = config.poison != PoisonDefence::default();
+        let scrutiny = is_on.then(|| Scrutiny::new(config.poison.clone(), me, space.variance()));
         let mut rng = rng;
         let secret = rng.next_u64();
         let mut learning = Self {
@@ -169,6 +174,7 @@ impl Learning {
             vocabulary,
             rng,
             set,
+            scrutiny,
             lessons,
             names,
             believer: None,
@@ -190,8 +196,14 @@ impl Learning {
             unsent: VecDeque::new(),
         };
         learning.gestures = learning.all_gestures();
-        learning.train_on_all();
+        learning.reckon_samples();
+        learning.training = learning.training_anew();
         Ok(learning)
+    }
+
+    /// The groups of authors that are learned from apart, if there are any.
+    pub(super) fn groups(&self) -> Option<Groups> {
+        Groups::new(self.config.learner.groups)
     }
 
     /// Notes a look at the gesture of a round; says whether it was kept.
@@ -251,6 +263,7 @@ impl Learning {
         let (heard, forgotten) = self.lessons.hear_among(lesson, standing, |round| recent.contains(round));
         if heard == LessonReceipt::New {
             self.judged.doubt();
+            self.doubt_samples();
             self.heard = true;
             // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
             if self.newest.is_some() || standing.is_some() {
@@ -317,11 +330,15 @@ impl Learning {
             match change {
                 SetChange::Added(key) => {
                     self.dirty.insert(Item::Sample(key));
+                    self.judge(key);
                     self.train_on(key);
                 }
                 SetChange::Removed(sample) => {
                     self.dirty.insert(Item::Sample(sample.key));
                     self.note_gone(sample.id);
+                    if let Some(scrutiny) = &mut self.scrutiny {
+                        scrutiny.forget(sample.key);
+                    }
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
                 SetChange::Unseen(series) => {
@@ -329,6 +346,7 @@ impl Learning {
                 }
                 SetChange::Relabelled(key) => {
                     self.dirty.insert(Item::Sample(key));
+                    self.judge(key);
                     self.train_as_another(key);
                 }
                 SetChange::Shared(key, id) => {
@@ -341,6 +359,7 @@ impl Learning {
 
     /// What is to be trained, since the last time.
     pub fn take_training(&mut self) -> Vec<TrainingChange> {
+        self.reckon_samples();
         std::mem::take(&mut self.training)
     }
 
@@ -420,30 +439,6 @@ impl Learning {
             let mut sip = SipHasher24::new_with_keys(self.secret, u64::from_le_bytes(*b"a key   "));
             sip.write(&self.drawn.to_le_bytes());
             (self.key, self.digest) = (sip.finish(), OnceCell::new());
-        }
-    }
-
-    /// Where it stands, for the status. What the host knows of memory and training is left to it.
-    pub fn status(&self) -> LearningStatus {
-        let counts = |part: SetPart| self.vocabulary.all().map(|class| self.set.count(part, class)).collect();
-        let common = self.set.common().filter_map(|sample| Some((sample.id?, sample.class)));
-        let mut fnv = Fnv1a::default();
-        for (id, class) in common.collect::<BTreeMap<_, _>>() {
-            let name = [id.author.0, id.life, id.number].into_iter().flat_map(u32::to_le_bytes);
-            fnv.add(name.chain(class.0.to_le_bytes()));
-        }
-        LearningStatus {
-            space: self.space_id.to_string(),
-            capacity: self.config.capacity,
-            personal: counts(SetPart::Personal),
-            shared: counts(SetPart::Shared),
-            external: counts(SetPart::External),
-            aside: self.aside.len(),
-            common: format!("{:016x}", fnv.hash()),
-            lessons: self.lessons.len(),
-            named: self.named_gestures(),
-            memory: String::new(),
-            trainings: 0,
         }
     }
 }

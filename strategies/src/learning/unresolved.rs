@@ -22,7 +22,7 @@ pub(super) struct UnresolvedSample {
 }
 
 /// The keys of such samples in training begin here, far beyond those of the training set.
-pub(super) const FIRST_KEY: u64 = 1 << 63;
+const FIRST_KEY: u64 = 1 << 63;
 
 /// The key that a sample of that number has in training.
 pub(crate) fn training_key(number: u64) -> u64 {

@@ -1,10 +1,10 @@
 //! What a host may want to know of a mind, and to show.
 
-use gestalt_protocol::{Decision, Digest, RobotId, RoundId, Stamp};
+use gestalt_protocol::{Decision, Digest, Heeded, RobotId, RoundId, Stamp};
 use gestalt_rounds::{Ballot, Refusals, RoundsConfig, Vocabulary};
 
 use super::machine::Mind;
-use crate::learning::Learning;
+use crate::learning::{Learning, TrainingChange};
 use crate::training_set::TrainingSet;
 
 impl Mind {
@@ -79,6 +79,18 @@ impl Mind {
     #[must_use]
     pub fn training_set(&self) -> Option<&TrainingSet> {
         self.learning.as_ref().map(Learning::set)
+    }
+
+    /// What makes a new learner learn what this robot trains on.
+    #[must_use]
+    pub fn training(&self) -> Vec<TrainingChange> {
+        self.learning.as_ref().map_or(Vec::new(), Learning::training_anew)
+    }
+
+    /// Of each other robot: how many of its samples it holds, and how many of these it trains on.
+    #[must_use]
+    pub fn heeded(&self) -> Vec<Heeded> {
+        self.learning.as_ref().map_or(Vec::new(), Learning::heeded)
     }
 
     /// What it refused so far, by cause.

@@ -17,6 +17,7 @@ use crate::feature_space::FeatureSpace;
 use crate::head::{Blend, Head, Shown};
 use crate::machine::Machine;
 use crate::no_hand::odds_of_no_hand;
+use crate::panel::{Certified, Votes};
 
 /// The squared distance at which two views are at a distance of 1, in units of the space's variance. Measured on drawn hands
 /// (3,000 frames, sixteen robots, 72 showings): whether two views of one showing are misjudged correlates by .93, .82, .68,
@@ -42,6 +43,31 @@ pub struct Classifier {
     pub(crate) familiarity: Option<Familiarity>,
     /// A head for few showings beside the machines; `None` where they answer alone.
     pub(crate) blend: Option<Blend>,
+    /// The classifiers of groups of authors, which answer in its place; `None` where all samples were learned from together. It is not part of what
+    /// [`Self::encode`] writes: who reads that has the first group's, until it learns again.
+    panel: Option<Arc<Panel>>,
+}
+
+/// The classifiers of groups of authors.
+#[derive(Debug, PartialEq)]
+struct Panel {
+    /// The gestures that any of them has met, and all of the list.
+    vocabulary: Vocabulary,
+    members: Vec<Arc<Classifier>>,
+}
+
+impl Panel {
+    fn asked(&self, coordinates: &[f32], no_hand: f64) -> Votes<'_> {
+        let mut votes = Votes::of(&self.vocabulary);
+        for member in &self.members {
+            let (probabilities, unknown) = member.judge_in_space(coordinates, no_hand);
+            // Who has met nothing says nothing.
+            let all = member.vocabulary.all().zip(probabilities).filter(|_| member.met().next().is_some());
+            let likeliest = all.reduce(|a, b| if b.1 > a.1 { b } else { a });
+            votes.add(likeliest.map(|(class, _)| class), unknown);
+        }
+        votes
+    }
 }
 
 impl Classifier {
@@ -53,12 +79,28 @@ impl Classifier {
         calibration: Calibration,
         familiarity: Option<Familiarity>,
     ) -> Self {
-        Self { vocabulary, space, learned, machine, calibration, familiarity, blend: None }
+        Self { vocabulary, space, learned, machine, calibration, familiarity, blend: None, panel: None }
     }
 
     /// The same with a head for few showings beside the machines.
     pub(crate) fn blended(self, blend: Option<Blend>) -> Self {
         Self { blend, ..self }
+    }
+
+    /// One that answers as most of these say, in that vocabulary.
+    pub(crate) fn of_panel(vocabulary: Vocabulary, first: &Self, members: Vec<Arc<Self>>) -> Self {
+        Self { panel: Some(Arc::new(Panel { vocabulary, members })), ..first.clone() }
+    }
+
+    /// What most groups of authors say of coordinates in its space, and how certain that is; `None` of one that learned from all samples together, and for
+    /// coordinates of another length or that are not finite.
+    #[must_use]
+    pub fn certified(&self, coordinates: &[f32]) -> Option<Certified> {
+        self.panel.as_ref().filter(|_| self.fits(coordinates))?.asked(coordinates, 0.0).certified()
+    }
+
+    fn fits(&self, coordinates: &[f32]) -> bool {
+        coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite())
     }
 
     /// The same, where nothing is left of the samples but the support vectors: each counts as a showing of its own. They lie where classes meet, so
@@ -138,6 +180,9 @@ impl Classifier {
 
     /// Judges coordinates in its space, given the odds of no hand: the probabilities of all gestures of the list, and that of one beside it.
     fn judge_in_space(&self, coordinates: &[f32], no_hand: f64) -> (Vec<f64>, f64) {
+        if let Some(panel) = &self.panel {
+            return panel.asked(coordinates, no_hand).probabilities();
+        }
         let (classes, met) = (self.learned.len(), self.met().count());
         let logs = self.logs_of_head(coordinates);
         let few = self.blend.as_ref().zip(logs.as_deref());
@@ -161,8 +206,14 @@ impl Classifier {
     fn judge_all(&self, features: &[f32], no_hand: f64) -> Result<Judgement, ClassifyError> {
         let coordinates = self.space.project(features)?;
         let (probabilities, unknown) = self.judge_in_space(&coordinates, no_hand);
-        let unknown = self.familiarity.is_some().then_some(unknown);
+        let unknown = self.tells_unknown().then_some(unknown);
         Ok(Judgement { probabilities, unknown, view: self.in_view(&coordinates) })
+    }
+
+    fn tells_unknown(&self) -> bool {
+        self.panel.as_ref().map_or(self.familiarity.is_some(), |panel| {
+            panel.members.iter().any(|member| member.familiarity.is_some())
+        })
     }
 
     /// Coordinates in units in which errors about two views correlate by exp(−d²); `None` in a space in which nothing varies.
@@ -174,7 +225,7 @@ impl Classifier {
 
 impl Classify for Classifier {
     fn vocabulary(&self) -> &Vocabulary {
-        &self.vocabulary
+        self.panel.as_ref().map_or(&self.vocabulary, |panel| &panel.vocabulary)
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
@@ -182,8 +233,13 @@ impl Classify for Classifier {
     }
 
     fn unknown(&self, features: &[f32]) -> Option<f64> {
-        self.familiarity.as_ref()?;
+        if !self.tells_unknown() {
+            return None;
+        }
         let coordinates = self.space.project(features).ok()?;
+        if let Some(panel) = &self.panel {
+            return Some(panel.asked(&coordinates, 0.0).probabilities().1);
+        }
         let logs = self.logs_of_head(&coordinates);
         Some(self.of_unknown(&coordinates, self.blend.as_ref().zip(logs.as_deref()), 0.0))
     }
@@ -202,8 +258,7 @@ impl Classify for Classifier {
     }
 
     fn probabilities_in_space(&self, coordinates: &[f32]) -> Option<Vec<f64>> {
-        let fits = coordinates.len() == self.space.components() && coordinates.iter().all(|x| x.is_finite());
-        fits.then(|| self.judge_in_space(coordinates, 0.0).0)
+        self.fits(coordinates).then(|| self.judge_in_space(coordinates, 0.0).0)
     }
 }
 

@@ -24,6 +24,7 @@ mod learner;
 mod machine;
 mod model_codec;
 mod no_hand;
+mod panel;
 mod reduction;
 mod scaling;
 mod scatter;
@@ -39,6 +40,7 @@ pub use head::{Discriminant, DiscriminantSums, Head, Shown, Teach};
 pub use labelled::LabelledFeatures;
 pub use learner::{LearnError, Learner, LearnerOptions, SharedKernel};
 pub use model_codec::{MAX_MODEL, ModelError};
+pub use panel::Certified;
 pub use reduction::{Components, Pca, Ranking, Reduction};
 pub use scaling::{Scaling, ScalingMethod};
 #[cfg(feature = "offline")]

@@ -41,7 +41,8 @@ pub use statistics::{Mean, Proportion};
 pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
-use gestalt_strategies::{Classifier, Refusals, TrainingSet, Vocabulary};
+use gestalt_protocol::Heeded;
+use gestalt_strategies::{Classifier, Mind, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -182,6 +183,12 @@ impl<'a> Emulation<'a> {
     #[must_use]
     pub fn training_set(&self, robot: usize) -> Option<&TrainingSet> {
         self.swarm.mind(robot)?.training_set()
+    }
+
+    /// Of each other robot: how many of its samples that robot holds, and how many of these it trains on.
+    #[must_use]
+    pub fn heeded(&self, robot: usize) -> Vec<Heeded> {
+        self.swarm.mind(robot).map_or(Vec::new(), Mind::heeded)
     }
 
     /// What a robot has refused so far, by its position; `None` of one that is down, or lies.

@@ -20,8 +20,6 @@ pub(super) struct Pupil {
     is_read: bool,
     /// Whether its learner goes once it has learned, with all that it keeps to follow changes: of a large swarm few are asked, and seldom.
     starts_over: bool,
-    /// What it has guessed of samples that are not of its training set, where it starts over.
-    guesses: BTreeMap<u64, TrainingChange>,
     /// Whether there is anything that the classifier has not followed.
     is_behind: bool,
     /// Whether its mind was not told of the classifier yet.
@@ -74,7 +72,6 @@ impl Pupil {
     pub fn stop(&mut self) {
         (self.remembered, self.learner, self.classifier) = (0, None, None);
         self.due.clear();
-        self.guesses.clear();
         (self.is_behind, self.is_news) = (false, false);
     }
 
@@ -94,12 +91,10 @@ impl Pupil {
 
     /// Gets ready to learn anew, from the samples that its mind holds.
     fn gather(&mut self, mind: Option<&Mind>, school: &School) {
-        let samples = || mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
+        let samples = mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
         // Of a shared sample all robots hold one vector: its kernel with the others is worked out once for all of them.
-        samples()
-            .filter(|sample| sample.id.is_some())
-            .for_each(|sample| school.kernel().hold(&sample.vector));
-        self.due = samples().map(TrainingChange::insert).chain(self.guesses.values().cloned()).collect();
+        samples.filter(|sample| sample.id.is_some()).for_each(|sample| school.kernel().hold(&sample.vector));
+        self.due = mind.map_or(Vec::new(), Mind::training);
         let mut learner = new_learner(school);
         learner.make_room(self.due.iter().filter_map(|change| match change {
             TrainingChange::Insert { class, .. } => Some(*class),
@@ -121,19 +116,9 @@ impl Pupil {
 
     pub fn train_later(&mut self, changes: Vec<TrainingChange>) {
         self.is_behind |= !changes.is_empty();
+        // Who starts over asks the mind what it trains on.
         if !self.starts_over {
-            return self.due.extend(changes);
-        }
-        for change in changes.into_iter().filter(TrainingChange::is_guess) {
-            match change {
-                TrainingChange::Insert { key, .. } => _ = self.guesses.insert(key, change),
-                TrainingChange::Remove(key) => _ = self.guesses.remove(&key),
-                TrainingChange::Relabel { key, class: now } => {
-                    if let Some(TrainingChange::Insert { class, .. }) = self.guesses.get_mut(&key) {
-                        *class = now;
-                    }
-                }
-            }
+            self.due.extend(changes);
         }
     }
 
@@ -202,8 +187,13 @@ mod tests {
 
     #[test]
     fn what_came_and_went_is_not_trained_and_all_else_is_in_its_order() {
-        let insert =
-            |key| TrainingChange::Insert { key, class: ClassId(0), vector: [0.0].into(), showing: key };
+        let insert = |key| TrainingChange::Insert {
+            key,
+            class: ClassId(0),
+            vector: [0.0].into(),
+            showing: key,
+            group: None,
+        };
         let relabel = |key| TrainingChange::Relabel { key, class: ClassId(1) };
         let remove = TrainingChange::Remove;
         let changes =

@@ -1,5 +1,7 @@
 //! Whole swarms in the emulated network.
 
+mod certified;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;

@@ -151,17 +151,7 @@ mod tests {
         let standing = |round| {
             let labels = f64::from(round / every);
             let single = (labels * worth).min(1.0);
-            Standing {
-                round,
-                single,
-                swarm: single,
-                majority: 0.0,
-                published: 0.0,
-                on_links: 0.0,
-                samples: 0.0,
-                questions: labels,
-                labels,
-            }
+            Standing { round, single, swarm: single, questions: labels, labels, ..Standing::default() }
         };
         (0..=rounds).map(standing).collect()
     }

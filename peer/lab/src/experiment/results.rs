@@ -27,6 +27,10 @@ struct Row {
     samples: f64,
     questions: f64,
     labels: f64,
+    heeded_honest: f64,
+    heeded_liars: f64,
+    least_heeded: f64,
+    certified: f64,
 }
 
 /// `results.csv`: all rounds of each run that ended.
@@ -89,41 +93,43 @@ fn rows(runs: &BTreeMap<Run, Vec<Standing>>) -> Vec<Row> {
 }
 
 fn row((line, value, seed): &Run, standing: &Standing) -> Row {
-    let Standing { round, single, swarm, majority, published, on_links, samples, questions, labels } =
-        *standing;
     Row {
         line: line.clone(),
         value: value.clone(),
         seed: *seed,
-        round,
-        single,
-        swarm,
-        majority,
-        published_bytes: published,
-        link_bytes: on_links,
-        samples,
-        questions,
-        labels,
+        round: standing.round,
+        single: standing.single,
+        swarm: standing.swarm,
+        majority: standing.majority,
+        published_bytes: standing.published,
+        link_bytes: standing.on_links,
+        samples: standing.samples,
+        questions: standing.questions,
+        labels: standing.labels,
+        heeded_honest: standing.heeded_honest,
+        heeded_liars: standing.heeded_liars,
+        least_heeded: standing.least_heeded,
+        certified: standing.certified,
     }
 }
 
 fn taken_apart(row: Row) -> (Run, Standing) {
-    let Row {
-        line, value, seed, round, single, swarm, majority, published_bytes, link_bytes, samples, ..
-    } = row;
-    let Row { questions, labels, .. } = row;
     let standing = Standing {
-        round,
-        single,
-        swarm,
-        majority,
-        published: published_bytes,
-        on_links: link_bytes,
-        samples,
-        questions,
-        labels,
+        round: row.round,
+        single: row.single,
+        swarm: row.swarm,
+        majority: row.majority,
+        published: row.published_bytes,
+        on_links: row.link_bytes,
+        samples: row.samples,
+        questions: row.questions,
+        labels: row.labels,
+        heeded_honest: row.heeded_honest,
+        heeded_liars: row.heeded_liars,
+        least_heeded: row.least_heeded,
+        certified: row.certified,
     };
-    ((line, value, seed), standing)
+    ((row.line, row.value, row.seed), standing)
 }
 
 #[cfg(test)]
@@ -141,6 +147,10 @@ mod tests {
             samples: 3.0,
             questions: 1.0,
             labels: 1.0,
+            heeded_honest: 1.0,
+            heeded_liars: 1.0,
+            least_heeded: 1.0,
+            certified: 0.0,
         };
         (0..=rounds).map(standing).collect()
     }

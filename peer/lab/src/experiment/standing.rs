@@ -1,7 +1,7 @@
 //! What is measured after each round of a run.
 
 /// How a swarm stands after a round.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Standing {
     /// How many rounds there were.
     pub round: u32,
@@ -22,4 +22,12 @@ pub struct Standing {
     pub questions: f64,
     /// How often the instructor said what was shown.
     pub labels: f64,
+    /// Of the samples that honest robots hold of other honest ones, the share that they train on.
+    pub heeded_honest: f64,
+    /// The same of those of liars; 1 where there are none.
+    pub heeded_liars: f64,
+    /// The least share that any honest robot trains on of the samples of another honest one.
+    pub least_heeded: f64,
+    /// Where robots learn from groups of authors apart: the share of held-out views that they judge rightly, whatever as many others said as lie, or one. 0 elsewhere.
+    pub certified: f64,
 }

@@ -44,6 +44,8 @@ pub struct Curves {
     pub on_links: Vec<Mean>,
     /// Samples held per robot.
     pub samples: Vec<Mean>,
+    /// What single robots judge rightly, whatever the liars had said.
+    pub certified: Vec<Mean>,
     /// The accuracy of a single robot, averaged over all rounds but the start.
     pub over_rounds: Mean,
     /// By how much it is above that of the first cell, seed by seed.
@@ -87,6 +89,7 @@ impl Summary {
                 published: over(&|s| s.published),
                 on_links: over(&|s| s.on_links),
                 samples: over(&|s| s.samples),
+                certified: over(&|s| s.certified),
                 over_rounds: Mean::of(&of_cell.values().map(|run| over_rounds(run)).collect::<Vec<_>>()),
                 gain_over_rounds: paired(&over_rounds),
                 gain_at_the_end: paired(&last),
@@ -164,7 +167,28 @@ impl Summary {
                  those of all."
             );
         }
+        self.write_certified(&mut text);
         text
+    }
+
+    /// Of robots that learn from groups of authors apart: what is certain.
+    fn write_certified(&self, text: &mut String) {
+        for (cell, curves) in self.cells.iter().filter(|(cell, _)| cell.setting.learning.learner.groups > 0) {
+            let last = curves.certified.last().copied().unwrap_or(Mean::of(&[]));
+            let line = if self.lines { format!("{}, ", cell.line) } else { String::new() };
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "\n{line}{}: at the end single robots judge {:.1} ± {:.1} % rightly, whatever {} had said.",
+                cell.value,
+                100.0 * last.mean,
+                100.0 * last.half_width,
+                match cell.setting.liars {
+                    0 | 1 => "any one other robot".to_owned(),
+                    liars => format!("any {liars} others"),
+                },
+            );
+        }
     }
 }
 
@@ -199,17 +223,8 @@ mod tests {
         let text = "{ title: 't', base: { rounds: 1 }, axis: { name: 'x', values: [
             { name: 'a', set: {} }, { name: 'b', set: {} } ] } }";
         let experiment = Experiment::parse(text, std::path::Path::new("test")).unwrap();
-        let standing = |round, single| Standing {
-            round,
-            single,
-            swarm: 1.0,
-            majority: 1.0,
-            published: 0.0,
-            on_links: 0.0,
-            samples: 0.0,
-            questions: 0.0,
-            labels: 0.0,
-        };
+        let standing =
+            |round, single| Standing { round, single, swarm: 1.0, majority: 1.0, ..Standing::default() };
         let mut runs = BTreeMap::new();
         for (seed, ease) in [(0, 0.2), (1, 0.6)] {
             for (value, skill) in [("a", 0.0), ("b", 0.1)] {

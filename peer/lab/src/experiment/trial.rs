@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, FusionRule};
+use gestalt_protocol::{ClassId, FusionRule, Heeded};
 use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, JudgedFrame};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -63,8 +63,9 @@ pub fn run(
         Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
     let honest = &places[..setting.robots - setting.liars];
     let examined = examined(honest.len(), seed);
-    let exams =
-        [0, 1].map(|after| Exam::new(pool, school, &split.held_out[after], (honest, &examined), rules));
+    let exams = [0, 1].map(|after| {
+        Exam::new(pool, school, &split.held_out[after], (honest, &examined), rules).against(setting.liars)
+    });
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
         if stop.load(Ordering::Relaxed) {
@@ -75,6 +76,13 @@ pub fn run(
         standings.push(exams[after].sit(&mut emulation, round));
     }
     Ok(standings)
+}
+
+/// Which part of the samples held is trained on.
+fn share<'a>(of: impl IntoIterator<Item = &'a Heeded>) -> f64 {
+    let (held, trained) =
+        of.into_iter().fold((0, 0), |(held, trained), of| (held + of.held, trained + of.trained));
+    if held == 0 { 1.0 } else { trained as f64 / held as f64 }
 }
 
 /// Draws where robots stand: no two at one place, as long as there are places.
@@ -157,6 +165,8 @@ struct Exam {
     places: Vec<usize>,
     /// By which a swarm judges.
     fusion: Arc<dyn Fuse>,
+    /// Against how many liars a judgement is to be certain.
+    liars: usize,
 }
 
 impl Exam {
@@ -178,7 +188,19 @@ impl Exam {
         };
         let questions = moments.iter().map(question).collect();
         let fusion = rules.fusion.clone().unwrap_or(Arc::new(FusionRule::default()));
-        Self { classes: pool.gestures.len(), robots, examined: examined.to_vec(), questions, places, fusion }
+        Self {
+            classes: pool.gestures.len(),
+            robots,
+            examined: examined.to_vec(),
+            questions,
+            places,
+            fusion,
+            liars: 1,
+        }
+    }
+
+    fn against(self, liars: usize) -> Self {
+        Self { liars: liars.max(1), ..self }
     }
 
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
@@ -186,12 +208,15 @@ impl Exam {
         let classifiers: Vec<Option<Arc<Classifier>>> =
             self.examined.iter().map(|robot| emulation.classifier(*robot)).collect();
         let chance = 1.0 / self.classes as f64;
-        let (mut single, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0);
+        let (mut single, mut certified, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for (class, views) in &self.questions {
             let mut evidence: Vec<Vec<f32>> = Vec::new();
             for (place, classifier) in self.places.iter().zip(&classifiers) {
                 let Some(view) = views.get(place) else { continue };
                 seen += 1.0;
+                let certain = classifier.as_ref().and_then(|classifier| classifier.certified(view));
+                let certain = certain.is_some_and(|it| it.class == *class && it.tolerates >= self.liars);
+                certified += f64::from(u8::from(certain));
                 let judged =
                     classifier.as_ref().and_then(|classifier| classifier.probabilities_in_space(view));
                 match judged {
@@ -216,6 +241,10 @@ impl Exam {
         let traffic: crate::emulation::Traffic = traffic.sum();
         let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
         let (asked, labels) = emulation.asked();
+        let heeded: Vec<Heeded> = (0..self.robots).flat_map(|robot| emulation.heeded(robot)).collect();
+        // The honest robots are the first.
+        let (of_honest, of_liars): (Vec<Heeded>, Vec<Heeded>) =
+            heeded.into_iter().partition(|of| of.robot.0 as usize <= self.robots);
         Standing {
             round,
             single: single / f64::max(seen, 1.0),
@@ -226,6 +255,10 @@ impl Exam {
             samples: samples.sum::<usize>() as f64 / robots,
             questions: f64::from(asked),
             labels: f64::from(labels),
+            heeded_honest: share(&of_honest),
+            heeded_liars: share(&of_liars),
+            least_heeded: of_honest.iter().map(|of| share([of])).fold(1.0, f64::min),
+            certified: certified / f64::max(seen, 1.0),
         }
     }
 }

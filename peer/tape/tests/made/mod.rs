@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use gestalt_protocol::{
     Announcement, Answer, Ask, ClassId, Decision, Envelope, FeatureSpaceId, FrameHeader, FusionRule, Gesture,
-    ImageEncoding, Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Question, Reported,
-    RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
+    Heeded, ImageEncoding, Instruction, Keys, LearningStatus, Message, Motion, Opinion, Outcome, Question,
+    Reported, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Status, Topic, Vector,
 };
 use gestalt_rounds::{
     Classify, ClassifyError, Input, Life, Observation, Output, Rounds, RoundsConfig, Vocabulary,
@@ -154,7 +154,11 @@ pub fn one_of_each() -> Vec<Passing> {
     let mut full = status();
     full.camera.motion = Some(Motion { state: Default::default(), delay_ms: 1.5 });
     full.camera.opinion = Some(Opinion { gesture: "fist".to_owned(), probability: 0.25, at_ms: 7 });
-    full.learning = Some(LearningStatus { personal: vec![1, 2], ..LearningStatus::default() });
+    full.learning = Some(LearningStatus {
+        personal: vec![1, 2],
+        doubted: vec![Heeded { robot: RobotId(3), held: 9, trained: 2 }],
+        ..LearningStatus::default()
+    });
     full.counters.insert("sent_vote".to_owned(), u64::MAX);
     full.errors.push(Reported { at_ms: 1, what: "no camera".to_owned() });
     full.round = Some(round);

@@ -8,6 +8,7 @@ mod naming;
 mod refusing;
 mod rest;
 mod sharing;
+mod trusting;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -30,6 +31,7 @@ use crate::learning::{
     TrainingChange, training_key,
 };
 use crate::sample::SetPart;
+use crate::scrutiny::PoisonDefence;
 use crate::selection::SelectionRule;
 use crate::vector_codec::Precision;
 
@@ -312,15 +314,19 @@ impl Swarm {
         self.minds.iter().map(|mind| mind.learned().unwrap().common).collect()
     }
 
-    /// That each trains on exactly what it holds, and its disk holds it too.
+    /// That each trains on what it holds and trusts, as one that begins anew would, and its disk holds it too.
     fn check(&self) {
         for (i, mind) in self.minds.iter().enumerate() {
             let set = mind.training_set().unwrap();
+            let anew: BTreeMap<u64, ClassId> = mind.training().into_iter().filter_map(inserted).collect();
+            assert_eq!(anew, self.trained[i], "robot {} trains on what it would if it began anew", i + 1);
             let held: BTreeMap<u64, ClassId> = set.iter().map(|sample| (sample.key, sample.class)).collect();
-            let mut trained = self.trained[i].clone();
-            // Beyond these are its own guesses.
-            trained.split_off(&training_key(0));
-            assert_eq!(held, trained, "robot {} trains on what it holds", i + 1);
+            if self.config.poison == PoisonDefence::default() {
+                let mut trained = self.trained[i].clone();
+                // Beyond these are its own guesses.
+                trained.split_off(&training_key(0));
+                assert_eq!(held, trained, "robot {} trains on what it holds", i + 1);
+            }
             let records = self.disks[i].iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
             let memory = RobotMemory::read(records).unwrap();
             let kept: BTreeMap<u64, ClassId> = memory.samples.iter().map(|s| (s.key, s.class)).collect();
@@ -328,6 +334,13 @@ impl Swarm {
             assert_eq!(&memory.seen, set.seen());
             mind.learning.as_ref().unwrap().check_batches(memory);
         }
+    }
+}
+
+fn inserted(change: TrainingChange) -> Option<(u64, ClassId)> {
+    match change {
+        TrainingChange::Insert { key, class, .. } => Some((key, class)),
+        TrainingChange::Remove(_) | TrainingChange::Relabel { .. } => None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod few;
 mod folds;
+mod groups;
 mod growing;
 mod kernel;
 mod options;
@@ -57,6 +58,8 @@ pub struct Learner {
     /// The fold of each sample, by class.
     folds: Vec<Vec<usize>>,
     classifier: Option<Arc<Classifier>>,
+    /// One for each group of authors, which learn in its place; none where one learns from all.
+    members: Vec<Self>,
 }
 
 impl Learner {
@@ -84,6 +87,7 @@ impl Learner {
             touched: vec![false; classes],
             folds: vec![Vec::new(); classes],
             classifier: None,
+            members: Self::members(&space, &vocabulary, &options)?,
             space,
             vocabulary,
             options,
@@ -94,6 +98,7 @@ impl Learner {
     /// that has the machines alone, until they learn again.
     #[must_use]
     pub fn with_head(mut self, own: Arc<dyn Teach>) -> Self {
+        self.members = self.members.into_iter().map(|member| member.with_head(own.clone())).collect();
         self.few.own = Some(own);
         self.touched.fill(true);
         self
@@ -120,6 +125,12 @@ impl Learner {
         }
         if classifier.space().id() != self.space.id() {
             return Err(LearnError::Space);
+        }
+        for member in &mut self.members {
+            member.build_on(classifier)?;
+        }
+        if !self.members.is_empty() {
+            return Ok(());
         }
         for index in 0..std::mem::take(&mut self.supports) {
             if let Some(place) = self.samples.place(Key::Support(index)) {
@@ -176,6 +187,9 @@ impl Learner {
         if let Some(coordinate) = vector.iter().position(|x| !range.contains(x)) {
             return Err(LearnError::Range(coordinate));
         }
+        if !self.members.is_empty() {
+            return self.insert_by_members(None, key, class, &vector, showing);
+        }
         let class = self.place_for(class)?;
         let shown_before = self.few.showing(Key::Inserted(key));
         self.few.note(key, showing);
@@ -192,6 +206,9 @@ impl Learner {
 
     /// Samples of these gestures are about to be inserted, one of each: the room for their kernel is made at once.
     pub fn make_room(&mut self, classes: impl IntoIterator<Item = ClassId>) {
+        if !self.members.is_empty() {
+            return;
+        }
         let mut more = vec![0; self.vocabulary.classes()];
         for place in classes.into_iter().filter_map(|class| self.vocabulary.place(class)) {
             more[place] += 1;
@@ -201,6 +218,9 @@ impl Learner {
 
     /// Takes out a sample; whether it was there.
     pub fn remove(&mut self, key: u64) -> bool {
+        if !self.members.is_empty() {
+            return self.remove_by_members(key);
+        }
         let place = self.samples.place(Key::Inserted(key));
         if let Some(place) = place {
             self.take(place);
@@ -214,6 +234,9 @@ impl Learner {
     /// # Errors
     /// As of [`Self::insert`].
     pub fn relabel(&mut self, key: u64, class: ClassId) -> Result<bool, LearnError> {
+        if !self.members.is_empty() {
+            return self.relabel_by_members(key, class);
+        }
         let class = self.place_for(class)?;
         let Some(place) = self.samples.place(Key::Inserted(key)) else { return Ok(false) };
         if place.class != class {
@@ -228,6 +251,9 @@ impl Learner {
     /// How many samples were inserted and not removed; the support vectors built on do not count.
     #[must_use]
     pub fn len(&self) -> usize {
+        if !self.members.is_empty() {
+            return self.keys_of_members().len();
+        }
         self.samples.places().len() - self.supports as usize
     }
 
@@ -244,6 +270,9 @@ impl Learner {
     /// # Errors
     /// None: it always has a solution. A solver that can fail would say so here.
     pub fn learn(&mut self) -> Result<Arc<Classifier>, LearnError> {
+        if !self.members.is_empty() {
+            return self.learn_by_members();
+        }
         if let (Some(classifier), false) = (&self.classifier, self.touched.contains(&true)) {
             return Ok(classifier.clone());
         }

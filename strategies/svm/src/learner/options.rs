@@ -11,6 +11,7 @@ use thiserror::Error;
 /// | `cost` | 10 | C: what a sample on the wrong side of the margin costs | 0.001–10,000 |
 /// | `gamma` | 1 | γ of the kernel exp(−γ·‖x − y‖²), in units of 1 / [`FeatureSpace::variance`](crate::FeatureSpace::variance) | 0.0001–10,000 |
 /// | `staleness` | 0.1 | the part of a pair's samples that may come or go before it is calibrated again | 0–0.25 |
+/// | `groups` | 0 | groups of authors, each with a classifier of its own, of which the majority is [certified](crate::Certified); 0: one learns from all | 0, or 2–64 |
 /// | `folds` | 5 | parts of the cross-validation that the probabilities are fitted on | 2–20 |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -28,11 +29,13 @@ pub struct LearnerOptions {
     /// to find out. With the default, at 1,000 samples of classes of one size, fewer than one in 1,000 answers differ
     /// from those of a fresh fit; at 200 samples or where classes differ eightfold in size, two to eight.
     pub staleness: f64,
+    /// Groups of authors, each with a classifier of its own, of which the majority is certified; 0: one learns from all.
+    pub groups: usize,
 }
 
 impl Default for LearnerOptions {
     fn default() -> Self {
-        Self { cost: 10.0, gamma: 1.0, folds: 5, staleness: 0.1 }
+        Self { cost: 10.0, gamma: 1.0, folds: 5, staleness: 0.1, groups: 0 }
     }
 }
 
@@ -53,6 +56,9 @@ impl LearnerOptions {
         }
         if !(0.0..=0.25).contains(&self.staleness) {
             return Err(LearnError::Option("staleness from 0 to 0.25"));
+        }
+        if self.groups != 0 && !(2..=64).contains(&self.groups) {
+            return Err(LearnError::Option("groups 0, or from 2 to 64"));
         }
         Ok(())
     }

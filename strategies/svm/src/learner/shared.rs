@@ -43,6 +43,7 @@ impl Learner {
     #[must_use]
     pub fn sharing(mut self, kernel: Arc<SharedKernel>) -> Self {
         if kernel.gamma == self.gamma {
+            self.members = self.members.into_iter().map(|member| member.sharing(kernel.clone())).collect();
             self.samples.share(kernel);
         }
         self
