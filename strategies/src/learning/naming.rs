@@ -11,6 +11,7 @@ use super::unresolved;
 use crate::believe::Standing;
 use crate::candidates::Candidates;
 use crate::names::{NameBook, NamingReceipt};
+use crate::sample::HeldSample;
 
 impl Learning {
     pub fn names(&self) -> &NameBook {
@@ -92,11 +93,16 @@ impl Learning {
     /// Trains on a sample of the set.
     pub(super) fn train_on(&mut self, key: u64) {
         if let Some(sample) = self.set.get(key) {
-            let class = self.trained_as(sample.class).filter(|_| self.trusts(key));
-            let group = self.groups().and_then(|groups| groups.of(sample));
-            let change = inserted_as(class, key, &sample.vector, sample.round, group);
+            let change = self.change_for(sample);
             self.training.push(change);
         }
+    }
+
+    /// What makes a learner train on a sample of the set as what it now is, or no longer.
+    fn change_for(&self, sample: &HeldSample) -> TrainingChange {
+        let class = self.trained_as(sample.class).filter(|_| self.trusts(sample.key));
+        let group = self.groups().and_then(|groups| groups.of(sample));
+        inserted_as(class, sample.key, &sample.vector, sample.round, group)
     }
 
     /// Trains on a sample of the set as what it now shows.
@@ -136,20 +142,11 @@ impl Learning {
 
     /// What makes a learner train on all samples of these classes as what they now are.
     fn changes_for(&self, is_wanted: impl Fn(ClassId) -> bool) -> Vec<TrainingChange> {
-        let groups = self.groups();
-        let held = self.set.iter().map(|sample| {
-            let group = groups.and_then(|groups| groups.of(sample));
-            (sample.class, sample.key, &sample.vector, sample.round, group)
-        });
+        let held = self.set.iter().filter(|sample| is_wanted(sample.class));
         let guessed = self.aside.iter().filter_map(|(number, aside)| {
-            Some((aside.guess?, unresolved::training_key(number), &aside.vector, aside.round, None))
+            let class = self.trained_as(aside.guess.filter(|class| is_wanted(*class))?);
+            Some(inserted_as(class, unresolved::training_key(number), &aside.vector, aside.round, None))
         });
-        held.chain(guessed)
-            .filter(|(class, ..)| is_wanted(*class))
-            .map(|(class, key, vector, round, group)| {
-                let class = self.trained_as(class).filter(|_| self.trusts(key));
-                inserted_as(class, key, vector, round, group)
-            })
-            .collect()
+        held.map(|sample| self.change_for(sample)).chain(guessed).collect()
     }
 }

@@ -60,8 +60,14 @@ pub(crate) struct Scrutiny {
 impl Scrutiny {
     /// In a feature space of that variance, the natural unit of squared distances.
     pub fn new(config: PoisonDefence, me: RobotId, variance: f64) -> Self {
-        let (rates, left_out) = Default::default();
-        Self { config, me, reach: variance as f32, rates, left_out, is_due: true }
+        Self {
+            config,
+            me,
+            reach: variance as f32,
+            rates: BTreeMap::new(),
+            left_out: BTreeSet::new(),
+            is_due: true,
+        }
     }
 
     /// Whether a sample is not trained on.
@@ -113,16 +119,7 @@ impl Scrutiny {
         let Some(claim) = held.iter().find(|claim| claim.key == key && claim.is_of_others) else { return };
         // Until it is found true, it counts for nothing.
         self.left_out.insert(key);
-        let mut nearest: BTreeMap<RobotId, Nearest> = BTreeMap::new();
-        if self.config.agreement > 0.0 {
-            for other in held.iter().filter(|other| other.author != claim.author) {
-                let squared = squared_distance(claim.vector, other.vector);
-                nearest.entry(other.author).or_insert(Nearest::NONE).see(squared, other.class, claim.class);
-            }
-        }
-        let testimony = nearest
-            .iter()
-            .filter_map(|(witness, nearest)| Some((*witness, nearest.evidence(self.reach, FAINT)?)));
+        let testimony = self.testimony(held, &[claim]).into_iter().flatten();
         if self.truth(claim.author, testimony) >= BAR
             && self.count(held, claim) < self.bound(held, claim.class)
         {
@@ -155,13 +152,8 @@ impl Scrutiny {
     /// Judges all samples anew, the newest first; gives those that are to be trained on from now on, or no longer.
     pub fn reckon(&mut self, held: &[Claim<'_>]) -> Vec<u64> {
         self.is_due = false;
-        let mut points = Points::default();
         let others: Vec<&Claim<'_>> = held.iter().rev().filter(|claim| claim.is_of_others).collect();
-        others.iter().for_each(|claim| points.push(claim.key, claim.vector));
-        let mut witnesses: Vec<RobotId> = held.iter().map(|claim| claim.author).collect();
-        witnesses.sort_unstable();
-        witnesses.dedup();
-        let testimony = self.testimony(held, &others, &points, &witnesses);
+        let testimony = self.testimony(held, &others);
         let truths = self.truths(&others, &testimony);
 
         let before = self.left_out.clone();
@@ -191,14 +183,13 @@ impl Scrutiny {
         before.symmetric_difference(&self.left_out).copied().collect()
     }
 
-    /// What each witness says of each sample of another.
-    fn testimony(
-        &self,
-        held: &[Claim<'_>],
-        others: &[&Claim<'_>],
-        points: &Points,
-        witnesses: &[RobotId],
-    ) -> Vec<Vec<(RobotId, f64)>> {
+    /// What each witness says of each of these samples of others.
+    fn testimony(&self, held: &[Claim<'_>], others: &[&Claim<'_>]) -> Vec<Vec<(RobotId, f64)>> {
+        let mut points = Points::default();
+        others.iter().for_each(|claim| points.push(claim.key, claim.vector));
+        let mut witnesses: Vec<RobotId> = held.iter().map(|claim| claim.author).collect();
+        witnesses.sort_unstable();
+        witnesses.dedup();
         let slot = |robot: RobotId| witnesses.binary_search(&robot).unwrap_or(0);
         let slots: Vec<usize> = others.iter().map(|claim| slot(claim.author)).collect();
         let n = witnesses.len();
@@ -241,8 +232,4 @@ impl Scrutiny {
         }
         truths
     }
-}
-
-fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
