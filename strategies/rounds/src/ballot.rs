@@ -2,6 +2,7 @@
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use gestalt_protocol::{CountedVote, HeldVote, MAX_ROBOTS, RobotId, Stamp, VocabularyId, Vote};
 
@@ -43,7 +44,8 @@ impl Scale {
 /// number of copies, the same votes make the same ballot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ballot {
-    votes: BTreeMap<RobotId, HeldVote>,
+    /// Robots that live in one process may hold one copy of each: see [`Follow::keep`](crate::Follow::keep).
+    votes: BTreeMap<RobotId, Arc<HeldVote>>,
     /// How many votes there are of each vocabulary and number of gestures: asked at every input, in a swarm of thousands too.
     scales: BTreeMap<(u32, usize), usize>,
     changes: Changes,
@@ -61,8 +63,8 @@ impl PartialEq for Changes {
 
 impl Ballot {
     /// Puts a vote in, if it is the latest of its robot.
-    pub fn cast(&mut self, held: HeldVote) -> Cast {
-        let cast = self.put(held);
+    pub fn cast(&mut self, held: impl Into<Arc<HeldVote>>) -> Cast {
+        let cast = self.put(held.into());
         self.changes.0 += u64::from(cast == Cast::Counted);
         cast
     }
@@ -73,7 +75,7 @@ impl Ballot {
         self.changes.0
     }
 
-    fn put(&mut self, held: HeldVote) -> Cast {
+    fn put(&mut self, held: Arc<HeldVote>) -> Cast {
         let full = self.votes.len() >= MAX_ROBOTS;
         match self.votes.entry(held.robot) {
             Entry::Occupied(known) if known.get().stamp >= held.stamp => Cast::Known,
@@ -135,7 +137,7 @@ impl Ballot {
     /// The votes that one who holds `known` lacks or has only older versions of, by robot.
     pub fn lacking<'a>(&'a self, known: &'a BTreeMap<RobotId, Stamp>) -> impl Iterator<Item = HeldVote> + 'a {
         let lacking = |held: &&HeldVote| known.get(&held.robot).is_none_or(|theirs| *theirs < held.stamp);
-        self.votes.values().filter(lacking).cloned()
+        self.all().filter(lacking).cloned()
     }
 
     /// The scale most votes with evidence are on; of equals the one of the smaller vocabulary, then of fewer classes.
@@ -159,30 +161,33 @@ impl Ballot {
         Columns::of(scale.classes, self.on(scale).map(|held| &held.vote))
     }
 
-    /// How many of these robots take part, seeing or not.
+    /// How many of these robots take part, seeing or not; and how many of them gave evidence on that scale.
     #[must_use]
-    pub fn reached_of(&self, robots: &BTreeSet<RobotId>) -> usize {
-        robots.iter().filter(|robot| self.votes.contains_key(robot)).count()
-    }
-
-    /// How many of these robots gave evidence on that scale.
-    #[must_use]
-    pub fn contributors_of(&self, scale: Scale, robots: &BTreeSet<RobotId>) -> usize {
-        let gave = |robot: &&RobotId| self.votes.get(robot).is_some_and(|held| scale.is_of(&held.vote));
-        robots.iter().filter(gave).count()
+    pub fn turnout(&self, robots: &BTreeSet<RobotId>, scale: Scale) -> (usize, usize) {
+        let mut robots = robots.iter().peekable();
+        let (mut reached, mut gave) = (0, 0);
+        for (robot, held) in &self.votes {
+            while robots.next_if(|other| *other < robot).is_some() {}
+            if robots.next_if_eq(&robot).is_some() {
+                reached += 1;
+                gave += usize::from(scale.is_of(&held.vote));
+            }
+        }
+        (reached, gave)
     }
 
     /// All evidence on that scale as one distribution over its [`columns`](Self::columns), with "unknown" as a last class where any of the robots can tell; `None` when there is
     /// none, or the rule makes none of it. Of the gestures it is asked only which of those it is that any of the robots was taught.
     #[must_use]
     pub fn fuse(&self, rule: &dyn Fuse, clip: f64, scale: Scale) -> Option<Fusion> {
-        self.rows(clip, scale).fuse(rule, clip)
+        self.rows(&self.columns(scale), clip, scale).fuse(rule, clip)
     }
 
     /// How likely the top class of a fusion of this ballot is if as many of the robots lied as are expected.
     #[must_use]
     pub fn withstands(&self, rule: &dyn Fuse, config: &RoundsConfig, scale: Scale, fusion: &Fusion) -> f64 {
-        self.rows(config.clip, scale).withstands(rule, config.clip, fusion, config.liars)
+        let rows = self.rows(&self.columns(scale), config.clip, scale);
+        rows.withstands(rule, config.clip, fusion, config.liars)
     }
 
     /// The votes that [`Ballot::fuse`] counts, as a certificate lists them.
@@ -205,7 +210,7 @@ impl Ballot {
     #[must_use]
     pub fn uncounted(&self, scale: Option<Scale>) -> Vec<HeldVote> {
         let counted = |held: &&HeldVote| !scale.is_some_and(|scale| scale.is_of(&held.vote));
-        self.votes.values().filter(counted).cloned().collect()
+        self.all().filter(counted).cloned().collect()
     }
 
     /// Whether that vote of that robot is held, word for word; `None` when another one of it, or none, is held.
@@ -216,12 +221,17 @@ impl Ballot {
         Some(same && held.vote.unknown == vote.unknown && held.vote.named == vote.named)
     }
 
-    fn rows(&self, clip: f64, scale: Scale) -> Rows {
-        Rows::of(&self.columns(scale), clip, self.on(scale).map(|held| &held.vote))
+    /// The votes on that scale, over these columns of it.
+    pub(crate) fn rows(&self, columns: &Columns, clip: f64, scale: Scale) -> Rows<'_> {
+        Rows::of(columns, clip, self.on(scale).map(|held| &held.vote))
     }
 
     fn on(&self, scale: Scale) -> impl Iterator<Item = &HeldVote> + Clone {
-        self.votes.values().filter(move |held| scale.is_of(&held.vote))
+        self.all().filter(move |held| scale.is_of(&held.vote))
+    }
+
+    fn all(&self) -> impl Iterator<Item = &HeldVote> + Clone {
+        self.votes.values().map(|held| &**held)
     }
 }
 

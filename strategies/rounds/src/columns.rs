@@ -1,5 +1,7 @@
 //! The gestures that votes are fused over: those of the list, and those that were named since.
 
+use std::borrow::Cow;
+
 use gestalt_protocol::{Certificate, ClassId, MAX_CLASSES, Vote};
 
 /// The gestures that a set of votes is evidence for, each with its place.
@@ -71,9 +73,9 @@ impl Columns {
     }
 
     /// A vote's evidence for each. Where it says nothing of "unknown" either, a gesture that it does not know is as likely as its mean.
-    pub(crate) fn row(&self, vote: &Vote) -> Vec<f32> {
+    pub(crate) fn row<'a>(&self, vote: &'a Vote) -> Cow<'a, [f32]> {
         if self.named == vote.named {
-            return vote.evidence.clone();
+            return Cow::Borrowed(&vote.evidence);
         }
         let for_others = vote.unknown.unwrap_or(0.0);
         self.classes().map(|class| vote.evidence_for(class).unwrap_or(for_others)).collect()
@@ -114,8 +116,8 @@ mod tests {
         let votes = [vote(&[1.0, -1.0], &[]), vote(&[0.0, -2.0, 2.0], &["circle"])];
         let columns = Columns::of(2, votes.iter());
         assert_eq!(columns.classes().collect::<Vec<_>>(), [ClassId(0), ClassId(1), named("circle")]);
-        assert_eq!(columns.row(&votes[0]), [1.0, -1.0, -0.5]);
-        assert_eq!(columns.row(&votes[1]), [0.0, -2.0, 2.0]);
+        assert_eq!(*columns.row(&votes[0]), [1.0, -1.0, -0.5]);
+        assert_eq!(*columns.row(&votes[1]), [0.0, -2.0, 2.0]);
         assert_eq!(columns.top(&votes[0]), ClassId(0));
         assert_eq!(columns.top(&votes[1]), named("circle"));
         let far = vote(&[-3.0, -2.0], &[]);

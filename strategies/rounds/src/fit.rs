@@ -52,9 +52,9 @@ impl Testimony {
         let mut totals = vec![0.0; taught.len()];
         let mut strengths = Vec::with_capacity(decision.certificate.votes.len());
         let mut singles = Vec::new();
-        for row in rows.of_taught() {
+        for row in rows.of_taught().rows() {
             let mut clipped = vec![0.0; taught.len()];
-            clip_into(&mut clipped, &row, clip);
+            clip_into(&mut clipped, row, clip);
             totals.iter_mut().zip(&clipped).for_each(|(total, part)| *total += part);
             strengths.push(strength(&clipped));
             if singles.len() < MAX_SINGLES {

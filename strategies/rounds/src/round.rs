@@ -17,6 +17,7 @@ use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
 use crate::observation::Observation;
+use crate::rows::Rows;
 use crate::sign::Sign;
 use crate::vocabulary::Vocabulary;
 
@@ -340,32 +341,31 @@ impl Round {
         {
             return;
         }
-        // Of fewer robots all count, as the certificate states how many there are.
-        let is_drawn = config.committee_of(view.robots).is_some();
-        let suffice = || {
-            contributors > 0
-                && match (view.committee.filter(|_| is_drawn), scale) {
-                    (Some(members), Some(scale)) => config.suffice(
-                        self.ballot.reached_of(members),
-                        self.ballot.contributors_of(scale, members),
-                        view.robots,
-                    ),
-                    _ => config.suffice(self.ballot.len(), contributors, view.robots),
-                }
-        };
         if !(late || self.has_heard_all(now, view, config)) {
             return;
         }
-        let suffice = suffice();
-        if !(late || suffice) {
+        // At most, where a committee votes: who of it did is looked up for a gesture that convinces.
+        let may_suffice = contributors > 0 && config.suffice(self.ballot.len(), contributors, view.robots);
+        if !(late || may_suffice) {
             return;
         }
-        let fusion = scale.and_then(|scale| self.ballot.fuse(rule, config.clip, scale));
-        let convinces = |fusion: &&Fusion| {
-            let scale = scale.filter(|_| suffice);
-            scale.is_some_and(|scale| config.convinces(self.ballot.withstands(rule, config, scale, fusion)))
-        };
         let columns = scale.map(|scale| self.ballot.columns(scale));
+        let rows = scale.zip(columns.as_ref());
+        let rows = rows.map(|(scale, columns)| self.ballot.rows(columns, config.clip, scale));
+        let fusion = rows.as_ref().and_then(|rows| rows.fuse(rule, config.clip));
+        // Of fewer robots all count, as the certificate states how many there are.
+        let drawn = view.committee.filter(|_| config.committee_of(view.robots).is_some());
+        let suffice = || {
+            may_suffice
+                && drawn.zip(scale).is_none_or(|(members, scale)| {
+                    let (reached, contributors) = self.ballot.turnout(members, scale);
+                    config.suffice(reached, contributors, view.robots)
+                })
+        };
+        let convinces = |fusion: &&Fusion| {
+            let withstands = |rows: &Rows<'_>| rows.withstands(rule, config.clip, fusion, config.liars);
+            rows.as_ref().is_some_and(|rows| config.convinces(withstands(rows))) && suffice()
+        };
         let of_place = |place: usize| columns.as_ref().and_then(|columns| columns.class(place));
         let class = fusion.as_ref().filter(convinces).and_then(|fusion| of_place(fusion.top.index()));
         if class.is_none() && (!late || self.agreement.best().is_some_and(|best| best.class.is_some())) {

@@ -1,5 +1,7 @@
 //! Votes as fusion rules take them: first whether it is a gesture that was taught at all, then which.
 
+use std::borrow::Cow;
+
 use gestalt_protocol::{ClassId, FusionRule, Vote};
 
 use crate::columns::Columns;
@@ -16,39 +18,69 @@ use crate::fusion::{Fusion, top_of};
 ///
 /// "Unknown" and each gesture that nobody was taught share the rest alike.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Rows {
+pub(crate) struct Rows<'a> {
     /// By how many robots each gesture was learned.
     known_by: Vec<usize>,
     /// For each vote its evidence for each gesture.
-    rows: Vec<Vec<f32>>,
-    /// For each vote that tells, and each gesture: d(k).
-    leads: Vec<Vec<f64>>,
+    rows: Vec<Cow<'a, [f32]>>,
+    /// For each vote that tells, one after the other, and each gesture: d(k).
+    leads: Vec<f64>,
+    /// How many votes tell.
+    tell: usize,
 }
 
 /// The gestures among which a rule is asked to choose, and what it chose.
-struct Choice {
+struct Choice<'a> {
     of: Vec<usize>,
-    rows: Vec<Vec<f32>>,
+    part: Part<'a>,
     fusion: Fusion,
 }
 
-impl Rows {
+/// The evidence of each vote for some of the gestures.
+pub(crate) enum Part<'a> {
+    All(&'a [Cow<'a, [f32]>]),
+    /// One vote after the other: for a swarm of a thousand, one piece of memory and not a thousand.
+    Some(Vec<f32>, usize),
+}
+
+impl Part<'_> {
+    /// By vote.
+    pub fn rows(&self) -> Vec<&[f32]> {
+        match self {
+            Self::All(rows) => rows.iter().map(AsRef::as_ref).collect(),
+            Self::Some(values, width) => values.chunks_exact((*width).max(1)).collect(),
+        }
+    }
+}
+
+impl<'a> Rows<'a> {
     /// Those of votes over these gestures; "unknown" is compared after clipping both to ±`clip`.
-    pub fn of<'a>(columns: &Columns, clip: f64, votes: impl Iterator<Item = &'a Vote>) -> Self {
+    pub fn of(columns: &Columns, clip: f64, votes: impl Iterator<Item = &'a Vote>) -> Self {
         let mut known_by = vec![0; columns.len()];
-        let (mut rows, mut leads) = (Vec::new(), Vec::new());
+        let most = votes.size_hint().1.unwrap_or_default();
+        let mut rows = Vec::with_capacity(most);
+        let (mut leads, mut tell) = (Vec::with_capacity(most * columns.len()), 0);
         let clipped = |value: f32| f64::from(value).min(clip).max(-clip);
         for vote in votes {
-            for (class, known_by) in columns.classes().zip(&mut known_by) {
-                *known_by += usize::from(knows(vote, class));
-            }
             let row = columns.row(vote);
+            for (place, (class, known_by)) in columns.classes().zip(&mut known_by).enumerate() {
+                let is_known = match &row {
+                    // Of the same gestures as the columns.
+                    Cow::Borrowed(evidence) => {
+                        evidence.get(place).is_some_and(|value| tells_apart(vote, *value))
+                    }
+                    Cow::Owned(_) => knows(vote, class),
+                };
+                *known_by += usize::from(is_known);
+            }
             if let Some(unknown) = vote.unknown.map(clipped) {
-                leads.push(row.iter().map(|value| clipped(*value) - unknown).collect());
+                leads.extend(row.iter().map(|value| clipped(*value) - unknown));
+                leads.resize((tell + 1) * columns.len(), 0.0);
+                tell += 1;
             }
             rows.push(row);
         }
-        Self { known_by, rows, leads }
+        Self { known_by, rows, leads, tell }
     }
 
     /// How many probabilities a fusion has: one for each gesture, and where any robot tells, one for "unknown".
@@ -62,7 +94,7 @@ impl Rows {
     }
 
     /// The evidence of each vote for these.
-    pub fn of_taught(&self) -> Vec<Vec<f32>> {
+    pub fn of_taught(&self) -> Part<'_> {
         self.restricted(&self.taught())
     }
 
@@ -94,7 +126,7 @@ impl Rows {
             if choice.of.len() == 1 {
                 return Some(1.0);
             }
-            Some(rule.withstands(clip, &as_slices(&choice.rows), &choice.fusion, liars))
+            Some(rule.withstands(clip, &choice.part.rows(), &choice.fusion, liars))
         };
         if !self.tells() || liars == 0 {
             let share = fusion.probabilities.get(top).filter(|_| self.tells() && fusion.margin > 0.0);
@@ -111,7 +143,7 @@ impl Rows {
     /// The least part of a majority that is for a gesture, whatever liars pretend to have been taught: by that they can make robots abstain who find what they
     /// do not know themselves likeliest. Who finds that gesture likelier than all others is for it in any case.
     fn always_for(&self, top: usize, liars: u32) -> f64 {
-        let is_for = |row: &&Vec<f32>| {
+        let is_for = |row: &&Cow<'_, [f32]>| {
             let others = row.iter().enumerate().filter(|(class, _)| *class != top);
             row.get(top)
                 .is_some_and(|of_top| others.map(|(_, of_other)| of_other).all(|other| other < of_top))
@@ -122,7 +154,7 @@ impl Rows {
     }
 
     fn tells(&self) -> bool {
-        !self.leads.is_empty()
+        self.tell > 0
     }
 
     /// The gestures that more than so many robots know; all of them, where no robot tells what is unknown.
@@ -131,41 +163,48 @@ impl Rows {
         (0..self.known_by.len()).filter(known).collect()
     }
 
-    fn restricted(&self, gestures: &[usize]) -> Vec<Vec<f32>> {
-        let part = |row: &Vec<f32>| gestures.iter().filter_map(|class| row.get(*class).copied()).collect();
-        self.rows.iter().map(part).collect()
+    /// The evidence for these gestures, ascending.
+    fn restricted(&self, gestures: &[usize]) -> Part<'_> {
+        if gestures.len() == self.known_by.len() {
+            return Part::All(&self.rows);
+        }
+        let mut values = Vec::with_capacity(self.rows.len() * gestures.len());
+        for row in &self.rows {
+            values.extend(gestures.iter().map(|class| row.get(*class).copied().unwrap_or_default()));
+        }
+        Part::Some(values, gestures.len())
     }
 
     /// What the rule makes of the evidence for these gestures. Of a single one it is not asked.
-    fn choose(&self, rule: &dyn Fuse, clip: f64, of: Vec<usize>) -> Option<Choice> {
-        let rows = self.restricted(&of);
+    fn choose(&self, rule: &dyn Fuse, clip: f64, of: Vec<usize>) -> Option<Choice<'_>> {
+        let part = self.restricted(&of);
         let fusion = match of[..] {
             [] => Fusion { probabilities: Vec::new(), top: ClassId(0), margin: 0.0 },
             [class] => {
                 Fusion { probabilities: vec![1.0], top: ClassId(0), margin: self.known_by[class] as f64 }
             }
-            _ => rule.fuse(clip, of.len(), &as_slices(&rows)).filter(|fusion| fusion.is_sound(of.len()))?,
+            _ => rule.fuse(clip, of.len(), &part.rows()).filter(|fusion| fusion.is_sound(of.len()))?,
         };
-        Some(Choice { of, rows, fusion })
+        Some(Choice { of, part, fusion })
     }
 
     /// S over the gestures that more than so many robots know, without as many of the robots that are surest of them.
     fn odds(&self, liars: usize) -> f64 {
         let firm = self.known_by_more_than(liars);
-        let of_robot = |leads: &Vec<f64>| {
+        let of_robot = |leads: &[f64]| {
             let lead = |class: &usize| leads.get(*class).map_or(0.0, |lead| lead.exp());
             firm.iter().map(lead).sum::<f64>().ln()
         };
-        let mut odds: Vec<f64> = self.leads.iter().map(of_robot).collect();
+        let mut odds: Vec<f64> = self.leads.chunks(self.known_by.len().max(1)).map(of_robot).collect();
         if liars > 0 {
             odds.sort_by(f64::total_cmp);
-            odds.truncate(self.leads.len().saturating_sub(liars));
+            odds.truncate(self.tell.saturating_sub(liars));
         }
         if odds.is_empty() { f64::NEG_INFINITY } else { odds.iter().sum::<f64>() / odds.len() as f64 }
     }
 }
 
-impl Choice {
+impl Choice<'_> {
     /// The likeliest gesture.
     fn top(&self) -> Option<usize> {
         self.of.get(self.fusion.top.index()).copied()
@@ -175,15 +214,15 @@ impl Choice {
 /// Whether that robot was taught that gesture: one that was not is as likely to it as "unknown", to the bit. Who tells nothing of that was taught all
 /// gestures, or none where all are as likely.
 pub(crate) fn knows(vote: &Vote, class: ClassId) -> bool {
-    let Some(of_class) = vote.evidence_for(class) else { return false };
+    vote.evidence_for(class).is_some_and(|of_class| tells_apart(vote, of_class))
+}
+
+/// Whether that evidence of a vote is of a gesture that its robot was taught.
+fn tells_apart(vote: &Vote, of_class: f32) -> bool {
     match vote.unknown {
         Some(unknown) => of_class != unknown,
         None => vote.evidence.iter().any(|other| *other != of_class),
     }
-}
-
-fn as_slices(rows: &[Vec<f32>]) -> Vec<&[f32]> {
-    rows.iter().map(Vec::as_slice).collect()
 }
 
 /// How likely it is that it was taught, and each of so many gestures that were not and "unknown", by the logarithm of the odds of the first against one of

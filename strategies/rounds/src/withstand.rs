@@ -20,22 +20,27 @@ use crate::fusion::{Fusion, part_into};
 /// decide. The trimmed sums are those of robust statistics, here cut on the one side that favours the decision.
 pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: usize) -> f64 {
     let (classes, top) = (fusion.probabilities.len(), fusion.top.index());
-    let mut parts = Vec::with_capacity(votes.len());
+    if classes == 0 {
+        return 0.0;
+    }
+    let mut part = vec![0.0; classes];
+    // One vote after the other.
+    let mut all = Vec::with_capacity(votes.len() * classes);
     for evidence in votes {
-        let mut part = vec![0.0; classes];
         match part_into(&mut part, rule, clip, evidence) {
-            Some(true) => parts.push(part),
+            Some(true) => all.extend_from_slice(&part),
             Some(false) => {}
             None => return 0.0,
         }
     }
+    let parts = all.chunks_exact(classes);
     let sharpness = match rule {
         FusionRule::CorrelatedPool => sharpness(Pool::PRIOR, parts.len().saturating_sub(liars) as f64),
         _ => 1.0,
     };
     let mut against = 0.0;
     for rival in (0..classes).filter(|class| *class != top) {
-        let lead = all_but_greatest(parts.iter().map(|part| part[top] - part[rival]), liars);
+        let lead = all_but_greatest(parts.clone().map(|part| part[top] - part[rival]), liars);
         // Also where too few are left, or what they say is no number.
         if !lead.is_some_and(|lead| lead > 0.0) {
             return 0.0;
@@ -47,8 +52,9 @@ pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusi
             1.0 / (1.0 + against)
         }
         FusionRule::Majority | FusionRule::MeanProbability => {
-            let sure = all_but_greatest(parts.iter().map(|part| part[top]), liars);
-            sure.map_or(0.0, |sure| sure / (parts.len() - liars) as f64)
+            let robots = parts.len();
+            let sure = all_but_greatest(parts.map(|part| part[top]), liars);
+            sure.map_or(0.0, |sure| sure / (robots - liars) as f64)
         }
         FusionRule::Other(_) => 0.0,
     }

@@ -1,6 +1,8 @@
 //! What learning is told of the rounds, and tells them.
 
-use gestalt_protocol::{Decision, Digest, Pool, RoundId};
+use std::sync::Arc;
+
+use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
 use gestalt_rounds::{Follow, Testimony};
 
 use super::state::Learning;
@@ -30,6 +32,10 @@ impl Follow for Learning {
     fn pool(&mut self) -> Option<Pool> {
         let Self { judged, lessons, recent, gestures, .. } = self;
         Some(judged.pool(|round| lessons.verdict_by_names(recent.names(round), gestures)))
+    }
+
+    fn keep(&mut self, vote: HeldVote) -> Arc<HeldVote> {
+        self.shelf.vote(vote)
     }
 
     fn wants_more(&self, round: RoundId) -> bool {

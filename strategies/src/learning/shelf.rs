@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use gestalt_protocol::{HeldBatch, RobotId, RoundId, SampleId};
+use gestalt_protocol::{HeldBatch, HeldVote, RobotId, RoundId, SampleId, Stamp};
 use gestalt_rounds::Testimony;
 
 /// By which lists of who is alive are found: how many they are, and the first.
@@ -13,7 +13,7 @@ type Alive = (usize, Option<RobotId>);
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
 
-/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, the votes of rounds, who is alive. Each still takes in
+/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, and what those of a round came to, who is alive. Each still takes in
 /// what it hears by itself, and what one of them is told otherwise than the others stays its own: only what is equal is held once. So what a robot does is
 /// the same with a shelf and without; a thousand that hold the same thousand samples hold them once.
 ///
@@ -22,6 +22,7 @@ const FEW: usize = 1024;
 pub struct Shelf {
     vectors: Mutex<Board<SampleId, [f32]>>,
     batches: Mutex<Board<SampleId, HeldBatch>>,
+    votes: Mutex<Board<(RobotId, Stamp), HeldVote>>,
     testimonies: Mutex<Board<RoundId, Testimony>>,
     alive: Mutex<Board<Alive, BTreeSet<RobotId>>>,
 }
@@ -33,6 +34,10 @@ impl Shelf {
 
     pub(super) fn batch(&self, first: SampleId, batch: HeldBatch) -> Arc<HeldBatch> {
         put(&self.batches, first, batch)
+    }
+
+    pub(super) fn vote(&self, vote: HeldVote) -> Arc<HeldVote> {
+        put(&self.votes, (vote.robot, vote.stamp), vote)
     }
 
     pub(super) fn testimony(&self, of: RoundId, testimony: Testimony) -> Arc<Testimony> {

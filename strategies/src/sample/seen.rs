@@ -5,6 +5,7 @@ use std::hash::Hasher;
 
 use gestalt_protocol::{RobotId, SampleId, SampleSeries};
 use siphasher::sip::SipHasher24;
+use smallvec::SmallVec;
 use thiserror::Error;
 
 /// Series that are kept track of: lives of authors.
@@ -52,12 +53,15 @@ pub enum SeenError {
     Disorder(SampleSeries),
 }
 
+/// Of most series nothing is missing.
+type Intervals = SmallVec<[(u32, u32); 1]>;
+
 /// A set of sample identifiers: for each series the numbers seen, as intervals. A robot that misses nothing holds one
 /// interval for each life in which an author shared something, however long that is; [`MAX_SERIES`], [`MAX_LIVES`],
 /// [`MAX_GAPS`] and [`MAX_INTERVALS_IN_ALL`] hold whatever arrives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SeenSamples {
-    series: BTreeMap<SampleSeries, Vec<(u32, u32)>>,
+    series: BTreeMap<SampleSeries, Intervals>,
     /// How many intervals there are in all.
     intervals: usize,
 }
@@ -90,7 +94,7 @@ impl SeenSamples {
                 return Err(SeenError::Disorder(series));
             }
             seen.intervals += intervals.len();
-            if seen.series.insert(series, intervals).is_some() {
+            if seen.series.insert(series, intervals.into()).is_some() {
                 return Err(SeenError::Disorder(series));
             }
         }
@@ -151,8 +155,11 @@ impl SeenSamples {
         let last = intervals.partition_point(|(start, _)| *start <= to.saturating_add(1));
         if let Some(merged) = intervals.get(first..last).filter(|merged| !merged.is_empty()) {
             (from, to) = (from.min(merged[0].0), to.max(merged[merged.len() - 1].1));
+            intervals[first] = (from, to);
+            intervals.drain(first + 1..last);
+        } else {
+            intervals.insert(first, (from, to));
         }
-        intervals.splice(first..last, [(from, to)]);
         if intervals.len() > MAX_GAPS {
             close_lowest_gap(intervals);
         }
@@ -216,7 +223,7 @@ impl SeenSamples {
     /// The numbers seen of a series: inclusive intervals, ascending, neither overlapping nor touching.
     #[must_use]
     pub fn intervals(&self, series: SampleSeries) -> &[(u32, u32)] {
-        self.series.get(&series).map_or(&[], Vec::as_slice)
+        self.series.get(&series).map_or(&[], SmallVec::as_slice)
     }
 
     /// Whether the other has seen a sample that this one has not.
@@ -249,7 +256,7 @@ impl SeenSamples {
 }
 
 /// Takes what lies between the two lowest intervals as seen.
-fn close_lowest_gap(intervals: &mut Vec<(u32, u32)>) {
+fn close_lowest_gap(intervals: &mut Intervals) {
     if intervals.len() > 1 {
         let (from, _) = intervals.remove(0);
         intervals[0].0 = from;

@@ -18,8 +18,10 @@ pub(super) struct Pupil {
     disk: BTreeMap<Vec<u8>, Vec<u8>>,
     /// Whether anybody ever reads what is on it.
     is_read: bool,
-    /// Whether its learner goes once it has learned, with all that it keeps to follow changes: of a large swarm few are asked, and seldom.
+    /// Whether its learner goes once it is asked no more, with all that it keeps to follow changes: of a large swarm few are asked, and seldom.
     starts_over: bool,
+    /// Whether its mind writes down what it hears: of a large swarm what nobody ever reads is not even written.
+    writes: bool,
     /// Whether there is anything that the classifier has not followed.
     is_behind: bool,
     /// Whether its mind was not told of the classifier yet.
@@ -50,6 +52,7 @@ impl Pupil {
         let records = self.disk.iter().map(|(key, value)| (key.as_slice(), value.as_slice()));
         let memory = RobotMemory::read(records).expect("it holds what this robot's minds wrote");
         self.stop();
+        self.writes = self.is_read || !self.starts_over;
         self.classifier = school.start().cloned();
         self.learner = (!self.starts_over).then(|| new_learner(school));
         let setup = LearningSetup {
@@ -57,8 +60,7 @@ impl Pupil {
             space: school.space().clone(),
             vocabulary: school.vocabulary().clone(),
             rng: Box::new(rng),
-            // Of a large swarm what nobody ever reads is not even written.
-            memory: (self.is_read || !self.starts_over).then_some(memory),
+            memory: self.writes.then_some(memory),
             rules: rules.clone(),
         };
         Mind::new(me, life, mind)
@@ -68,6 +70,11 @@ impl Pupil {
             .with_shelf(shelf.clone())
     }
 
+    /// Whether its mind writes down what it hears.
+    pub fn writes(&self) -> bool {
+        self.writes
+    }
+
     /// Loses what is on no disk.
     pub fn stop(&mut self) {
         (self.remembered, self.learner, self.classifier) = (0, None, None);
@@ -75,15 +82,21 @@ impl Pupil {
         (self.is_behind, self.is_news) = (false, false);
     }
 
-    /// From now on it learns all anew each time it is asked: before it has learned anything.
+    /// From now on it learns all anew when it is asked after a [rest](Self::rest): before it has learned anything.
     pub fn start_over(&mut self) {
         (self.starts_over, self.learner) = (true, None);
     }
 
+    /// It is asked no more for now.
+    pub fn rest(&mut self) {
+        if self.starts_over {
+            (self.learner, self.due) = (None, Vec::new());
+        }
+    }
+
     /// From now on it keeps what follows changes: it is asked often.
     pub fn keep_up(&mut self, mind: Option<&Mind>, school: &School) {
-        if self.starts_over {
-            self.starts_over = false;
+        if std::mem::take(&mut self.starts_over) && self.learner.is_none() {
             self.gather(mind, school);
             self.is_behind = !self.due.is_empty();
         }
@@ -117,14 +130,14 @@ impl Pupil {
     pub fn train_later(&mut self, changes: Vec<TrainingChange>) {
         self.is_behind |= !changes.is_empty();
         // Who starts over asks the mind what it trains on.
-        if !self.starts_over {
+        if self.learner.is_some() {
             self.due.extend(changes);
         }
     }
 
     /// Whether it has anything to learn; gets ready to.
     pub fn prepare(&mut self, mind: Option<&Mind>, school: &School) -> bool {
-        if self.is_behind && self.starts_over {
+        if self.is_behind && self.learner.is_none() {
             self.gather(mind, school);
         }
         self.is_behind
@@ -137,10 +150,10 @@ impl Pupil {
             change.apply_to(learner).expect("a mind trains on vectors of the school's space and classes");
         }
         self.classifier = Some(learner.learn().expect("a learner learns from any samples it took"));
-        (self.is_behind, self.is_news) = (false, true);
-        if self.starts_over {
-            self.learner = None;
+        if !self.writes {
+            learner.slim_down();
         }
+        (self.is_behind, self.is_news) = (false, true);
     }
 
     /// The classifier, if it was learned since it was last asked for.

@@ -328,19 +328,23 @@ fn large() -> Scenario {
 fn of_a_large_swarm_too_a_seed_fixes_every_byte_on_any_number_of_threads() {
     let scenario = large();
     assert_eq!(scenario.mind.committee_of(130), Some(72));
-    let on = |threads: usize| {
+    let on = |threads: usize, most_unread: Option<usize>| {
         let mut bytes = Vec::new();
         let mut observers = statistical_observers(&scenario).unwrap();
         let school = school_of_scores(&scenario, &mut observers).unwrap();
         let emulation = Emulation::new(&scenario, 1, observers, school, Trace::to(&mut bytes)).unwrap();
-        let (report, written) = emulation.on_threads(threads).finish();
+        let mut emulation = emulation.on_threads(threads);
+        emulation.swarm.most_unread = most_unread.unwrap_or(emulation.swarm.most_unread);
+        let (report, written) = emulation.finish();
         written.unwrap();
         (bytes, report)
     };
-    let first = on(1);
+    let first = on(1, None);
     assert!(String::from_utf8_lossy(&first.0).contains("learn"));
-    assert!(first == on(2), "two threads make another trace than one");
-    assert!(first == on(8), "eight threads make another trace than one");
+    assert!(first == on(2, None), "two threads make another trace than one");
+    assert!(first == on(8, None), "eight threads make another trace than one");
+    assert!(first == on(1, Some(1)), "minds that are told at once what could wait do another thing");
+    assert!(first == on(8, Some(usize::MAX)), "minds that are told as late as can be do another thing");
 }
 
 #[test]

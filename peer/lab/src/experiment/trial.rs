@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, FusionRule, Heeded};
-use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, JudgedFrame};
+use gestalt_strategies::{Classifier, Classify, Evidence, Fuse, JudgedFrame, PoisonDefence};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -63,9 +63,8 @@ pub fn run(
         Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
     let honest = &places[..setting.robots - setting.liars];
     let examined = examined(honest.len(), seed);
-    let exams = [0, 1].map(|after| {
-        Exam::new(pool, school, &split.held_out[after], (honest, &examined), rules).against(setting.liars)
-    });
+    let exams = [0, 1]
+        .map(|after| Exam::new(pool, school, &split.held_out[after], (honest, &examined), (rules, setting)));
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
         if stop.load(Ordering::Relaxed) {
@@ -167,6 +166,8 @@ struct Exam {
     fusion: Arc<dyn Fuse>,
     /// Against how many liars a judgement is to be certain.
     liars: usize,
+    /// Whether robots leave samples of others out.
+    doubt: bool,
 }
 
 impl Exam {
@@ -175,7 +176,7 @@ impl Exam {
         school: &School,
         moments: &[usize],
         (places, examined): (&[usize], &[usize]),
-        rules: &Rules,
+        (rules, setting): (&Rules, &Setting),
     ) -> Self {
         let (robots, places) =
             (places.len(), examined.iter().map(|robot| places[*robot]).collect::<Vec<_>>());
@@ -195,12 +196,9 @@ impl Exam {
             questions,
             places,
             fusion,
-            liars: 1,
+            liars: setting.liars.max(1),
+            doubt: setting.learning.poison != PoisonDefence::default(),
         }
-    }
-
-    fn against(self, liars: usize) -> Self {
-        Self { liars: liars.max(1), ..self }
     }
 
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
@@ -241,7 +239,8 @@ impl Exam {
         let traffic: crate::emulation::Traffic = traffic.sum();
         let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
         let (asked, labels) = emulation.asked();
-        let heeded: Vec<Heeded> = (0..self.robots).flat_map(|robot| emulation.heeded(robot)).collect();
+        let doubting = 0..if self.doubt { self.robots } else { 0 };
+        let heeded: Vec<Heeded> = doubting.flat_map(|robot| emulation.heeded(robot)).collect();
         // The honest robots are the first.
         let (of_honest, of_liars): (Vec<Heeded>, Vec<Heeded>) =
             heeded.into_iter().partition(|of| of.robot.0 as usize <= self.robots);

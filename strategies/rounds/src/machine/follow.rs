@@ -1,6 +1,8 @@
 //! What goes along with the rounds of a robot without deciding any of them: its learning.
 
-use gestalt_protocol::{Decision, Digest, Pool, RoundId};
+use std::sync::Arc;
+
+use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
 
 /// Follows the rounds that a robot lives through: is told of them, and asked for the little they need to know of it.
 ///
@@ -27,6 +29,11 @@ pub trait Follow {
     /// This robot holds that decision of its round now, which may be for nothing; evidence counts up to ±`clip`.
     fn settled(&mut self, decision: &Decision, clip: f64) {
         let _ = (decision, clip);
+    }
+
+    /// Where a vote that counts is to be kept: robots that live in one process may keep one copy of each.
+    fn keep(&mut self, vote: HeldVote) -> Arc<HeldVote> {
+        Arc::new(vote)
     }
 
     /// How alike robots are, by the rounds that instructors confirmed. `None`: it does not know.

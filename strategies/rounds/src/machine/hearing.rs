@@ -247,7 +247,7 @@ impl Rounds {
             self.join(vote.round, effects);
         }
         let Some(round) = self.round.as_mut() else { return false };
-        let is_news = match round.ballot.cast(held) {
+        let is_news = match round.ballot.cast(effects.follower.keep(held)) {
             Cast::Counted => {
                 self.electorate.hear(robot, self.now);
                 if !self.alive.contains(&robot) {

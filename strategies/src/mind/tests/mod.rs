@@ -189,8 +189,18 @@ impl Swarm {
     fn input(&mut self, i: usize, input: Input) {
         let mut due = VecDeque::from([(i, input)]);
         while let Some((i, input)) = due.pop_front() {
-            for output in self.minds[i].handle(self.now, input) {
-                let me = self.minds[i].me();
+            let me = self.minds[i].me();
+            let wake = self.minds[i].next_wake();
+            let is_shared = matches!(&input, Input::Received(Envelope { author, message: Message::Samples(_), .. }) if *author != me);
+            let outputs = self.minds[i].handle(self.now, input);
+            if is_shared && wake.is_none_or(|wake| wake > self.now) {
+                // What an author shares may so be told to a mind later than it comes.
+                let concerns_it_alone =
+                    |out: &Output| matches!(out, Output::Train(_) | Output::Remember { .. });
+                assert!(outputs.iter().all(concerns_it_alone), "{outputs:?}");
+                assert_eq!(self.minds[i].next_wake(), wake);
+            }
+            for output in outputs {
                 match output {
                     Output::Broadcast(envelope) => {
                         if let Message::Samples(samples) = &envelope.message {

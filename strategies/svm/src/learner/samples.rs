@@ -67,7 +67,7 @@ impl KernelMatrix {
         self.known = Some(known);
     }
 
-    /// So many samples of each class are about to come: from now on rows are made as long as they will be.
+    /// So many samples of each class are about to come: from now on rows are made as long as they will be, and those of the new ones when they are asked for.
     pub fn make_room(&mut self, more: &[usize]) {
         for ((room, samples), more) in self.room.iter_mut().zip(&self.classes).zip(more) {
             *room = samples.len() + more;
@@ -96,6 +96,23 @@ impl KernelMatrix {
         self.at(place).kernel.get_or_init(|| self.work_out(place))
     }
 
+    /// Lets go of the kernel of all samples but these: it is worked out again when it is asked for.
+    pub fn keep_rows(&mut self, keeps: impl Fn(Place) -> bool) {
+        for (class, samples) in self.classes.iter_mut().enumerate() {
+            for (position, sample) in samples.iter_mut().enumerate() {
+                if !keeps(Place { class, position }) {
+                    sample.kernel.take();
+                }
+            }
+        }
+    }
+
+    /// Of how many samples the kernel is there.
+    #[cfg(test)]
+    pub fn rows_held(&self) -> usize {
+        self.classes.iter().flatten().filter(|sample| sample.kernel.get().is_some()).count()
+    }
+
     pub fn place(&self, key: Key) -> Option<Place> {
         self.places.get(&key).copied()
     }
@@ -115,8 +132,9 @@ impl KernelMatrix {
             .zip(&self.room)
             .map(|(samples, room)| roomy_for(samples.len() + 1, *room))
             .collect();
-        // Where all others have their rows it has its own at once, from the same products.
-        let mut own = Some(lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
+        // Where all others have their rows it has its own at once, from the same products. Of many that come together most are never asked for.
+        let is_last = count(&self.classes) + 1 >= self.room.iter().sum();
+        let mut own = is_last.then(|| lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
         let known = self.known.as_ref().map(|known| known.row(shared));
         for (of, samples) in self.classes.iter_mut().enumerate() {
             for sample in samples {
@@ -193,6 +211,10 @@ impl KernelMatrix {
         };
         self.classes.iter().zip(&self.room).map(of_class).collect()
     }
+}
+
+fn count(classes: &[Vec<KernelRow>]) -> usize {
+    classes.iter().map(Vec::len).sum()
 }
 
 fn roomy_for(length: usize, room: usize) -> usize {

@@ -194,3 +194,30 @@ fn there_is_room_for_so_many_gestures_and_no_more() {
     let unlisted = learner.insert(61, ClassId(4), &vector(0, &mut rng));
     assert_eq!(unlisted, Err(LearnError::Class(ClassId(4))));
 }
+
+#[test]
+fn one_that_slims_down_after_each_round_learns_the_same() {
+    let mut rng = generator(9);
+    let (mut slim, mut full) = (learner(), learner());
+    // Some come together, as where a robot begins anew.
+    slim.make_room((0..60).map(|key| ClassId(key % CLASSES as u32)));
+    let mut rows = [0, 0];
+    for round in 0..12_u64 {
+        for n in 0..if round == 0 { 60 } else { 7 } {
+            let key = 100 * round + n;
+            let vector = vector(key as usize, &mut rng);
+            for learner in [&mut slim, &mut full] {
+                learner.insert(key, ClassId((key % CLASSES as u64) as u32), &vector).unwrap();
+                learner.remove(100 * (round % 3) + 3 * n);
+                learner.relabel(100 * (round % 2) + n, ClassId(1)).unwrap();
+            }
+        }
+        let learned = [&mut slim, &mut full].map(|learner| learner.learn().unwrap());
+        assert_eq!(learned[0].encode(), learned[1].encode(), "round {round}");
+        let x = vector(1, &mut rng);
+        assert_eq!(learned[0].probabilities_in_space(&x), learned[1].probabilities_in_space(&x));
+        slim.slim_down();
+        rows = [&slim, &full].map(|learner| learner.samples.rows_held());
+    }
+    assert!(rows[0] < rows[1], "{rows:?}");
+}

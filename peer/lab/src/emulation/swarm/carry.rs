@@ -22,6 +22,7 @@ impl Swarm<'_> {
         if self.network.presence(i) != Presence::Up {
             return;
         }
+        self.robots[i].read();
         let Some(mind) = &mut self.robots[i].mind else { return };
         let outputs = mind.handle(self.now, input);
         let wake = mind.next_wake();
@@ -92,7 +93,11 @@ impl Swarm<'_> {
             Output::Closed(round) => {
                 self.note(&Happening::Closed { robot, round });
                 self.record.close(self.now, i);
-                self.robots[i].looking = false;
+                let robot = &mut self.robots[i];
+                robot.looking = false;
+                if let Some(pupil) = &mut robot.pupil {
+                    pupil.rest();
+                }
             }
             Output::Answer(by, answer) => {
                 let Answer { at, outcome, samples, .. } = answer;
@@ -148,9 +153,10 @@ impl Swarm<'_> {
                 }
             }
             Presence::Up if self.robots[i].lies.is_some() => self.deceive(&parcel),
-            Presence::Up => {
-                self.tell_mind(i, parcel.opened());
-            }
+            Presence::Up => match parcel {
+                Parcel::Said(envelope) if self.robots[i].may_read_later(&envelope) => self.leave(i, envelope),
+                parcel => self.tell_mind(i, parcel.opened()),
+            },
         }
     }
 }

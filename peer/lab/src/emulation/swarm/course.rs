@@ -1,6 +1,5 @@
 //! The course of events: what is shown, what is seen of it, and what the instructor says.
 
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -145,7 +144,7 @@ impl Swarm<'_> {
         self.note(&Happening::Instruct { robot, instruction: &instruction });
         let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
         let bytes = json_bytes(&instruction);
-        let instructed = Rc::new(Instructed { by, at, instruction, said: None });
+        let instructed = Arc::new(Instructed { by, at, instruction, said: None });
         self.broadcast(i, bytes, Kind::Words, &Parcel::Instructed(instructed.clone()));
         self.arrive(i, Parcel::Instructed(instructed));
     }
@@ -153,6 +152,7 @@ impl Swarm<'_> {
     /// Makes a robot's classifier follow its samples.
     pub(super) fn train(&mut self, i: usize) {
         let up = self.network.presence(i) == Presence::Up;
+        self.robots[i].read();
         let Robot { pupil, mind, .. } = &mut self.robots[i];
         let (Some(pupil), Some(school)) = (pupil.as_mut().filter(|_| up), &self.school) else { return };
         if pupil.prepare(mind.as_ref(), school) {

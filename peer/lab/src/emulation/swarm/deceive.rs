@@ -1,6 +1,6 @@
 //! What liars say to the others.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, Give, HeldVote, Message, RobotId};
 
@@ -98,7 +98,7 @@ impl Swarm<'_> {
             let (held, held_bytes) =
                 over_the_wire(&said(self.plot.stamp(), Message::Holding(decision.holding(false))));
             let given = Give { decision: Some(decision.clone()), votes: Vec::new(), holders: Vec::new() };
-            let given = Rc::new(said(self.plot.stamp(), Message::Give(given)));
+            let given = Arc::new(said(self.plot.stamp(), Message::Give(given)));
             self.broadcast(*i, bytes, Kind::Decision, &Parcel::Announced(announced));
             self.broadcast(*i, held_bytes, Kind::Decision, &Parcel::Said(held));
             for to in self.network.neighbours(*i) {

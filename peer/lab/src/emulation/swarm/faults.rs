@@ -21,6 +21,7 @@ impl Swarm<'_> {
                 let i = index(robot);
                 self.robots[i].mind = None;
                 self.robots[i].waiting.clear();
+                self.robots[i].unread.clear();
                 self.robots[i].pupil.iter_mut().for_each(Pupil::stop);
                 self.record.forget(i);
                 self.change_presence(i, Presence::Down);

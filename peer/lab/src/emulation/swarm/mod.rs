@@ -10,6 +10,7 @@
 //! | `carry` | what does a mind want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
 //! | `poisoning` | what do poisoners share? |
+//! | `reading` | what may a mind be told later than it comes? |
 //! | `training` | who learns, on which thread? |
 
 mod answering;
@@ -22,6 +23,7 @@ mod parcel;
 mod plot;
 mod poisoning;
 mod queue;
+mod reading;
 mod robot;
 mod seed;
 mod training;
@@ -72,7 +74,10 @@ pub(super) struct Swarm<'a> {
     plot: Plot,
     record: Record,
     trace: Trace<'a>,
-    /// On how many threads robots learn.
+    /// How much has arrived that minds are told later, and at how much all are told.
+    unread: usize,
+    pub most_unread: usize,
+    /// On how many threads robots learn, and are told what could wait.
     pub threads: usize,
 }
 
@@ -116,6 +121,8 @@ impl<'a> Swarm<'a> {
             plot: Plot::default(),
             record,
             trace,
+            unread: 0,
+            most_unread: reading::MANY * scenario.swarm_size(),
             threads: std::thread::available_parallelism().map_or(1, NonZero::get),
         };
         if scenario.mind.committee_of(size).is_some() {
@@ -137,6 +144,7 @@ impl<'a> Swarm<'a> {
             self.now = at;
             self.happen(due);
         }
+        self.read_all();
     }
 
     /// Runs to the end of the scenario: an interval after the last showing.

@@ -1,6 +1,6 @@
 //! What travels between robots, and what it costs to write it.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use gestalt_protocol::{Announcement, Envelope, InstructorId, Question, RobotId};
 use gestalt_strategies::{Input, Instructed};
@@ -10,10 +10,10 @@ use serde::de::DeserializeOwned;
 /// What travels.
 #[derive(Clone)]
 pub(super) enum Parcel {
-    Said(Rc<Envelope>),
-    Announced(Rc<Announcement>),
-    Asked(Rc<Question>),
-    Instructed(Rc<Instructed>),
+    Said(Arc<Envelope>),
+    Announced(Arc<Announcement>),
+    Asked(Arc<Question>),
+    Instructed(Arc<Instructed>),
     Answered(InstructorId, u64, RobotId),
 }
 
@@ -31,10 +31,10 @@ impl Parcel {
 }
 
 /// What a message becomes by being written and read, and how many bytes that takes.
-pub(super) fn over_the_wire(envelope: &Envelope) -> (Rc<Envelope>, usize) {
+pub(super) fn over_the_wire(envelope: &Envelope) -> (Arc<Envelope>, usize) {
     let bytes = envelope.encode();
     let read = Envelope::decode(&bytes).expect("what a mind says can be read");
-    (Rc::new(read), bytes.len())
+    (Arc::new(read), bytes.len())
 }
 
 /// How many bytes something takes that travels as JSON.
@@ -43,8 +43,8 @@ pub(super) fn json_bytes(value: &impl Serialize) -> usize {
 }
 
 /// The same for what travels as JSON.
-pub(super) fn as_json<T: Serialize + DeserializeOwned>(said: &T) -> (Rc<T>, usize) {
+pub(super) fn as_json<T: Serialize + DeserializeOwned>(said: &T) -> (Arc<T>, usize) {
     let json = serde_json::to_vec(said).expect("a decision holds nothing that JSON cannot");
     let read = gestalt_protocol::decode_json(&json).expect("what was written can be read");
-    (Rc::new(read), json.len())
+    (Arc::new(read), json.len())
 }

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeSet, VecDeque};
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Envelope, RobotId};
 use gestalt_strategies::Mind;
 use rand_chacha::ChaCha8Rng;
 
@@ -27,6 +28,8 @@ pub(super) struct Robot {
     pub looking: bool,
     pub looks: u32,
     pub waiting: VecDeque<Parcel>,
+    /// What has arrived, and when, that its mind may be told later.
+    pub unread: Vec<(Duration, Arc<Envelope>)>,
     /// None of a robot that does not learn.
     pub pupil: Option<Pupil>,
     /// Whom it believes alive, and whom it believes itself linked to.
@@ -54,6 +57,7 @@ impl Robot {
             looking: false,
             looks: 0,
             waiting: VecDeque::new(),
+            unread: Vec::new(),
             pupil: learns.map(Pupil::new),
             knows: Default::default(),
             lies,

@@ -24,6 +24,7 @@ impl Swarm<'_> {
     pub fn keep_up(&mut self, robots: &[usize]) {
         let Some(school) = &self.school else { return };
         for i in robots {
+            self.robots[*i].read();
             let Robot { pupil, mind, .. } = &mut self.robots[*i];
             if let Some(pupil) = pupil {
                 pupil.keep_up(mind.as_ref(), school);
@@ -34,6 +35,7 @@ impl Swarm<'_> {
 
     fn train_together(&mut self, robots: BTreeSet<usize>) {
         let Some(school) = &self.school else { return };
+        robots.iter().for_each(|i| self.robots[*i].read());
         let network = &self.network;
         let all = self.robots.iter_mut().enumerate();
         let behind = all.filter(|(i, _)| robots.contains(i) && network.presence(*i) == Presence::Up);
