@@ -352,15 +352,14 @@ impl Learner {
         now.map(|(_, (_, index))| *index).collect()
     }
 
-    /// Lets go of the kernel of those samples that no machine rests on, until it is asked for again: of many learners in one process few learn at a time.
+    /// Lets go of the kernel, most of what it takes, until it learns again: of many learners in one process few learn at a time.
     pub fn slim_down(&mut self) {
         self.members.iter_mut().for_each(Self::slim_down);
-        let used = self.supporting();
-        self.samples.keep_rows(|Place { class, position }| used[class][position]);
+        self.samples.let_rows_go();
     }
 
-    /// Whether any machine rests on each sample, by class.
-    fn supporting(&self) -> Vec<Vec<bool>> {
+    /// The machines of all pairs with a sample each.
+    fn machine(&self, present: &[usize]) -> Machine {
         let mut used: Vec<Vec<bool>> =
             self.classes().map(|class| vec![false; self.samples.of(class).len()]).collect();
         for pair in self.trained() {
@@ -370,12 +369,6 @@ impl Learner {
                 }
             }
         }
-        used
-    }
-
-    /// The machines of all pairs with a sample each.
-    fn machine(&self, present: &[usize]) -> Machine {
-        let used = self.supporting();
         let mut weights = Vec::new();
         for pair in self.trained() {
             for (side, class) in pair.classes.into_iter().enumerate() {

@@ -96,15 +96,9 @@ impl KernelMatrix {
         self.at(place).kernel.get_or_init(|| self.work_out(place))
     }
 
-    /// Lets go of the kernel of all samples but these: it is worked out again when it is asked for.
-    pub fn keep_rows(&mut self, keeps: impl Fn(Place) -> bool) {
-        for (class, samples) in self.classes.iter_mut().enumerate() {
-            for (position, sample) in samples.iter_mut().enumerate() {
-                if !keeps(Place { class, position }) {
-                    sample.kernel.take();
-                }
-            }
-        }
+    /// Lets go of all rows: each is worked out again when it is asked for.
+    pub fn let_rows_go(&mut self) {
+        self.classes.iter_mut().flatten().for_each(|sample| drop(sample.kernel.take()));
     }
 
     /// Of how many samples the kernel is there.

@@ -201,7 +201,6 @@ fn one_that_slims_down_after_each_round_learns_the_same() {
     let (mut slim, mut full) = (learner(), learner());
     // Some come together, as where a robot begins anew.
     slim.make_room((0..60).map(|key| ClassId(key % CLASSES as u32)));
-    let mut rows = [0, 0];
     for round in 0..12_u64 {
         for n in 0..if round == 0 { 60 } else { 7 } {
             let key = 100 * round + n;
@@ -217,7 +216,6 @@ fn one_that_slims_down_after_each_round_learns_the_same() {
         let x = vector(1, &mut rng);
         assert_eq!(learned[0].probabilities_in_space(&x), learned[1].probabilities_in_space(&x));
         slim.slim_down();
-        rows = [&slim, &full].map(|learner| learner.samples.rows_held());
+        assert!(slim.samples.rows_held() == 0 && full.samples.rows_held() > 0);
     }
-    assert!(rows[0] < rows[1], "{rows:?}");
 }

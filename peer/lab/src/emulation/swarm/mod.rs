@@ -11,7 +11,8 @@
 //! | `deceive` | what do liars say? |
 //! | `poisoning` | what do poisoners share? |
 //! | `reading` | what may a mind be told later than it comes? |
-//! | `training` | who learns, on which thread? |
+//! | `training` | who learns? |
+//! | `threads` | what is done on many threads? |
 
 mod answering;
 mod carry;
@@ -26,6 +27,7 @@ mod queue;
 mod reading;
 mod robot;
 mod seed;
+mod threads;
 mod training;
 
 use std::collections::BTreeSet;

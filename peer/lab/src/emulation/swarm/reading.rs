@@ -4,7 +4,7 @@
 //! they arrive, each of a thousand minds comes to a thousand samples with all that it knows out of the processor's caches; told together it does not, and many
 //! minds are told at once. What comes of it is the same.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Message};
@@ -12,6 +12,7 @@ use gestalt_strategies::{Input, Mind, Output};
 
 use super::Swarm;
 use super::robot::Robot;
+use super::threads::on_each;
 use crate::emulation::pupil::Pupil;
 
 /// How much waits for a robot, on the average, when all are told.
@@ -32,22 +33,8 @@ impl Swarm<'_> {
         if std::mem::take(&mut self.unread) == 0 {
             return;
         }
-        let readers = self.robots.iter_mut().filter_map(Robot::reader);
-        if self.threads <= 1 {
-            return readers.for_each(Reader::read);
-        }
-        let readers: Vec<Reader<'_>> = readers.collect();
-        let left = Mutex::new(readers.into_iter());
-        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
-        std::thread::scope(|scope| {
-            for _ in 0..self.threads {
-                scope.spawn(|| {
-                    while let Some(reader) = next() {
-                        reader.read();
-                    }
-                });
-            }
-        });
+        let readers = self.robots.iter_mut().filter_map(Robot::reader).collect();
+        on_each(self.threads, readers, Reader::read);
     }
 }
 

@@ -1,10 +1,10 @@
 //! Many robots learn at once, on as many threads as there are: what each learns depends on nothing but its own samples.
 
 use std::collections::BTreeSet;
-use std::sync::{Mutex, PoisonError};
 
 use super::Swarm;
 use super::robot::Robot;
+use super::threads::on_each;
 use crate::emulation::network::Presence;
 use crate::emulation::pupil::Pupil;
 
@@ -44,20 +44,6 @@ impl Swarm<'_> {
                 pupil.as_mut().and_then(|pupil| pupil.prepare(mind.as_ref(), school).then_some(pupil))
             })
             .collect();
-        let threads = self.threads.min(behind.len());
-        if threads <= 1 {
-            return behind.into_iter().for_each(Pupil::learn);
-        }
-        let left = Mutex::new(behind.into_iter());
-        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
-        std::thread::scope(|scope| {
-            for _ in 0..threads {
-                scope.spawn(|| {
-                    while let Some(pupil) = next() {
-                        pupil.learn();
-                    }
-                });
-            }
-        });
+        on_each(self.threads, behind, Pupil::learn);
     }
 }

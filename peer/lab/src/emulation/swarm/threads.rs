@@ -1,0 +1,22 @@
+//! Work on many robots that is done in any order.
+
+use std::sync::{Mutex, PoisonError};
+
+/// Does that with each of these, on so many threads at most.
+pub(super) fn on_each<T: Send>(threads: usize, all: Vec<T>, work: impl Fn(T) + Sync) {
+    let threads = threads.min(all.len());
+    if threads <= 1 {
+        return all.into_iter().for_each(work);
+    }
+    let left = Mutex::new(all.into_iter());
+    let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some(one) = next() {
+                    work(one);
+                }
+            });
+        }
+    });
+}
