@@ -40,7 +40,7 @@ struct Choice<'a> {
 pub(crate) enum Part<'a> {
     All(&'a [Cow<'a, [f32]>]),
     /// One vote after the other: for a swarm of a thousand, one piece of memory and not a thousand.
-    Some(Vec<f32>, usize),
+    Picked(Vec<f32>, usize),
 }
 
 impl Part<'_> {
@@ -48,7 +48,7 @@ impl Part<'_> {
     pub fn rows(&self) -> Vec<&[f32]> {
         match self {
             Self::All(rows) => rows.iter().map(AsRef::as_ref).collect(),
-            Self::Some(values, width) => values.chunks_exact((*width).max(1)).collect(),
+            Self::Picked(values, width) => values.chunks_exact((*width).max(1)).collect(),
         }
     }
 }
@@ -172,7 +172,7 @@ impl<'a> Rows<'a> {
         for row in &self.rows {
             values.extend(gestures.iter().map(|class| row.get(*class).copied().unwrap_or_default()));
         }
-        Part::Some(values, gestures.len())
+        Part::Picked(values, gestures.len())
     }
 
     /// What the rule makes of the evidence for these gestures. Of a single one it is not asked.

@@ -20,9 +20,6 @@ use crate::fusion::{Fusion, part_into};
 /// decide. The trimmed sums are those of robust statistics, here cut on the one side that favours the decision.
 pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: usize) -> f64 {
     let (classes, top) = (fusion.probabilities.len(), fusion.top.index());
-    if classes == 0 {
-        return 0.0;
-    }
     let mut part = vec![0.0; classes];
     // One vote after the other.
     let mut all = Vec::with_capacity(votes.len() * classes);
@@ -33,7 +30,7 @@ pub(crate) fn least(rule: FusionRule, clip: f64, votes: &[&[f32]], fusion: &Fusi
             None => return 0.0,
         }
     }
-    let parts = all.chunks_exact(classes);
+    let parts = all.chunks_exact(classes.max(1));
     let sharpness = match rule {
         FusionRule::CorrelatedPool => sharpness(Pool::PRIOR, parts.len().saturating_sub(liars) as f64),
         _ => 1.0,

@@ -21,7 +21,7 @@ pub(super) struct Pupil {
     /// Whether its learner goes once it is asked no more, with all that it keeps to follow changes: of a large swarm few are asked, and seldom.
     starts_over: bool,
     /// Whether its mind writes down what it hears: of a large swarm what nobody ever reads is not even written.
-    writes: bool,
+    pub writes: bool,
     /// Whether there is anything that the classifier has not followed.
     is_behind: bool,
     /// Whether its mind was not told of the classifier yet.
@@ -68,11 +68,6 @@ impl Pupil {
             .learning(setup)
             .expect("the scenario was validated, and the memory is this robot's own")
             .with_shelf(shelf.clone())
-    }
-
-    /// Whether its mind writes down what it hears.
-    pub fn writes(&self) -> bool {
-        self.writes
     }
 
     /// Loses what is on no disk.
@@ -150,6 +145,7 @@ impl Pupil {
             change.apply_to(learner).expect("a mind trains on vectors of the school's space and classes");
         }
         self.classifier = Some(learner.learn().expect("a learner learns from any samples it took"));
+        // Of a large swarm: not all learn at a time, and all wait in one memory.
         if !self.writes {
             learner.slim_down();
         }

@@ -239,7 +239,7 @@ impl Exam {
         let traffic: crate::emulation::Traffic = traffic.sum();
         let samples = (0..self.robots).filter_map(|robot| Some(emulation.training_set(robot)?.len()));
         let (asked, labels) = emulation.asked();
-        let doubting = 0..if self.doubt { self.robots } else { 0 };
+        let doubting = (0..self.robots).filter(|_| self.doubt);
         let heeded: Vec<Heeded> = doubting.flat_map(|robot| emulation.heeded(robot)).collect();
         // The honest robots are the first.
         let (of_honest, of_liars): (Vec<Heeded>, Vec<Heeded>) =

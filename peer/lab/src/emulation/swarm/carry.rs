@@ -11,6 +11,7 @@ use super::Swarm;
 use super::parcel::{Parcel, as_json, json_bytes, over_the_wire};
 use super::queue::Due;
 use crate::emulation::network::{Kind, Presence};
+use crate::emulation::pupil::Pupil;
 use crate::emulation::trace::Happening;
 
 /// What waits for a frozen robot, at most; what comes after is lost, as in a full buffer.
@@ -93,11 +94,8 @@ impl Swarm<'_> {
             Output::Closed(round) => {
                 self.note(&Happening::Closed { robot, round });
                 self.record.close(self.now, i);
-                let robot = &mut self.robots[i];
-                robot.looking = false;
-                if let Some(pupil) = &mut robot.pupil {
-                    pupil.rest();
-                }
+                self.robots[i].looking = false;
+                self.robots[i].pupil.iter_mut().for_each(Pupil::rest);
             }
             Output::Answer(by, answer) => {
                 let Answer { at, outcome, samples, .. } = answer;

@@ -43,7 +43,7 @@ impl Robot {
     pub fn may_read_later(&self, envelope: &Envelope) -> bool {
         matches!(envelope.message, Message::Samples(_))
             && envelope.author != self.id
-            && self.pupil.as_ref().is_some_and(|pupil| !pupil.writes())
+            && self.pupil.as_ref().is_some_and(|pupil| !pupil.writes)
     }
 
     /// Tells its mind what it was not told yet: before anything else, and before anybody looks what it holds.

@@ -13,6 +13,7 @@ impl Swarm<'_> {
     /// would when they look, one after the other; of a small swarm they do.
     pub(super) fn train_voters(&mut self, counter: u32, opener: usize) {
         if self.school.is_some() {
+            self.read_all();
             let alive = self.network.reachable(opener);
             if let Some(members) = self.scenario.mind.draw(counter, &alive) {
                 self.train_together(members.iter().map(|robot| robot.0 as usize - 1).collect());
@@ -20,11 +21,10 @@ impl Swarm<'_> {
         }
     }
 
-    /// These learn from all they hold, and go on to follow what changes.
+    /// These learn from all they hold, and go on to follow what changes. Between two showings, when there is nothing that they were not told.
     pub fn keep_up(&mut self, robots: &[usize]) {
         let Some(school) = &self.school else { return };
         for i in robots {
-            self.robots[*i].read();
             let Robot { pupil, mind, .. } = &mut self.robots[*i];
             if let Some(pupil) = pupil {
                 pupil.keep_up(mind.as_ref(), school);
@@ -35,7 +35,6 @@ impl Swarm<'_> {
 
     fn train_together(&mut self, robots: BTreeSet<usize>) {
         let Some(school) = &self.school else { return };
-        robots.iter().for_each(|i| self.robots[*i].read());
         let network = &self.network;
         let all = self.robots.iter_mut().enumerate();
         let behind = all.filter(|(i, _)| robots.contains(i) && network.presence(*i) == Presence::Up);
