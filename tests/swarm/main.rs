@@ -3,6 +3,7 @@
 
 mod asking;
 mod cameras;
+mod cells;
 mod center;
 mod churn;
 mod clients;
@@ -129,6 +130,9 @@ fn main() -> std::process::ExitCode {
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,
         [Alone] paced::a_slow_centre_drops_frames_evenly_and_its_memory_stays_flat.await,
         [Alone] siege::two_thousand_half_open_connections_and_ghosts_slow_no_round_and_keep_no_member_out.await,
+        [Alone] cells::robots_form_cells_by_themselves_and_mend_when_a_relay_is_killed.await,
+        [Works] cells::a_sealed_swarm_forms_cells_too.await,
+        [Waits] cells::robots_hang_on_routers_that_are_there_as_they_are.await,
         [Alone] scouting::a_hundred_robots_in_hearing_keep_four_links_each_and_agree.await,
     ])
 }

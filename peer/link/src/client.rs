@@ -107,7 +107,8 @@ impl Client {
     /// The robot it is attached to; `None` while it is to none of this swarm.
     pub async fn attached(&self) -> Option<RobotId> {
         let swarm = swarm_checksum(self.keys.swarm());
-        self.session.info().routers_zid().await.find_map(|id| robot_of(id, swarm))
+        // One in a cell is a client itself, of a relay.
+        self.session.info().transports().await.find_map(|transport| robot_of(*transport.zid(), swarm))
     }
 
     /// The last decision of the swarm; `None` when nobody who answers within `patience` knows of one.

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::LinkError;
-use super::identity::zenoh_id;
+use super::cells::Cells;
+use super::identity::{relay_id, zenoh_id};
 use super::reach;
 use super::tls::{self, Credentials};
 
@@ -29,6 +30,8 @@ pub struct LinkConfig {
     /// The number of links to robots that scouting builds up to, at least 2. Explicit endpoints and clients are
     /// not counted.
     pub max_links: usize,
+    /// For swarms of more than a hundred: robots form cells by themselves, see [`Cells`]. The same at all robots; needs `scouting`.
+    pub cells: Option<Cells>,
     /// How long a link may be silent before it counts as lost, and how long an attempt to make one may take. A
     /// silently lost relay is routed around after about this time; where a hundred robots share a busy processor,
     /// a short lease loses links that are merely slow.
@@ -69,6 +72,7 @@ impl Default for LinkConfig {
             connect: Vec::new(),
             scouting: None,
             max_links: 4,
+            cells: None,
             lease: Duration::from_secs(1),
             insecure: false,
             credentials: None,
@@ -101,6 +105,19 @@ impl LinkConfig {
         self.of_robot(robot, swarm, nonce, self.credentials.is_some())
     }
 
+    /// Zenoh's configuration for the `count`th relay that such a robot runs.
+    pub(super) fn relay(
+        &self,
+        robot: RobotId,
+        swarm: &str,
+        nonce: u64,
+        count: u16,
+    ) -> Result<zenoh::Config, LinkError> {
+        let sealed = self.credentials.is_some();
+        let wall = self.wall(swarm)?;
+        self.routing(&relay_id(robot, swarm, nonce, count), wall, sealed)
+    }
+
     fn of_robot(
         &self,
         robot: RobotId,
@@ -120,13 +137,37 @@ impl LinkConfig {
                 cause: format!("{} is no part below 1: take 0 but for trials", self.loss),
             });
         }
+        let (id, wall) = (zenoh_id(robot, swarm, nonce), self.wall(swarm)?);
+        let Some(cells) = self.cells else { return self.routing(&id, wall, sealed) };
+        if !(1..=Cells::MAX_SIZE).contains(&cells.size) {
+            return Err(LinkError::Config {
+                key: "cells.size".to_owned(),
+                cause: format!("{} is not from 1 to {}", cells.size, Cells::MAX_SIZE),
+            });
+        }
+        if self.scouting.is_none() {
+            return Err(LinkError::Config {
+                key: "cells".to_owned(),
+                cause: "relays are found by scouting, which is off: switch it on, or name endpoints to connect to and no cells".to_owned(),
+            });
+        }
+        // A relay must be possible too, before one is needed.
+        self.routing(&id, wall.clone(), sealed)?;
+        self.member(&id, wall)
+    }
+
+    fn wall(&self, swarm: &str) -> Result<Value, LinkError> {
         let keys = Keys::new(swarm)?;
-        let wall = self.credentials.as_ref().map(|credentials| tls::robot(credentials, &keys));
+        Ok(self.credentials.as_ref().map(|credentials| tls::robot(credentials, &keys)).unwrap_or_default())
+    }
+
+    /// A session that relays.
+    fn routing(&self, id: &str, wall: Value, sealed: bool) -> Result<zenoh::Config, LinkError> {
         let listen = self.listening(sealed);
         let config = self.with_defaults(
-            wall.unwrap_or_default(),
+            wall,
             &serde_json::json!({
-                "id": zenoh_id(robot, swarm, nonce),
+                "id": id,
                 "mode": "router",
                 "listen/endpoints": listen,
                 // Words of instructors have the time that their clients give them; nothing else needs one.
@@ -142,6 +183,26 @@ impl LinkConfig {
             reach::check_open(&config, self.insecure)?;
         }
         Ok(config)
+    }
+
+    /// The session of a robot in a cell: a client of a relay, to be dialled for, and itself what clients on this computer attach to.
+    fn member(&self, id: &str, mut wall: Value) -> Result<zenoh::Config, LinkError> {
+        let own = serde_json::json!({
+            "mode": "client",
+            "listen/endpoints": [tls::bounded("tcp/127.0.0.1:0")],
+            "connect/endpoints": [],
+            "gateway": { "south": [{ "filters": [{ "modes": ["client"] }] }] },
+            // Its keeper calls; the session itself answers nobody.
+            "scouting/multicast/enabled": false,
+        });
+        match (&mut wall, own) {
+            (Value::Object(wall), Value::Object(own)) => wall.extend(own),
+            (wall, own) => *wall = own,
+        }
+        self.with_defaults(
+            wall,
+            &serde_json::json!({ "id": id, "timestamping/enabled": false, "scouting/delay": 0 }),
+        )
     }
 
     /// The endpoints that an open robot listens on, or one of a sealed swarm.

@@ -27,18 +27,21 @@ const LONGEST: Duration = Duration::from_secs(300);
 /// Who was heard is heard again after so many idle periods of repair: neighbours are answered after half as many.
 const SILENT_PERIODS: u32 = 12;
 
-/// Looks after the links of a robot that compares notes with its neighbours every `idle` at the latest. Never returns.
+/// Looks after the links of a robot that compares notes with its neighbours every `idle` at the latest; some of them may have `most` such
+/// neighbours. Never returns.
 pub(crate) async fn mend_deafness(
     node: Node,
     inbox: Arc<Inbox>,
     account: Arc<Account>,
     idle: Duration,
+    most: usize,
 ) -> Result<(), String> {
     let mut patience = Patience::new(idle);
     loop {
         tokio::time::sleep(PERIOD).await;
         let now = Instant::now();
         let links = inbox.hearing();
+        patience.of = links.len().max(most);
         for (id, robot, since, last) in links {
             if patience.is_over(robot, now.duration_since(since), last.map(|last| now.duration_since(last))) {
                 tracing::info!("nothing is heard from robot {robot} over its link, which is made anew");
@@ -49,16 +52,21 @@ pub(crate) async fn mend_deafness(
     }
 }
 
+/// Who has so many neighbours turns to each as often as is reckoned with here; who has twice as many, half as often.
+const FEW: usize = 8;
+
 /// How long each neighbour may be silent.
 struct Patience {
     idle: Duration,
+    /// How many neighbours there are: who has many, as a relay has, turns to each the more rarely.
+    of: usize,
     /// How often each was hung up on without a word since.
     tried: BTreeMap<RobotId, u32>,
 }
 
 impl Patience {
     fn new(idle: Duration) -> Self {
-        Self { idle, tried: BTreeMap::new() }
+        Self { idle, of: 0, tried: BTreeMap::new() }
     }
 
     /// Whether a robot, linked for so long and last heard so long ago, if ever, has been silent for too long.
@@ -66,11 +74,13 @@ impl Patience {
         let over = match silent {
             Some(silent) => {
                 self.tried.remove(&robot);
-                silent > self.idle.saturating_mul(SILENT_PERIODS)
+                let periods = SILENT_PERIODS.max(u32::try_from(2 * self.of).unwrap_or(u32::MAX));
+                silent > self.idle.saturating_mul(periods)
             }
             None => {
                 let tried = self.tried.get(&robot).copied().unwrap_or_default();
-                linked > FIRST_WORD.saturating_mul(1 << tried.min(16)).min(LONGEST)
+                let turns = u32::try_from(self.of.div_ceil(FEW)).unwrap_or(u32::MAX).max(1);
+                linked > FIRST_WORD.saturating_mul(turns).saturating_mul(1 << tried.min(16)).min(LONGEST)
             }
         };
         if over {

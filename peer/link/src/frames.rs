@@ -164,8 +164,8 @@ impl Client {
 
     /// Whether it is attached to a robot now.
     pub async fn is_attached(&self) -> bool {
-        let info = self.session.info();
-        info.routers_zid().await.next().is_some() || info.peers_zid().await.next().is_some()
+        // Also to one in a cell, which is a client itself.
+        self.session.info().transports().await.next().is_some()
     }
 }
 

@@ -34,6 +34,18 @@ pub(super) fn zenoh_id(robot: RobotId, swarm: &str, nonce: u64) -> String {
     format!("{:016x}{:08x}{:08x}", nonce | HIGHEST, swarm_checksum(swarm), robot.0)
 }
 
+/// The Zenoh id of the `count`th relay that a robot runs in that life; `count` is not 0.
+pub(super) fn relay_id(robot: RobotId, swarm: &str, nonce: u64, count: u16) -> String {
+    zenoh_id(robot, swarm, nonce ^ u64::from(count))
+}
+
+/// Whether a Zenoh id of a robot is that of its session, or of one of its relays, in the life with that nonce.
+pub(super) fn is_of_life(id: ZenohId, nonce: u64) -> bool {
+    let bytes = id.to_le_bytes();
+    let said = u64::from_le_bytes(std::array::from_fn(|i| bytes[8 + i]));
+    said >> 16 == (nonce | HIGHEST) >> 16
+}
+
 /// The robot behind a Zenoh id; `None` for clients, routers of other kinds and other swarms.
 pub(super) fn robot_of(id: ZenohId, swarm: u32) -> Option<RobotId> {
     let bytes = id.to_le_bytes();
@@ -51,6 +63,17 @@ mod tests {
             let id: ZenohId = zenoh_id(RobotId(robot), "demo", 0).parse().unwrap();
             assert_eq!(robot_of(id, swarm_checksum("demo")), Some(RobotId(robot)));
             assert_eq!(robot_of(id, swarm_checksum("other")), None);
+        }
+    }
+
+    #[test]
+    fn a_robots_relays_are_known_for_its_own_in_one_life_alone() {
+        let nonce = fresh_nonce();
+        for count in [1, 2, u16::MAX] {
+            let relay: ZenohId = relay_id(RobotId(7), "demo", nonce, count).parse().unwrap();
+            assert_eq!(robot_of(relay, swarm_checksum("demo")), Some(RobotId(7)));
+            assert_ne!(relay.to_string(), zenoh_id(RobotId(7), "demo", nonce));
+            assert!(is_of_life(relay, nonce) && !is_of_life(relay, nonce ^ 1 << 40));
         }
     }
 

@@ -17,8 +17,8 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::session::ZenohId;
 
 use super::account::{Account, Refusal};
-use super::identity::robot_of;
 use super::roll::Roll;
+use super::ways::Ways;
 use super::words::{Vouched, Words};
 
 /// The most messages that wait for the mind, votes apart.
@@ -32,19 +32,21 @@ const OWN_VOTES: usize = 64;
 /// Votes wait in a ring of one per robot: the latest replaces the earlier. Everything else waits in a queue that
 /// loses nothing short of its bound; what exceeds it is refused and counted, and repair brings it again.
 pub(super) struct Inbox {
-    me: RobotId,
-    swarm: u32,
+    pub(super) me: RobotId,
+    pub(super) swarm: u32,
     keys: Keys,
     pub(super) account: Arc<Account>,
     state: Mutex<State>,
     /// In a sealed swarm: who lets in what its members said, what is done about its roster, and by which right instructors speak.
     pub(super) sealed: Option<Sealed>,
+    /// The keys that are in use.
+    pub(super) ways: Ways,
     /// For trials: the part of what arrives that is dropped, and the chance that chooses it.
     loss: f64,
     chance: Mutex<ChaCha8Rng>,
-    ready: Notify,
+    pub(super) ready: Notify,
     pub(super) unrest: Notify,
-    lost_links: watch::Sender<u64>,
+    pub(super) lost_links: watch::Sender<u64>,
 }
 
 pub(super) struct Sealed {
@@ -58,11 +60,13 @@ pub(super) struct State {
     pub(super) votes: BTreeMap<RobotId, Envelope>,
     pub(super) queue: VecDeque<Input>,
     own_votes: VecDeque<u32>,
-    links: BTreeMap<ZenohId, RobotId>,
+    pub(super) links: BTreeMap<ZenohId, RobotId>,
+    /// Those of them that relay for others.
+    pub(super) relays: BTreeSet<ZenohId>,
     /// Since when each of those is linked, and when it last told this robot something.
-    heard: BTreeMap<RobotId, (Instant, Option<Instant>)>,
+    pub(super) heard: BTreeMap<RobotId, (Instant, Option<Instant>)>,
     pub(super) alive: BTreeSet<RobotId>,
-    links_changed: bool,
+    pub(super) links_changed: bool,
     pub(super) alive_changed: bool,
     /// Words that this robot signed, and are yet to be said.
     pub(super) vouched: Vec<Vouched>,
@@ -85,6 +89,7 @@ impl Inbox {
             account,
             state,
             sealed,
+            ways: Ways::default(),
             loss,
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
@@ -358,6 +363,9 @@ impl Inbox {
                 self.judged(|judge, _| judge.tell_again());
             }
             state.alive_changed = true;
+            if sample.kind() == SampleKind::Put {
+                self.ways.speaker(id);
+            }
             self.ready.notify_one();
             self.unrest.notify_one();
         }
@@ -383,48 +391,6 @@ impl Inbox {
     /// The robots alive by liveliness.
     pub(super) fn tokens(&self) -> BTreeSet<RobotId> {
         self.lock().alive.clone()
-    }
-
-    /// A link to another session came or went.
-    pub(super) fn on_link(&self, id: ZenohId, up: bool) {
-        let Some(robot) = robot_of(id, self.swarm) else { return };
-        if robot == self.me {
-            return self.account.twin();
-        }
-        let mut state = self.lock();
-        if up {
-            state.links.insert(id, robot);
-            state.heard.insert(robot, (Instant::now(), None));
-            if let Some(sealed) = &self.sealed {
-                sealed.roll.meet();
-            }
-        } else {
-            state.links.remove(&id);
-            state.heard.remove(&robot);
-            self.lost_links.send_modify(|lost| *lost += 1);
-        }
-        state.links_changed = true;
-        self.ready.notify_one();
-        self.unrest.notify_one();
-    }
-
-    /// The sessions of robots that this one is linked to now.
-    pub(super) fn links(&self) -> BTreeMap<ZenohId, RobotId> {
-        self.lock().links.clone()
-    }
-
-    /// Since when each session that this one is linked to is, and when that last told this robot something.
-    pub(super) fn hearing(&self) -> Vec<(ZenohId, RobotId, Instant, Option<Instant>)> {
-        let state = self.lock();
-        let heard =
-            state.links.iter().filter_map(|(id, robot)| Some((*id, *robot, *state.heard.get(robot)?)));
-        heard.map(|(id, robot, (since, last))| (id, robot, since, last)).collect()
-    }
-
-    /// The robots alive by liveliness, or because they are linked to this one.
-    pub(super) fn alive(&self) -> BTreeSet<RobotId> {
-        let state = self.lock();
-        state.alive.iter().chain(state.links.values()).copied().collect()
     }
 }
 

@@ -25,6 +25,9 @@ const UNSETTLED: Duration = Duration::from_secs(3);
 /// How long the smaller id of a pair is left to dial before the other does.
 const COURTESY: Duration = Duration::from_secs(2);
 
+/// The same where this one is new and has no link yet: most likely the other has not heard of it.
+const COURTESY_OF_NEW: Duration = Duration::from_millis(500);
+
 /// How long a heard robot may stay unreachable before it is linked to outside the rings.
 const PATIENCE: Duration = Duration::from_secs(4);
 const PATIENCE_OF_OTHERS: Duration = Duration::from_secs(15);
@@ -69,6 +72,8 @@ pub(super) struct Plan {
 pub(super) struct Neighbourhood {
     me: RobotId,
     max_links: usize,
+    /// Whether it came to others that were there, and not with them.
+    is_new: bool,
     there: BTreeSet<RobotId>,
     wanted: BTreeSet<RobotId>,
     settled_since: Duration,
@@ -83,10 +88,11 @@ pub(super) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    pub(super) fn new(me: RobotId, max_links: usize) -> Self {
+    pub(super) fn new(me: RobotId, max_links: usize, is_new: bool) -> Self {
         Self {
             me,
             max_links,
+            is_new,
             there: BTreeSet::new(),
             wanted: BTreeSet::new(),
             settled_since: Duration::ZERO,
@@ -155,7 +161,9 @@ impl Neighbourhood {
     fn due_in_rings(&mut self, now: Duration, wanted: &BTreeSet<RobotId>, view: &View) -> BTreeSet<RobotId> {
         let lacking: BTreeSet<_> = wanted.difference(&view.linked).copied().collect();
         since(&mut self.wanted_since, &lacking, now);
-        let due = |id: &RobotId| self.me < *id || now.saturating_sub(self.wanted_since[id]) >= COURTESY;
+        let is_alone = self.is_new && view.linked.is_empty();
+        let courtesy = if is_alone { COURTESY_OF_NEW } else { COURTESY };
+        let due = |id: &RobotId| self.me < *id || now.saturating_sub(self.wanted_since[id]) >= courtesy;
         lacking.into_iter().filter(due).collect()
     }
 
@@ -236,7 +244,7 @@ fn since(times: &mut BTreeMap<RobotId, Duration>, present: &BTreeSet<RobotId>, n
 }
 
 /// A robot's place in a ring: its id, well mixed (the finaliser of SplitMix64).
-fn place(ring: usize, id: RobotId) -> u64 {
+pub(super) fn place(ring: usize, id: RobotId) -> u64 {
     let mut z = (u64::from(id.0) + 1)
         .wrapping_add(((ring as u64) << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15))
         .wrapping_mul(0x9e37_79b9_7f4a_7c15);

@@ -15,6 +15,7 @@ use zenoh::Session;
 
 use crate::account::Account;
 use crate::apprentice::{Apprentice, Prepared, RobotLearning};
+use crate::cells::{CellKeeper, Foundation};
 use crate::census::take_census;
 use crate::config::LinkConfig;
 use crate::deafness::mend_deafness;
@@ -28,6 +29,7 @@ use crate::host::Host;
 use crate::identity::{self, swarm_checksum};
 use crate::inbox::{Inbox, Sealed};
 use crate::keeper::Keeper;
+use crate::lookout::Lookout;
 use crate::mind::new_mind;
 use crate::outbox::Outbox;
 use crate::presence::Presence;
@@ -161,16 +163,25 @@ impl Robot {
             }
             None => None,
         };
-        let on_link = {
-            let inbox = inbox.clone();
-            move |id, up| inbox.on_link(id, up)
-        };
-        let guard = roll.as_ref().map(|roll| Guard {
-            swarm: swarm_checksum(&swarm),
-            door: roll.door(),
-            account: account.clone(),
+        let door = roll.as_ref().map(|roll| roll.door());
+        let lookout =
+            Arc::new(Lookout::new(id, &swarm, nonce, inbox.clone(), account.clone(), zenoh.clone()));
+        let cell = link.cells.map(|cells| {
+            let (swarm, link, door, inbox) = (swarm.clone(), link.clone(), door.clone(), inbox.clone());
+            let (account, lookout, keys) = (account.clone(), lookout.clone(), keys.clone());
+            let foundation =
+                Foundation { me: id, swarm, keys, nonce, link, cells, door, inbox, account, lookout };
+            Arc::new(CellKeeper::new(foundation))
         });
-        let node = Node::open(zenoh.clone(), guard, on_link).await?;
+        let on_link = {
+            let (inbox, cell) = (inbox.clone(), cell.clone());
+            move |far, up| match &cell {
+                Some(cell) => cell.on_link(far, up),
+                None => inbox.on_link(far, up),
+            }
+        };
+        let guard = door.map(|door| Guard { swarm: swarm_checksum(&swarm), door, account: account.clone() });
+        let node = Node::open(zenoh, guard, None, on_link).await?;
         let locators = node.locators();
         account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));
         let declared = declare(id, &node, &keys, &inbox, &account, &supervisor).await;
@@ -182,11 +193,14 @@ impl Robot {
                 return Err(error);
             }
         };
-        if link.scouting.is_some() {
+        if let Some(cell) = cell.clone() {
+            let node = node.clone();
+            supervisor.keep(Part::Links, move || cell.clone().run(node.clone()));
+        } else if link.scouting.is_some() {
             let (node, inbox, account) = (node.clone(), inbox.clone(), account.clone());
             supervisor.keep(Part::Links, move || {
                 let (node, inbox, account) = (node.clone(), inbox.clone(), account.clone());
-                Keeper::new(id, &swarm, link.max_links, node, inbox, account, zenoh.clone()).run()
+                Keeper::new(id, link.max_links, node, inbox, account, lookout.clone(), false).run()
             });
         }
         if let Some(roll) = roll {
@@ -197,11 +211,18 @@ impl Robot {
         }
         let (linked, heard, mended, idle) =
             (node.clone(), inbox.clone(), account.clone(), rounds.repair_idle);
-        supervisor
-            .keep(Part::Deafness, move || mend_deafness(linked.clone(), heard.clone(), mended.clone(), idle));
+        let most = link.cells.map_or(0, |cells| cells.size);
+        supervisor.keep(Part::Deafness, move || {
+            mend_deafness(linked.clone(), heard.clone(), mended.clone(), idle, most)
+        });
         let (of_census, of_keys, counted) = (node.clone(), keys.clone(), inbox.clone());
         supervisor
             .keep(Part::Census, move || take_census(of_census.clone(), of_keys.clone(), counted.clone()));
+        let (of_ways, in_use, of_node) = (inbox.clone(), keys.clone(), node.clone());
+        supervisor.keep(Part::Links, move || {
+            let (inbox, node, keys) = (of_ways.clone(), of_node.clone(), in_use.clone());
+            async move { inbox.ways.keep(node, keys).await }
+        });
         let (watched, watching) = (node.session().clone(), supervisor.clone());
         supervisor.keep(Part::Session, move || watch_session(watched.clone(), watching.clone()));
         let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
@@ -230,7 +251,7 @@ impl Robot {
             first_events: Mutex::new(Some(first_events)),
             classifier,
             locators,
-            host: tokio::spawn(serve(host, supervisor.clone(), node)),
+            host: tokio::spawn(serve(host, supervisor.clone(), node, cell)),
             supervisor,
             session,
             keys,
@@ -412,10 +433,13 @@ async fn declare(
 }
 
 /// Runs the mind's task, and all that is kept beside it, to the end.
-async fn serve(host: Host, supervisor: Arc<Supervisor>, node: Node) {
+async fn serve(host: Host, supervisor: Arc<Supervisor>, node: Node, cell: Option<Arc<CellKeeper>>) {
     if let Err(cause) = run_apart(supervisor.clone(), Part::Mind, host.run()).await {
         supervisor.end(Part::Mind, cause);
     }
     supervisor.stop().await;
     node.close().await;
+    if let Some(cell) = cell {
+        cell.close().await;
+    }
 }

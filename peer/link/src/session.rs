@@ -3,16 +3,18 @@
 //! The one file that uses Zenoh's `internal` feature and its transport crate, which may change with any release:
 //! Zenoh's public interface opens sessions, but neither dials nor closes single links of one.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::any::Any;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use gestalt_protocol::RobotId;
 use zenoh::Session;
 use zenoh::config::WhatAmI;
 use zenoh::internal::runtime::{DynamicRuntime, Runtime, RuntimeBuilder};
-use zenoh::sample::SampleKind;
 use zenoh::session::ZenohId;
+use zenoh_protocol::network::NetworkMessageMut;
 use zenoh_transport::multicast::TransportMulticast;
 use zenoh_transport::unicast::TransportUnicast;
 use zenoh_transport::{
@@ -27,6 +29,14 @@ use crate::identity::robot_of;
 use crate::supervisor::Supervisor;
 use crate::tls::{Door, Knocks, Visitor};
 
+/// The other end of a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Far {
+    pub id: ZenohId,
+    /// Whether it relays for others: all do but clients.
+    pub relays: bool,
+}
+
 /// How often it is made sure that a session is still open.
 const LOOK_AFTER: Duration = Duration::from_millis(500);
 
@@ -36,38 +46,32 @@ pub(super) struct Node {
     session: Session,
     runtime: Runtime,
     links: Arc<Links>,
+    /// The session that relays for others in this robot's name, if there is one: its links are this robot's.
+    relay: Arc<Mutex<Option<Node>>>,
 }
 
 impl Node {
     /// Opens a session: binds the listening endpoints and starts to connect, without waiting for anyone. Who is not let in by the `guard` of
-    /// a sealed swarm is hung up. `on_link` is told of every other link as it comes (`true`) and goes (`false`), from Zenoh's threads.
+    /// a sealed swarm, or finds no `room`, is hung up. `on_link` is told of every other link as it comes (`true`) and goes (`false`), from
+    /// Zenoh's threads.
     pub(super) async fn open(
         config: zenoh::Config,
         guard: Option<Guard>,
-        on_link: impl Fn(ZenohId, bool) + Send + Sync + 'static,
+        room: Option<Room>,
+        on_link: impl Fn(Far, bool) + Send + Sync + 'static,
     ) -> Result<Self, LinkError> {
         let listen = config.get_json("listen/endpoints").unwrap_or_default();
         let mut runtime = RuntimeBuilder::new(config).build().await.map_err(|e| LinkError::open(&*e))?;
-        let links = Arc::new(Links::new(guard));
-        DynamicRuntime::from(runtime.clone()).new_handler(links.clone());
+        let links = Arc::new(Links::new(guard, room, Box::new(on_link)));
+        DynamicRuntime::from(runtime.clone()).new_handler(Arc::new(Handler(links.clone())));
         let session = zenoh::session::init(runtime.clone().into()).await.map_err(|e| LinkError::open(&*e))?;
-        let gone = links.clone();
-        session
-            .info()
-            .transport_events_listener()
-            .history(true)
-            .callback(move |event| {
-                let (id, up) = (*event.transport().zid(), event.kind() == SampleKind::Put);
-                if gone.has_let_in(id, up) {
-                    on_link(id, up);
-                }
-            })
-            .background()
-            .await
-            .map_err(|e| LinkError::open(&*e))?;
         let started = runtime.start().await;
-        let node = Self { session, runtime, links };
+        let node = Self { session, runtime, links, relay: Arc::default() };
         if let Err(error) = started {
+            // A client says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
+            if node.runtime.whatami() == WhatAmI::Client && !node.locators().is_empty() {
+                return Ok(node);
+            }
             node.close().await;
             return Err(LinkError::Start { listen, cause: reason(&*error) });
         }
@@ -93,18 +97,44 @@ impl Node {
         self.runtime.connect_peer(&id.into(), &locators).await
     }
 
+    /// How many robots are linked that relay for nobody, this one itself apart.
+    pub(super) fn members(&self) -> usize {
+        self.links.lock().values().filter(|link| link.is_member).count()
+    }
+
+    /// From now on that session relays for others in this robot's name, or none does.
+    pub(super) fn relays_by(&self, relay: Option<Node>) {
+        *self.relay.lock().unwrap_or_else(PoisonError::into_inner) = relay;
+    }
+
+    /// This session, and the one that relays in its name.
+    pub(super) fn sessions(&self) -> impl Iterator<Item = Session> + use<> {
+        let relay = self.relay.lock().unwrap_or_else(PoisonError::into_inner);
+        [Some(self.session.clone()), relay.as_ref().map(|relay| relay.session.clone())].into_iter().flatten()
+    }
+
+    /// The links of this session, and of the one that relays in its name.
+    fn all_links(&self) -> impl Iterator<Item = Arc<Links>> {
+        let relay = self.relay.lock().unwrap_or_else(PoisonError::into_inner);
+        [Some(self.links.clone()), relay.as_ref().map(|relay| relay.links.clone())].into_iter().flatten()
+    }
+
     /// Ends the link to one other session, if there is one.
     pub(super) async fn hang_up(&self, id: ZenohId) {
-        let link = self.links.lock().transports.remove(&id);
-        if let Some(link) = link {
-            close(link).await;
+        for links in self.all_links() {
+            let link = links.lock().get(&id).map(|link| link.transport.clone());
+            if let Some(link) = link {
+                close(link).await;
+            }
         }
     }
 
     /// Ends the links to all who would not be let in any more: the roster has changed.
     pub(super) async fn look_through(&self) {
-        for link in self.links.no_longer_welcome() {
-            close(link).await;
+        for links in self.all_links() {
+            for link in links.no_longer_welcome() {
+                close(link).await;
+            }
         }
     }
 
@@ -143,41 +173,89 @@ pub(crate) struct Guard {
     pub account: Arc<Account>,
 }
 
+/// For how many robots that relay for nobody a relay has room.
+pub(crate) struct Room {
+    /// The robot that runs it, for which there always is.
+    pub of: RobotId,
+    /// The checksum of the swarm's name.
+    pub swarm: u32,
+    pub size: usize,
+    pub account: Arc<Account>,
+}
+
 /// How many of those who knock again are kept waiting at the same time: each takes a thread.
 const MAX_WAITING: usize = 4;
 
-/// Keeps a handle on each link, which Zenoh's public interface does not give.
+/// Keeps a handle on each link, which Zenoh's public interface does not give, and tells of it in the order of what happened, which Zenoh's own
+/// listener does not: of a link that came and went at once it was measured to tell the other way around.
 struct Links {
     guard: Option<Guard>,
-    state: Mutex<State>,
+    room: Option<Room>,
+    on_link: Box<dyn Fn(Far, bool) + Send + Sync>,
+    state: Mutex<BTreeMap<ZenohId, Link>>,
+    made: AtomicUsize,
     knocks: Mutex<Knocks>,
     waiting: AtomicUsize,
 }
 
-#[derive(Default)]
-struct State {
-    transports: BTreeMap<ZenohId, TransportUnicast>,
-    /// Those that are being hung up.
-    refused: BTreeSet<ZenohId>,
+struct Link {
+    transport: TransportUnicast,
+    /// Which of the links to that session it is.
+    number: usize,
+    relays: bool,
+    /// Whether it is one that there must be room for.
+    is_member: bool,
 }
 
 impl Links {
-    fn new(guard: Option<Guard>) -> Self {
-        Self { guard, state: Mutex::default(), knocks: Mutex::default(), waiting: AtomicUsize::new(0) }
+    fn new(guard: Option<Guard>, room: Option<Room>, on_link: Box<dyn Fn(Far, bool) + Send + Sync>) -> Self {
+        Self {
+            guard,
+            room,
+            on_link,
+            state: Mutex::default(),
+            made: AtomicUsize::new(0),
+            knocks: Mutex::default(),
+            waiting: AtomicUsize::new(0),
+        }
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<ZenohId, Link>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes that a link has come or gone; whether it is one that was let in.
-    fn has_let_in(&self, id: ZenohId, up: bool) -> bool {
+    /// Lets in the one at the other end, unless there is no room for it; the number of the link.
+    fn let_in(&self, id: ZenohId, peer: &TransportPeer, transport: TransportUnicast) -> Option<usize> {
+        let relays = peer.whatami != WhatAmI::Client;
+        let is_member = self
+            .room
+            .as_ref()
+            .is_some_and(|room| !relays && robot_of(id, room.swarm).is_some_and(|robot| robot != room.of));
         let mut state = self.lock();
-        if !up {
-            state.transports.remove(&id);
-            return !state.refused.remove(&id);
+        let others = state.iter().filter(|(other, link)| **other != id && link.is_member).count();
+        if let Some(room) = self.room.as_ref().filter(|room| is_member && others >= room.size) {
+            room.account.count("cell_full");
+            return None;
         }
-        !state.refused.contains(&id)
+        let number = self.made.fetch_add(1, Ordering::Relaxed);
+        if let Some(before) = state.insert(id, Link { transport, number, relays, is_member }) {
+            (self.on_link)(Far { id, relays: before.relays }, false);
+        }
+        // Told while it is locked: who is told asks nothing of this session before it has returned.
+        (self.on_link)(Far { id, relays }, true);
+        Some(number)
+    }
+
+    /// That link has gone, if it has not been replaced.
+    fn lose(&self, id: ZenohId, number: usize) {
+        let mut state = self.lock();
+        if let Some(link) = state.remove(&id) {
+            if link.number == number {
+                (self.on_link)(Far { id, relays: link.relays }, false);
+            } else {
+                state.insert(id, link);
+            }
+        }
     }
 
     /// Whether the one at the other end may stay.
@@ -219,39 +297,44 @@ impl Links {
     }
 
     fn no_longer_welcome(&self) -> Vec<TransportUnicast> {
-        let mut state = self.lock();
-        let state = &mut *state;
+        let state = self.lock();
         // One that is gone already needs no look.
-        let unwelcome = |id: &ZenohId, link: &TransportUnicast| {
-            link.get_peer().is_ok_and(|peer| !self.is_welcome(*id, &peer))
+        let unwelcome = |id: &ZenohId, link: &Link| {
+            link.transport.get_peer().is_ok_and(|peer| !self.is_welcome(*id, &peer))
         };
-        let unwelcome: Vec<ZenohId> =
-            state.transports.iter().filter(|(id, link)| unwelcome(id, link)).map(|(id, _)| *id).collect();
-        unwelcome.iter().filter_map(|id| state.transports.remove(id)).collect()
+        let unwelcome = state.iter().filter(|(id, link)| unwelcome(id, link));
+        unwelcome.map(|(_, link)| link.transport.clone()).collect()
     }
 }
 
-impl TransportEventHandler for Links {
+/// What Zenoh calls when a link is made.
+struct Handler(Arc<Links>);
+
+/// What Zenoh calls when one link is gone.
+struct OfLink {
+    links: Arc<Links>,
+    id: ZenohId,
+    number: usize,
+}
+
+impl TransportEventHandler for Handler {
     fn new_unicast(
         &self,
         peer: TransportPeer,
         transport: TransportUnicast,
     ) -> zenoh::Result<Arc<dyn TransportPeerEventHandler>> {
-        let id: ZenohId = peer.zid.into();
-        let welcome = self.is_welcome(id, &peer);
-        if !welcome {
-            self.lock().refused.insert(id);
-            self.keep_waiting(&peer);
+        let (links, id) = (self.0.clone(), peer.zid.into());
+        let known = links.is_welcome(id, &peer);
+        if !known {
+            links.keep_waiting(&peer);
         }
-        let mut state = self.lock();
-        if welcome {
-            state.refused.remove(&id);
-            state.transports.insert(id, transport);
-        } else {
+        let number = if known { links.let_in(id, &peer, transport.clone()) } else { None };
+        let Some(number) = number else {
             // Zenoh asks nobody whether it may link: it can only be ended again.
             tokio::spawn(close(transport));
-        }
-        Ok(Arc::new(DummyTransportPeerEventHandler))
+            return Ok(Arc::new(DummyTransportPeerEventHandler));
+        };
+        Ok(Arc::new(OfLink { links, id, number }))
     }
 
     fn new_multicast(
@@ -259,5 +342,23 @@ impl TransportEventHandler for Links {
         _transport: TransportMulticast,
     ) -> zenoh::Result<Arc<dyn TransportMulticastEventHandler>> {
         Ok(Arc::new(DummyTransportMulticastEventHandler))
+    }
+}
+
+impl TransportPeerEventHandler for OfLink {
+    fn handle_message(&self, _: NetworkMessageMut) -> zenoh::Result<()> {
+        Ok(())
+    }
+
+    fn new_link(&self, _: zenoh_link::Link) {}
+
+    fn del_link(&self, _: zenoh_link::Link) {}
+
+    fn closed(&self) {
+        self.links.lose(self.id, self.number);
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
     }
 }

@@ -30,7 +30,7 @@ impl Stage {
     /// [`LinkError::Config`] names what Zenoh cannot take, [`LinkError::Start`] an endpoint that is taken.
     pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
         let keys = Keys::new(swarm)?;
-        let node = Node::open(link.stage()?, None, |_, _| {}).await?;
+        let node = Node::open(link.stage()?, None, None, |_, _| {}).await?;
         let latest = Arc::<Mutex<BTreeMap<String, Vec<u8>>>>::default();
         for key in [keys.every_robot("status"), keys.key(&Topic::Decision)] {
             let latest = latest.clone();

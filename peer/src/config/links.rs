@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
-use gestalt_link::{LinkConfig, Scouting};
+use gestalt_link::{Cells, LinkConfig, Scouting};
 
 /// How a robot finds others, and how many it links to. Endpoints stand in the `zenoh` block.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -13,6 +13,8 @@ pub struct LinksSection {
     pub scouting: ScoutingSection,
     /// The most links that scouting builds up to. Range `2..=16`.
     pub max_links: usize,
+    /// Whether robots form cells, and how large: for swarms of more than a hundred.
+    pub cells: Option<Cells>,
 }
 
 /// Looking for robots by UDP multicast.
@@ -29,7 +31,7 @@ pub struct ScoutingSection {
 
 impl Default for LinksSection {
     fn default() -> Self {
-        Self { scouting: ScoutingSection::default(), max_links: LinkConfig::default().max_links }
+        Self { scouting: ScoutingSection::default(), max_links: LinkConfig::default().max_links, cells: None }
     }
 }
 
@@ -42,10 +44,20 @@ impl Default for ScoutingSection {
 
 impl LinksSection {
     pub(super) fn check(&self) -> Result<(), ConfigError> {
-        if (2..=16).contains(&self.max_links) {
-            return Ok(());
+        if !(2..=16).contains(&self.max_links) {
+            let cause = "is outside 2..=16: two links keep a swarm connected, four add redundancy";
+            return Err(ConfigError::value("links.max_links", format!("{} {cause}", self.max_links)));
         }
-        let cause = "is outside 2..=16: two links keep a swarm connected, four add redundancy";
-        Err(ConfigError::value("links.max_links", format!("{} {cause}", self.max_links)))
+        let Some(Cells { size }) = self.cells else { return Ok(()) };
+        if !(1..=Cells::MAX_SIZE).contains(&size) {
+            let cause = format!("{size} is outside 1..={}: 32 is well tried", Cells::MAX_SIZE);
+            return Err(ConfigError::value("links.cells.size", cause));
+        }
+        if !self.scouting.enabled {
+            let cause =
+                "relays are found by scouting, which is off: links: {scouting: {enabled: true}}, or no cells";
+            return Err(ConfigError::value("links.cells", cause));
+        }
+        Ok(())
     }
 }

@@ -175,6 +175,7 @@ impl Config {
         LinkConfig {
             scouting: enabled.then_some(Scouting { address, interface }),
             max_links: self.links.max_links,
+            cells: self.links.cells,
             insecure: self.trust.insecure,
             zenoh: self.zenoh.clone(),
             ..LinkConfig::default()
@@ -318,6 +319,8 @@ mod tests {
             ("{ros: {views_per_second: 90}}", "ros.views_per_second", "0.1..=30"),
             ("{ros: {namespace: 'a b'}}", "ros.namespace", "letters"),
             ("{links: {max_links: 1}}", "links.max_links", "2..=16"),
+            ("{links: {cells: {size: 51}}}", "links.cells.size", "1..=50"),
+            ("{links: {cells: {}, scouting: {enabled: false}}}", "links.cells", "scouting"),
             ("{camera: {source: {video: {path: 'x.mp4'}}}}", "model", "classifier"),
             (
                 "{camera: {source: {rendered: {pose: {bearing_deg: 0, elevation_deg: 0, distance_m: 0}}}}, model: 'rendered'}",

@@ -36,7 +36,7 @@ impl World {
     }
 
     fn start(&mut self, id: RobotId, max_links: usize) {
-        self.minds.insert(id, (Neighbourhood::new(id, max_links), BTreeMap::new()));
+        self.minds.insert(id, (Neighbourhood::new(id, max_links, false), BTreeMap::new()));
     }
 
     fn kill(&mut self, id: RobotId) {

@@ -1,0 +1,116 @@
+//! Asks by multicast who is there, and keeps what was answered.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use gestalt_protocol::RobotId;
+use zenoh::config::WhatAmI;
+use zenoh::session::ZenohId;
+
+use crate::account::Account;
+use crate::identity::{is_of_life, robot_of, swarm_checksum};
+use crate::inbox::Inbox;
+use crate::sightings::{Place, Sightings};
+
+/// How long answers to a call are waited for.
+const CALL: Duration = Duration::from_millis(700);
+
+/// What a robot knows of where others can be dialled.
+pub(crate) struct Lookout {
+    me: RobotId,
+    nonce: u64,
+    swarm: u32,
+    inbox: Arc<Inbox>,
+    account: Arc<Account>,
+    scouting: zenoh::Config,
+    started: Instant,
+    heard: Mutex<Sightings>,
+}
+
+impl Lookout {
+    /// That of a robot in the life with that nonce.
+    pub fn new(
+        me: RobotId,
+        swarm: &str,
+        nonce: u64,
+        inbox: Arc<Inbox>,
+        account: Arc<Account>,
+        scouting: zenoh::Config,
+    ) -> Self {
+        let (swarm, started) = (swarm_checksum(swarm), Instant::now());
+        Self { me, nonce, swarm, inbox, account, scouting, started, heard: Mutex::default() }
+    }
+
+    /// The time by which it says when robots were heard.
+    pub fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    /// When each robot was heard of last.
+    pub fn heard(&self) -> BTreeMap<RobotId, Duration> {
+        self.sightings().heard()
+    }
+
+    /// Where to try next to reach a robot.
+    pub fn next(&self, robot: RobotId) -> Option<Place> {
+        self.sightings().next(robot)
+    }
+
+    /// A place was dialled.
+    pub fn dialled(&self, robot: RobotId, place: &Place, stands: bool) {
+        self.sightings().dialled(robot, place, stands);
+        if !stands {
+            self.account.count("dial_failed");
+        }
+    }
+
+    /// Asks who is there; the answers come by themselves.
+    pub async fn call(self: &Arc<Self>) {
+        self.account.count("scouted");
+        let lookout = self.clone();
+        let scouting = zenoh::scout(WhatAmI::Router, self.scouting.clone())
+            .callback(move |hello| {
+                let locators = hello.locators().iter().map(ToString::to_string).collect();
+                lookout.on_heard(hello.zid(), locators);
+            })
+            .await;
+        match scouting {
+            Ok(scouting) => {
+                tokio::spawn(async move {
+                    tokio::time::sleep(CALL).await;
+                    scouting.stop();
+                });
+            }
+            Err(error) => self.account.error(&format!(
+                "cannot look for other robots: {error}: check the scouting address and interface"
+            )),
+        }
+    }
+
+    fn on_heard(&self, id: ZenohId, locators: Vec<String>) {
+        let Some(robot) = robot_of(id, self.swarm) else { return };
+        let locators = self.reachable(locators);
+        if locators.is_empty() || self.inbox.is_stranger(robot) {
+            return;
+        }
+        if robot == self.me {
+            if !is_of_life(id, self.nonce) {
+                self.account.twin();
+            }
+            return;
+        }
+        self.sightings().hear(self.now(), robot, Place { id, locators });
+    }
+
+    /// Where a robot is dialled: in a sealed swarm by TLS alone.
+    pub fn reachable(&self, mut locators: Vec<String>) -> Vec<String> {
+        let sealed = self.inbox.is_sealed();
+        locators.retain(|locator| locator.starts_with("tls/") == sealed);
+        locators
+    }
+
+    fn sightings(&self) -> MutexGuard<'_, Sightings> {
+        self.heard.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
