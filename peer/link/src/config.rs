@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::LinkError;
-use super::cells::Cells;
 use super::identity::{relay_id, zenoh_id};
 use super::reach;
 use super::tls::{self, Credentials};
@@ -62,6 +61,26 @@ pub struct Scouting {
 impl Default for Scouting {
     fn default() -> Self {
         Self { address: "224.0.0.224:7446".to_owned(), interface: "auto".to_owned() }
+    }
+}
+
+/// Cells, into which robots of a large swarm come together by themselves: one of each runs a relay, a Zenoh router, to which the others hang
+/// as clients.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Cells {
+    /// For how many robots a relay has room beside the one that runs it. Range 1 to 50.
+    pub size: usize,
+}
+
+impl Cells {
+    /// The largest `size`. A sealed robot has no more than 64 sessions with others, and some of them are relays and clients.
+    pub const MAX_SIZE: usize = 50;
+}
+
+impl Default for Cells {
+    fn default() -> Self {
+        Self { size: 32 }
     }
 }
 

@@ -66,9 +66,8 @@ mod worker;
 
 pub use apprentice::RobotLearning;
 pub use boot::boot_number;
-pub use cells::Cells;
 pub use client::{Answers, Client, Decisions};
-pub use config::{LinkConfig, Scouting};
+pub use config::{Cells, LinkConfig, Scouting};
 pub use error::LinkError;
 pub use event::Event;
 pub use failure::{Failure, Part};

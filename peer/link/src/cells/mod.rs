@@ -17,26 +17,5 @@ mod choice;
 mod keeper;
 mod relay;
 
-use serde::{Deserialize, Serialize};
-
 pub(crate) use keeper::CellKeeper;
 pub(crate) use relay::Foundation;
-
-/// How large cells are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Cells {
-    /// For how many robots a relay has room beside the one that runs it. Range 1 to 50.
-    pub size: usize,
-}
-
-impl Cells {
-    /// The largest `size`. A sealed robot has no more than 64 sessions with others, and some of them are relays and clients.
-    pub const MAX_SIZE: usize = 50;
-}
-
-impl Default for Cells {
-    fn default() -> Self {
-        Self { size: 32 }
-    }
-}

@@ -7,9 +7,8 @@ use gestalt_protocol::{Keys, RobotId};
 use tokio::task::JoinSet;
 use zenoh::session::ZenohId;
 
-use super::Cells;
 use crate::account::Account;
-use crate::config::LinkConfig;
+use crate::config::{Cells, LinkConfig};
 use crate::error::LinkError;
 use crate::identity::{robot_of, swarm_checksum};
 use crate::inbox::Inbox;
