@@ -67,7 +67,8 @@ pub async fn a_hundred_robots_in_hearing_keep_four_links_each_and_agree() {
     let started = began.elapsed();
     let complete = converged(&robots, PATIENCE).await;
     eprintln!("100 robots by scouting: started in {started:?}, all know all after {:?}", began.elapsed());
-    assert!(complete, "links: {:?}", links(&robots));
+    let known: Vec<usize> = robots.iter().map(|robot| robot.robot.status().alive.len()).collect();
+    assert!(complete, "known: {known:?}; links: {:?}; {:?}", links(&robots), sums(&robots));
 
     let long = std::env::var_os("GESTALT_LONG").is_some();
     let rounds = if long { 10 } else { 4 };

@@ -356,6 +356,32 @@ mod tests {
     }
 
     #[test]
+    fn a_robot_of_a_cell_is_a_client_and_its_relay_has_what_the_user_says() {
+        let zenoh = serde_json::json!({"listen": {"endpoints": ["tcp/127.0.0.1:7447"]}});
+        let cells = LinkConfig {
+            cells: Some(Cells::default()),
+            scouting: Some(Scouting::default()),
+            zenoh: zenoh.as_object().unwrap().clone(),
+            ..LinkConfig::default()
+        };
+        let (member, relay) = (cells.to_zenoh(RobotId(7), "demo", 1), cells.relay(RobotId(7), "demo", 1, 1));
+        let said =
+            |config: &Result<zenoh::Config, LinkError>, key| config.as_ref().unwrap().get_json(key).unwrap();
+        assert_eq!([said(&member, "mode"), said(&relay, "mode")], ["\"client\"", "\"router\""]);
+        assert!(said(&relay, "listen/endpoints").contains("127.0.0.1:7447"));
+        assert!(said(&member, "listen/endpoints").contains("127.0.0.1:0"));
+        assert_ne!(said(&member, "id"), said(&relay, "id"));
+
+        let refused = |link: LinkConfig| link.to_zenoh(RobotId(7), "demo", 1).unwrap_err().to_string();
+        assert!(refused(LinkConfig { scouting: None, ..cells.clone() }).contains("scouting"));
+        for size in [0, Cells::MAX_SIZE + 1] {
+            assert!(
+                refused(LinkConfig { cells: Some(Cells { size }), ..cells.clone() }).contains("cells.size")
+            );
+        }
+    }
+
+    #[test]
     fn what_seals_a_swarm_cannot_be_taken_back() {
         use gestalt_trust::{Identity, Membership};
 

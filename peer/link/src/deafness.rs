@@ -41,7 +41,8 @@ pub(crate) async fn mend_deafness(
         tokio::time::sleep(PERIOD).await;
         let now = Instant::now();
         let links = inbox.hearing();
-        patience.of = links.len().max(most);
+        // Where hundreds start on one machine, first words take their time.
+        patience.of = links.len().max(most).max(inbox.tokens().len() / ROBOTS_A_TURN);
         for (id, robot, since, last) in links {
             if patience.is_over(robot, now.duration_since(since), last.map(|last| now.duration_since(last))) {
                 tracing::info!("nothing is heard from robot {robot} over its link, which is made anew");
@@ -51,6 +52,9 @@ pub(crate) async fn mend_deafness(
         }
     }
 }
+
+/// So many robots of the swarm are reckoned with as one more neighbour.
+const ROBOTS_A_TURN: usize = 5;
 
 /// Who has so many neighbours turns to each as often as is reckoned with here; who has twice as many, half as often.
 const FEW: usize = 8;

@@ -5,6 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use gestalt_protocol::{Keys, MAX_ROBOTS, RobotId, Topic};
 use tokio::sync::Notify;
@@ -16,6 +17,13 @@ use crate::session::Node;
 
 /// Of each robot its votes and what it holds, and of each neighbour what it is told: what else is said is said seldom.
 const MAX_WAYS: usize = 3 * MAX_ROBOTS;
+
+/// Links are made when many robots start, and Zenoh makes none while it takes in a key. So keys wait.
+const SETTLED: Duration = Duration::from_secs(8);
+
+/// So many keys are declared at a time, and so long is the pause between.
+const FEW: usize = 16;
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// What is said so often that its route is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -61,14 +69,18 @@ impl Ways {
         }
     }
 
-    /// Declares them as they come into use. Never returns.
+    /// Declares them some time after they came into use, a few at a time. Never returns.
     pub async fn keep(&self, node: Node, keys: Keys) -> Result<(), String> {
         loop {
-            let new = std::mem::take(&mut self.lock().undeclared);
-            for session in node.sessions() {
-                self.declare(&session, &keys, &new).await?;
-            }
             self.news.notified().await;
+            tokio::time::sleep(SETTLED).await;
+            let new = std::mem::take(&mut self.lock().undeclared);
+            for few in new.chunks(FEW) {
+                for session in node.sessions() {
+                    self.declare(&session, &keys, few).await?;
+                }
+                tokio::time::sleep(PAUSE).await;
+            }
         }
     }
 
@@ -80,7 +92,9 @@ impl Ways {
 
     /// That session is closed.
     pub fn end(&self, session: ZenohId) {
-        self.lock().kept.remove(&session);
+        // Dropped when nothing is locked: what is dropped asks Zenoh to forget it.
+        let kept = self.lock().kept.remove(&session);
+        drop(kept);
     }
 
     async fn declare(&self, session: &Session, keys: &Keys, ways: &[(RobotId, Way)]) -> Result<(), String> {

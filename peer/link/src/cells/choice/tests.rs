@@ -141,7 +141,11 @@ proptest! {
             world.run(Duration::from_millis(100 * tenths));
         }
         world.run(Duration::from_secs(25));
-        prop_assert!(world.is_sound());
+        // One that gives up its relay for a full one is without for a moment.
+        prop_assert!((0..20).any(|_| {
+            world.run(STEP);
+            world.is_sound()
+        }));
     }
 }
 
