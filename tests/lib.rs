@@ -5,6 +5,8 @@
 mod browser;
 #[path = "set_up/classifier.rs"]
 mod classifier;
+#[path = "set_up/crowd.rs"]
+mod crowd;
 #[path = "set_up/learning.rs"]
 mod learning;
 #[path = "set_up/namespaces.rs"]
@@ -20,6 +22,7 @@ mod streaming;
 
 pub use browser::Browser;
 pub use classifier::{Fixed, look};
+pub use crowd::{in_crowd, processor_time, sums};
 pub use learning::{between, gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;
 pub use process::Process;

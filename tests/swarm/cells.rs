@@ -1,17 +1,16 @@
 //! Robots that form cells: few of them relay, the others are clients of a relay.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Cells, Client, Event, LinkConfig, RobotConfig, Scouting};
+use gestalt_link::{Cells, Client, Event, LinkConfig, RobotConfig};
 use gestalt_protocol::{ClassId, Instruction, RobotId};
 use gestalt_strategies::MindConfig;
-use gestalt_tests::{Process, Watched, config, sealed, start, unique, with_eve};
+use gestalt_tests::{
+    Process, Watched, config, in_crowd, processor_time, sealed, start, sums, unique, with_eve,
+};
 use serde_json::json;
-
-/// Many robots share the processor with each other and with whatever else runs here: Zenoh's own lease.
-const LEASE: Duration = Duration::from_secs(10);
 
 /// Far above what any of this takes: who is not there by then is stuck.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -20,31 +19,8 @@ const PATIENCE: Duration = Duration::from_secs(90);
 const DOOMED: u32 = 1000;
 
 fn in_cells(plain: RobotConfig, size: usize) -> RobotConfig {
-    // A group and port of this process alone.
-    let port = 20_000 + std::process::id() % 20_000;
-    let scouting = Scouting { address: format!("239.255.77.78:{port}"), interface: "lo".to_owned() };
-    let cells = Some(Cells { size });
-    let link = LinkConfig { scouting: Some(scouting), cells, lease: LEASE, ..plain.link };
-    // A busy machine may take long to bring the votes together; no round is to end undecided for that.
-    let mind = MindConfig { deadline: Duration::from_secs(30), ..MindConfig::default() };
-    RobotConfig { link, mind, ..plain }
-}
-
-/// Seconds of processor time this process has used.
-fn processor_time() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
-    let ticks = |i: usize| fields[i].parse::<f64>().unwrap();
-    (ticks(11) + ticks(12)) / 100.0
-}
-
-/// The robots' counters, summed.
-fn sums(robots: &[Watched]) -> BTreeMap<String, u64> {
-    let mut sums = BTreeMap::new();
-    for (name, count) in robots.iter().flat_map(|robot| robot.robot.status().counters) {
-        *sums.entry(name).or_default() += count;
-    }
-    sums
+    let plain = in_crowd(plain);
+    RobotConfig { link: LinkConfig { cells: Some(Cells { size }), ..plain.link }, ..plain }
 }
 
 /// Waits until each robot knows all of them to be alive, and `others` more.

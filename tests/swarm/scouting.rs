@@ -1,46 +1,13 @@
 //! Robots that find each other by multicast.
 
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use gestalt_link::{LinkConfig, RobotConfig, Scouting};
 use gestalt_protocol::ClassId;
 use gestalt_strategies::MindConfig;
-use gestalt_tests::{Watched, config, start, unique};
-
-/// A hundred robots share the processor with each other and with whatever else runs here: Zenoh's own lease.
-const LEASE: Duration = Duration::from_secs(10);
+use gestalt_tests::{Watched, config, in_crowd, processor_time, start, sums, unique};
 
 /// Far above what any of this takes: who is not there by then is stuck.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-fn scouting(id: u32, swarm: &str) -> RobotConfig {
-    // A group and port of this process alone.
-    let port = 20_000 + std::process::id() % 20_000;
-    let scouting = Scouting { address: format!("239.255.77.77:{port}"), interface: "lo".to_owned() };
-    let plain = config(id, swarm, &[]);
-    let link = LinkConfig { scouting: Some(scouting), lease: LEASE, ..plain.link };
-    // A busy machine may take long to bring the votes together; no round is to end undecided for that.
-    let mind = MindConfig { deadline: Duration::from_secs(30), ..MindConfig::default() };
-    RobotConfig { link, mind, ..plain }
-}
-
-/// Seconds of processor time this process has used.
-fn processor_time() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-    let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
-    let ticks = |i: usize| fields[i].parse::<f64>().unwrap();
-    (ticks(11) + ticks(12)) / 100.0
-}
-
-/// The robots' counters, summed.
-fn sums(robots: &[Watched]) -> BTreeMap<String, u64> {
-    let mut sums = BTreeMap::new();
-    for (name, count) in robots.iter().flat_map(|robot| robot.robot.status().counters) {
-        *sums.entry(name).or_default() += count;
-    }
-    sums
-}
 
 async fn converged(robots: &[Watched], patience: Duration) -> bool {
     let deadline = Instant::now() + patience;
@@ -59,7 +26,7 @@ pub async fn a_hundred_robots_in_hearing_keep_four_links_each_and_agree() {
     // Ten see the gesture. Disagreement is for smaller swarms: a hundred sessions in one process deliver votes too slowly for a
     // quorum of theirs.
     let sees = |id: u32| id.is_multiple_of(10).then_some(ClassId(1));
-    let starts = (0..100).map(|id| start(scouting(id, &swarm), sees(id)));
+    let starts = (0..100).map(|id| start(in_crowd(config(id, &swarm, &[])), sees(id)));
     let mut robots = Vec::new();
     for robot in starts {
         robots.push(robot.await);

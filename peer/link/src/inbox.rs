@@ -361,11 +361,9 @@ impl Inbox {
             // Whoever comes listens before it says that it is there.
             if sample.kind() == SampleKind::Put {
                 self.judged(|judge, _| judge.tell_again());
-            }
-            state.alive_changed = true;
-            if sample.kind() == SampleKind::Put {
                 self.ways.speaker(id);
             }
+            state.alive_changed = true;
             self.ready.notify_one();
             self.unrest.notify_one();
         }
