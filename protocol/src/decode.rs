@@ -59,15 +59,6 @@ pub(crate) fn encode_versioned<T: Serialize>(value: &T) -> Vec<u8> {
         .expect("memory is the only thing that writing to a vector can lack")
 }
 
-/// Reads what [`encode_versioned`] wrote, of at most `limit` bytes, and nothing else.
-pub(crate) fn decode_versioned<'a, T: Deserialize<'a>>(
-    bytes: &'a [u8],
-    limit: usize,
-) -> Result<T, DecodeError> {
-    let (value, rest) = take_versioned(bytes, limit)?;
-    if rest.is_empty() { Ok(value) } else { Err(DecodeError::Trailing(rest.len())) }
-}
-
 /// Reads what [`encode_versioned`] wrote, of at most `limit` bytes together with what follows it, which is given too.
 pub(crate) fn take_versioned<'a, T: Deserialize<'a>>(
     bytes: &'a [u8],

@@ -3,11 +3,15 @@
 //! The payload on `robot/<id>/frame` is the encoded picture itself, so that any Zenoh client can show it; what belongs to
 //! it travels beside it, as the attachment. Whoever looks says on `robot/<id>/taken` that it took a frame, and thereby
 //! asks for the next one.
+//!
+//! In a sealed swarm whoever looks sends a [`FrameChallenge`] along, and a [`FrameProof`] answers it behind each header: a frame that was
+//! recorded earlier answers no challenge of today. `gestalt-trust` makes and checks both.
 
 use serde::{Deserialize, Serialize};
 
-use crate::decode::{DecodeError, decode_versioned, encode_versioned};
-use crate::id::RoundId;
+use crate::decode::{DecodeError, encode_versioned, take_versioned};
+use crate::id::{RobotId, RoundId};
+use crate::signature::Signature;
 
 /// The largest encoded picture accepted, in bytes.
 pub const MAX_FRAME: usize = 4 * 1024 * 1024;
@@ -17,6 +21,9 @@ pub const MAX_FRAME_HEADER: usize = 256;
 
 /// The longest name of a camera, in bytes.
 const MAX_CAMERA: usize = 64;
+
+/// The most challenges that one frame answers: so many robots may look at one camera.
+pub const MAX_CHALLENGES: usize = 8;
 
 /// How a picture is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,6 +63,27 @@ pub struct FrameTaken {
     pub round: Option<RoundId>,
 }
 
+/// That a frame is its robot's and new: behind its header, in a sealed swarm.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameProof {
+    /// What those asked who look at it: at most [`MAX_CHALLENGES`].
+    pub challenges: Vec<u64>,
+    /// The robot's, over all of it: robot, header, challenges and picture.
+    pub signature: Signature,
+}
+
+/// What whoever looks asks the sender to answer, so that it knows new frames from recorded ones: behind an acknowledgement, in a
+/// sealed swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameChallenge {
+    /// Who looks.
+    pub by: RobotId,
+    /// A number that it drew for this robot's frames.
+    pub challenge: u64,
+    /// The signature of whoever looks.
+    pub signature: Signature,
+}
+
 impl FrameHeader {
     /// The bytes that travel: the protocol's version byte, then postcard.
     #[must_use]
@@ -63,19 +91,45 @@ impl FrameHeader {
         encode_versioned(self)
     }
 
-    /// Reads what [`FrameHeader::encode`] wrote.
+    /// The bytes that travel in a sealed swarm: the [header](Self::encode), the challenges in postcard, the 64 bytes of the signature.
+    #[must_use]
+    pub fn encode_proven(&self, proof: &FrameProof) -> Vec<u8> {
+        let mut bytes = self.encode_answering(&proof.challenges);
+        bytes.extend(proof.signature.as_bytes());
+        bytes
+    }
+
+    /// What is signed of them: all but the signature.
+    #[must_use]
+    pub fn encode_answering(&self, challenges: &[u64]) -> Vec<u8> {
+        appended(self.encode(), &challenges)
+    }
+
+    /// Reads what [`FrameHeader::encode`] or [`FrameHeader::encode_proven`] wrote.
     ///
     /// # Errors
     /// See [`DecodeError`]; the check of the values is part of the decoding.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        let header: Self = decode_versioned(bytes, MAX_FRAME_HEADER)?;
+        Self::decode_proven(bytes).map(|(header, _)| header)
+    }
+
+    /// The same, with the proof, if there is one.
+    ///
+    /// # Errors
+    /// See [`DecodeError`].
+    pub fn decode_proven(bytes: &[u8]) -> Result<(Self, Option<FrameProof>), DecodeError> {
+        let (header, rest): (Self, _) = take_versioned(bytes, MAX_FRAME_HEADER)?;
         if !(header.fps > 0.0 && header.fps <= 1000.0) {
             return Err(DecodeError::Impossible("frames per second, above 0 and at most 1000"));
         }
         if header.camera.len() > MAX_CAMERA || header.camera.chars().any(char::is_control) {
             return Err(DecodeError::Impossible("a camera's name, at most 64 bytes of plain text"));
         }
-        Ok(header)
+        let proof = signed_rest(rest)?.map(|(challenges, signature)| FrameProof { challenges, signature });
+        if proof.as_ref().is_some_and(|proof| proof.challenges.len() > MAX_CHALLENGES) {
+            return Err(DecodeError::Impossible("answers to more robots than may look at one camera"));
+        }
+        Ok((header, proof))
     }
 }
 
@@ -86,11 +140,49 @@ impl FrameTaken {
         encode_versioned(self)
     }
 
-    /// Reads what [`FrameTaken::encode`] wrote.
+    /// The bytes that travel in a sealed swarm: the [acknowledgement](Self::encode), who looks and the challenge in postcard, the 64
+    /// bytes of the signature.
+    #[must_use]
+    pub fn encode_challenging(&self, challenge: &FrameChallenge) -> Vec<u8> {
+        let mut bytes = appended(self.encode(), &(challenge.by, challenge.challenge));
+        bytes.extend(challenge.signature.as_bytes());
+        bytes
+    }
+
+    /// Reads what [`FrameTaken::encode`] or [`FrameTaken::encode_challenging`] wrote.
     ///
     /// # Errors
     /// See [`DecodeError`].
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
-        decode_versioned(bytes, MAX_FRAME_HEADER)
+        Self::decode_challenging(bytes).map(|(taken, _)| taken)
     }
+
+    /// The same, with the challenge, if there is one.
+    ///
+    /// # Errors
+    /// See [`DecodeError`].
+    pub fn decode_challenging(bytes: &[u8]) -> Result<(Self, Option<FrameChallenge>), DecodeError> {
+        let (taken, rest) = take_versioned(bytes, MAX_FRAME_HEADER)?;
+        let challenge = signed_rest(rest)?.map(|((by, challenge), signature)| FrameChallenge {
+            by,
+            challenge,
+            signature,
+        });
+        Ok((taken, challenge))
+    }
+}
+
+fn appended(bytes: Vec<u8>, value: &impl Serialize) -> Vec<u8> {
+    postcard::to_extend(value, bytes).expect("memory is the only thing that writing to a vector can lack")
+}
+
+/// What follows a message: nothing, or a value in postcard and a signature.
+fn signed_rest<'a, T: Deserialize<'a>>(rest: &'a [u8]) -> Result<Option<(T, Signature)>, DecodeError> {
+    if rest.is_empty() {
+        return Ok(None);
+    }
+    let trailing = || DecodeError::Trailing(rest.len());
+    let (value, signature) = postcard::take_from_bytes(rest).map_err(|_| trailing())?;
+    let signature = signature.try_into().map_err(|_| trailing())?;
+    Ok(Some((value, Signature::from_bytes(signature))))
 }

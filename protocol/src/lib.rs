@@ -42,7 +42,10 @@ pub use decision::{Certificate, CountedVote, Decision, Rank};
 pub use decode::{DecodeError, decode_json};
 pub use envelope::Envelope;
 pub use fnv::Fnv1a;
-pub use frame::{FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, MAX_FRAME_HEADER};
+pub use frame::{
+    FrameChallenge, FrameHeader, FrameProof, FrameTaken, ImageEncoding, MAX_CHALLENGES, MAX_FRAME,
+    MAX_FRAME_HEADER,
+};
 pub use fusion_rule::{FusionRule, RuleName, RuleNameError};
 pub use holding::{Holder, Holding};
 pub use id::{

@@ -1,7 +1,8 @@
 //! What travels beside a picture: the bytes once and for all, and the bounds of reading it.
 
 use gestalt_protocol::{
-    DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME_HEADER, RobotId, RoundId,
+    DecodeError, FrameChallenge, FrameHeader, FrameProof, FrameTaken, ImageEncoding, MAX_CHALLENGES,
+    MAX_FRAME_HEADER, RobotId, RoundId, Signature,
 };
 use proptest::prelude::*;
 
@@ -38,6 +39,43 @@ fn an_acknowledgement() {
         assert_eq!(hex(&taken.encode()), bytes.replace(' ', ""));
         assert_eq!(FrameTaken::decode(&taken.encode()), Ok(taken));
     }
+}
+
+#[test]
+fn what_a_sealed_swarm_adds() {
+    let signature = Signature::from_bytes([0xAB; 64]);
+    let signed = |bytes: &str| bytes.replace(' ', "") + &"ab".repeat(64);
+    // how many challenges, each (varints); the signature
+    let proof = FrameProof { challenges: vec![5, 300], signature };
+    let bytes = header().encode_proven(&proof);
+    assert_eq!(hex(&bytes), signed("03 ac02 07 e05d 00 0000f041 06 706172726f74 02 05 ac02"));
+    assert_eq!(FrameHeader::decode_proven(&bytes), Ok((header(), Some(proof.clone()))));
+    assert_eq!(FrameHeader::decode(&bytes), Ok(header()), "who does not ask for it need not know of it");
+    assert_eq!(FrameHeader::decode_proven(&header().encode()), Ok((header(), None)));
+    // who looks, the challenge; the signature
+    let taken = FrameTaken { nonce: 300, sequence: 7, round: None };
+    let challenge = FrameChallenge { by: RobotId(2), challenge: 300, signature };
+    let bytes = taken.encode_challenging(&challenge);
+    assert_eq!(hex(&bytes), signed("03 ac02 07 00 02 ac02"));
+    assert_eq!(FrameTaken::decode_challenging(&bytes), Ok((taken, Some(challenge))));
+    assert_eq!(FrameTaken::decode(&bytes), Ok(taken));
+    for length in taken.encode().len() + 1..bytes.len() {
+        let left = length - taken.encode().len();
+        assert_eq!(FrameTaken::decode(&bytes[..length]), Err(DecodeError::Trailing(left)));
+    }
+
+    let most = |challenges| FrameProof { challenges: vec![u64::MAX; challenges], ..proof.clone() };
+    let longest = FrameHeader {
+        nonce: u64::MAX,
+        sequence: u32::MAX,
+        age_us: u32::MAX,
+        camera: "x".repeat(64),
+        ..header()
+    };
+    let bytes = longest.encode_proven(&most(MAX_CHALLENGES));
+    assert!(FrameHeader::decode_proven(&bytes).is_ok(), "{} bytes", bytes.len());
+    let bytes = header().encode_proven(&most(MAX_CHALLENGES + 1));
+    assert!(matches!(FrameHeader::decode_proven(&bytes), Err(DecodeError::Impossible(_))));
 }
 
 #[test]

@@ -124,5 +124,5 @@ pub fn sender_config(orders: &Value) -> (SenderConfig, Feed) {
     };
     let feed = Feed::new(&camera, robot, Duration::ZERO).expect("a camera");
     let swarm = orders["swarm"].as_str().expect("\"swarm\": a name").to_owned();
-    (SenderConfig { swarm, link, robot, camera: "parrot".to_owned(), quality: 80 }, feed)
+    (SenderConfig { swarm, link, robot, camera: "parrot".to_owned(), quality: 80, signer: None }, feed)
 }

@@ -12,6 +12,7 @@ mod doctor;
 mod eyes;
 mod false_answers;
 mod field;
+mod filmed;
 mod foxglove;
 mod in_process;
 mod knocking;
@@ -112,6 +113,7 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more.await,
         [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
+        [Waits] filmed::frames_are_their_robots_own_and_new_whatever_a_member_makes_of_them.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,
         [Waits] page::what_the_page_shows_and_says_is_what_the_swarm_says_and_hears.await,
         [Waits, Websockets] foxglove::a_viewer_in_python_sees_what_zenoh_carries_teaches_and_sees_the_links.await,

@@ -116,7 +116,7 @@ async fn camera(
             let _ = acknowledge.try_send(taken);
         }
     };
-    let sender = client.stream(RobotId(id), heard).await.unwrap();
+    let sender = client.stream(RobotId(id), None, heard).await.unwrap();
     let nonce = fresh_nonce();
     let mut credit = Credit::new(nonce);
     for picture in pictures.iter().cycle() {

@@ -253,8 +253,14 @@ impl Taken {
         assert!(gate.set(opened).is_ok());
         let link = serde_json::from_value(json!({"connect": robot.locators()})).unwrap();
         let swarm = swarm.to_owned();
-        let of_camera =
-            SenderConfig { swarm, link, robot: RobotId(7), camera: "parrot".to_owned(), quality: 80 };
+        let of_camera = SenderConfig {
+            swarm,
+            link,
+            robot: RobotId(7),
+            camera: "parrot".to_owned(),
+            quality: 80,
+            signer: None,
+        };
         let sender = Sender::start(of_camera, feed).unwrap();
         let (said, began) = (failures.clone(), Instant::now());
         let sending = tokio::spawn(async move {

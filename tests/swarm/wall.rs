@@ -36,7 +36,7 @@ fn walled(id: u32, members: &Membership, connect: &[String]) -> RobotConfig {
 }
 
 /// The zenoh configuration of a stranger in that mode, which will not wait for ever.
-fn stranger(mode: &str, endpoint: &str, tls: Option<&Value>) -> zenoh::Config {
+pub fn stranger(mode: &str, endpoint: &str, tls: Option<&Value>) -> zenoh::Config {
     let mut zenoh = zenoh::Config::default();
     let mut set = |key: &str, value: Value| zenoh.insert_json5(key, &value.to_string()).unwrap();
     set("mode", json!(mode));

@@ -128,7 +128,7 @@ pub fn play() -> bool {
 async fn camera(id: RobotId, client: Client, clip: Arc<Clip>) {
     let (acknowledge, mut acknowledged) = mpsc::channel(16);
     let heard = move |taken| drop(acknowledge.try_send(taken));
-    let sender = client.stream(id, heard).await.expect("the session is open");
+    let sender = client.stream(id, None, heard).await.expect("the session is open");
     let nonce = fresh_nonce();
     let mut credit = Credit::new(nonce);
     // Cameras do not take their pictures all at the same moment.

@@ -66,9 +66,12 @@ impl Account {
         add(&mut self.lock().counters, name.to_owned(), amount);
     }
 
-    /// Counts something that was refused, by cause, and names it among the latest errors.
+    /// Counts something that was refused, by cause, and names it among the latest errors, unless it is what always happens.
     pub(super) fn refused(&self, kind: &str, key: &str, bytes: usize, cause: &Refusal) {
         self.count(&format!("refused_{kind}_{}", cause.name()));
+        if matches!(cause, Refusal::First) {
+            return;
+        }
         self.error(&format!("refused {bytes} bytes on {key}: {cause}"));
     }
 
@@ -147,6 +150,8 @@ pub(super) enum Refusal {
     Evidence(#[from] EvidenceError),
     #[error(transparent)]
     Roster(#[from] RosterError),
+    #[error("the first of a camera, which has not heard yet what it is asked")]
+    First,
     #[error("more of it than is looked into: it comes again")]
     TooOften,
     #[error("nobody but those on this robot's own computer say anything without a signature")]
@@ -173,6 +178,7 @@ impl Refusal {
             Self::Roster(RosterError::Contradiction { .. }) => "contradiction",
             Self::Roster(RosterError::Forged) => "forged",
             Self::Roster(_) => "malformed",
+            Self::First => "unasked",
             Self::TooOften => "too_often",
             Self::Unsaid => "unsigned",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),

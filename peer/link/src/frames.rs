@@ -1,12 +1,17 @@
 //! Frames on Zenoh: sent by a client without a computer to speak of, received at a robot's session.
 
 use std::borrow::Cow;
-use std::sync::Arc;
-use std::time::Instant;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{
-    DecodeError, FrameHeader, FrameTaken, ImageEncoding, Keys, MAX_FRAME, RobotId, RoundId, Topic,
+    DecodeError, FrameChallenge, FrameHeader, FrameProof, FrameTaken, ImageEncoding, Keys, MAX_FRAME,
+    RobotId, RoundId, Topic,
 };
+use gestalt_trust::{Distrust, Ed25519, FrameClaim, FrameGuard, FrameSigner};
+use thiserror::Error;
 use zenoh::bytes::{Encoding, ZBytes};
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
@@ -14,7 +19,12 @@ use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait};
 
 use super::account::{Account, Refusal};
+use super::identity::fresh_nonce;
+use super::inbox::Inbox;
 use super::{Client, LinkError, Robot};
+
+/// Whose frames answered no challenge is told the present one at once, but no more often than so: whoever makes frames up gets no more for it.
+const TOLD_EVERY: Duration = Duration::from_millis(100);
 
 /// A frame as it arrived; the picture is not looked into yet.
 #[derive(Debug)]
@@ -37,17 +47,32 @@ impl FrameArrival {
 }
 
 /// Where frames come in, as long as it is kept; and where it is said that they were taken.
-#[derive(Debug)]
 pub struct FrameGate {
     _frames: Subscriber<()>,
+    desk: Arc<Desk>,
+}
+
+/// What a gate goes by.
+struct Desk {
     session: Session,
     keys: Keys,
+    inbox: Arc<Inbox>,
     account: Arc<Account>,
+    cameras: Mutex<Cameras>,
+}
+
+/// Of a sealed swarm's cameras: which frames are new, what they were asked, and when one that did not know it was told.
+#[derive(Default)]
+struct Cameras {
+    guard: FrameGuard,
+    asked: BTreeMap<RobotId, FrameChallenge>,
+    told: BTreeMap<RobotId, Instant>,
 }
 
 impl Robot {
     /// Hears the frames of that robot, or of every robot, from now on. `on_frame` is called on Zenoh's threads, which must
-    /// not wait. What is no frame is counted in the status, and goes no further.
+    /// not wait. What is no frame is counted in the status, and goes no further; nor does, in a sealed swarm, what its robot did not sign
+    /// in answer to this one.
     ///
     /// # Errors
     /// [`LinkError::Open`] when the session is closed.
@@ -60,28 +85,37 @@ impl Robot {
             Some(robot) => self.keys.key(&Topic::Frame(robot)),
             None => self.keys.every_robot("frame"),
         };
-        let (keys, account) = (self.keys.clone(), self.account.clone());
+        let desk = Arc::new(Desk {
+            session: self.session.clone(),
+            keys: self.keys.clone(),
+            inbox: self.inbox.clone(),
+            account: self.account.clone(),
+            cameras: Mutex::default(),
+        });
+        let at_desk = desk.clone();
         let frames = self
             .session
             .declare_subscriber(key)
             .allowed_origin(Locality::Remote)
-            .callback(move |sample| match read(&keys, &sample) {
+            .callback(move |sample| match at_desk.look_at(&sample) {
                 Ok(arrival) => {
-                    account.received("frame", sample.payload().len());
+                    at_desk.account.received("frame", sample.payload().len());
                     on_frame(arrival);
                 }
                 Err(cause) => {
-                    account.refused("frame", sample.key_expr(), sample.payload().len(), &cause);
+                    let (key, length) = (sample.key_expr(), sample.payload().len());
+                    at_desk.account.refused("frame", key, length, &cause);
                 }
             })
             .await
             .map_err(|error| LinkError::open(&*error))?;
-        Ok(FrameGate {
-            _frames: frames,
-            session: self.session.clone(),
-            keys: self.keys.clone(),
-            account: self.account.clone(),
-        })
+        Ok(FrameGate { _frames: frames, desk })
+    }
+}
+
+impl fmt::Debug for FrameGate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FrameGate").field("keys", &self.desk.keys).finish_non_exhaustive()
     }
 }
 
@@ -89,13 +123,26 @@ impl FrameGate {
     /// The round that the robot takes part in now at whose session the frames come in.
     #[must_use]
     pub fn round(&self) -> Option<RoundId> {
-        let status = self.account.lock();
-        status.round.filter(|_| status.open)
+        self.desk.round()
     }
 
     /// Says to a robot's camera that a frame was taken, so that the next one may come.
     pub fn taken(&self, robot: RobotId, taken: &FrameTaken) {
-        let bytes = taken.encode();
+        self.desk.taken(robot, taken);
+    }
+}
+
+impl Desk {
+    fn round(&self) -> Option<RoundId> {
+        let status = self.account.lock();
+        status.round.filter(|_| status.open)
+    }
+
+    fn taken(&self, robot: RobotId, taken: &FrameTaken) {
+        let bytes = match self.challenge(robot) {
+            Some(challenge) => taken.encode_challenging(&challenge),
+            None => taken.encode(),
+        };
         self.account.sent("taken", bytes.len());
         let put = self
             .session
@@ -106,9 +153,70 @@ impl FrameGate {
             .wait();
         self.account.check(put);
     }
+
+    fn cameras(&self) -> MutexGuard<'_, Cameras> {
+        self.cameras.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn now(&self) -> Duration {
+        self.account.started().elapsed()
+    }
+
+    /// What that robot's camera is asked to answer; `None` in an open swarm, and for those whom nobody believes.
+    fn challenge(&self, robot: RobotId) -> Option<FrameChallenge> {
+        let key = self.inbox.judged(|judge, _| judge.key(robot).copied())?.ok()?;
+        let mut cameras = self.cameras();
+        let number = cameras.guard.challenge(self.now(), robot, &key, fresh_nonce());
+        if let Some(asked) = cameras.asked.get(&robot).filter(|asked| asked.challenge == number) {
+            return Some(*asked);
+        }
+        let asked = self.inbox.sign_challenge(robot, number)?;
+        cameras.asked.insert(robot, asked);
+        Some(asked)
+    }
+
+    /// The frame, if it is one, and its robot's.
+    fn look_at(&self, sample: &Sample) -> Result<FrameArrival, Refusal> {
+        let (arrival, proof) = read(&self.keys, sample)?;
+        let trusted = self
+            .inbox
+            .judged(|judge, _| judge.key(arrival.robot).map(|key| (*key, judge.roster().swarm_id())));
+        let Some(trusted) = trusted else { return Ok(arrival) };
+        let (key, swarm) = trusted?;
+        let picture = arrival.picture();
+        let proof = proof.as_ref().ok_or(Distrust::Unsigned)?;
+        let frame = FrameClaim { robot: arrival.robot, header: &arrival.header, proof, picture: &picture };
+        let weighed = self.cameras().guard.weigh(self.now(), &key, &frame, fresh_nonce());
+        if weighed == Err(Distrust::Unasked) {
+            self.ask(arrival.robot, &arrival.header);
+            if proof.challenges.is_empty() {
+                return Err(Refusal::First);
+            }
+        }
+        weighed?;
+        // Not while others wait.
+        if !frame.is_signed::<Ed25519>(&key, &swarm) {
+            return Err(Distrust::Forged.into());
+        }
+        self.cameras().guard.admit(self.now(), &key, &frame, fresh_nonce())?;
+        drop(picture);
+        Ok(arrival)
+    }
+
+    /// Tells a camera what it is asked, so that its next frame answers it.
+    fn ask(&self, robot: RobotId, of: &FrameHeader) {
+        let now = Instant::now();
+        let mut cameras = self.cameras();
+        if cameras.told.get(&robot).is_some_and(|told| now.duration_since(*told) < TOLD_EVERY) {
+            return;
+        }
+        cameras.told.insert(robot, now);
+        drop(cameras);
+        self.taken(robot, &FrameTaken { nonce: of.nonce, sequence: of.sequence, round: self.round() });
+    }
 }
 
-fn read(keys: &Keys, sample: &Sample) -> Result<FrameArrival, Refusal> {
+fn read(keys: &Keys, sample: &Sample) -> Result<(FrameArrival, Option<FrameProof>), Refusal> {
     if sample.kind() != SampleKind::Put {
         return Err(Refusal::Kind);
     }
@@ -121,33 +229,54 @@ fn read(keys: &Keys, sample: &Sample) -> Result<FrameArrival, Refusal> {
         return Err(DecodeError::Empty.into());
     }
     let header = sample.attachment().ok_or(DecodeError::Empty)?;
-    let header = FrameHeader::decode(&header.to_bytes())?;
-    Ok(FrameArrival { robot, header, at: Instant::now(), picture: sample.payload().clone() })
+    let (header, proof) = FrameHeader::decode_proven(&header.to_bytes())?;
+    Ok((FrameArrival { robot, header, at: Instant::now(), picture: sample.payload().clone() }, proof))
+}
+
+/// What came in place of an acknowledgement.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TakenError {
+    /// No acknowledgement.
+    #[error("malformed acknowledgement: {0}")]
+    Bytes(#[from] DecodeError),
+    /// One that asks what must not be answered.
+    #[error("robot {by} asks for this camera's frames, and is not answered: {cause}")]
+    Challenge {
+        /// Who asks, by its own words.
+        by: RobotId,
+        /// Why it is not believed.
+        cause: Distrust,
+    },
 }
 
 /// Sends the frames of one robot.
 #[derive(Debug)]
 pub struct FrameSender {
     publisher: Publisher<'static>,
+    signer: Option<Arc<Mutex<FrameSigner>>>,
     _taken: Subscriber<()>,
 }
 
 impl Client {
-    /// Sends frames in the name of that robot from now on. `on_taken` is told of every acknowledgement, and of what arrives
-    /// in place of one, on Zenoh's threads.
+    /// Sends frames in the name of that robot from now on, signed in a sealed swarm, where nobody looks at others. `on_taken` is told of every
+    /// acknowledgement, and of what arrives in place of one, on Zenoh's threads.
     ///
     /// # Errors
     /// [`LinkError::Open`] when the session is closed.
     pub async fn stream(
         &self,
         robot: RobotId,
-        on_taken: impl Fn(Result<FrameTaken, DecodeError>) + Send + Sync + 'static,
+        signer: Option<FrameSigner>,
+        on_taken: impl Fn(Result<FrameTaken, TakenError>) + Send + Sync + 'static,
     ) -> Result<FrameSender, LinkError> {
+        let signer = signer.map(|signer| Arc::new(Mutex::new(signer)));
+        let (of_taken, began) = (signer.clone(), Instant::now());
         let declared = async {
             let taken = self
                 .session
                 .declare_subscriber(self.keys.key(&Topic::Taken(robot)))
-                .callback(move |sample| on_taken(FrameTaken::decode(&sample.payload().to_bytes())))
+                .callback(move |sample| on_taken(heed(of_taken.as_deref(), began.elapsed(), &sample)))
                 .await?;
             let publisher = self
                 .session
@@ -157,7 +286,7 @@ impl Client {
                 .congestion_control(CongestionControl::Drop)
                 .express(true)
                 .await?;
-            zenoh::Result::Ok(FrameSender { publisher, _taken: taken })
+            zenoh::Result::Ok(FrameSender { publisher, signer, _taken: taken })
         };
         declared.await.map_err(|error| LinkError::open(&*error))
     }
@@ -167,6 +296,20 @@ impl Client {
         // Also to one in a cell, which is a client itself.
         self.session.info().transports().await.next().is_some()
     }
+}
+
+/// The acknowledgement; what it asks is answered from now on.
+fn heed(
+    signer: Option<&Mutex<FrameSigner>>,
+    now: Duration,
+    sample: &Sample,
+) -> Result<FrameTaken, TakenError> {
+    let (taken, asked) = FrameTaken::decode_challenging(&sample.payload().to_bytes())?;
+    if let (Some(signer), Some(asked)) = (signer, asked) {
+        let heard = signer.lock().unwrap_or_else(PoisonError::into_inner).hear(now, &asked);
+        heard.map_err(|cause| TakenError::Challenge { by: asked.by, cause })?;
+    }
+    Ok(taken)
 }
 
 impl FrameSender {
@@ -179,7 +322,14 @@ impl FrameSender {
             ImageEncoding::Jpeg => Encoding::IMAGE_JPEG,
             ImageEncoding::Png => Encoding::IMAGE_PNG,
         };
-        let put = self.publisher.put(picture).encoding(encoding).attachment(header.encode());
+        let attachment = match &self.signer {
+            Some(signer) => {
+                let signer = signer.lock().unwrap_or_else(PoisonError::into_inner);
+                header.encode_proven(&signer.sign(header, &picture))
+            }
+            None => header.encode(),
+        };
+        let put = self.publisher.put(picture).encoding(encoding).attachment(attachment);
         put.await.map_err(|error| LinkError::open(&*error))
     }
 }

@@ -92,6 +92,7 @@ impl Robot {
             supervisor,
             session: self.session.clone(),
             keys: self.keys.clone(),
+            inbox: self.inbox.clone(),
             rounds: self.rounds.clone(),
             lost_links: self.lost_links.clone(),
             guests: Arc::default(),

@@ -1,6 +1,7 @@
 //! Between Zenoh's threads, which must never wait, and the one task that owns the mind.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -70,6 +71,12 @@ pub(super) struct State {
     pub(super) alive_changed: bool,
     /// Words that this robot signed, and are yet to be said.
     pub(super) vouched: Vec<Vouched>,
+}
+
+impl fmt::Debug for Inbox {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Inbox").field("me", &self.me).finish_non_exhaustive()
+    }
 }
 
 impl Inbox {

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, PoisonError};
 
 use gestalt_protocol::{
-    Answer, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId, Signature, SignedWord,
-    decode_json,
+    Answer, FrameChallenge, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId,
+    Signature, SignedWord, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
 use gestalt_trust::MAX_ROSTER;
@@ -64,6 +64,12 @@ impl Inbox {
     pub(super) fn sign_statement(&self, statement: &[u8]) -> Option<Signature> {
         let words = self.sealed.as_ref()?.words.lock().unwrap_or_else(PoisonError::into_inner);
         Some(words.statement(statement))
+    }
+
+    /// What this robot asks the camera of another one, in a sealed swarm.
+    pub(super) fn sign_challenge(&self, to: RobotId, challenge: u64) -> Option<FrameChallenge> {
+        let words = self.sealed.as_ref()?.words.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(words.challenge(to, challenge))
     }
 
     pub(super) fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {

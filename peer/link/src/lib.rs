@@ -71,7 +71,7 @@ pub use config::{Cells, LinkConfig, Scouting};
 pub use error::LinkError;
 pub use event::Event;
 pub use failure::{Failure, Part};
-pub use frames::{FrameArrival, FrameGate, FrameSender};
+pub use frames::{FrameArrival, FrameGate, FrameSender, TakenError};
 pub use guest::GuestConfig;
 pub use hearing::hear;
 pub use identity::fresh_nonce;

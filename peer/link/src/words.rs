@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use gestalt_protocol::{InstructorId, Keys, RobotId, Signature, Topic};
-use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, statement, word};
+use gestalt_protocol::{FrameChallenge, InstructorId, Keys, RobotId, Signature, Topic};
+use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, frame, statement, word};
 
 /// Signs words in the name of a robot.
 pub(crate) struct Words {
@@ -42,6 +42,11 @@ impl Words {
     /// Signs this robot's answer.
     pub fn answer(&self, to: &InstructorId, answer: &[u8]) -> Signature {
         answer::sign(&self.identity, &self.swarm, self.me, to, answer)
+    }
+
+    /// Signs what this robot asks the camera of another one.
+    pub fn challenge(&self, to: RobotId, challenge: u64) -> FrameChallenge {
+        frame::challenge(&self.identity, &self.swarm, self.me, to, challenge)
     }
 
     /// Signs what this robot says to whoever asks.

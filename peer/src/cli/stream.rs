@@ -47,12 +47,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let feed = Feed::new(&config.camera, robot, clock).ok_or(
         "no camera source to stream: set camera.source (--source) to rendered, images, video or device",
     )?;
+    let signer = config.trust.frame_signer(robot)?;
     let source = feed.describe();
     let camera = config.camera.model.properties().name;
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         let sender = Sender::start(
-            SenderConfig { swarm: swarm.clone(), link, robot, camera, quality: args.quality },
+            SenderConfig { swarm: swarm.clone(), link, robot, camera, quality: args.quality, signer },
             feed,
         )?;
         line(

@@ -5,9 +5,9 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal};
+use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal, SealError};
 use gestalt_protocol::{InstructorId, RobotId};
-use gestalt_trust::{Identity, Roster};
+use gestalt_trust::{FrameSigner, Identity, Roster};
 use serde::{Deserialize, Serialize};
 
 /// The roster in a folder of keys.
@@ -72,6 +72,20 @@ impl TrustSection {
             }
         }
         Ok(Some(seal))
+    }
+
+    /// What signs the frames of a robot whose camera is here, and whose mind elsewhere; `None` in an open swarm.
+    ///
+    /// # Errors
+    /// As [`TrustSection::seal`].
+    pub fn frame_signer(&self, robot: RobotId) -> Result<Option<FrameSigner>, LinkError> {
+        let Some(folder) = &self.keys else { return Ok(None) };
+        let roster = Roster::read(&folder.join(ROSTER_FILE)).map_err(wrong)?;
+        let identity = Arc::new(Identity::read(&key_file(folder, robot)).map_err(wrong)?);
+        if roster.members().robots.get(&robot) != Some(&identity.public_key()) {
+            return Err(wrong(SealError::NotEnrolled(robot)));
+        }
+        Ok(Some(FrameSigner::new(robot, identity, roster)))
     }
 
     /// What a program shows to be let in that is no robot: the one client's key in the folder, or else this robot's own.

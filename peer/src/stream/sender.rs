@@ -2,9 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{
-    Announcement, DecodeError, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId,
-};
+use gestalt_protocol::{Announcement, FrameHeader, FrameTaken, ImageEncoding, MAX_FRAME, RobotId};
 use opencv::core::Mat;
 use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
@@ -12,7 +10,8 @@ use tokio::time::MissedTickBehavior;
 use super::credit::Credit;
 use super::failures::Failures;
 use super::feed::{Content, Feed, Shot};
-use gestalt_link::{Client, Decisions, FrameSender, LinkConfig, LinkError, fresh_nonce};
+use gestalt_link::{Client, Decisions, FrameSender, LinkConfig, LinkError, TakenError, fresh_nonce};
+use gestalt_trust::FrameSigner;
 use gestalt_vision::human::Human;
 use gestalt_vision::source::{Reader, Scene, SourceError, encode_jpeg};
 
@@ -39,6 +38,8 @@ pub struct SenderConfig {
     pub camera: String,
     /// JPEG quality, `1..=100`.
     pub quality: i32,
+    /// What signs the frames, in a sealed swarm.
+    pub signer: Option<FrameSigner>,
 }
 
 /// What happens to a thin client.
@@ -148,7 +149,7 @@ impl Sender {
     ) -> Result<End, LinkError> {
         let (acknowledge, mut acknowledged) = mpsc::channel(MAX_WAITING);
         let sender = client
-            .stream(self.config.robot, move |taken| {
+            .stream(self.config.robot, self.config.signer.clone(), move |taken| {
                 // More than were sent cannot all be meant.
                 let _ = acknowledge.try_send(taken);
             })
@@ -207,7 +208,7 @@ impl Sender {
         }
     }
 
-    fn on_taken(&mut self, taken: Result<FrameTaken, DecodeError>, credit: &mut Credit) {
+    fn on_taken(&mut self, taken: Result<FrameTaken, TakenError>, credit: &mut Credit) {
         match taken {
             Ok(taken) if credit.taken(&taken) => {
                 self.taken += 1;
@@ -215,7 +216,7 @@ impl Sender {
                 self.reader.want(Some(scene));
             }
             Ok(_) => {}
-            Err(error) => self.failures.note(format!("malformed acknowledgement: {error}")),
+            Err(error) => self.failures.note(error.to_string()),
         }
     }
 

@@ -1,9 +1,16 @@
 //! What it costs to sign and to check what robots say. `cargo bench -p gestalt-trust --bench trust`
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, Message, RobotId, RoundId, Signature, Stamp, VocabularyId, Vote};
-use gestalt_trust::{Budget, Identity, Membership, Roster, Verifier, statement};
+use gestalt_protocol::{
+    Envelope, FrameHeader, ImageEncoding, Message, RobotId, RoundId, Signature, Stamp, VocabularyId, Vote,
+};
+use gestalt_trust::{
+    Budget, Ed25519, FrameClaim, FrameSigner, Identity, Membership, Roster, Verifier, statement,
+};
+
+const CAMERA: RobotId = RobotId(1);
 
 fn main() {
     divan::main();
@@ -19,6 +26,11 @@ fn roster(robots: u32) -> Roster {
     let robots = (0..robots).map(|number| (RobotId(number), robot(number).public_key())).collect();
     let members = Membership { swarm: "demo".to_owned(), epoch: 1, robots, ..Membership::default() };
     members.sign(&robot(u32::MAX)).expect("members that go together")
+}
+
+fn header() -> FrameHeader {
+    let (encoding, camera) = (ImageEncoding::Jpeg, "parrot".to_owned());
+    FrameHeader { nonce: 1, sequence: 1, age_us: 0, encoding, fps: 30.0, camera }
 }
 
 /// A vote over six classes.
@@ -77,6 +89,24 @@ fn check_known_votes(bencher: divan::Bencher, robots: u32) {
     };
     check();
     bencher.bench_local(check);
+}
+
+/// A JPEG of so many bytes, as a camera signs it.
+#[divan::bench(args = [12_000, 60_000])]
+fn sign_a_frame(bencher: divan::Bencher, bytes: usize) {
+    let (signer, header, picture) =
+        (FrameSigner::new(CAMERA, Arc::new(robot(1)), roster(2)), header(), vec![7; bytes]);
+    bencher.bench(|| signer.sign(divan::black_box(&header), divan::black_box(&picture)));
+}
+
+/// And as whoever looks checks it, but for what it remembers of the camera.
+#[divan::bench(args = [12_000, 60_000])]
+fn check_a_frame(bencher: divan::Bencher, bytes: usize) {
+    let (roster, header, picture) = (roster(2), header(), vec![7; bytes]);
+    let proof = FrameSigner::new(CAMERA, Arc::new(robot(1)), roster.clone()).sign(&header, &picture);
+    let frame = FrameClaim { robot: CAMERA, header: &header, proof: &proof, picture: &picture };
+    let key = roster.key(CAMERA).expect("a member");
+    bencher.bench(|| assert!(divan::black_box(&frame).is_signed::<Ed25519>(key, &roster.swarm_id())));
 }
 
 #[divan::bench]

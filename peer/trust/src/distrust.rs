@@ -26,6 +26,9 @@ pub enum Distrust {
     /// A word of an instructor that was heeded before, or is older than one that was.
     #[error("said before, or overtaken by a later word: it is heeded once")]
     Repeated,
+    /// A frame that answers nothing which this robot asked since it started.
+    #[error("it answers no challenge of today: recorded earlier, or its camera has not heard of it yet")]
+    Unasked,
     /// More statements in that author's name than are checked.
     #[error("more in its author's name than is checked: it or somebody in its name floods the swarm")]
     TooFast,
@@ -38,13 +41,14 @@ pub enum Distrust {
 
 impl Distrust {
     /// All causes.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Unsigned,
         Self::Malformed,
         Self::Stranger,
         Self::Expelled,
         Self::Convicted,
         Self::Repeated,
+        Self::Unasked,
         Self::TooFast,
         Self::Forged,
     ];
@@ -59,6 +63,7 @@ impl Distrust {
             Self::Expelled => "refused_expelled",
             Self::Convicted => "refused_convicted",
             Self::Repeated => "refused_repeated",
+            Self::Unasked => "refused_unasked",
             Self::TooFast => "refused_too_fast",
             Self::Forged => "refused_forged",
         }

@@ -120,6 +120,14 @@ impl<S: Scheme> Judge<S> {
         self.precedence.permits(by, roles, said, |name| instructors.contains_key(name))
     }
 
+    /// The key of a member that is believed.
+    ///
+    /// # Errors
+    /// [`Distrust::Stranger`], [`Distrust::Expelled`], [`Distrust::Convicted`].
+    pub fn key(&self, robot: RobotId) -> Result<&S::Key, Distrust> {
+        if self.convicts(robot) { Err(Distrust::Convicted) } else { self.roster().key(robot) }
+    }
+
     /// Whether that robot was proven to lie, with the key that it has.
     #[must_use]
     pub fn convicts(&self, robot: RobotId) -> bool {

@@ -67,6 +67,7 @@ mod evidence;
 mod evidence_file;
 #[cfg(any(test, feature = "fake"))]
 mod fake;
+pub mod frame;
 mod identity;
 mod judge;
 mod key_file;
@@ -93,6 +94,7 @@ pub use distrust::Distrust;
 pub use evidence::{Conviction, Evidence, EvidenceError, Lie, Refutes};
 #[cfg(feature = "fake")]
 pub use fake::Fake;
+pub use frame::{CHALLENGE_DOMAIN, FRAME_DOMAIN, FrameClaim, FrameGuard, FrameSigner};
 pub use identity::Identity;
 pub use judge::Judge;
 pub use key_file::KeyFileError;

@@ -188,9 +188,17 @@ impl<S: Scheme> Roster<S> {
     /// Whose statement it claims to be, and the key that it must be signed with.
     pub(crate) fn author(&self, statement: &[u8]) -> Result<(Heading, &S::Key), Distrust> {
         let heading = statement::heading(statement).map_err(|_| Distrust::Malformed)?;
-        match self.keys.get(&heading.author) {
-            Some(key) => Ok((heading, key)),
-            None if self.members.expelled.contains_key(&heading.author) => Err(Distrust::Expelled),
+        Ok((heading, self.key(heading.author)?))
+    }
+
+    /// The key of that robot, as it is ready to check signatures with.
+    ///
+    /// # Errors
+    /// [`Distrust::Expelled`] and [`Distrust::Stranger`].
+    pub fn key(&self, robot: RobotId) -> Result<&S::Key, Distrust> {
+        match self.keys.get(&robot) {
+            Some(key) => Ok(key),
+            None if self.members.expelled.contains_key(&robot) => Err(Distrust::Expelled),
             None => Err(Distrust::Stranger),
         }
     }

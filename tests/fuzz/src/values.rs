@@ -2,10 +2,11 @@
 
 use gestalt_protocol::{
     Announcement, Answer, Ask, Batches, Certificate, ClassId, CountedVote, Decision, Digest, Envelope, Fate,
-    FeatureSpaceId, FrameHeader, FrameTaken, FusionRule, Gesture, Give, Have, HeldBatch, HeldVote, Holder,
-    Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson, Lessons, MAX_SAMPLES, Message,
-    Naming, Namings, Outcome, Question, RobotId, RoundId, SampleId, SampleSeries, Samples, SharedSample,
-    Signature, SignedWord, Stamp, Status, Terms, Vector, VocabularyId, Vote, Word,
+    FeatureSpaceId, FrameChallenge, FrameHeader, FrameProof, FrameTaken, FusionRule, Gesture, Give, Have,
+    HeldBatch, HeldVote, Holder, Holding, ImageEncoding, Instruction, InstructorId, Know, Known, Lesson,
+    Lessons, MAX_CHALLENGES, MAX_SAMPLES, Message, Naming, Namings, Outcome, Question, RobotId, RoundId,
+    SampleId, SampleSeries, Samples, SharedSample, Signature, SignedWord, Stamp, Status, Terms, Vector,
+    VocabularyId, Vote, Word,
 };
 use rand::{Rng, RngExt};
 
@@ -348,19 +349,23 @@ pub fn status(rng: &mut impl Rng) -> Status {
     status
 }
 
-/// What belongs to a frame.
-pub fn frame_header(rng: &mut impl Rng) -> FrameHeader {
-    FrameHeader {
-        nonce: rng.random(),
-        sequence: number(rng),
-        age_us: number(rng),
-        encoding: if rng.random() { ImageEncoding::Jpeg } else { ImageEncoding::Png },
-        fps: rng.random_range(0.1..1000.0),
-        camera: "Foot-bot, omnidirectional".to_owned(),
+/// What travels beside a frame, or in answer to one; in an open swarm or a sealed one.
+pub fn beside_a_frame(rng: &mut impl Rng) -> Vec<u8> {
+    let signature = signature(rng);
+    if rng.random() {
+        let header = FrameHeader {
+            nonce: rng.random(),
+            sequence: number(rng),
+            age_us: number(rng),
+            encoding: if rng.random() { ImageEncoding::Jpeg } else { ImageEncoding::Png },
+            fps: rng.random_range(0.1..1000.0),
+            camera: "Foot-bot, omnidirectional".to_owned(),
+        };
+        let challenges = (0..rng.random_range(0..=MAX_CHALLENGES)).map(|_| rng.random()).collect();
+        let proof = rng.random::<bool>().then_some(FrameProof { challenges, signature });
+        return proof.map_or_else(|| header.encode(), |proof| header.encode_proven(&proof));
     }
-}
-
-/// That a frame was taken.
-pub fn frame_taken(rng: &mut impl Rng) -> FrameTaken {
-    FrameTaken { nonce: rng.random(), sequence: number(rng), round: maybe(rng, round) }
+    let taken = FrameTaken { nonce: rng.random(), sequence: number(rng), round: maybe(rng, round) };
+    let asked = FrameChallenge { by: robot(rng), challenge: rng.random(), signature };
+    if rng.random() { taken.encode() } else { taken.encode_challenging(&asked) }
 }

@@ -9,12 +9,14 @@ use crate::memory::bounded;
 /// # Panics
 /// If not.
 pub fn run(bytes: &[u8]) {
-    if let Ok(header) = bounded(bytes, || FrameHeader::decode(bytes)) {
+    if let Ok((header, proof)) = bounded(bytes, || FrameHeader::decode_proven(bytes)) {
         assert!(bytes.len() <= MAX_FRAME_HEADER);
         assert!(header.fps > 0.0 && header.fps <= 1000.0 && header.camera.len() <= 64);
-        assert_eq!(FrameHeader::decode(&header.encode()), Ok(header));
+        let again = proof.as_ref().map_or_else(|| header.encode(), |proof| header.encode_proven(proof));
+        assert_eq!(FrameHeader::decode_proven(&again), Ok((header, proof)));
     }
-    if let Ok(taken) = bounded(bytes, || FrameTaken::decode(bytes)) {
-        assert_eq!(FrameTaken::decode(&taken.encode()), Ok(taken));
+    if let Ok((taken, asked)) = bounded(bytes, || FrameTaken::decode_challenging(bytes)) {
+        let again = asked.map_or_else(|| taken.encode(), |asked| taken.encode_challenging(&asked));
+        assert_eq!(FrameTaken::decode_challenging(&again), Ok((taken, asked)));
     }
 }

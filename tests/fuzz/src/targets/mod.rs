@@ -93,8 +93,7 @@ impl Target {
             Self::Roster => roster::seed(rng),
             Self::Proof => proof::seed(rng),
             Self::Key => key_seed(rng),
-            Self::Frame if rng.random() => values::frame_header(rng).encode(),
-            Self::Frame => values::frame_taken(rng).encode(),
+            Self::Frame => values::beside_a_frame(rng),
             Self::Inbox => inbox::seed(rng),
             Self::Mind => mind::seed(rng),
         }
