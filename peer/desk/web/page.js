@@ -230,6 +230,7 @@ function showRobot(row, robot) {
     ["Hears", counted(robot.alive, "robot")],
     ["Samples", learning ? `${learning.personal} personal, ${learning.shared} shared, ${learning.external} external, at most ` +
       `${learning.capacity}; trained ${learning.trainings} times` : ""],
+    ["Doubts", learning ? learning.doubted.map((it) => `robot ${it.robot}: trains on ${it.trained} of its ${counted(it.held, "sample")}`).join(", ") : ""],
     ["Memory", learning ? learning.memory : ""],
     ["Started", `${counted(robot.boot, "time")}${robot.sealed ? ", signs what it says" : ""}`],
   ].filter(([, words]) => words);

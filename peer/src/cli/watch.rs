@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
+use gestalt_protocol::Heeded;
 use serde_json::json;
 use tokio::time::MissedTickBehavior;
 
@@ -160,6 +161,11 @@ async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
                 learning.common,
                 clean(&learning.memory)
             ));
+            for Heeded { robot, held, trained } in &learning.doubted {
+                words.push_str(&format!(
+                    ", trains on {trained} of {held} samples of robot {robot}, which it doubts"
+                ));
+            }
         }
         if let Some(error) = status.errors.last() {
             words.push_str(&format!(", last error: {}", clean(&error.what)));

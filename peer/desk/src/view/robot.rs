@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Camera, ClassId, Holding, Opinion, Rank, Reported, RobotId, RoundId, Status, VocabularyId,
+    Camera, ClassId, Heeded, Holding, Opinion, Rank, Reported, RobotId, RoundId, Status, VocabularyId,
 };
 use gestalt_strategies::Vocabulary;
 use serde::Serialize;
@@ -12,8 +12,9 @@ use serde::Serialize;
 use super::SILENT;
 use super::text::{clipped, finite};
 
-/// The most links, counters and errors that are kept of a robot.
+/// The most links, doubted robots, counters and errors that are kept of a robot.
 const MAX_LINKS: usize = 64;
+const MAX_DOUBTED: usize = 64;
 const MAX_COUNTERS: usize = 128;
 const MAX_ERRORS: usize = 16;
 
@@ -64,6 +65,8 @@ pub struct LearningView {
     pub capacity: usize,
     /// How often it has trained.
     pub trainings: u64,
+    /// Other robots whose samples it does not all train on.
+    pub doubted: Vec<Heeded>,
     /// Where it keeps all this.
     pub memory: String,
 }
@@ -187,6 +190,7 @@ impl RobotView {
                 external: total(&it.external),
                 capacity: it.capacity,
                 trainings: it.trainings,
+                doubted: it.doubted.clone(),
                 memory: it.memory.clone(),
             }
         });
@@ -222,6 +226,7 @@ fn bounded(mut status: Status) -> Status {
     }
     if let Some(learning) = &mut status.learning {
         learning.memory = clipped(&learning.memory);
+        learning.doubted.truncate(MAX_DOUBTED);
         for classes in [&mut learning.personal, &mut learning.shared, &mut learning.external] {
             classes.truncate(gestalt_protocol::MAX_CLASSES);
         }

@@ -1,8 +1,8 @@
 //! One sentence of the view each, and that order and repetition change nothing.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, FusionRule, Gesture, Instruction, Outcome, Reported, Stamp,
-    Terms, Vote,
+    Certificate, ClassId, CountedVote, Decision, FusionRule, Gesture, Heeded, Instruction, LearningStatus,
+    Outcome, Reported, Stamp, Terms, Vote,
 };
 use proptest::prelude::*;
 
@@ -142,6 +142,16 @@ fn a_robot_is_there_as_long_as_its_token_and_a_late_answer_does_not_bring_it_bac
     // What never had a token is forgotten.
     view.hear(NOW + 2 * SILENT, Input::Asked(1));
     assert_eq!(view.robots.len(), 1);
+}
+
+#[test]
+fn whose_samples_a_robot_doubts_is_shown_and_no_more_of_them_than_fit() {
+    let heeded = |robot| Heeded { robot: RobotId(robot), held: 40, trained: 3 };
+    let learning = LearningStatus { doubted: (2..1000).map(heeded).collect(), ..LearningStatus::default() };
+    let view = after([Input::Came(RobotId(1)), reported(Status { learning: Some(learning), ..status(1) })]);
+    let swarm = view.swarm(NOW);
+    let doubted = &swarm.robots[0].learning.as_ref().unwrap().doubted;
+    assert_eq!((doubted.len(), doubted[0]), (64, heeded(2)));
 }
 
 #[test]
