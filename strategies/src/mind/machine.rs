@@ -237,7 +237,7 @@ impl Mind {
             Message::Have(have) if !have.answer => self.compare_knowledge(author, have.knowledge, out),
             Message::Know(know) => self.on_know(author, know, out),
             Message::Lessons(lessons) => self.on_lessons(author, &lessons.lessons),
-            Message::Namings(namings) => self.on_namings(namings),
+            Message::Namings(namings) => self.on_namings(author, namings),
             Message::Vote(_)
             | Message::Have(_)
             | Message::Samples(_)

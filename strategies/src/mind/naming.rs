@@ -1,7 +1,7 @@
 //! Gestures that instructors name while the swarm works: what a robot makes of such a word, and of what a neighbour heard.
 
 use gestalt_protocol::{
-    ClassId, Fate, Gesture, Instruction, InstructorId, MAX_LABEL, Naming, Namings, Outcome, RoundId,
+    ClassId, Fate, Gesture, Instruction, InstructorId, MAX_LABEL, Naming, Namings, Outcome, RobotId, RoundId,
 };
 use gestalt_rounds::Refusal;
 
@@ -46,7 +46,7 @@ impl Mind {
     }
 
     /// Takes in what a neighbour heard of names.
-    pub(super) fn on_namings(&mut self, namings: &Namings) {
+    pub(super) fn on_namings(&mut self, from: RobotId, namings: &Namings) {
         let Some(learning) = &mut self.learning else { return };
         let (mut news, mut unproven) = (false, Vec::new());
         for naming in &namings.namings {
@@ -70,7 +70,7 @@ impl Mind {
             self.exchanges.forget_declined_lessons();
             self.call_by_names();
             // The other neighbours may lack it too.
-            self.rounds.hurry_repair();
+            self.rounds.pass_on_soon(from);
         }
     }
 

@@ -191,7 +191,7 @@ impl Mind {
         }
         if news && author != from {
             // The other neighbours may lack it too.
-            self.rounds.hurry_repair();
+            self.rounds.pass_on_soon(from);
         }
     }
 
@@ -248,7 +248,7 @@ impl Mind {
             }
         }
         if news {
-            self.rounds.hurry_repair();
+            self.rounds.pass_on_soon(from);
             self.share();
         }
     }

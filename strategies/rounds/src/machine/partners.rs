@@ -26,6 +26,13 @@ const HURRIED: u32 = 16;
 /// The longest such pause, in idle periods.
 const LONGEST: u32 = 32;
 
+/// What a neighbour brought is told to so many others soon: to all of a line, a ring or a grid. In a dense swarm the others hear it from them, and in
+/// their turn.
+const TOLD_SOON: usize = 4;
+
+/// They are told after this part of the busy period: what a neighbour gives comes in several messages.
+const SOON: u32 = 4;
+
 /// The partners of repair, and the time of the next one's turn.
 #[derive(Clone, Debug)]
 pub(super) struct Partners {
@@ -34,6 +41,8 @@ pub(super) struct Partners {
     busy_until: Duration,
     /// Whom this robot turned to last.
     last: Option<RobotId>,
+    /// Whom it turns to before all others: there is news for them.
+    soon: BTreeSet<RobotId>,
 }
 
 /// What a robot has of the newest round: its decision, and the digest of its words on who holds what.
@@ -56,6 +65,8 @@ struct Partner {
     since: Duration,
     /// When it was last told what this robot has.
     told: Duration,
+    /// When it was last to be told soon what another neighbour had brought.
+    hurried: Option<Duration>,
     /// By what comparison it was last given something.
     given: Option<Given>,
     /// In what the two differed last, and how often they were found to.
@@ -64,7 +75,13 @@ struct Partner {
 
 impl Partners {
     pub fn new(first: Duration) -> Self {
-        Self { neighbours: BTreeMap::new(), next: first, busy_until: Duration::ZERO, last: None }
+        Self {
+            neighbours: BTreeMap::new(),
+            next: first,
+            busy_until: Duration::ZERO,
+            last: None,
+            soon: BTreeSet::new(),
+        }
     }
 
     pub fn neighbours(&self) -> impl ExactSizeIterator<Item = RobotId> {
@@ -142,17 +159,42 @@ impl Partners {
         self.hurry(now, busy);
     }
 
+    /// A neighbour brought news: tells others soon, each once in a busy period, and keeps to that pace for a while.
+    pub fn pass_on(&mut self, now: Duration, from: RobotId, busy: Duration) {
+        self.stay_busy(now, busy);
+        let is_first = |robot: &RobotId| Some(*robot) > self.last;
+        let (mut others, rest): (Vec<RobotId>, Vec<RobotId>) = self.neighbours().partition(is_first);
+        others.extend(rest);
+        others.retain(|robot| *robot != from);
+        for robot in others.into_iter().take(TOLD_SOON) {
+            let Some(partner) = self.neighbours.get_mut(&robot) else { continue };
+            if partner.hurried.is_none_or(|hurried| now >= hurried.saturating_add(busy)) {
+                partner.hurried = Some(now);
+                self.soon.insert(robot);
+            }
+        }
+        if !self.soon.is_empty() {
+            self.hurry(now, busy / SOON);
+        }
+    }
+
     /// Whether it is somebody's turn. The next turn is after `busy`, or after `idle` when all has been quiet for long.
     pub fn is_due(&mut self, now: Duration, open: bool, (busy, idle): (Duration, Duration)) -> bool {
         if now < self.next {
             return false;
         }
-        self.next = now + if open || now < self.busy_until { busy } else { idle };
+        let pace = if open || now < self.busy_until { busy } else { idle };
+        self.next = now + if self.soon.len() > 1 { busy / SOON } else { pace };
         true
     }
 
-    /// Whom to turn to: the neighbours in turn, or, where none is known, all the living in turn.
+    /// Whom to turn to: those for whom there is news, then the neighbours in turn, or, where none is known, all the living in turn.
     pub fn turn(&mut self, alive: &BTreeSet<RobotId>) -> Option<RobotId> {
+        while let Some(robot) = self.soon.pop_first() {
+            if self.is_neighbour(robot) {
+                return Some(robot);
+            }
+        }
         let after = |robot: &RobotId| Some(*robot) > self.last;
         let next = if self.neighbours.is_empty() {
             alive.iter().copied().find(after).or(alive.first().copied())
@@ -189,6 +231,39 @@ mod tests {
         partners.change(at(40), &BTreeSet::new());
         partners.change(at(41), &[robot].into());
         assert!(partners.owes(at(42), robot, IDLE), "they have met again");
+    }
+
+    #[test]
+    fn what_a_neighbour_brought_is_told_to_some_others_soon_and_to_nobody_twice_at_once() {
+        let busy = Duration::from_millis(500);
+        let ms = |ms| at(100) + Duration::from_millis(ms);
+        let mut partners = Partners::new(at(1));
+        partners.change(at(1), &[RobotId(1), RobotId(2)].into());
+        let turn = |partners: &mut Partners, now| {
+            if !partners.is_due(now, false, (busy, IDLE)) {
+                return None;
+            }
+            let robot = partners.turn(&BTreeSet::new())?;
+            partners.tell(now, robot);
+            Some(robot.0)
+        };
+        assert_eq!(turn(&mut partners, ms(0)), Some(1));
+        // Robot 1 is told nothing that it brought itself, and its turn comes when it would have.
+        partners.pass_on(ms(10), RobotId(1), busy);
+        assert_eq!([120, 140].map(|at| turn(&mut partners, ms(at))), [None, Some(2)]);
+        // More of it: who was told a moment ago is told in its turn.
+        partners.pass_on(ms(150), RobotId(1), busy);
+        assert_eq!([600, 640, 1140].map(|at| turn(&mut partners, ms(at))), [None, Some(2), Some(1)]);
+
+        let mut partners = Partners::new(at(1));
+        partners.change(at(1), &(0..100).map(RobotId).collect());
+        partners.pass_on(ms(0), RobotId(2), busy);
+        let told: Vec<u32> = (0..9).filter_map(|n| turn(&mut partners, ms(125 * n + 125))).collect();
+        assert_eq!(told, [0, 1, 3, 4, 0], "four soon, then all in their turn");
+        // Who has left is not waited for.
+        partners.pass_on(ms(9000), RobotId(2), busy);
+        partners.change(ms(9001), &[RobotId(7)].into());
+        assert_eq!(turn(&mut partners, ms(9200)), Some(7));
     }
 
     #[test]

@@ -193,6 +193,11 @@ impl Rounds {
         self.partners.stay_busy(self.now, self.config.repair_busy);
     }
 
+    /// The same, and to others than the neighbour that brought it at once.
+    pub fn pass_on_soon(&mut self, from: RobotId) {
+        self.partners.pass_on(self.now, from, self.config.repair_busy);
+    }
+
     fn tell(&mut self, robot: RobotId, message: Message, effects: &mut Effects<'_>) {
         let envelope = self.stamped(message);
         (effects.carry_out)(Output::Tell(robot, envelope));

@@ -3,6 +3,41 @@
 use super::*;
 
 #[test]
+fn what_half_of_a_line_learned_is_known_at_its_end_in_less_than_a_busy_period_a_robot() {
+    let mut swarm = Swarm::new(8, config(8, 1.0), 31);
+    for class in 0..4 {
+        let round = swarm.show(class);
+        swarm.was(round, class);
+    }
+    let all: BTreeSet<RobotId> = swarm.minds.iter().map(Mind::me).collect();
+    for i in 4..8 {
+        swarm.disks[i].clear();
+        swarm.minds[i] = swarm.waken(i);
+        swarm.input(i, Input::Learned(Arc::new(ByFirst)));
+        swarm.input(i, Input::Alive(all.clone()));
+    }
+    let mut meet = |i: usize, beside: &[u32]| {
+        swarm.input(i, Input::Neighbours(beside.iter().copied().map(RobotId).collect()));
+    };
+    for (i, beside) in [&[2][..], &[1, 3], &[2, 4], &[3], &[6], &[5, 7], &[6, 8], &[7]].iter().enumerate() {
+        meet(i, beside);
+    }
+    swarm.pass(Duration::from_secs(7));
+    assert_eq!(swarm.common().len(), 2, "the last four have met nobody who knows anything");
+    swarm.input(3, Input::Neighbours([RobotId(3), RobotId(5)].into()));
+    swarm.input(4, Input::Neighbours([RobotId(4), RobotId(6)].into()));
+    let began = swarm.now;
+    while swarm.common().len() > 1 {
+        swarm.pass(Duration::from_millis(50));
+        assert!(swarm.now < began + Duration::from_secs(20), "{:?}", swarm.common());
+    }
+    // To four robots that had lost all, at a busy pace of half a second.
+    let took = swarm.now - began;
+    assert!(took < Duration::from_millis(1000), "{took:?}");
+    swarm.check_rest();
+}
+
+#[test]
 fn whatever_is_lost_all_end_with_the_same_common_knowledge() {
     let mut swarm = Swarm::new(6, config(3, 0.5), 3);
     swarm.loss = 0.5;
