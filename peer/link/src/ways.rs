@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::{Keys, MAX_ROBOTS, RobotId, Topic};
 use tokio::sync::Notify;
@@ -18,8 +18,11 @@ use crate::session::Node;
 /// Of each robot its votes and what it holds, and of each neighbour what it is told: what else is said is said seldom.
 const MAX_WAYS: usize = 3 * MAX_ROBOTS;
 
-/// Links are made when many robots start, and Zenoh makes none while it takes in a key. So keys wait.
+/// Links are made when many robots start, and Zenoh makes none while it takes in a key. So keys wait so long, and until nobody was new for
+/// a while: on a slow machine a hundred robots have not found each other before. Where somebody always is, they wait no longer than that.
 const SETTLED: Duration = Duration::from_secs(8);
+const CALM: Duration = Duration::from_secs(3);
+const LONGEST: Duration = Duration::from_secs(40);
 
 /// So many keys are declared at a time, and so long is the pause between.
 const FEW: usize = 16;
@@ -73,7 +76,9 @@ impl Ways {
     pub async fn keep(&self, node: Node, keys: Keys) -> Result<(), String> {
         loop {
             self.news.notified().await;
+            let began = Instant::now();
             tokio::time::sleep(SETTLED).await;
+            self.calm(began + LONGEST).await;
             let new = std::mem::take(&mut self.lock().undeclared);
             for few in new.chunks(FEW) {
                 for session in node.sessions() {
@@ -81,6 +86,20 @@ impl Ways {
                 }
                 tokio::time::sleep(PAUSE).await;
             }
+        }
+    }
+
+    /// Waits until there was no news for a while, or until then.
+    async fn calm(&self, end: Instant) {
+        // What came while it waited is no news any more.
+        let mut seen = self.lock().known.len();
+        loop {
+            tokio::time::sleep(CALM).await;
+            let known = self.lock().known.len();
+            if known == seen || Instant::now() >= end {
+                return;
+            }
+            seen = known;
         }
     }
 

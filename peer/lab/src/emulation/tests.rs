@@ -366,7 +366,8 @@ fn a_committee_decides_for_all_and_costs_each_less_than_all_would() {
 
 #[test]
 fn a_small_swarm_knows_neither_committee_nor_budget() {
-    let mut scenario = learning(20, 1.0, NetworkShape::Random);
+    // Of ten the budget leaves each ten samples: those of two rounds, if the lesson of one is heard late.
+    let mut scenario = learning(10, 1.0, NetworkShape::Random);
     scenario.link.loss = 0.1;
     scenario.rounds = 3;
     let by_default = traced(&scenario, 1);
