@@ -195,7 +195,7 @@ fn a_sender_answers_the_latest_of_each_and_of_no_more_than_are_read() {
 
 #[test]
 fn a_flood_of_frames_is_checked_within_a_budget_of_bytes() {
-    for (length, checked) in [(1, 256), (UNIT, 256), (UNIT + 1, 128), (4 * UNIT, 64)] {
+    for (length, checked) in [(1, 256), (65_536, 256), (65_537, 128), (262_144, 64)] {
         let (mut centre, mut parrot) = (Looking::new(0), Filming::start(3, 50));
         parrot.hear(&centre.ask(RobotId(3))).unwrap();
         let forged = Sent { picture: vec![0; length], ..parrot.film() };
