@@ -11,7 +11,6 @@
 
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
-use std::num::NonZeroU32;
 use std::time::Duration;
 
 use gestalt_protocol::{InstructorId, RobotId, Signature};
@@ -74,12 +73,7 @@ impl<S: Scheme> Roster<S> {
 }
 
 /// How many answers of one robot are checked: more than instructors say words.
-const OF_ANSWERS: Budget = {
-    const fn number(of: u32) -> NonZeroU32 {
-        NonZeroU32::new(of).expect("not zero")
-    }
-    Budget { burst: number(32), per_second: number(8), spare: number(1) }
-};
+const OF_ANSWERS: Budget = Budget::of(32, 8, 1);
 
 /// What is kept so that nobody's answers keep a robot busy: a budget of each robot on the roster.
 #[derive(Clone, Debug)]

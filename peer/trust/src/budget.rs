@@ -24,14 +24,19 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        const fn number(of: u32) -> NonZeroU32 {
-            NonZeroU32::new(of).expect("not zero")
-        }
-        Self { burst: const { number(16) }, per_second: const { number(8) }, spare: const { number(1000) } }
+        const { Self::of(16, 8, 1000) }
     }
 }
 
 impl Budget {
+    /// For constants: a number that is 0 does not compile.
+    pub(crate) const fn of(burst: u32, per_second: u32, spare: u32) -> Self {
+        const fn number(of: u32) -> NonZeroU32 {
+            NonZeroU32::new(of).expect("not zero")
+        }
+        Self { burst: number(burst), per_second: number(per_second), spare: number(spare) }
+    }
+
     /// That of all authors together, once their own are used up: a second's worth at once.
     pub(crate) fn of_all(&self) -> Self {
         Self { burst: self.spare, per_second: self.spare, ..*self }

@@ -11,7 +11,6 @@
 //! Numbers are little-endian.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -77,12 +76,7 @@ fn challenge_bytes(swarm: &SwarmId, by: RobotId, robot: RobotId, challenge: u64)
 }
 
 /// How many challenges a sender checks: more than come as long as nobody makes some up.
-const OF_CHALLENGES: Budget = {
-    const fn number(of: u32) -> NonZeroU32 {
-        NonZeroU32::new(of).expect("not zero")
-    }
-    Budget { burst: number(32), per_second: number(8), spare: number(1) }
-};
+const OF_CHALLENGES: Budget = Budget::of(32, 8, 1);
 
 /// Signs the frames of one robot's camera, in answer to those who look at it. Pure: time is an argument.
 #[derive(Clone, Debug)]
@@ -160,12 +154,7 @@ impl FrameClaim<'_> {
 const UNIT: usize = 64 * 1024;
 
 /// How much of one robot's frames is checked: 32 MiB a second, which is more than cameras send, and a tenth of a core at most.
-const OF_FRAMES: Budget = {
-    const fn number(of: u32) -> NonZeroU32 {
-        NonZeroU32::new(of).expect("not zero")
-    }
-    Budget { burst: number(256), per_second: number(512), spare: number(1) }
-};
+const OF_FRAMES: Budget = Budget::of(256, 512, 1);
 
 /// Tells which frames are new at one who looks. Pure: time is an argument, and so are numbers drawn at random.
 ///

@@ -1,6 +1,5 @@
 //! What a robot of a sealed swarm lets in, message by message.
 
-use std::num::NonZeroU32;
 use std::time::Duration;
 
 use gestalt_protocol::{
@@ -23,12 +22,7 @@ use crate::witness::Witness;
 use crate::word::{Attention, WordHeading};
 
 /// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows.
-const OF_SAMPLES: Budget = {
-    const fn number(of: u32) -> NonZeroU32 {
-        NonZeroU32::new(of).expect("not zero")
-    }
-    Budget { burst: number(512), per_second: number(64), spare: number(1000) }
-};
+const OF_SAMPLES: Budget = Budget::of(512, 64, 1000);
 
 /// Lets in what members of the swarm signed, and finds out who of them lies: who says two things, and who gives a decision that does not follow from its
 /// votes. Pure: time is an argument.

@@ -12,7 +12,6 @@
 
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
-use std::num::NonZeroU32;
 use std::time::Duration;
 
 use gestalt_protocol::{InstructorId, RobotId, Signature};
@@ -124,12 +123,7 @@ impl<S: Scheme> Roster<S> {
 }
 
 /// How many words of one speaker are checked: more than anybody says.
-const OF_WORDS: Budget = {
-    const fn number(of: u32) -> NonZeroU32 {
-        NonZeroU32::new(of).expect("not zero")
-    }
-    Budget { burst: number(32), per_second: number(8), spare: number(1) }
-};
+const OF_WORDS: Budget = Budget::of(32, 8, 1);
 
 /// What is kept so that no word counts twice, and nobody's words keep a robot busy: of each speaker that is on the roster, a budget and the
 /// highest count.
