@@ -22,6 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
+use tokio::time::Instant;
 
 fn main() {
     let orders: Value = std::env::args()
@@ -76,6 +77,7 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
         rounds => serde_json::from_value(rounds.clone()).expect("\"rounds\": how it takes part"),
     };
     let mind = MindConfig { quorum, ..rounds };
+    let refractory = mind.refractory;
     let learns = learning.is_some();
     // {"members": 20}: of a sealed swarm of so many.
     let members = orders["members"].as_u64().and_then(|members| u32::try_from(members).ok());
@@ -101,10 +103,17 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     frames.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let mut open = false;
     let mut last = None;
+    // A request to open a round right after the newest began counts as a copy of that one's: this one waits until it does not.
+    let mut heard_of_a_round = None;
+    let mut asked = false;
     loop {
+        let refractory_until = heard_of_a_round.map_or_else(Instant::now, |at: Instant| at + refractory);
         tokio::select! {
             event = events.recv() => {
                 let Ok(event) = event else { continue };
+                if matches!(event, Event::Opened(_) | Event::Held(_)) {
+                    heard_of_a_round = Some(Instant::now());
+                }
                 match &event {
                     Event::Held(decision) => last = Some(decision.round),
                     Event::Opened(_) => open = true,
@@ -118,8 +127,12 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
                     robot.observe(if learns { gesture(class, &mut rng) } else { look(class, p) });
                 }
             }
+            () = tokio::time::sleep_until(refractory_until), if asked => {
+                asked = false;
+                robot.open_round();
+            }
             line = stdin.recv() => match line.as_deref() {
-                Some("open") => robot.open_round(),
+                Some("open") => asked = true,
                 // `shown 3`: what is in front of its camera from now on.
                 Some(order) if order.starts_with("shown ") => {
                     sees = order["shown ".len()..].parse().ok().map(ClassId);

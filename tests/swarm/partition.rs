@@ -97,7 +97,6 @@ fn parted(fault: Fault, time: Duration, soon: Duration, config: &MindConfig) {
     let links: Vec<_> = (0..8).map(|i| (i, i + 1)).collect();
     let mut field = Field::learning(9, &links, config);
     learn(&mut field);
-    std::thread::sleep(Duration::from_millis(700));
     let before: Vec<usize> = field.robots.iter().map(|robot| robot.told().len()).collect();
     field.robots[0].order("open");
     for (robot, before) in field.robots.iter().zip(before) {
