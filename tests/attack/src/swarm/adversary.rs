@@ -123,10 +123,9 @@ impl Swarm {
             return;
         }
         let i = robot as usize - 1;
-        let counted = |swarm: &Self| swarm.robots[i].refused().values().sum::<u64>();
-        let before = counted(self);
+        let before = self.robots[i].refusals();
         self.arrive(i, parcel);
-        self.silent += u64::from(counted(self) == before);
+        self.silent += u64::from(self.robots[i].refusals() == before);
     }
 
     /// Says a vote under the key of its author.

@@ -57,7 +57,7 @@ pub struct Account {
 
 #[derive(Debug)]
 struct Signer {
-    identity: Identity,
+    identity: Arc<Identity>,
     swarm: SwarmId,
 }
 
@@ -143,6 +143,12 @@ impl Robot {
             *refused.entry(counter).or_default() += times;
         }
         refused
+    }
+
+    /// How much it refused in all its lives.
+    pub fn refusals(&self) -> u64 {
+        let of_mind = self.mind.refusals().iter().map(|(_, times)| times);
+        self.before.values().copied().chain(of_mind).chain(self.port.refused().values().copied()).sum()
     }
 
     /// What it says and knows.

@@ -1,6 +1,7 @@
 //! What all robots of an emulated swarm have in common: their gestures, their feature space, their keys.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_strategies::{Classify, ClassifyError, Components, FeatureSpace, ScalingMethod, Vocabulary};
@@ -63,23 +64,30 @@ impl Classify for ByFirst {
 }
 
 /// The key that a robot of that number is enrolled with; any other number is somebody's too.
-pub fn key(number: u32) -> Identity {
+pub fn key(number: u32) -> Arc<Identity> {
     let mut secret = [7; 32];
     secret[..4].copy_from_slice(&number.to_le_bytes());
-    Identity::from_bytes(&secret)
+    identity(secret)
 }
 
 /// Who enrols the robots.
-pub fn authority() -> Identity {
+pub fn authority() -> Arc<Identity> {
     key(1000)
 }
 
 /// The key that an instructor of that name is enrolled with.
-pub fn key_of(name: &InstructorId) -> Identity {
+pub fn key_of(name: &InstructorId) -> Arc<Identity> {
     let mut secret = [9; 32];
     let name = name.to_string();
     secret[..name.len()].copy_from_slice(name.as_bytes());
-    Identity::from_bytes(&secret)
+    identity(secret)
+}
+
+/// That of a secret, whose public key is worked out once in a process: thousands of swarms have the same.
+fn identity(secret: [u8; 32]) -> Arc<Identity> {
+    static KNOWN: Mutex<BTreeMap<[u8; 32], Arc<Identity>>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    known.entry(secret).or_insert_with(|| Arc::new(Identity::from_bytes(&secret))).clone()
 }
 
 /// The number of a key that nobody enrolled.
@@ -102,9 +110,12 @@ pub fn members(robots: u32, epoch: u64) -> Membership {
     Membership { swarm: SWARM.to_owned(), epoch, robots, instructors, local, ..Membership::default() }
 }
 
-/// Those, enrolled.
+/// Those, enrolled: once in a process.
 pub fn roster(robots: u32) -> Roster {
-    members(robots, 1).sign(&authority()).expect("members that go together")
+    static KNOWN: Mutex<BTreeMap<u32, Roster>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let signed = || members(robots, 1).sign(&authority()).expect("members that go together");
+    known.entry(robots).or_insert_with(signed).clone()
 }
 
 /// An instructor of that name.
