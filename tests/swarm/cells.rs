@@ -31,8 +31,21 @@ async fn all_know(robots: &[Watched], others: &[u32]) -> Duration {
     loop {
         let knows = |robot: &&Watched| there.is_subset(&robot.robot.status().alive.into_iter().collect());
         let Some(ignorant) = robots.iter().find(|robot| !knows(robot)) else { return began.elapsed() };
-        let status = || ignorant.robot.status();
-        assert!(began.elapsed() < PATIENCE, "{} are there; {:?}; {:?}", there.len(), sums(robots), status());
+        // Of who does not know all, and of those it does not know.
+        let statuses = || {
+            let heard = ignorant.robot.status().alive;
+            let unheard = robots.iter().filter(|robot| !heard.contains(&robot.robot.status().robot));
+            let all = std::iter::once(ignorant).chain(unheard).map(|robot| robot.robot.status());
+            all.map(|status| (status.robot, status.neighbours, status.alive.len(), status.counters))
+                .collect::<Vec<_>>()
+        };
+        assert!(
+            began.elapsed() < PATIENCE,
+            "{} are there; {:?}; {:?}",
+            there.len(),
+            sums(robots),
+            statuses()
+        );
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
 }
