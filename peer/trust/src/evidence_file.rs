@@ -11,6 +11,9 @@ use crate::evidence::Evidence;
 
 const EXTENSION: &str = "evidence";
 
+/// How much of a file shows that it is too long to be evidence.
+const TOO_LONG: u64 = Evidence::MAX_LENGTH as u64 + 1;
+
 impl Evidence {
     /// Keeps evidence against that robot in a folder, which is made if there is none, in place of other evidence against it: whoever reads meanwhile, or
     /// after a power cut, finds the whole old one or the whole new one.
@@ -44,7 +47,7 @@ impl Evidence {
         let (mut kept, mut bytes) = (Vec::new(), 0);
         for path in paths {
             let mut read = Vec::new();
-            File::open(path)?.take(Self::MAX_LENGTH as u64 + 1).read_to_end(&mut read)?;
+            File::open(path)?.take(TOO_LONG).read_to_end(&mut read)?;
             bytes += read.len();
             if bytes > KEPT_BYTES {
                 break;
@@ -118,11 +121,22 @@ mod tests {
         // Left by a power cut.
         fs::write(folder.path().join("robot-3.77"), &whole).unwrap();
         assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [evidence(1)]);
-        for robot in 3..50 {
-            let name = format!("robot-0{robot}.evidence");
-            fs::write(folder.path().join(name), vec![2; Evidence::MAX_LENGTH]).unwrap();
+        for name in ["robot-0.evidence", "robot-2.evidence"] {
+            fs::remove_file(folder.path().join(name)).unwrap();
         }
-        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [], "it comes behind 16 MiB of something else");
+        let before = |name: &str, length| {
+            fs::write(folder.path().join(format!("robot-0{name}.evidence")), vec![2; length]).unwrap();
+        };
+        let room = KEPT_BYTES - whole.len();
+        (0..room / Evidence::MAX_LENGTH).for_each(|n| before(&n.to_string(), Evidence::MAX_LENGTH));
+        before("rest", room % Evidence::MAX_LENGTH);
+        assert_eq!(
+            Evidence::kept_in(folder.path()).unwrap(),
+            [evidence(1)],
+            "16 MiB, with what comes before it"
+        );
+        before("rest", room % Evidence::MAX_LENGTH + 1);
+        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [], "one byte more");
         assert!(Evidence::kept_in(&folder.path().join("robot-1.evidence")).is_err(), "no folder");
     }
 }

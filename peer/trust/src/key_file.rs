@@ -197,19 +197,24 @@ mod tests {
         assert!(matches!(nowhere, KeyFileError::Write { .. }), "{nowhere}");
 
         let digits = "5e".repeat(32);
-        let bad: [Vec<u8>; 6] = [
-            Vec::new(),
-            digits.as_bytes()[..63].to_vec(),
-            format!("{digits}5").into(),
-            format!("{digits}\n{digits}").into(),
-            digits.to_uppercase().into(),
-            vec![0xff; 64],
+        let of_third = [&digits.as_bytes()[..2], &[0xff; 62]].concat();
+        // The character that is no digit, where it is one.
+        let bad: [(Vec<u8>, Option<usize>); 7] = [
+            (Vec::new(), None),
+            (digits.as_bytes()[..63].to_vec(), None),
+            (format!("{digits}5").into(), None),
+            (format!("{digits}\n{digits}").into(), None),
+            (digits.to_uppercase().into(), Some(2)),
+            (vec![0xff; 64], Some(1)),
+            (of_third, Some(3)),
         ];
-        for text in bad {
+        for (text, wrong) in bad {
             Identity::from_bytes(&[1; 32]).write(&path).unwrap();
             fs::write(&path, text).unwrap();
             let error = Identity::read(&path).unwrap_err();
-            assert!(matches!(error, KeyFileError::Malformed { .. }), "{error}");
+            let KeyFileError::Malformed { reason, .. } = &error else { panic!("{error}") };
+            let at = if let HexError::Digit { position } = reason { Some(*position) } else { None };
+            assert_eq!(at, wrong, "{error}");
             let shown = format!("{error} {error:?}");
             assert!(shown.contains("robot.key") && !shown.to_lowercase().contains("5e5e"), "{shown}");
             fs::remove_file(&path).unwrap();
