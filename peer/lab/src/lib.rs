@@ -10,3 +10,4 @@ pub mod experiment;
 #[cfg(feature = "charts")]
 pub mod explain;
 pub mod shape;
+mod threads;

@@ -1,9 +1,15 @@
 //! Work on many robots that is done in any order.
 
+use std::num::NonZero;
 use std::sync::{Mutex, PoisonError};
 
+/// As many threads as the machine has cores for.
+pub(crate) fn all_cores() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get)
+}
+
 /// Does that with each of these, on so many threads at most.
-pub(super) fn on_each<T: Send>(threads: usize, all: Vec<T>, work: impl Fn(T) + Sync) {
+pub(crate) fn on_each<T: Send>(threads: usize, all: Vec<T>, work: impl Fn(T) + Sync) {
     let threads = threads.min(all.len());
     if threads <= 1 {
         return all.into_iter().for_each(work);

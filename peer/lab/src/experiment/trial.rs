@@ -17,6 +17,7 @@ use super::pool::{Moment, Pool};
 use super::setting::{Drift, Setting};
 use super::standing::Standing;
 use crate::emulation::{Emulation, Observer, Rules, School, Trace, likeliest};
+use crate::threads::{all_cores, on_each};
 
 /// The most robots of which all are examined after each round, and how many are of more: all who are train for it.
 pub(super) const ALL_EXAMINED: usize = 100;
@@ -152,6 +153,18 @@ fn split(pool: &Pool, rng: &mut ChaCha8Rng) -> Result<Split, ExperimentError> {
     Ok(split)
 }
 
+/// What is right, and the coordinates from each place.
+type Question = (ClassId, BTreeMap<usize, Vec<f32>>);
+
+/// What a robot makes of what it sees.
+#[derive(Clone)]
+struct Verdict {
+    /// Whether it is right, and certainly.
+    is_certain: bool,
+    /// None where it has learned nothing.
+    probabilities: Option<Vec<f64>>,
+}
+
 /// Held-out moments as all robots see them, in the space they learn in. Robots at one place see the same.
 struct Exam {
     classes: usize,
@@ -159,8 +172,7 @@ struct Exam {
     robots: usize,
     /// Those that are examined.
     examined: Vec<usize>,
-    /// What is right, and the coordinates from each place.
-    questions: Vec<(ClassId, BTreeMap<usize, Vec<f32>>)>,
+    questions: Vec<Question>,
     places: Vec<usize>,
     /// By which a swarm judges.
     fusion: Arc<dyn Fuse>,
@@ -201,27 +213,41 @@ impl Exam {
         }
     }
 
+    /// What a robot makes of what it sees of a hand that shows that.
+    fn verdict(&self, classifier: Option<&Classifier>, view: &[f32], class: ClassId) -> Verdict {
+        let certain = classifier.and_then(|classifier| classifier.certified(view));
+        Verdict {
+            is_certain: certain.is_some_and(|it| it.class == class && it.tolerates >= self.liars),
+            probabilities: classifier.and_then(|classifier| classifier.probabilities_in_space(view)),
+        }
+    }
+
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
         emulation.learn(&self.examined);
         let classifiers: Vec<Option<Arc<Classifier>>> =
             self.examined.iter().map(|robot| emulation.classifier(*robot)).collect();
+        let mut verdicts: Vec<Vec<Option<Verdict>>> = vec![Vec::new(); classifiers.len()];
+        let all = verdicts.iter_mut().zip(classifiers.iter().zip(&self.places)).collect();
+        on_each(all_cores(), all, |(verdicts, (classifier, place))| {
+            let verdict = |(class, views): &Question| {
+                Some(self.verdict(classifier.as_deref(), views.get(place)?, *class))
+            };
+            verdicts.extend(self.questions.iter().map(verdict));
+        });
         let chance = 1.0 / self.classes as f64;
         let (mut single, mut certified, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for (class, views) in &self.questions {
+        for (n, (class, _)) in self.questions.iter().enumerate() {
             let mut evidence: Vec<Vec<f32>> = Vec::new();
-            for (place, classifier) in self.places.iter().zip(&classifiers) {
-                let Some(view) = views.get(place) else { continue };
+            for Verdict { is_certain, probabilities } in
+                verdicts.iter().filter_map(|of_robot| of_robot[n].as_ref())
+            {
                 seen += 1.0;
-                let certain = classifier.as_ref().and_then(|classifier| classifier.certified(view));
-                let certain = certain.is_some_and(|it| it.class == *class && it.tolerates >= self.liars);
-                certified += f64::from(u8::from(certain));
-                let judged =
-                    classifier.as_ref().and_then(|classifier| classifier.probabilities_in_space(view));
-                match judged {
+                certified += f64::from(u8::from(*is_certain));
+                match probabilities {
                     None => single += chance,
                     Some(p) => {
-                        single += f64::from(u8::from(likeliest(&p) == Some(class.index())));
-                        evidence.push(evidence_of(&p));
+                        single += f64::from(u8::from(likeliest(p) == Some(class.index())));
+                        evidence.push(evidence_of(p));
                     }
                 }
             }

@@ -12,7 +12,6 @@
 //! | `poisoning` | what do poisoners share? |
 //! | `reading` | what may a mind be told later than it comes? |
 //! | `training` | who learns? |
-//! | `threads` | what is done on many threads? |
 
 mod answering;
 mod carry;
@@ -27,11 +26,9 @@ mod queue;
 mod reading;
 mod robot;
 mod seed;
-mod threads;
 mod training;
 
 use std::collections::BTreeSet;
-use std::num::NonZero;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -49,6 +46,7 @@ use super::scenario::{Event, Fault, Scenario};
 use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
+use crate::threads::all_cores;
 use answering::Asking;
 use plot::Plot;
 use poisoning::Poisoner;
@@ -125,7 +123,7 @@ impl<'a> Swarm<'a> {
             trace,
             unread: 0,
             most_unread: reading::MANY * scenario.swarm_size(),
-            threads: std::thread::available_parallelism().map_or(1, NonZero::get),
+            threads: all_cores(),
         };
         if scenario.mind.committee_of(size).is_some() {
             swarm.robots.iter_mut().filter_map(|robot| robot.pupil.as_mut()).for_each(Pupil::start_over);

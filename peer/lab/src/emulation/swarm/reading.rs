@@ -12,8 +12,8 @@ use gestalt_strategies::{Input, Mind, Output};
 
 use super::Swarm;
 use super::robot::Robot;
-use super::threads::on_each;
 use crate::emulation::pupil::Pupil;
+use crate::threads::on_each;
 
 /// How much waits for a robot, on the average, when all are told.
 pub(super) const MANY: usize = 8;

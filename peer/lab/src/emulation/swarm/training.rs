@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use super::Swarm;
 use super::robot::Robot;
-use super::threads::on_each;
 use crate::emulation::network::Presence;
 use crate::emulation::pupil::Pupil;
+use crate::threads::on_each;
 
 impl Swarm<'_> {
     /// Those who will be asked to vote in the round of that counter, which that robot opened, learn from all they hold, where a committee votes. They
