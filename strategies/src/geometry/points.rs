@@ -44,6 +44,10 @@ impl Points {
         }
         let place = self.keys.len();
         if place.is_multiple_of(LANES) {
+            // A thousand robots that hold as many points each would otherwise hold room for as many again.
+            if self.rows.capacity() < self.rows.len() + self.dimension {
+                self.rows.reserve_exact(self.dimension + self.rows.len() / 8);
+            }
             self.rows.resize(self.rows.len() + self.dimension, [0.0; LANES]);
         }
         self.keys.push(key);

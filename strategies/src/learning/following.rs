@@ -30,8 +30,8 @@ impl Follow for Learning {
     }
 
     fn pool(&mut self) -> Option<Pool> {
-        let Self { judged, lessons, recent, gestures, .. } = self;
-        Some(judged.pool(|round| lessons.verdict_by_names(recent.names(round), gestures)))
+        let Self { judged, lessons, recent, gestures, shelf, .. } = self;
+        Some(judged.pool(shelf, |round| lessons.verdict_by_names(recent.names(round), gestures)))
     }
 
     fn keep(&mut self, vote: HeldVote) -> Arc<HeldVote> {

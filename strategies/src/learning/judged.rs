@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, Pool, RoundId};
-use gestalt_rounds::{Testimony, Weights, fit};
+use gestalt_protocol::{Pool, RoundId};
+use gestalt_rounds::{Testimony, fit};
 
+use super::shelf::Shelf;
+use super::weighed::Weighed;
 use crate::lessons::Verdict;
 
 /// How many rounds are kept, the newest: classifiers learn, and what they said long ago tells little of them.
@@ -22,8 +24,7 @@ pub(super) struct JudgedRounds {
 #[derive(Clone, Debug)]
 struct Judged {
     testimony: Arc<Testimony>,
-    /// What it says, by which verdict.
-    weights: Option<(Verdict, Option<Weights>)>,
+    weighed: Option<Arc<Weighed>>,
 }
 
 impl JudgedRounds {
@@ -33,7 +34,7 @@ impl JudgedRounds {
         if known {
             return;
         }
-        self.rounds.insert(round, Judged { testimony, weights: None });
+        self.rounds.insert(round, Judged { testimony, weighed: None });
         while self.rounds.len() > MAX_ROUNDS {
             self.rounds.pop_first();
         }
@@ -45,34 +46,26 @@ impl JudgedRounds {
         self.pool = None;
     }
 
-    /// How alike the robots are, given what instructors said of each round.
-    pub fn pool(&mut self, verdict: impl Fn(RoundId) -> Verdict) -> Pool {
+    /// How alike the robots are, given what instructors said of each round. What that says is on the shelf where another robot has found it.
+    pub fn pool(&mut self, shelf: &Shelf, verdict: impl Fn(RoundId) -> Verdict) -> Pool {
         if let Some(pool) = self.pool {
             return pool;
         }
-        for (round, judged) in &mut self.rounds {
+        for (round, Judged { testimony, weighed }) in &mut self.rounds {
             let verdict = verdict(*round);
-            if judged.weights.as_ref().is_some_and(|(known, _)| *known == verdict) {
-                continue;
+            if !weighed.as_ref().is_some_and(|weighed| weighed.is_of(testimony, &verdict)) {
+                *weighed = shelf.weighed(*round, testimony, verdict);
             }
-            let weigh = |possible: &dyn Fn(ClassId) -> bool| {
-                Some((verdict.clone(), judged.testimony.weigh(possible)))
-            };
-            judged.weights = match &verdict {
-                Verdict::Class(class) => weigh(&|k| k == *class),
-                Verdict::Among(candidates) => weigh(&|k| candidates.contains(k)),
-                Verdict::Unsaid | Verdict::Retracted => None,
-            };
         }
-        let judged = self.rounds.values().filter_map(|judged| judged.weights.as_ref()?.1.as_ref());
-        *self.pool.insert(fit(judged))
+        let weighed = self.rounds.values().filter_map(|judged| judged.weighed.as_ref()?.weights());
+        *self.pool.insert(fit(weighed))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{
-        Certificate, CountedVote, Decision, FusionRule, RobotId, Stamp, Terms, VocabularyId, Vote,
+        Certificate, ClassId, CountedVote, Decision, FusionRule, RobotId, Stamp, Terms, VocabularyId, Vote,
     };
 
     use super::*;
@@ -125,12 +118,12 @@ mod tests {
         let was = |class: u32| Verdict::Class(ClassId(class));
         // Of thirty rounds every third was another gesture than all five robots were sure of.
         let verdict = |round: RoundId| if round.counter.is_multiple_of(3) { was(1) } else { was(0) };
-        let mut heard = JudgedRounds::default();
-        assert_eq!(heard.pool(verdict), Pool::PRIOR);
+        let (shelf, mut heard) = (Shelf::default(), JudgedRounds::default());
+        assert_eq!(heard.pool(&shelf, verdict), Pool::PRIOR);
         (0..30).for_each(|n| heard.note(round(n), testimony(0)));
-        assert_eq!(heard.pool(|_| Verdict::Unsaid), Pool::PRIOR, "nobody said what they were");
+        assert_eq!(heard.pool(&shelf, |_| Verdict::Unsaid), Pool::PRIOR, "nobody said what they were");
         heard.doubt();
-        let pool = heard.pool(verdict);
+        let pool = heard.pool(&shelf, verdict);
         assert_eq!(pool.rounds, 30);
         assert!(
             pool.likeness > Pool::PRIOR.likeness && pool.temperature > Pool::PRIOR.temperature,
@@ -140,9 +133,9 @@ mod tests {
         let mut turned = JudgedRounds::default();
         (0..30).rev().chain(5..10).for_each(|n| turned.note(round(n), testimony(0)));
         turned.doubt();
-        assert_eq!(turned.pool(verdict), pool);
+        assert_eq!(turned.pool(&shelf, verdict), pool);
         heard.doubt();
-        assert_eq!(heard.pool(|_| Verdict::Retracted), Pool::PRIOR);
+        assert_eq!(heard.pool(&shelf, |_| Verdict::Retracted), Pool::PRIOR);
     }
 
     #[test]

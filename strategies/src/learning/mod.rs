@@ -18,6 +18,7 @@ mod sharing;
 mod shelf;
 mod state;
 mod unresolved;
+mod weighed;
 
 pub use changes::TrainingChange;
 pub use config::{LearningConfig, LearningConfigError};

@@ -2,10 +2,13 @@
 
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use gestalt_protocol::{HeldBatch, HeldVote, RobotId, RoundId, SampleId, Stamp};
 use gestalt_rounds::Testimony;
+
+use super::weighed::Weighed;
+use crate::lessons::Verdict;
 
 /// By which lists of who is alive are found: how many they are, and the first.
 type Alive = (usize, Option<RobotId>);
@@ -13,7 +16,7 @@ type Alive = (usize, Option<RobotId>);
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
 
-/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, and what those of a round came to, who is alive. Each still takes in
+/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, what those of a round came to and say, who is alive. Each still takes in
 /// what it hears by itself, and what one of them is told otherwise than the others stays its own: only what is equal is held once. So what a robot does is
 /// the same with a shelf and without; a thousand that hold the same thousand samples hold them once.
 ///
@@ -24,6 +27,7 @@ pub struct Shelf {
     batches: Mutex<Board<SampleId, HeldBatch>>,
     votes: Mutex<Board<(RobotId, Stamp), HeldVote>>,
     testimonies: Mutex<Board<RoundId, Testimony>>,
+    weighed: Mutex<Board<RoundId, Weighed>>,
     alive: Mutex<Board<Alive, BTreeSet<RobotId>>>,
 }
 
@@ -42,6 +46,22 @@ impl Shelf {
 
     pub(super) fn testimony(&self, of: RoundId, testimony: Testimony) -> Arc<Testimony> {
         put(&self.testimonies, of, testimony)
+    }
+
+    /// What these votes say where it was about that; worked out unless somebody holds it.
+    pub(super) fn weighed(
+        &self,
+        round: RoundId,
+        testimony: &Arc<Testimony>,
+        verdict: Verdict,
+    ) -> Option<Arc<Weighed>> {
+        let held = lock(&self.weighed).get(&round);
+        if let Some(held) = held.filter(|held| held.is_of(testimony, &verdict)) {
+            return Some(held);
+        }
+        let weighed = Arc::new(Weighed::new(testimony.clone(), verdict)?);
+        lock(&self.weighed).put(round, &weighed);
+        Some(weighed)
     }
 
     pub(super) fn alive(&self, robots: &BTreeSet<RobotId>) -> Arc<BTreeSet<RobotId>> {
@@ -63,24 +83,37 @@ impl<K, T: ?Sized> Default for Board<K, T> {
     }
 }
 
+impl<K: Ord, T: ?Sized> Board<K, T> {
+    fn get(&self, name: &K) -> Option<Arc<T>> {
+        self.held.get(name).and_then(Weak::upgrade)
+    }
+
+    fn put(&mut self, name: K, value: &Arc<T>) {
+        self.held.insert(name, Arc::downgrade(value));
+        if self.held.len() >= self.full {
+            self.held.retain(|_, held| held.strong_count() > 0);
+            self.full = FEW.max(2 * self.held.len());
+        }
+    }
+}
+
+/// What is on it is held by others: a thread that ended half-way leaves nothing wrong behind.
+fn lock<T>(board: &Mutex<T>) -> MutexGuard<'_, T> {
+    board.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The one that is held already, if it is the same; else this one, for whoever comes next with the same.
 fn put<K: Ord, T: PartialEq + ?Sized, V: Borrow<T> + Into<Arc<T>>>(
     board: &Mutex<Board<K, T>>,
     name: K,
     value: V,
 ) -> Arc<T> {
-    // What is on it is held by others: a thread that ended half-way leaves nothing wrong behind.
-    let mut board = board.lock().unwrap_or_else(PoisonError::into_inner);
-    let held = board.held.get(&name).and_then(Weak::upgrade);
-    if let Some(held) = held.filter(|held| **held == *value.borrow()) {
+    let mut board = lock(board);
+    if let Some(held) = board.get(&name).filter(|held| **held == *value.borrow()) {
         return held;
     }
     let value = value.into();
-    board.held.insert(name, Arc::downgrade(&value));
-    if board.held.len() >= board.full {
-        board.held.retain(|_, held| held.strong_count() > 0);
-        board.full = FEW.max(2 * board.held.len());
-    }
+    board.put(name, &value);
     value
 }
 

@@ -1,57 +1,18 @@
 //! The samples a robot holds, found by key, by identifier, by class and by part.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
-use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+use gestalt_protocol::{ClassId, RobotId, SampleId};
 use rand::{Rng, RngExt};
 
-/// The part of a training set that a sample is in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SetPart {
-    /// Own, not shared yet.
-    Personal,
-    /// Own, broadcast.
-    Shared,
-    /// Received from its author or from whoever held it.
-    External,
-}
-
-impl SetPart {
-    /// All parts.
-    pub const ALL: [Self; 3] = [Self::Personal, Self::Shared, Self::External];
-}
-
-/// A sample as held.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HeldSample {
-    /// Local arrival number: from 1, grows, is never used twice, also across restarts.
-    pub key: u64,
-    /// Where it is.
-    pub part: SetPart,
-    /// Its name in the swarm; `None` while it is personal.
-    pub id: Option<SampleId>,
-    /// The gesture shown.
-    pub class: ClassId,
-    /// The round it was seen in.
-    pub round: RoundId,
-    /// Coordinates in the robot's feature space.
-    pub vector: Arc<[f32]>,
-}
-
-impl HeldSample {
-    /// Who shared it, if anybody did.
-    #[must_use]
-    pub fn author(&self) -> Option<RobotId> {
-        self.id.map(|id| id.author)
-    }
-}
+use super::held::{HeldSample, SetPart};
+use super::in_order::InOrder;
 
 /// The samples held, as selection and forgetting rules see them. Every list is in the order of the keys, so what a
 /// rule picks depends on what is held and not on how it came to be.
 #[derive(Debug, Default)]
 pub struct HeldSamples {
-    held: BTreeMap<u64, HeldSample>,
+    held: InOrder,
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
     /// How many external ones there are, by author.
@@ -72,7 +33,7 @@ impl HeldSamples {
     /// The sample with that key.
     #[must_use]
     pub fn get(&self, key: u64) -> Option<&HeldSample> {
-        self.held.get(&key)
+        self.held.get(key)
     }
 
     /// The sample with that name.
@@ -83,7 +44,7 @@ impl HeldSamples {
 
     /// All samples, by key.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &HeldSample> {
-        self.held.values()
+        self.held.iter()
     }
 
     /// Shared and external samples, by key: what the swarm knows together.
@@ -100,7 +61,7 @@ impl HeldSamples {
     /// Whether no sample is held.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.held.is_empty()
+        self.held.len() == 0
     }
 
     /// How many samples ever came in, held or not.
@@ -199,12 +160,12 @@ impl HeldSamples {
         for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
             list.insert(list.partition_point(|key| *key < sample.key), sample.key);
         }
-        self.held.insert(sample.key, sample);
+        self.held.insert(sample);
     }
 
     /// Takes a sample out.
     pub(crate) fn remove(&mut self, key: u64) -> Option<HeldSample> {
-        let sample = self.held.remove(&key)?;
+        let sample = self.held.remove(key)?;
         if let Some(id) = sample.id {
             self.ids.remove(&id);
             let held = self.authors.get(&id.author).filter(|_| sample.part == SetPart::External);

@@ -1,0 +1,104 @@
+//! Samples by key, side by side.
+
+use super::held::HeldSample;
+
+/// One place in so many is empty at most before all are moved together.
+const EMPTY: usize = 8;
+
+/// Samples in the order of their keys, which mostly grow: a new one is put at the end, one that goes leaves its place empty until many are. In a tree
+/// of such samples every other place would be empty.
+#[derive(Debug, Default)]
+pub(super) struct InOrder {
+    keys: Vec<u64>,
+    /// By place of the key.
+    samples: Vec<Option<HeldSample>>,
+    empty: usize,
+}
+
+impl InOrder {
+    pub fn get(&self, key: u64) -> Option<&HeldSample> {
+        self.samples[self.keys.binary_search(&key).ok()?].as_ref()
+    }
+
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = &HeldSample> {
+        self.samples.iter().flatten()
+    }
+
+    pub fn len(&self) -> usize {
+        self.keys.len() - self.empty
+    }
+
+    /// Takes a sample in, in place of another one of that key.
+    pub fn insert(&mut self, sample: HeldSample) {
+        match self.keys.binary_search(&sample.key) {
+            Ok(place) => {
+                let before = self.samples[place].replace(sample);
+                self.empty -= usize::from(before.is_none());
+            }
+            Err(place) => {
+                if self.keys.len() == self.keys.capacity() {
+                    let more = 1 + self.keys.len() / EMPTY;
+                    self.keys.reserve_exact(more);
+                    self.samples.reserve_exact(more);
+                }
+                self.keys.insert(place, sample.key);
+                self.samples.insert(place, Some(sample));
+            }
+        }
+    }
+
+    pub fn remove(&mut self, key: u64) -> Option<HeldSample> {
+        let sample = self.samples[self.keys.binary_search(&key).ok()?].take()?;
+        self.empty += 1;
+        if self.empty * EMPTY > self.keys.len() {
+            self.samples.retain(Option::is_some);
+            self.keys.clear();
+            self.keys.extend(self.samples.iter().flatten().map(|sample| sample.key));
+            self.empty = 0;
+        }
+        Some(sample)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use gestalt_protocol::{ClassId, RobotId, RoundId};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::sample::SetPart;
+
+    fn sample(key: u64, class: u32) -> HeldSample {
+        let round = RoundId { counter: 1, opener: RobotId(1), life: 0 };
+        HeldSample {
+            key,
+            part: SetPart::Personal,
+            id: None,
+            class: ClassId(class),
+            round,
+            vector: [0.5].into(),
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn it_holds_what_a_tree_holds(ops in proptest::collection::vec((any::<bool>(), 0_u64..40, 0_u32..6), 0..400)) {
+            let (mut held, mut tree) = (InOrder::default(), BTreeMap::new());
+            for (comes, key, class) in ops {
+                if comes {
+                    held.insert(sample(key, class));
+                    tree.insert(key, sample(key, class));
+                } else {
+                    prop_assert_eq!(held.remove(key), tree.remove(&key));
+                }
+                prop_assert_eq!(held.get(key), tree.get(&key));
+                prop_assert_eq!(held.len(), tree.len());
+                prop_assert!(held.iter().eq(tree.values()));
+                prop_assert!(held.iter().rev().eq(tree.values().rev()));
+                prop_assert!(held.empty * EMPTY <= held.keys.len(), "few places are empty");
+            }
+        }
+    }
+}
