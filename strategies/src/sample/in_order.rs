@@ -2,7 +2,7 @@
 
 use super::held::HeldSample;
 
-/// One place in so many is empty at most before all are moved together.
+/// One place in so many is empty at most, and as much room is made for more.
 const EMPTY: usize = 8;
 
 /// Samples in the order of their keys, which mostly grow: a new one is put at the end, one that goes leaves its place empty until many are. In a tree

@@ -266,11 +266,7 @@ fn close_lowest_gap(intervals: &mut Intervals) {
 fn edge(key: u64, series: SampleSeries, number: u32) -> u64 {
     let mut sip = SipHasher24::new_with_keys(key, u64::from_le_bytes(*b"samples "));
     let SampleSeries { author, life } = series;
-    let mut bytes = [0; 12];
-    for (place, part) in bytes.chunks_exact_mut(4).zip([author.0, life, number]) {
-        place.copy_from_slice(&part.to_le_bytes());
-    }
-    sip.write(&bytes);
+    [author.0, life, number].iter().for_each(|part| sip.write(&part.to_le_bytes()));
     sip.finish()
 }
 
