@@ -27,5 +27,5 @@ pub use learning::{between, gesture, learning, short_rounds, space};
 pub use namespaces::Namespaces;
 pub use process::Process;
 pub use robots::{Watched, agreed, config, start, start_learning, start_looking, unique};
-pub use sealed::{by_tls, credentials, key, seal, sealed, with_eve};
+pub use sealed::{by_tls, credentials, key, seal, sealed, tag, with_eve};
 pub use streaming::{Hands, center_config, model, sender_config};

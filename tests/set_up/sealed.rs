@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use gestalt_link::{Bearer, Certificate, Credentials, LinkConfig, RobotConfig, Seal};
 use gestalt_protocol::RobotId;
-use gestalt_trust::{Identity, Instructor, Membership, Role, Roles};
+use gestalt_trust::{Channels, Identity, Instructor, Membership, Role, Roles};
 
 use crate::config;
 
@@ -48,6 +48,17 @@ pub fn by_tls(locators: &[String]) -> Vec<String> {
 pub fn seal(id: u32, members: &Membership) -> Seal {
     let roster = members.clone().sign(&key(AUTHORITY)).expect("a roster");
     Seal::issue(&key(AUTHORITY), roster, RobotId(id), Arc::new(key(id))).expect("a certificate")
+}
+
+/// What shows robot `to` that member `from` tells it that.
+///
+/// # Panics
+/// When one of them is none.
+#[must_use]
+pub fn tag(from: u32, to: u32, members: &Membership, message: &[u8]) -> Vec<u8> {
+    let roster = members.clone().sign(&key(AUTHORITY)).expect("a roster");
+    let mut channels = Channels::new(RobotId(from), Arc::new(key(from)), roster.swarm_id());
+    channels.tag(&roster, RobotId(to), message).expect("two members").to_vec()
 }
 
 /// A member on the loopback interface that dials `connect`.

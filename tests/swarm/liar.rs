@@ -7,7 +7,7 @@ use gestalt_protocol::{
     ClassId, Decision, Envelope, Give, HeldVote, Keys, Message, RobotId, RoundId, Stamp, Topic, Vote,
 };
 use gestalt_strategies::Classify;
-use gestalt_tests::{Fixed, Watched, agreed, key, sealed, start, unique, with_eve};
+use gestalt_tests::{Fixed, Watched, agreed, key, sealed, start, tag, unique, with_eve};
 use gestalt_trust::statement;
 use zenoh::qos::CongestionControl;
 
@@ -60,11 +60,9 @@ pub async fn who_says_two_things_is_known_to_all_and_counts_no_more() {
         holders: vec![],
     });
     let stamp = Stamp { boot: 1, sequence: 3 };
-    put(
-        Topic::Repair(RobotId(1)),
-        Envelope { author: RobotId(3), stamp, message: give, signature: None }.encode(),
-    )
-    .await;
+    let given = Envelope { author: RobotId(3), stamp, message: give, signature: None }.encode();
+    let to_one = liar.put(keys.key(&Topic::Repair(RobotId(1))), given.clone());
+    to_one.attachment(tag(3, 1, &members, &given)).await.unwrap();
     for robot in &robots {
         counted(robot, "convicted_3", 1).await;
     }
@@ -111,8 +109,10 @@ pub async fn who_gives_what_does_not_follow_is_known_to_all_and_counts_no_more()
     let keys = Keys::new(&swarm).unwrap();
     let liar = enter(&members, &locators).await;
     let put = async |topic: Topic, said: Envelope| {
-        let put = liar.put(keys.key(&topic), said.encode()).congestion_control(CongestionControl::Block);
-        put.await.unwrap();
+        let bytes = said.encode();
+        let tag = matches!(topic, Topic::Repair(_)).then(|| tag(3, 1, &members, &bytes));
+        let put = liar.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
+        put.attachment(tag).await.unwrap();
     };
     let signed = |by: u32, sequence: u32, message: Message| {
         let stamp = Stamp { boot: 1, sequence };

@@ -15,7 +15,7 @@ use gestalt_protocol::{
 use gestalt_strategies::Classify;
 use gestalt_tests::{
     Fixed, Watched, agreed, by_tls, credentials, key, learning, sealed, short_rounds, start, start_learning,
-    unique, with_eve,
+    tag, unique, with_eve,
 };
 use gestalt_trust::{Membership, statement};
 use serde_json::Value;
@@ -230,8 +230,11 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
     let Message::Samples(samples) = true_batch.message.clone() else { panic!("{true_batch:?}") };
 
     let put = async |topic: Topic, envelope: Envelope| {
-        let put = liar.put(keys.key(&topic), envelope.encode()).congestion_control(CongestionControl::Block);
-        put.await.unwrap();
+        let bytes = envelope.encode();
+        // Of what it says to one robot alone it makes up nothing but what it passes on: it has the key of robot 3.
+        let tag = matches!(topic, Topic::Repair(_)).then(|| tag(3, 0, &members, &bytes));
+        let put = liar.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
+        put.attachment(tag).await.unwrap();
     };
     let of_another_class = |by: u32| {
         let mut samples = samples.clone();
@@ -241,24 +244,34 @@ pub async fn what_its_robots_learn_is_said_by_its_members_and_passed_on_as_they_
         });
         samples
     };
-    let stamp = Stamp { boot: u32::MAX, sequence: 1 };
-    let said = |message| Envelope { author: RobotId(1), stamp, message, signature: None };
-    let give = |samples, signature| {
+    let said = |author, sequence, message| {
+        let stamp = Stamp { boot: u32::MAX, sequence };
+        Envelope { author: RobotId(author), stamp, message, signature: None }
+    };
+    let give = |sequence, samples, signature| {
         let held = HeldBatch { robot: RobotId(1), stamp: true_batch.stamp, samples, signature };
-        said(Message::Batches(Batches { batches: vec![held] }))
+        said(3, sequence, Message::Batches(Batches { batches: vec![held] }))
     };
     // The next ones in its name, its own under another label, and what nobody said.
-    put(Topic::Sample(RobotId(1)), said(Message::Samples(of_another_class(100)))).await;
-    put(Topic::Repair(RobotId(0)), give(of_another_class(200), None)).await;
-    put(Topic::Repair(RobotId(0)), give(of_another_class(0), true_batch.signature)).await;
+    put(Topic::Sample(RobotId(1)), said(1, 1, Message::Samples(of_another_class(100)))).await;
+    put(Topic::Repair(RobotId(0)), give(1, of_another_class(200), None)).await;
+    put(Topic::Repair(RobotId(0)), give(2, of_another_class(0), true_batch.signature)).await;
     let word = |count, word| Lesson { round, instructor: ada.clone(), count, at: u64::MAX, word, said: None };
     let lessons = vec![word(2, Word::Was(ClassId(5))), word(3, Word::Retracted)];
-    put(Topic::Repair(RobotId(0)), said(Message::Lessons(Lessons { lessons }))).await;
+    put(Topic::Repair(RobotId(0)), said(3, 3, Message::Lessons(Lessons { lessons }))).await;
     // What is true is true whoever says it, and nothing new.
-    put(Topic::Repair(RobotId(0)), give(samples.clone(), true_batch.signature)).await;
-    for (counter, least) in
-        [("refused_sample_unsigned", 1), ("refused_repair_unsigned", 2), ("refused_repair_forged", 1)]
-    {
+    let again = give(4, samples.clone(), true_batch.signature);
+    put(Topic::Repair(RobotId(0)), again.clone()).await;
+    put(Topic::Repair(RobotId(0)), again).await;
+    // And in the name of a robot whose key it has not.
+    let as_another = said(1, 5, Message::Give(Give { decision: None, votes: vec![], holders: vec![] }));
+    put(Topic::Repair(RobotId(0)), as_another).await;
+    for (counter, least) in [
+        ("refused_sample_unsigned", 1),
+        ("refused_repair_unsigned", 2),
+        ("refused_repair_forged", 2),
+        ("refused_repair_repeated", 1),
+    ] {
         counted(&robots[0], counter, least).await;
     }
     assert_eq!(knows(&robots[0], [2, 4]).await, common);

@@ -10,7 +10,7 @@ use gestalt_protocol::{
     RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
-use gestalt_trust::{Distrust, Evidence, Judge};
+use gestalt_trust::{Channels, Distrust, Evidence, Judge};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tokio::sync::{Notify, watch};
@@ -54,6 +54,8 @@ pub(super) struct Sealed {
     pub judge: Mutex<Judge>,
     pub roll: Arc<Roll>,
     pub words: Mutex<Words>,
+    /// What this robot says to others alone, and they to it.
+    pub channels: Mutex<Channels>,
 }
 
 #[derive(Debug, Default)]
@@ -258,10 +260,12 @@ impl Inbox {
     }
 
     fn on_repair(&self, sample: &Sample) -> Result<(), Refusal> {
-        let mut envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
+        let bytes = payload(sample, MAX_MESSAGE)?;
+        let mut envelope = Envelope::decode(&bytes)?;
         if envelope.author == self.me {
             return Err(Refusal::Twin);
         }
+        self.was_told(&envelope, &bytes, sample)?;
         // What is said to all comes under a key of its own.
         let to_all = matches!(
             envelope.message,

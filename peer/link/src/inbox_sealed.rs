@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, PoisonError};
 
 use gestalt_protocol::{
-    Answer, FrameChallenge, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId,
+    Answer, Envelope, FrameChallenge, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId,
     Signature, SignedWord, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
-use gestalt_trust::MAX_ROSTER;
+use gestalt_trust::{Distrust, MAX_ROSTER, Tag};
 use zenoh::sample::Sample;
 
 use crate::account::Refusal;
@@ -70,6 +70,31 @@ impl Inbox {
     pub(super) fn sign_challenge(&self, to: RobotId, challenge: u64) -> Option<FrameChallenge> {
         let words = self.sealed.as_ref()?.words.lock().unwrap_or_else(PoisonError::into_inner);
         Some(words.challenge(to, challenge))
+    }
+
+    /// What shows that robot that it was told this by this one, in a sealed swarm.
+    pub(super) fn tag(&self, to: RobotId, message: &[u8]) -> Option<Result<Tag, Distrust>> {
+        let sealed = self.sealed.as_ref()?;
+        let mut channels = sealed.channels.lock().unwrap_or_else(PoisonError::into_inner);
+        self.judged(|judge, _| channels.tag(judge.roster(), to, message))
+    }
+
+    /// Whether its author told this robot that, and is a member that is believed; in an open swarm everybody is.
+    pub(super) fn was_told(
+        &self,
+        envelope: &Envelope,
+        message: &[u8],
+        sample: &Sample,
+    ) -> Result<(), Distrust> {
+        let Some(sealed) = &self.sealed else { return Ok(()) };
+        let tag = sample.attachment().filter(|it| it.len() == size_of::<Tag>()).map(|it| it.to_bytes());
+        let mut channels = sealed.channels.lock().unwrap_or_else(PoisonError::into_inner);
+        let (author, stamp) = (envelope.author, envelope.stamp);
+        let checked = self.judged(|judge, _| {
+            judge.key(author)?;
+            channels.check(judge.roster(), (author, stamp), message, tag.as_deref())
+        });
+        checked.unwrap_or(Ok(()))
     }
 
     pub(super) fn on_answer(&self, to: InstructorId, sample: &Sample) -> Result<(), Refusal> {

@@ -25,6 +25,8 @@ pub(crate) struct Parcel {
     pub kind: &'static str,
     pub key: String,
     pub bytes: Vec<u8>,
+    /// What travels beside it.
+    pub attachment: Option<Vec<u8>>,
     /// Whether it is sent at once, and not gathered with others.
     pub express: bool,
 }
@@ -99,10 +101,11 @@ fn send_all(tray: &Tray<Waiting>, session: &Session, account: &Account, supervis
 }
 
 fn send(session: &Session, account: &Account, parcel: Parcel) {
-    let Parcel { kind, key, bytes, express } = parcel;
-    account.sent(kind, bytes.len());
+    let Parcel { kind, key, bytes, attachment, express } = parcel;
+    account.sent(kind, bytes.len() + attachment.as_ref().map_or(0, Vec::len));
     let put = session
         .put(key, bytes)
+        .attachment(attachment)
         .priority(Priority::Data)
         .congestion_control(CongestionControl::Drop)
         .express(express)

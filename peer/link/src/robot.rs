@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use gestalt_protocol::{Camera, Keys, RobotId, RoundId, Status};
 use gestalt_strategies::{Classify, Fuse, Input, MindConfig, Observation, Vocabulary, is_refuted};
-use gestalt_trust::Judge;
+use gestalt_trust::{Channels, Judge};
 use serde_json::Value;
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{broadcast, mpsc, watch};
@@ -140,10 +140,12 @@ impl Robot {
             let key = identity.public_key();
             let roll = Roll::new(id, key, roster.clone(), roster_file.clone(), account.clone());
             let words = Words::new(id, identity.clone(), roster.swarm_id(), keys.clone());
+            let channels = Channels::new(id, identity.clone(), roster.swarm_id());
             Sealed {
                 judge: Mutex::new(Judge::new(roster.clone(), is_refuted)),
                 roll: Arc::new(roll),
                 words: Mutex::new(words),
+                channels: Mutex::new(channels),
             }
         });
         let roll = sealed.as_ref().map(|sealed| sealed.roll.clone());

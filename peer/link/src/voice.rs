@@ -92,7 +92,7 @@ impl Voice {
         match envelope.message {
             Message::Samples(_) => {
                 let (key, bytes) = (self.keys.key(&Topic::Sample(self.me)), envelope.encode());
-                self.outbox.send(Parcel { kind: "sample", key, bytes, express: false });
+                self.outbox.send(Parcel { kind: "sample", key, bytes, attachment: None, express: false });
             }
             Message::Holding(_) => self.unsaid = Some(envelope.clone()),
             _ => self.inbox.said(&self.presence.vote(envelope)),
@@ -113,8 +113,11 @@ impl Voice {
             | Message::Announced(_)
             | Message::Asked(_) => "give",
         };
-        let key = self.keys.key(&Topic::Repair(neighbour));
-        self.outbox.send(Parcel { kind, key, bytes: envelope.encode(), express: true });
+        let (key, bytes) = (self.keys.key(&Topic::Repair(neighbour)), envelope.encode());
+        // To who is no member any more nothing is said.
+        let Ok(tag) = self.inbox.tag(neighbour, &bytes).transpose() else { return };
+        let attachment = tag.map(|tag| tag.to_vec());
+        self.outbox.send(Parcel { kind, key, bytes, attachment, express: true });
     }
 
     /// Answers an instructor.
@@ -153,7 +156,7 @@ impl Voice {
     pub fn accuse(&self) {
         for evidence in self.inbox.untold() {
             let (key, bytes) = (self.keys.key(&Topic::Evidence), evidence.encode());
-            self.outbox.send(Parcel { kind: "evidence", key, bytes, express: true });
+            self.outbox.send(Parcel { kind: "evidence", key, bytes, attachment: None, express: true });
         }
     }
 

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
+use gestalt_protocol::RobotId;
 use serde::{Deserialize, Serialize};
 
 /// How many signatures are checked in the name of one author, of those that come by one way: as it says them itself, as others pass them on, as
@@ -18,7 +19,8 @@ pub struct Budget {
     /// How many more every second. At least 1.
     pub per_second: NonZeroU32,
     /// How many every second in all names together by one way, beyond those, for authors whose own are used up: somebody may flood the swarm in
-    /// the name of one that has something to say, and a slower flood than this does not silence it. At least 1.
+    /// the name of one that has something to say, and a slower flood than this does not silence it. Of what others pass on a quarter at once, and a sixteenth
+    /// every second, for each that passes something on. At least 1.
     pub spare: NonZeroU32,
 }
 
@@ -40,6 +42,12 @@ impl Budget {
     /// That of all authors together, once their own are used up: a second's worth at once.
     pub(crate) fn of_all(&self) -> Self {
         Self { burst: self.spare, per_second: self.spare, ..*self }
+    }
+
+    /// That of one robot for what it passes on of others whose own are used up: enough at once for the votes of a committee and their decision.
+    pub(crate) fn of_one_that_passes_on(&self) -> Self {
+        let part = |of: u32| NonZeroU32::new(self.spare.get() / of).unwrap_or(NonZeroU32::MIN);
+        Self { burst: part(4), per_second: part(16), ..*self }
     }
 }
 
@@ -76,8 +84,8 @@ impl Bucket {
 pub(crate) enum Way {
     /// Under its author's own key.
     Said,
-    /// Passed on by somebody, or in a decision that rests on it.
-    PassedOn,
+    /// Passed on by that robot, or in a decision of its that rests on it.
+    PassedOn(RobotId),
     /// In evidence against its author.
     Evidence,
 }
@@ -101,7 +109,7 @@ impl Ways {
     pub(crate) fn take(&mut self, way: Way, budget: &Budget, now: Duration) -> bool {
         let bucket = match way {
             Way::Said => &mut self.said,
-            Way::PassedOn => &mut self.passed_on,
+            Way::PassedOn(_) => &mut self.passed_on,
             Way::Evidence => &mut self.evidence,
         };
         bucket.take(budget, now)

@@ -53,6 +53,13 @@ impl Scheme for Fake {
     fn verify(key: &PublicKey, message: &[u8], signature: &Signature) -> bool {
         forge(key, message) == *signature
     }
+
+    fn agree(secret: &Self::Secret, key: &PublicKey) -> Zeroizing<[u8; 32]> {
+        let mut both = [Self::public(secret), *key];
+        both.sort_unstable();
+        let hash = both.iter().fold(Sha256::new(), |hash, key| hash.chain_update(key.as_bytes()));
+        Zeroizing::new(hash.finalize().into())
+    }
 }
 
 fn forge(key: &PublicKey, message: &[u8]) -> Signature {

@@ -64,6 +64,11 @@ impl<S: Scheme> Identity<S> {
     pub(crate) fn sign(&self, message: &[u8]) -> Signature {
         S::sign(&self.secret, message)
     }
+
+    /// What this one and whoever has that key come to alone.
+    pub(crate) fn agree(&self, key: &S::Key) -> Zeroizing<[u8; 32]> {
+        S::agree(&self.secret, key)
+    }
 }
 
 impl<S: Scheme> fmt::Debug for Identity<S> {

@@ -144,8 +144,8 @@ impl<S: Scheme> Judge<S> {
     }
 
     /// The same of what somebody passes on, or a decision rests on: a flood under the author's own key does not keep it from being heard.
-    fn relayed(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Distrust> {
-        self.check(envelope, |verifier, said, signature| verifier.check_passed_on(now, said, signature))
+    fn relayed(&mut self, by: RobotId, now: Duration, envelope: &Envelope) -> Result<(), Distrust> {
+        self.check(envelope, |verifier, said, signature| verifier.check_passed_on(by, now, said, signature))
     }
 
     fn check(
@@ -180,14 +180,12 @@ impl<S: Scheme> Judge<S> {
         if proven { Err(Distrust::Convicted) } else { Ok(()) }
     }
 
-    /// Whether all the votes that a decision rests on were cast.
-    ///
-    /// # Errors
-    /// The [`Distrust`] that the first of them meets which was not.
-    pub fn decision(&mut self, now: Duration, decision: &Decision) -> Result<(), Distrust> {
+    /// Whether all the votes were cast that a decision rests on, which that robot gave or announced.
+    fn decision(&mut self, by: RobotId, now: Duration, decision: &Decision) -> Result<(), Distrust> {
         let certificate = &decision.certificate;
         let votes = certificate.votes.iter().map(CountedVote::held);
-        votes.chain(certificate.others.iter().cloned()).try_for_each(|held| self.relayed(now, &held.into()))
+        let mut all = votes.chain(certificate.others.iter().cloned());
+        all.try_for_each(|held| self.relayed(by, now, &held.into()))
     }
 
     /// Whether its announcer said it, to the last word, and all the votes that it rests on were cast.
@@ -202,23 +200,25 @@ impl<S: Scheme> Judge<S> {
         let said = Envelope::from(announcement.clone());
         self.envelope(now, &said)?;
         self.stands_by(&said, &announcement.decision)?;
-        self.decision(now, &announcement.decision)
+        self.decision(announcement.announcer, now, &announcement.decision)
     }
 
     /// Leaves of what one robot passes on to another what was really said; says why the rest is not believed. What is left may be true: who passes on votes,
     /// words and samples as it was told them is no liar. By a decision it stands itself.
+    ///
+    /// That it was this robot [has been shown](crate::Channels::check): what it passes on is bounded, and in nobody else's name.
     pub fn passed_on(&mut self, now: Duration, envelope: &mut Envelope) -> Option<Distrust> {
-        let given = self.given(now, envelope);
+        let (by, given) = (envelope.author, self.given(now, envelope));
         match &mut envelope.message {
             Message::Give(give) => {
-                let of_holders = self.retain(now, &mut give.holders);
-                let of_votes = self.retain(now, &mut give.votes);
+                let of_holders = self.retain(by, now, &mut give.holders);
+                let of_votes = self.retain(by, now, &mut give.votes);
                 if given.is_err() {
                     give.decision = None;
                 }
                 given.err().or(of_votes).or(of_holders)
             }
-            Message::Batches(Batches { batches }) => self.retain(now, batches),
+            Message::Batches(Batches { batches }) => self.retain(by, now, batches),
             _ => None,
         }
     }
@@ -227,14 +227,19 @@ impl<S: Scheme> Judge<S> {
     fn given(&mut self, now: Duration, said: &Envelope) -> Result<(), Distrust> {
         let Message::Give(Give { decision: Some(decision), .. }) = &said.message else { return Ok(()) };
         // Not for the witness, who remembers what is said to all.
-        self.verifier.check_passed_on(now, &said.statement(), said.signature.as_ref())?;
+        self.verifier.check_passed_on(said.author, now, &said.statement(), said.signature.as_ref())?;
         self.stands_by(said, decision)?;
-        self.decision(now, decision)
+        self.decision(said.author, now, decision)
     }
 
-    fn retain<T: Clone + Into<Envelope>>(&mut self, now: Duration, held: &mut Vec<T>) -> Option<Distrust> {
+    fn retain<T: Clone + Into<Envelope>>(
+        &mut self,
+        by: RobotId,
+        now: Duration,
+        held: &mut Vec<T>,
+    ) -> Option<Distrust> {
         let mut refused = None;
-        held.retain(|held| match self.relayed(now, &held.clone().into()) {
+        held.retain(|held| match self.relayed(by, now, &held.clone().into()) {
             Ok(()) => true,
             Err(distrust) => {
                 refused = Some(distrust);

@@ -60,6 +60,7 @@
 
 pub mod answer;
 mod budget;
+mod channel;
 mod distrust;
 mod docket;
 mod document;
@@ -90,6 +91,7 @@ pub mod word;
 
 pub use answer::{ANSWER_DOMAIN, Answers};
 pub use budget::Budget;
+pub use channel::{CHANNEL_DOMAIN, Channels, Tag};
 pub use distrust::Distrust;
 pub use evidence::{Conviction, Evidence, EvidenceError, Lie, Refutes};
 #[cfg(feature = "fake")]

@@ -35,6 +35,9 @@ pub trait Scheme: sealed::Sealed + Clone + Debug + PartialEq + Eq + 'static {
 
     /// Whether that is the key's signature under that message.
     fn verify(key: &Self::Key, message: &[u8], signature: &Signature) -> bool;
+
+    /// What whoever has this secret and whoever has the secret of that key both come to, and nobody else.
+    fn agree(secret: &Self::Secret, key: &Self::Key) -> Zeroizing<[u8; 32]>;
 }
 
 /// Ed25519 (RFC 8032) by its strict rule, one signature at a time.
@@ -84,6 +87,11 @@ impl Scheme for Ed25519 {
 
     fn verify(key: &VerifyingKey, message: &[u8], signature: &Signature) -> bool {
         key.verify_strict(message, &ed25519_dalek::Signature::from_bytes(signature.as_bytes())).is_ok()
+    }
+
+    /// X25519 of the keys' Montgomery forms (RFC 7748, 4.1 and 6.1).
+    fn agree(secret: &Ed25519Secret, key: &VerifyingKey) -> Zeroizing<[u8; 32]> {
+        Zeroizing::new((key.to_montgomery() * secret.expanded.scalar).to_bytes())
     }
 }
 

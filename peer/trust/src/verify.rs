@@ -6,7 +6,7 @@ use std::time::Duration;
 use gestalt_protocol::{RobotId, Signature, Stamp};
 use sha2::{Digest, Sha256};
 
-use crate::budget::{Budget, Way, Ways};
+use crate::budget::{Bucket, Budget, Way, Ways};
 use crate::distrust::Distrust;
 use crate::evidence::{Conviction, Evidence, EvidenceError, Refutes};
 use crate::public_key::PublicKey;
@@ -22,8 +22,9 @@ const REMEMBERED: usize = 16;
 ///
 /// Pure: time is an argument, counted from any point that stays the same. Checking a signature is the last and only costly step;
 /// before it, strangers, the expelled and what was verified before are told apart, and every author named has a [`Budget`] of its
-/// own: a flood in robot 7's name costs robot 7 alone. What is spared beside these lets robot 7 be heard in the midst of it, and
-/// what others pass on has budgets apart from what is said under its author's own key: a flood on one way leaves the other open.
+/// own: a flood in robot 7's name costs robot 7 alone. What is spared beside these lets robot 7 be heard in the midst of it; and
+/// what others pass on has budgets apart from what is said under its author's own key, one of them each robot's own that passes
+/// something on: a flood on one way leaves the other open, and who passes on what was never said keeps nobody else from being heard.
 ///
 /// Memory is bounded by the roster: up to a kilobyte for each robot on it, none for anybody else.
 #[derive(Clone, Debug)]
@@ -31,8 +32,7 @@ pub struct Verifier<S: Scheme = Ed25519> {
     roster: Roster<S>,
     budget: Budget,
     authors: BTreeMap<RobotId, Account>,
-    /// What is left for all whose own budgets are used up; `None` before anything was checked.
-    spare: Option<Ways>,
+    spare: Spare,
     convicted: BTreeSet<RobotId>,
 }
 
@@ -57,11 +57,34 @@ impl Account {
     }
 }
 
+/// What is left for authors whose own budgets are used up.
+#[derive(Clone, Debug, Default)]
+struct Spare {
+    /// For all together; `None` before anything was checked.
+    of_all: Option<Ways>,
+    /// For what each robot passes on.
+    of_each: BTreeMap<RobotId, Bucket>,
+}
+
+impl Spare {
+    /// Takes one check out by that way, if there is one.
+    fn take<S: Scheme>(&mut self, way: Way, budget: &Budget, roster: &Roster<S>, now: Duration) -> bool {
+        let Way::PassedOn(by) = way else {
+            let of_all = budget.of_all();
+            return self.of_all.get_or_insert_with(|| Ways::new(&of_all, now)).take(way, &of_all, now);
+        };
+        let of_one = budget.of_one_that_passes_on();
+        let new = || Bucket::new(&of_one, now);
+        let is_member = roster.members().robots.contains_key(&by);
+        is_member && self.of_each.entry(by).or_insert_with(new).take(&of_one, now)
+    }
+}
+
 impl<S: Scheme> Verifier<S> {
     /// One that believes the robots of that roster, which must be of the swarm that this robot was enrolled in.
     #[must_use]
     pub fn new(roster: Roster<S>, budget: Budget) -> Self {
-        Self { roster, budget, authors: BTreeMap::new(), spare: None, convicted: BTreeSet::new() }
+        Self { roster, budget, authors: BTreeMap::new(), spare: Spare::default(), convicted: BTreeSet::new() }
     }
 
     /// The roster it goes by.
@@ -87,18 +110,19 @@ impl<S: Scheme> Verifier<S> {
         self.check_by(Way::Said, now, statement, signature)
     }
 
-    /// The same of a statement that somebody else passes on, or a decision rests on: however many are made up under the author's own key, and
-    /// refused as too many, that one has a budget of its own.
+    /// The same of a statement that this robot passes on, or rests a decision on: however many are made up under the author's own key, or passed on by
+    /// others, and refused as too many, that way has budgets of its own. Who passes it on has to be known: it is a robot on the roster that was shown to say so.
     ///
     /// # Errors
     /// The [`Distrust`] that it meets.
     pub fn check_passed_on(
         &mut self,
+        by: RobotId,
         now: Duration,
         statement: &[u8],
         signature: Option<&Signature>,
     ) -> Result<(), Distrust> {
-        self.check_by(Way::PassedOn, now, statement, signature)
+        self.check_by(Way::PassedOn(by), now, statement, signature)
     }
 
     fn check_by(
@@ -124,9 +148,9 @@ impl<S: Scheme> Verifier<S> {
                 return Ok(());
             }
         }
-        let of_all = self.budget.of_all();
-        let spare = self.spare.get_or_insert_with(|| Ways::new(&of_all, now));
-        if !account.left.take(way, &self.budget, now) && !spare.take(way, &of_all, now) {
+        if !account.left.take(way, &self.budget, now)
+            && !self.spare.take(way, &self.budget, &self.roster, now)
+        {
             return Err(Distrust::TooFast);
         }
         if !statement::is_signed::<S>(key, &self.roster.swarm_id(), statement, signature) {
@@ -150,6 +174,7 @@ impl<S: Scheme> Verifier<S> {
         }
         let keeps_key = |robot: &RobotId| roster.keeps_key(&self.roster, *robot);
         self.authors.retain(|robot, _| keeps_key(robot));
+        self.spare.of_each.retain(|robot, _| keeps_key(robot));
         self.convicted.retain(keeps_key);
         self.roster = roster;
         Ok(true)
@@ -174,10 +199,9 @@ impl<S: Scheme> Verifier<S> {
         }
         let new = || Account::new(&self.budget, now);
         let account = self.authors.entry(claimed.author).or_insert_with(new);
-        let of_all = self.budget.of_all();
-        let spare = self.spare.get_or_insert_with(|| Ways::new(&of_all, now));
-        let way = Way::Evidence;
-        if !account.left.take(way, &self.budget, now) && !spare.take(way, &of_all, now) {
+        if !account.left.take(Way::Evidence, &self.budget, now)
+            && !self.spare.take(Way::Evidence, &self.budget, &self.roster, now)
+        {
             return Err(EvidenceError::TooFast(claimed.author));
         }
         let conviction = evidence.check(&self.roster, refutes)?;

@@ -213,7 +213,7 @@ fn what_others_pass_on_is_heard_in_the_midst_of_a_flood_in_its_authors_name() {
     // decisions rest on it,
     let mut decision = decision(1);
     decision.certificate.others = vec![held];
-    assert_eq!(judge.clone().decision(NOW, &decision), Ok(()));
+    assert_eq!(judge.clone().decision(RobotId(1), NOW, &decision), Ok(()));
     // and once it was checked it is believed by whichever way it comes.
     assert_eq!(judge.passed_on(NOW, &mut given), None);
     assert_eq!(judge.envelope(NOW, &own), Ok(()));

@@ -103,7 +103,7 @@ fn a_flood_on_one_way_leaves_the_others_open() {
             (said(sequence), sign(99, &said(sequence)))
         };
         if passed_on {
-            verifier.check_passed_on(NOW, &said, Some(&signature))
+            verifier.check_passed_on(RobotId(2), NOW, &said, Some(&signature))
         } else {
             verifier.check(NOW, &said, Some(&signature))
         }
@@ -126,7 +126,31 @@ fn a_flood_on_one_way_leaves_the_others_open() {
         };
         assert!(verifier.convict(NOW, &convicted(), |_| false).is_ok(), "evidence comes by a third way");
     }
-    assert_eq!(verifier().check_passed_on(NOW, &theirs, Some(&by_another)), Err(Distrust::Forged));
+    assert_eq!(
+        verifier().check_passed_on(RobotId(2), NOW, &theirs, Some(&by_another)),
+        Err(Distrust::Forged)
+    );
+}
+
+#[test]
+fn who_passes_on_what_was_never_said_keeps_nobody_else_from_being_heard() {
+    let said = |sequence| vote(1, sequence, 1.0);
+    let pass_on = |verifier: &mut Verifier, by, sequence, key| {
+        verifier.check_passed_on(RobotId(by), NOW, &said(sequence), Some(&sign(key, &said(sequence))))
+    };
+    let mut verifier = verifier();
+    let answers: Vec<_> = (0..2000).map(|sequence| pass_on(&mut verifier, 3, sequence, 99)).collect();
+    // What there is for robot 1 by this way, and a quarter of what is spared.
+    assert_eq!(answers.iter().filter(|answer| **answer == Err(Distrust::Forged)).count(), 16 + 250);
+    assert_eq!(pass_on(&mut verifier, 3, 5000, 1), Err(Distrust::TooFast));
+    assert_eq!(pass_on(&mut verifier, 2, 5000, 1), Ok(()));
+    // Nobody passes on anything beside what there is for its author in a name that is nobody's.
+    assert_eq!(pass_on(&mut verifier, 9, 5001, 1), Err(Distrust::TooFast));
+    // A new key begins anew.
+    let mut renewed = crate::testing::members(6);
+    renewed.robots.insert(RobotId(3), crate::testing::robot(91).public_key());
+    assert!(verifier.adopt(renewed.sign(&authority()).unwrap()).unwrap());
+    assert_eq!(pass_on(&mut verifier, 3, 5001, 1), Ok(()));
 }
 
 #[test]

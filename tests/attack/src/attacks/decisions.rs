@@ -58,9 +58,19 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::All(&["refused_repair_unsigned", "refused_repair_stranger"]),
+        counted: Counted::All(&["refused_repair_stranger"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, |swarm| made_up(swarm, &given), unmoved),
+    },
+    Attack {
+        number: "2",
+        what: "an enrolled robot gives that decision to one robot after the other",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_unsigned", "refused_repair_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| made_up(swarm, &given_by_liar), unmoved),
     },
     Attack {
         number: "2",
@@ -98,7 +108,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "it is not announced as final",
-        counted: Counted::Some(&["refused_robot_decision_unsigned", "refused_repair_unsigned"]),
+        counted: Counted::All(&["refused_robot_decision_unsigned", "refused_repair_forged"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, false_finality, final_as_in_peace),
     },
@@ -236,6 +246,10 @@ fn given(swarm: &mut Swarm, votes: Vec<HeldVote>) {
     for to in 1..=swarm.honest() {
         swarm.put_to(to, &Topic::Repair(RobotId(to)), &said.encode());
     }
+}
+
+fn given_by_liar(swarm: &mut Swarm, votes: Vec<HeldVote>) {
+    swarm.whisper(swarm.liar(), &forged::given(forged::decision(swarm.round(), votes, 0)));
 }
 
 fn in_their_names(swarm: &mut Swarm) {

@@ -61,20 +61,34 @@ pub const ALL: &[Attack] = &[
     },
     Attack {
         number: "17",
-        what: "gives 8,000 such votes a second, as its neighbours do",
+        what: "gives 8,000 such votes a second in the names of its neighbours",
         tier: Tier::T0,
+        setting: Setting::Sealed,
+        expected: COUNTED,
+        counted: Counted::All(&["refused_repair_forged"]),
+        gap: None,
+        play: |seed| {
+            let flood = |swarm: &mut Swarm| in_its_name(swarm, Way::Given(&[(1, 2), (2, 1)]), 8);
+            beside(&Plan::sealed(), seed, flood, third_is_counted)
+        },
+    },
+    Attack {
+        number: "17",
+        what: "an enrolled robot gives 8,000 such votes a second",
+        tier: Tier::T4,
         setting: Setting::Sealed,
         expected: COUNTED,
         counted: Counted::Some(&["refused_repair_forged", "refused_repair_too_fast"]),
         gap: None,
         play: |seed| {
-            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Given, 8), third_is_counted)
+            let flood = |swarm: &mut Swarm| in_its_name(swarm, Way::Given(BY_LIARS), 8);
+            beside(&Plan::sealed().liars(1), seed, flood, third_is_counted)
         },
     },
     Attack {
         number: "17",
-        what: "8,000 such votes a second by each of both ways",
-        tier: Tier::T0,
+        what: "two enrolled robots say and give 8,000 such votes a second each",
+        tier: Tier::T4,
         setting: Setting::Sealed,
         expected: COUNTED,
         counted: Counted::Some(&[
@@ -83,12 +97,10 @@ pub const ALL: &[Attack] = &[
             "refused_repair_forged",
             "refused_repair_too_fast",
         ]),
-        gap: Some(
-            "what a robot says and what others pass on of it have budgets apart; who uses up both, with more than 1,000 a second each, leaves it \
-                   the luck of coming when there is something left",
-        ),
+        gap: None,
         play: |seed| {
-            beside(&Plan::sealed(), seed, |swarm| in_its_name(swarm, Way::Both, 8), third_is_counted)
+            let flood = |swarm: &mut Swarm| in_its_name(swarm, Way::Both(BY_TWO_LIARS), 8);
+            beside(&Plan::sealed().liars(2), seed, flood, third_is_counted)
         },
     },
 ];
@@ -97,15 +109,19 @@ pub const ALL: &[Attack] = &[
 const COUNTED: &str = "after 1 s of the round, and of the flood, robot 3 is counted everywhere";
 
 /// How votes come that were made up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Way {
     /// As their author says them,
     Said,
-    /// as its neighbours pass them on,
-    Given,
+    /// to these robots as those pass them on,
+    Given(&'static [(u32, u32)]),
     /// or so many by each.
-    Both,
+    Both(&'static [(u32, u32)]),
 }
+
+/// To robots 1 and 2, by the first liar or by the second as well.
+const BY_LIARS: &[(u32, u32)] = &[(1, 6), (2, 6)];
+const BY_TWO_LIARS: &[(u32, u32)] = &[(1, 6), (2, 6), (1, 7), (2, 7)];
 
 /// How many votes the enrolled robot says, in half a second.
 const FLOOD: u32 = 2000;
@@ -142,7 +158,7 @@ fn in_its_name(swarm: &mut Swarm, way: Way, rate: u32) {
     let flood = |swarm: &mut Swarm, from: u32, time: u32| {
         for ms in from..from + time {
             // Spread over the millisecond, or all in one message.
-            if way != Way::Given {
+            if let Way::Said | Way::Both(_) = way {
                 for n in ms * rate..(ms + 1) * rate {
                     swarm.pass(MS / rate);
                     if swarm.at_war() {
@@ -155,10 +171,12 @@ fn in_its_name(swarm: &mut Swarm, way: Way, rate: u32) {
             } else {
                 swarm.pass(MS);
             }
-            if way != Way::Said && swarm.at_war() {
+            if let Way::Given(by) | Way::Both(by) = way
+                && swarm.at_war()
+            {
                 let votes = (ms * rate..(ms + 1) * rate).map(|n| forged::held(made_up(swarm, !n))).collect();
                 let give = Message::Give(Give { decision: None, votes, holders: Vec::new() });
-                [(1, 2), (2, 1)].into_iter().for_each(|(to, from)| swarm.whisper_to(to, from, &give));
+                by.iter().for_each(|(to, from)| swarm.whisper_to(*to, *from, &give));
             }
         }
     };
@@ -180,13 +198,17 @@ fn made_up(swarm: &Swarm, n: u32) -> Envelope {
     Envelope { signature: Some(Signature::from_bytes(bytes)), ..said }
 }
 
+/// It is on every robot's ballot by its own word, and in every decision that is held.
 fn third_is_counted(_: &Swarm, war: &Swarm) -> Result<(), String> {
     let counts = |mind: &gestalt_strategies::Mind| {
-        let votes = mind.held().map(|held| held.certificate.votes.as_slice()).unwrap_or_default();
-        votes.iter().any(|counted| counted.robot == RobotId(3))
+        let stamp = mind.ballot().and_then(|ballot| ballot.stamp(RobotId(3)));
+        let in_decision = mind
+            .held()
+            .is_none_or(|held| held.certificate.votes.iter().any(|counted| counted.robot == RobotId(3)));
+        stamp.is_some_and(|stamp| stamp.boot < u32::MAX) && in_decision
     };
     match war.minds().filter(|mind| !counts(mind)).count() {
         0 => Ok(()),
-        robots => Err(format!("{robots} robots of 5 hold a decision in which robot 3 is not counted")),
+        robots => Err(format!("{robots} robots of 5 do not count robot 3")),
     }
 }

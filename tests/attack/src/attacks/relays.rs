@@ -25,23 +25,62 @@ pub const ALL: &[Attack] = &[
     },
     Attack {
         number: "A15",
+        what: "an enrolled robot asks robot 1 1,000 times what is known",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "at most 128 messages at once and 16 more a second come upon it",
+        counted: Counted::Some(&["refused_question_too_often"]),
+        gap: None,
+        play: |seed| {
+            beside(
+                &Plan::sealed().liars(1),
+                seed,
+                |swarm| asks(swarm, 6),
+                |peace, war| no_flood(peace, war, 6),
+            )
+        },
+    },
+    Attack {
+        number: "A15",
         what: "asks 1,000 times in the name of a robot that is no neighbour what is known",
         tier: Tier::T0,
-        setting: Setting::Sealed,
+        setting: Setting::Open,
         expected: "nothing",
         counted: Counted::All(&["refused_question_of_stranger"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed(), seed, |swarm| asks(swarm, 50), unmoved),
+        play: |seed| beside(&Plan::open(), seed, |swarm| asks(swarm, 50), unmoved),
     },
     Attack {
         number: "A15",
         what: "asks robot 1 1,000 times in the name of its neighbour, robot 2",
         tier: Tier::T0,
         setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_forged"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| asks(swarm, 2), unmoved),
+    },
+    Attack {
+        number: "A15",
+        what: "asks robot 1 1,000 times in the name of its neighbour, robot 2",
+        tier: Tier::T0,
+        setting: Setting::Open,
         expected: "at most 128 messages at once and 16 more a second come upon robot 2",
         counted: Counted::Some(&["refused_question_too_often"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed(), seed, |swarm| asks(swarm, 2), no_flood),
+        play: |seed| {
+            beside(&Plan::open(), seed, |swarm| asks(swarm, 2), |peace, war| no_flood(peace, war, 2))
+        },
+    },
+    Attack {
+        number: "22",
+        what: "says to robot 1 again what the others asked and gave it, ten times over",
+        tier: Tier::T2,
+        setting: Setting::Sealed,
+        expected: "nothing",
+        counted: Counted::All(&["refused_repair_repeated"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, said_again, unmoved),
     },
     Attack {
         number: "A20 · 26",
@@ -108,9 +147,19 @@ fn asks(swarm: &mut Swarm, name: u32) {
     swarm.pass(Duration::from_secs(10));
 }
 
-fn no_flood(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+fn said_again(swarm: &mut Swarm) {
+    teach_some(swarm);
+    let key = swarm.key(&Topic::Repair(RobotId(1)));
+    let heard: Vec<_> = swarm.air().iter().filter(|parcel| parcel.key == key).cloned().collect();
+    for _ in 0..10 {
+        heard.iter().for_each(|parcel| swarm.replay_to(1, parcel));
+    }
+    swarm.pass(Duration::from_secs(10));
+}
+
+fn no_flood(peace: &Swarm, war: &Swarm, upon: u32) -> Result<(), String> {
     let told = |swarm: &Swarm| {
-        let key = swarm.key(&Topic::Repair(RobotId(2)));
+        let key = swarm.key(&Topic::Repair(RobotId(upon)));
         swarm.air().iter().filter(|parcel| parcel.key == key).count()
     };
     let more = told(war).saturating_sub(told(peace));

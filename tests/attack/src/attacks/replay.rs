@@ -67,7 +67,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T2,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::All(&["refused_sample_kind", "refused_repair_kind"]),
+        counted: Counted::All(&["refused_sample_kind", "refused_repair_unsigned"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, under_other_keys, unmoved),
     },

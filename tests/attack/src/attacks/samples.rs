@@ -22,7 +22,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::All(&["refused_repair_unsigned"]),
+        counted: Counted::All(&["refused_repair_stranger"]),
         gap: None,
         play: |seed| beside(&Plan::sealed(), seed, |swarm| far_out(swarm, 50), unmoved),
     },
@@ -64,7 +64,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing",
-        counted: Counted::All(&["refused_repair_unsigned"]),
+        counted: Counted::All(&["refused_repair_stranger"]),
         gap: None,
         play: |seed| beside(&small(0), seed, by_strangers, learned_alike),
     },
@@ -84,9 +84,19 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing; the others still get the true ones",
+        counted: Counted::All(&["refused_repair_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| next_numbers(swarm, 50), true_vectors),
+    },
+    Attack {
+        number: "4",
+        what: "an enrolled robot gives samples under the names that robot 3 will use next",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing; the others still get the true ones",
         counted: Counted::All(&["refused_repair_unsigned"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed(), seed, next_numbers, true_vectors),
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| next_numbers(swarm, 6), true_vectors),
     },
     Attack {
         number: "4",
@@ -285,13 +295,13 @@ fn of_third(swarm: &Swarm) -> Vec<HeldBatch> {
     batches.collect()
 }
 
-fn next_numbers(swarm: &mut Swarm) {
+fn next_numbers(swarm: &mut Swarm, from: u32) {
     let round = show_and_teach(swarm, 1);
     let last = of_third(swarm).last().and_then(|batch| Some(batch.samples.samples.last()?.id));
     if let Some(last) = last {
         let next = (1..=10).map(|n| SampleId { number: last.number + n, ..last });
         let samples = next.map(|id| forged::sample(id, 4, round, &[1.0, -1.0])).collect();
-        swarm.whisper(50, &forged::samples(samples));
+        swarm.whisper(from, &forged::samples(samples));
     }
     show_and_teach(swarm, 2);
     swarm.pass(Duration::from_secs(10));

@@ -27,7 +27,6 @@ pub const ALL: &[Attack] = &[
             "refused_vote_unsigned",
             "refused_vote_forged",
             "refused_vote_author",
-            "refused_repair_unsigned",
             "refused_repair_forged",
         ]),
         gap: None,
@@ -59,9 +58,19 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T0,
         setting: Setting::Sealed,
         expected: "nothing",
+        counted: Counted::All(&["refused_repair_stranger"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed(), seed, |swarm| full_ballot(swarm, 50), unmoved),
+    },
+    Attack {
+        number: "A6",
+        what: "an enrolled robot gives 4,096 votes of made-up robots",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "nothing",
         counted: Counted::All(&["refused_repair_unsigned"]),
         gap: None,
-        play: |seed| beside(&Plan::sealed(), seed, full_ballot, unmoved),
+        play: |seed| beside(&Plan::sealed().liars(1), seed, |swarm| full_ballot(swarm, 6), unmoved),
     },
     Attack {
         number: "A6",
@@ -71,7 +80,7 @@ pub const ALL: &[Attack] = &[
         expected: "the true robots are counted",
         counted: Counted::Some(&["refused_ballot_full"]),
         gap: Some(WHOEVER_SAYS_SO),
-        play: |seed| beside(&Plan::open(), seed, full_ballot, decided_in_time),
+        play: |seed| beside(&Plan::open(), seed, |swarm| full_ballot(swarm, 50), decided_in_time),
     },
     Attack {
         number: "10",
@@ -121,7 +130,7 @@ fn own_vote_counts(_: &Swarm, war: &Swarm) -> Result<(), String> {
     }
 }
 
-fn full_ballot(swarm: &mut Swarm) {
+fn full_ballot(swarm: &mut Swarm, from: u32) {
     let began = swarm.now();
     swarm.begin(TRUE);
     swarm.pass(20 * MS);
@@ -131,7 +140,7 @@ fn full_ballot(swarm: &mut Swarm) {
     let votes: Vec<_> = (0..4096).map(|n| forged::held(vote(n))).collect();
     for to in 1..=5 {
         let give = gestalt_protocol::Give { decision: None, votes: votes.clone(), holders: Vec::new() };
-        swarm.whisper_to(to, 50, &gestalt_protocol::Message::Give(give));
+        swarm.whisper_to(to, from, &gestalt_protocol::Message::Give(give));
     }
     swarm.end(began);
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{Answer, Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::{Input, Mind, Output};
-use gestalt_trust::{Roster, answer};
+use gestalt_trust::{Channels, Roster, answer};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -49,6 +49,8 @@ pub struct Swarm {
     pub(super) said: u64,
     /// How often the adversary spoke as a neighbour does.
     pub(super) whispered: u32,
+    /// Those of the liars that are enrolled, to the robots.
+    pub(super) channels: BTreeMap<u32, Channels>,
     /// How long a message takes, by sender and receiver.
     delays: Vec<Vec<Duration>>,
     queue: BTreeMap<(Duration, u64), Due>,
@@ -65,6 +67,9 @@ impl Swarm {
         let delay = |rng: &mut ChaCha8Rng| Duration::from_micros(rng.random_range(500..5000));
         let delays = (0..plan.honest).map(|_| (0..plan.honest).map(|_| delay(&mut rng)).collect()).collect();
         let sealed = (plan.setting == Setting::Sealed).then_some(&roster);
+        let liars = plan.honest + 1..=members;
+        let channels = |liar| Channels::new(RobotId(liar), key(liar), roster.swarm_id());
+        let channels = liars.map(|liar| (liar, channels(liar))).collect();
         let robots = (1..=plan.honest).map(|id| Robot::new(RobotId(id), plan, sealed, seed)).collect();
         let mut swarm = Self {
             plan: plan.clone(),
@@ -81,6 +86,7 @@ impl Swarm {
             silent: 0,
             said: 0,
             whispered: 0,
+            channels,
             delays,
             queue: BTreeMap::new(),
             queued: 0,
@@ -226,12 +232,9 @@ impl Swarm {
     }
 
     fn send(&mut self, i: usize, to: RobotId, envelope: &Envelope) {
-        let parcel = Parcel {
-            key: self.keys.key(&Topic::Repair(to)),
-            bytes: envelope.encode(),
-            attachment: None,
-            at: self.time(),
-        };
+        let (key, bytes) = (self.keys.key(&Topic::Repair(to)), envelope.encode());
+        let attachment = self.robots[i].port.tag(to, &bytes);
+        let parcel = Parcel { key, bytes, attachment, at: self.time() };
         if let Some(j) = self.robots.iter().position(|robot| robot.id == to) {
             self.carry(i, j, parcel.clone());
         }

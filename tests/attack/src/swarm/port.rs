@@ -9,7 +9,7 @@ use gestalt_protocol::{
     MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
-use gestalt_trust::{Distrust, Evidence, EvidenceError, Judge, RosterError};
+use gestalt_trust::{Channels, Distrust, Evidence, EvidenceError, Judge, RosterError};
 
 use super::believer::Believer;
 
@@ -35,6 +35,8 @@ pub struct Port {
     me: RobotId,
     keys: Keys,
     judge: Option<Judge>,
+    /// To each other robot of a sealed swarm.
+    channels: Option<Channels>,
     own_votes: VecDeque<Vec<u8>>,
     refused: BTreeMap<String, u64>,
 }
@@ -96,9 +98,10 @@ impl Refusal {
 }
 
 impl Port {
-    /// That of robot `me`, with a judge in a sealed swarm.
-    pub fn new(me: RobotId, keys: Keys, judge: Option<Judge>) -> Self {
-        Self { me, keys, judge, own_votes: VecDeque::new(), refused: BTreeMap::new() }
+    /// That of robot `me`, in a sealed swarm with a judge, and channels to the others.
+    pub fn new(me: RobotId, keys: Keys, sealed: Option<(Judge, Channels)>) -> Self {
+        let (judge, channels) = sealed.unzip();
+        Self { me, keys, judge, channels, own_votes: VecDeque::new(), refused: BTreeMap::new() }
     }
 
     /// What was refused here, by counter.
@@ -114,12 +117,18 @@ impl Port {
         self.own_votes.push_back(vote);
     }
 
+    /// What shows that robot that it was told this by this one, in a sealed swarm.
+    pub fn tag(&mut self, to: RobotId, message: &[u8]) -> Option<Vec<u8>> {
+        let tag = self.channels.as_mut()?.tag(self.judge.as_ref()?.roster(), to, message).ok()?;
+        Some(tag.to_vec())
+    }
+
     /// What the mind is to hear of that message, if anything.
     pub fn take(&mut self, now: Duration, parcel: &Parcel) -> Option<Input> {
         let (kind, taken) = match self.keys.parse(&parcel.key) {
             Some(Topic::Vote(id)) => ("vote", self.on_vote(now, id, &parcel.bytes)),
             Some(Topic::Sample(id)) => ("sample", self.on_shared(now, id, &parcel.bytes)),
-            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(now, &parcel.bytes)),
+            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(now, parcel)),
             Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(now, id, &parcel.bytes)),
             Some(Topic::Decision) => ("decision", self.on_decision(now, &parcel.bytes)),
             Some(Topic::Question) => ("question", self.on_question(now, &parcel.bytes)),
@@ -182,10 +191,15 @@ impl Port {
         }
     }
 
-    fn on_repair(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
-        let mut envelope = decode(bytes)?;
+    fn on_repair(&mut self, now: Duration, parcel: &Parcel) -> Result<Option<Input>, Refusal> {
+        let mut envelope = decode(&parcel.bytes)?;
         if envelope.author == self.me {
             return Err(Refusal::Twin);
+        }
+        if let (Some(judge), Some(channels)) = (&self.judge, &mut self.channels) {
+            judge.key(envelope.author)?;
+            let from = (envelope.author, envelope.stamp);
+            channels.check(judge.roster(), from, &parcel.bytes, parcel.attachment.as_deref())?;
         }
         match envelope.message {
             Message::Vote(_)

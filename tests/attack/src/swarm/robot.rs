@@ -9,7 +9,7 @@ use gestalt_protocol::{Envelope, Fnv1a, Keys, RobotId, Signature, Stamp};
 use gestalt_strategies::{
     Input, LearningSetup, Life, Mind, Output, RecordChange, RobotMemory, Sign, is_refuted,
 };
-use gestalt_trust::{Identity, Judge, Roster, SwarmId, statement};
+use gestalt_trust::{Channels, Identity, Judge, Roster, SwarmId, statement};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -191,7 +191,11 @@ fn waken(
         mind = mind.signed_by(Arc::new(Signer { identity: key(id.0), swarm: roster.swarm_id() }));
     }
     let keys = Keys::new(SWARM).expect("a name");
-    (mind, Port::new(id, keys, roster.cloned().map(|roster| Judge::new(roster, is_refuted))))
+    let sealed = roster.map(|roster| {
+        let channels = Channels::new(id, key(id.0), roster.swarm_id());
+        (Judge::new(roster.clone(), is_refuted), channels)
+    });
+    (mind, Port::new(id, keys, sealed))
 }
 
 /// A message of a robot's, as the network carries it.
