@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use gestalt_protocol::{HeldBatch, HeldVote, RobotId, RoundId, SampleId, Stamp};
 use gestalt_rounds::Testimony;
+use smallvec::SmallVec;
 
 use super::weighed::Weighed;
 use crate::lessons::Verdict;
@@ -15,6 +16,9 @@ type Alive = (usize, Option<RobotId>);
 
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
+
+/// How many different things of one name are held once: robots that heard a round's votes in another order may have decided on others of them.
+const VERSIONS: usize = 16;
 
 /// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, what those of a round came to and say, who is alive. Each still takes in
 /// what it hears by itself, and what one of them is told otherwise than the others stays its own: only what is equal is held once. So what a robot does is
@@ -55,9 +59,9 @@ impl Shelf {
         testimony: &Arc<Testimony>,
         verdict: Verdict,
     ) -> Option<Arc<Weighed>> {
-        let held = lock(&self.weighed).get(&round);
-        if let Some(held) = held.filter(|held| held.is_of(testimony, &verdict)) {
-            return Some(held);
+        let held = lock(&self.weighed).find(&round, |held| held.is_of(testimony, &verdict));
+        if held.is_some() {
+            return held;
         }
         let weighed = Arc::new(Weighed::new(testimony.clone(), verdict)?);
         lock(&self.weighed).put(round, &weighed);
@@ -72,7 +76,7 @@ impl Shelf {
 /// What is held somewhere, by name.
 #[derive(Debug)]
 struct Board<K, T: ?Sized> {
-    held: BTreeMap<K, Weak<T>>,
+    held: BTreeMap<K, SmallVec<[Weak<T>; 1]>>,
     /// At how many it is looked through again.
     full: usize,
 }
@@ -84,14 +88,19 @@ impl<K, T: ?Sized> Default for Board<K, T> {
 }
 
 impl<K: Ord, T: ?Sized> Board<K, T> {
-    fn get(&self, name: &K) -> Option<Arc<T>> {
-        self.held.get(name).and_then(Weak::upgrade)
+    fn find(&self, name: &K, is_it: impl Fn(&T) -> bool) -> Option<Arc<T>> {
+        self.held.get(name)?.iter().filter_map(Weak::upgrade).find(|held| is_it(held))
     }
 
     fn put(&mut self, name: K, value: &Arc<T>) {
-        self.held.insert(name, Arc::downgrade(value));
+        let versions = self.held.entry(name).or_default();
+        versions.retain(|held| held.strong_count() > 0);
+        if versions.len() == VERSIONS {
+            versions.remove(0);
+        }
+        versions.push(Arc::downgrade(value));
         if self.held.len() >= self.full {
-            self.held.retain(|_, held| held.strong_count() > 0);
+            self.held.retain(|_, versions| versions.iter().any(|held| held.strong_count() > 0));
             self.full = FEW.max(2 * self.held.len());
         }
     }
@@ -109,7 +118,7 @@ fn put<K: Ord, T: PartialEq + ?Sized, V: Borrow<T> + Into<Arc<T>>>(
     value: V,
 ) -> Arc<T> {
     let mut board = lock(board);
-    if let Some(held) = board.get(&name).filter(|held| **held == *value.borrow()) {
+    if let Some(held) = board.find(&name, |held| *held == *value.borrow()) {
         return held;
     }
     let value = value.into();
@@ -133,6 +142,11 @@ mod tests {
         // A poisoner that says another thing under the same name.
         let other = shelf.vector(id(1), vec![1.0, 3.0]);
         assert_eq!((&*first, &*other), (&[1.0, 2.0][..], &[1.0, 3.0][..]));
+        let again = [vec![1.0, 2.0], vec![1.0, 3.0]].map(|vector| shelf.vector(id(1), vector));
+        assert!(
+            Arc::ptr_eq(&first, &again[0]) && Arc::ptr_eq(&other, &again[1]),
+            "each of both is held once"
+        );
         assert!(!Arc::ptr_eq(&first, &shelf.vector(id(2), vec![1.0, 2.0])), "of another name");
     }
 

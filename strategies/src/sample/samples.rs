@@ -16,9 +16,9 @@ pub struct HeldSamples {
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
     /// How many external ones there are, by author.
-    authors: BTreeMap<RobotId, usize>,
+    authors: BTreeMap<RobotId, u32>,
     /// The same the other way round: who has most is asked for each sample that comes into a full set.
-    by_number: BTreeSet<(usize, RobotId)>,
+    by_number: BTreeSet<(u32, RobotId)>,
     arrivals: u64,
 }
 
@@ -72,15 +72,15 @@ impl HeldSamples {
 
     /// The other robots of whom a sample is held, ascending, each with how many.
     pub fn authors(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
-        self.authors.iter().map(|(author, held)| (*author, *held))
+        self.authors.iter().map(|(author, held)| (*author, *held as usize))
     }
 
     /// The same in the order of how many, the most first; of equals the greater name first.
     pub(crate) fn authors_of_most(&self) -> impl Iterator<Item = (RobotId, usize)> + '_ {
-        self.by_number.iter().rev().map(|(held, author)| (*author, *held))
+        self.by_number.iter().rev().map(|(held, author)| (*author, *held as usize))
     }
 
-    fn count_author(&mut self, author: RobotId, held: usize) {
+    fn count_author(&mut self, author: RobotId, held: u32) {
         let before = if held == 0 { self.authors.remove(&author) } else { self.authors.insert(author, held) };
         self.by_number.remove(&(before.unwrap_or_default(), author));
         if held > 0 {

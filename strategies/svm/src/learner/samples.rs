@@ -20,16 +20,14 @@ pub(super) enum Key {
 pub(super) struct KernelRow {
     pub key: Key,
     pub vector: Arc<[f32]>,
-    /// Its place in the kernel that several learners share, where it is one of theirs.
-    shared: Option<usize>,
     /// For each class, the kernel with its samples, in their order: what a pair of classes needs of the matrix lies
     /// side by side. Worked out when it is first asked for: of most samples no machine ever asks.
     kernel: OnceLock<Vec<Vec<f32>>>,
 }
 
 impl KernelRow {
-    pub fn new(key: Key, vector: Arc<[f32]>, shared: Option<usize>) -> Self {
-        Self { key, vector, shared, kernel: OnceLock::new() }
+    pub fn new(key: Key, vector: Arc<[f32]>) -> Self {
+        Self { key, vector, kernel: OnceLock::new() }
     }
 }
 
@@ -46,6 +44,8 @@ pub(super) struct Place {
 pub(super) struct KernelMatrix {
     gamma: f32,
     classes: Vec<Vec<KernelRow>>,
+    /// The places that those have in the kernel of several learners, side by side: a row is mostly looked up there.
+    shared: Vec<Vec<Option<u32>>>,
     places: BTreeMap<Key, Place>,
     /// As many samples there will be at least, by class.
     room: Vec<usize>,
@@ -56,14 +56,18 @@ pub(super) struct KernelMatrix {
 impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
         let (places, room) = (BTreeMap::new(), vec![0; classes]);
-        Self { gamma, classes: (0..classes).map(|_| Vec::new()).collect(), places, room, known: None }
+        let shared = vec![Vec::new(); classes];
+        let classes = (0..classes).map(|_| Vec::new()).collect();
+        Self { gamma, classes, shared, places, room, known: None }
     }
 
     /// From now on looks there first.
     pub fn share(&mut self, known: Arc<SharedKernel>) {
-        for sample in self.classes.iter_mut().flatten() {
-            sample.shared = known.place(&sample.vector);
-        }
+        let places_of = |samples: &Vec<KernelRow>| {
+            let places = samples.iter().map(|sample| known.place(&sample.vector));
+            places.collect()
+        };
+        self.shared = self.classes.iter().map(places_of).collect();
         self.known = Some(known);
     }
 
@@ -79,6 +83,7 @@ impl KernelMatrix {
         let rows = self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut());
         rows.for_each(|row| row.push(Vec::new()));
         self.classes.push(Vec::new());
+        self.shared.push(Vec::new());
         self.room.push(0);
     }
 
@@ -119,7 +124,7 @@ impl KernelMatrix {
     /// Puts a sample at the end of its class.
     pub fn insert(&mut self, key: Key, class: usize, vector: Arc<[f32]>) -> Place {
         let shared = self.known.as_ref().and_then(|known| known.place(&vector));
-        let new = KernelRow::new(key, vector, shared);
+        let new = KernelRow::new(key, vector);
         let lengths: Vec<usize> = self
             .classes
             .iter()
@@ -130,13 +135,13 @@ impl KernelMatrix {
         let is_last = count(&self.classes) + 1 >= self.room.iter().sum();
         let mut own = is_last.then(|| lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
         let known = self.known.as_ref().map(|known| known.row(shared));
-        for (of, samples) in self.classes.iter_mut().enumerate() {
-            for sample in samples {
+        for (of, (samples, places)) in self.classes.iter_mut().zip(&self.shared).enumerate() {
+            for (sample, place) in samples.iter_mut().zip(places) {
                 let Some(row) = sample.kernel.get_mut() else {
                     own = None;
                     continue;
                 };
-                let known = known.as_ref().and_then(|known| known.with(sample.shared));
+                let known = known.as_ref().and_then(|known| known.with(*place));
                 let value = known.unwrap_or_else(|| kernel(self.gamma, &sample.vector, &new.vector));
                 push(&mut row[class], value);
                 if let Some(own) = &mut own {
@@ -150,13 +155,14 @@ impl KernelMatrix {
             // It has none yet.
             let _ = new.kernel.set(own);
         }
-        self.append(class, new)
+        self.append(class, new, shared)
     }
 
     /// Takes a sample out.
     pub fn remove(&mut self, place: Place) {
         let Place { class, position } = place;
         let gone = self.classes[class].swap_remove(position);
+        self.shared[class].swap_remove(position);
         for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut()) {
             row[class].swap_remove(position);
         }
@@ -171,14 +177,16 @@ impl KernelMatrix {
             push(&mut row[class], value);
         }
         let sample = self.classes[place.class].swap_remove(place.position);
+        let shared = self.shared[place.class].swap_remove(place.position);
         self.moved(place);
-        self.append(class, sample)
+        self.append(class, sample, shared)
     }
 
-    fn append(&mut self, class: usize, sample: KernelRow) -> Place {
+    fn append(&mut self, class: usize, sample: KernelRow, shared: Option<u32>) -> Place {
         let place = Place { class, position: self.classes[class].len() };
         self.places.insert(sample.key, place);
         self.classes[class].push(sample);
+        self.shared[class].push(shared);
         place
     }
 
@@ -191,19 +199,20 @@ impl KernelMatrix {
 
     /// The kernel of a sample with all: what others have of it already is looked up.
     fn work_out(&self, place: Place) -> Vec<Vec<f32>> {
-        let of = self.at(place);
-        let known = self.known.as_ref().map(|known| known.row(of.shared));
-        let with = |other: &KernelRow| {
-            let known = known.as_ref().and_then(|known| known.with(other.shared));
-            let theirs = || other.kernel.get().map(|row| row[place.class][place.position]);
-            known.or_else(theirs).unwrap_or_else(|| kernel(self.gamma, &other.vector, &of.vector))
-        };
-        let of_class = |(samples, room): (&Vec<KernelRow>, &usize)| {
+        let (of, its) = (self.at(place), self.shared[place.class][place.position]);
+        let known = self.known.as_ref().map(|known| known.row(its));
+        let theirs = |other: &KernelRow| other.kernel.get().map(|row| row[place.class][place.position]);
+        let reckoned = |other: &KernelRow| kernel(self.gamma, &other.vector, &of.vector);
+        let all = self.classes.iter().zip(&self.shared).zip(&self.room);
+        let of_class = |((samples, places), room): ((&Vec<KernelRow>, &Vec<Option<u32>>), &usize)| {
             let mut row = Vec::with_capacity(roomy_for(samples.len(), *room));
-            row.extend(samples.iter().map(with));
+            row.extend(places.iter().zip(samples).map(|(place, other)| {
+                let known = known.as_ref().and_then(|known| known.with(*place));
+                known.or_else(|| theirs(other)).unwrap_or_else(|| reckoned(other))
+            }));
             row
         };
-        self.classes.iter().zip(&self.room).map(of_class).collect()
+        all.map(of_class).collect()
     }
 }
 

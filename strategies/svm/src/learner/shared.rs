@@ -25,9 +25,9 @@ pub struct SharedKernel {
 struct Known {
     vectors: Vec<Arc<[f32]>>,
     /// By address.
-    places: BTreeMap<usize, usize>,
+    places: BTreeMap<usize, u32>,
     rows: Vec<Vec<f32>>,
-    free: Vec<usize>,
+    free: Vec<u32>,
     /// At how many vectors it is looked through for those that nobody holds.
     full: usize,
 }
@@ -71,12 +71,12 @@ impl SharedKernel {
     }
 
     /// The place of a vector that is held.
-    pub(super) fn place(&self, vector: &Arc<[f32]>) -> Option<usize> {
+    pub(super) fn place(&self, vector: &Arc<[f32]>) -> Option<u32> {
         self.read().places.get(&address(vector)).copied()
     }
 
     /// What is known of the vector at that place. A learner holds the vector, so it stays there.
-    pub(super) fn row(&self, place: Option<usize>) -> Row<'_> {
+    pub(super) fn row(&self, place: Option<u32>) -> Row<'_> {
         Row { known: self.read(), place }
     }
 
@@ -88,12 +88,12 @@ impl SharedKernel {
 /// The kernel of one vector with all others.
 pub(super) struct Row<'a> {
     known: RwLockReadGuard<'a, Known>,
-    place: Option<usize>,
+    place: Option<u32>,
 }
 
 impl Row<'_> {
-    pub fn with(&self, other: Option<usize>) -> Option<f32> {
-        self.known.rows.get(self.place?)?.get(other?).copied()
+    pub fn with(&self, other: Option<u32>) -> Option<f32> {
+        self.known.rows.get(self.place? as usize)?.get(other? as usize).copied()
     }
 }
 
@@ -105,7 +105,9 @@ impl Known {
         if self.free.is_empty() && self.vectors.len() >= self.full {
             self.let_go();
         }
-        let place = self.free.pop().unwrap_or(self.vectors.len());
+        // As many as there is no number for would take an EiB.
+        let number = self.free.pop().unwrap_or(self.vectors.len() as u32);
+        let place = number as usize;
         match self.vectors.get_mut(place) {
             Some(free) => *free = vector.clone(),
             None => {
@@ -118,12 +120,12 @@ impl Known {
             if place < other.len() { other[place] = *value } else { push(other, *value) }
         }
         self.rows[place] = row;
-        self.places.insert(address(vector), place);
+        self.places.insert(address(vector), number);
     }
 
     /// Frees the places of vectors that nobody else holds.
     fn let_go(&mut self) {
-        for (place, vector) in self.vectors.iter().enumerate() {
+        for (place, vector) in (0..).zip(&self.vectors) {
             // Nobody can hold it again: it is handed out nowhere.
             if Arc::strong_count(vector) == 1 && self.places.remove(&address(vector)).is_some() {
                 self.free.push(place);
