@@ -7,7 +7,7 @@ use gestalt_protocol::{
     Envelope, FrameHeader, ImageEncoding, Message, RobotId, RoundId, Signature, Stamp, VocabularyId, Vote,
 };
 use gestalt_trust::{
-    Budget, Ed25519, FrameClaim, FrameSigner, Identity, Membership, Roster, Verifier, statement,
+    Budget, Channels, Ed25519, FrameClaim, FrameSigner, Identity, Membership, Roster, Verifier, statement,
 };
 
 const CAMERA: RobotId = RobotId(1);
@@ -89,6 +89,24 @@ fn check_known_votes(bencher: divan::Bencher, robots: u32) {
     };
     check();
     bencher.bench_local(check);
+}
+
+/// What one robot tells another alone, once they have spoken.
+#[divan::bench]
+fn tag_what_is_told(bencher: divan::Bencher) {
+    let (roster, said) = (roster(2), vote(0));
+    let mut channels = Channels::new(RobotId(0), Arc::new(robot(0)), roster.swarm_id());
+    bencher.bench_local(|| channels.tag(&roster, RobotId(1), divan::black_box(&said)).expect("members"));
+}
+
+/// When they first speak: what they have in common is worked out.
+#[divan::bench]
+fn find_what_two_have_in_common(bencher: divan::Bencher) {
+    let (roster, said, me) = (roster(2), vote(0), Arc::new(robot(0)));
+    let new = || Channels::new(RobotId(0), me.clone(), roster.swarm_id());
+    bencher
+        .with_inputs(new)
+        .bench_refs(|channels| channels.tag(&roster, RobotId(1), &said).expect("members"));
 }
 
 /// A JPEG of so many bytes, as a camera signs it.

@@ -71,6 +71,7 @@ fn nothing_counts_twice_or_behind_what_was_said_after_it() {
         assert_eq!(hears(at(1, boot)), Ok(()), "it speaks on");
     }
     assert_eq!(hears(at(1, 4)), Err(Distrust::Repeated));
+    assert_eq!(two.with[&ONE].heard.len(), REMEMBERED, "and no more is kept");
 }
 
 #[test]
