@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::ops::Range;
-use std::panic::resume_unwind;
+use std::ops::RangeInclusive;
 
 /// What an attacker has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,49 +101,42 @@ pub struct Verdict {
     pub refused: BTreeMap<String, u64>,
 }
 
-impl Verdict {
-    fn add(&mut self, seed: u64, counted: Result<(), String>, played: Played) {
-        if let (true, Err(error)) = (self.reached.is_ok(), played.reached.and(counted)) {
-            self.reached = Err(format!("seed {seed}: {error}"));
-        }
-        for (counter, times) in played.refused {
-            *self.refused.entry(counter).or_default() += times;
-        }
+impl Default for Verdict {
+    fn default() -> Self {
+        Self { reached: Ok(()), refused: BTreeMap::new() }
     }
 }
 
 impl Attack {
-    /// Plays it with the seeds from 1 to that number; a gap until one of them shows it.
-    #[must_use]
-    pub fn run(&self, seeds: u64) -> Verdict {
-        let mut verdict = Verdict { reached: Ok(()), refused: BTreeMap::new() };
-        let at_once = if self.gap.is_some() { 1 } else { seeds };
-        for first in (1..=seeds).step_by(at_once.max(1) as usize) {
-            for (seed, played) in self.play_all(first..first + at_once) {
-                verdict.add(seed, self.check_counters(&played), played);
-            }
-            if verdict.reached.is_err() {
+    /// What comes of these seeds, one after the other, up to the first with which what is expected is not reached.
+    pub(crate) fn play_until_shown(&self, seeds: RangeInclusive<u64>) -> Vec<(u64, Played)> {
+        let mut played: Vec<(u64, Played)> = Vec::new();
+        for seed in seeds {
+            if played.last().is_some_and(|(_, before)| self.met(before).is_err()) {
                 break;
+            }
+            played.push((seed, (self.play)(seed)));
+        }
+        played
+    }
+
+    /// What all of them come to.
+    pub(crate) fn judge(&self, played: BTreeMap<u64, Played>) -> Verdict {
+        let mut verdict = Verdict::default();
+        for (seed, played) in played {
+            if let (true, Err(error)) = (verdict.reached.is_ok(), self.met(&played)) {
+                verdict.reached = Err(format!("seed {seed}: {error}"));
+            }
+            for (counter, times) in played.refused {
+                *verdict.refused.entry(counter).or_default() += times;
             }
         }
         verdict
     }
 
-    /// What came of each seed, in their order; played on all cores.
-    fn play_all(&self, seeds: Range<u64>) -> BTreeMap<u64, Played> {
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let play = self.play;
-        let share = |nth: usize| {
-            let seeds = seeds.clone().skip(nth).step_by(cores);
-            move || seeds.map(|seed| (seed, play(seed))).collect::<Vec<_>>()
-        };
-        std::thread::scope(|scope| {
-            let shares: Vec<_> = (0..cores).map(|nth| scope.spawn(share(nth))).collect();
-            // What panicked there panics here.
-            let joined =
-                shares.into_iter().map(|share| share.join().unwrap_or_else(|panic| resume_unwind(panic)));
-            joined.flatten().collect()
-        })
+    /// Whether one run came to what is expected, and everything that must be counted was.
+    fn met(&self, played: &Played) -> Result<(), String> {
+        played.reached.clone().and_then(|()| self.check_counters(played))
     }
 
     /// Whether that verdict is the one that the line announces: reached what is promised, and not what is a gap, so that a gap

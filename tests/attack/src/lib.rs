@@ -17,8 +17,10 @@ pub mod attack;
 pub mod attacks;
 mod beside;
 mod forged;
+mod on_all_cores;
 pub mod swarm;
 pub mod table;
 
 pub use attack::{Attack, Counted, Played, Setting, Tier};
 pub use attacks::all;
+pub use on_all_cores::run;

@@ -5,20 +5,20 @@ use std::time::Instant;
 
 use crate::attack::{Attack, Counted, Verdict};
 use crate::attacks::all;
+use crate::on_all_cores;
 
 /// Plays the attacks of these numbers, or all, and prints what comes of each; whether all came to what their line says.
 #[must_use]
 pub fn print(numbers: &[String], seeds: u64) -> bool {
     let began = Instant::now();
-    let wanted = |attack: &&Attack| {
+    let wanted = |attack: &Attack| {
         numbers.is_empty() || attack.number.split(" · ").any(|n| numbers.iter().any(|w| w == n))
     };
     let (mut reached, mut gaps, mut failed) = (0, 0, 0);
     println!("{:<10} {:<6} {:<2}  {:<8} attack → expected", "number", "swarm", "", "reached");
-    for attack in all().iter().filter(wanted) {
-        let started = Instant::now();
-        let verdict = attack.run(seeds);
-        let took = started.elapsed().as_secs_f64();
+    let attacks: Vec<Attack> = all().into_iter().filter(|attack| wanted(attack)).collect();
+    on_all_cores::play(&attacks, seeds, |attack, verdict, took| {
+        let took = took.as_secs_f64();
         let answer = attack.check(&verdict);
         let word = match (&answer, attack.gap) {
             (Err(_), _) => "FAILED",
@@ -40,7 +40,7 @@ pub fn print(numbers: &[String], seeds: u64) -> bool {
         if let Err(error) = answer {
             println!("{:<31} FAILED: {error}", "");
         }
-    }
+    });
     println!(
         "{} attacks, {seeds} seeds each: {reached} come to nothing or to what is bounded, {gaps} open, {failed} FAILED · {:.1} s",
         reached + gaps + failed,
