@@ -16,6 +16,7 @@ use gestalt_protocol::{Envelope, Keys, Message, RobotId, RoundId, Stamp, Topic, 
 use gestalt_strategies::MindConfig;
 use gestalt_trust::{Identity, Instructor, Membership, Roles, Roster, statement};
 use serde_json::Value;
+use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
@@ -24,8 +25,8 @@ const SAMPLES: u32 = 300;
 /// A robot that decides on the votes of another, which are put by hand.
 struct Neighbour {
     robot: Robot,
-    voter: Session,
-    vote_key: String,
+    _voter: Session,
+    votes: Publisher<'static>,
     holds: mpsc::Receiver<Instant>,
 }
 
@@ -60,12 +61,13 @@ impl Neighbour {
             }
         });
         let vote_key = Keys::new(swarm).expect("a swarm's name").key(&Topic::Vote(RobotId(0)));
-        Self { robot, voter, vote_key, holds }
+        let votes = publisher(&voter, vote_key).await;
+        Self { robot, _voter: voter, votes, holds }
     }
 
     /// How long after this vote it decides.
     fn decides(&self, vote: Vec<u8>) -> Duration {
-        let began = put(&self.voter, &self.vote_key, vote);
+        let began = put(&self.votes, vote);
         let held = self.holds.recv_timeout(Duration::from_secs(5));
         let held = held.unwrap_or_else(|_| panic!("the robot does not decide: {:#?}", self.robot.status()));
         std::thread::sleep(Duration::from_millis(10));
@@ -74,15 +76,15 @@ impl Neighbour {
 
     /// Lets it take part in a round.
     fn hears(&self, vote: Vec<u8>) {
-        put(&self.voter, &self.vote_key, vote);
+        put(&self.votes, vote);
         std::thread::sleep(Duration::from_millis(10));
     }
 }
 
 /// Two sessions that know nothing of robots.
 struct Raw {
-    sender: Session,
-    _receiver: Session,
+    votes: Publisher<'static>,
+    _sessions: [Session; 2],
     arrivals: mpsc::Receiver<Instant>,
 }
 
@@ -102,11 +104,12 @@ impl Raw {
             .background()
             .await
             .expect("a subscriber");
-        Self { sender, _receiver: receiver, arrivals }
+        let votes = publisher(&sender, "raw/vote".to_owned()).await;
+        Self { votes, _sessions: [sender, receiver], arrivals }
     }
 
     fn arrives(&self, vote: Vec<u8>) -> Duration {
-        let began = put(&self.sender, "raw/vote", vote);
+        let began = put(&self.votes, vote);
         let arrived = self.arrivals.recv_timeout(Duration::from_secs(5)).expect("the put arrives");
         std::thread::sleep(Duration::from_millis(10));
         arrived - began
@@ -209,15 +212,15 @@ fn votes(sample: u32) -> [Envelope; 3] {
     ]
 }
 
-fn put(session: &Session, key: &str, bytes: Vec<u8>) -> Instant {
+/// One as robots declare it for their votes.
+async fn publisher(session: &Session, key: String) -> Publisher<'static> {
+    let declared = session.declare_publisher(key).priority(Priority::DataHigh);
+    declared.congestion_control(CongestionControl::Drop).express(true).await.expect("a publisher")
+}
+
+fn put(votes: &Publisher<'_>, bytes: Vec<u8>) -> Instant {
     let began = Instant::now();
-    session
-        .put(key, bytes)
-        .priority(Priority::DataHigh)
-        .congestion_control(CongestionControl::Drop)
-        .express(true)
-        .wait()
-        .expect("the session sends");
+    votes.put(bytes).wait().expect("the session sends");
     began
 }
 

@@ -18,6 +18,7 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::session::ZenohId;
 
 use super::account::{Account, Refusal};
+use super::checks::Checks;
 use super::roll::Roll;
 use super::ways::Ways;
 use super::words::{Vouched, Words};
@@ -46,6 +47,7 @@ pub(super) struct Inbox {
     loss: f64,
     chance: Mutex<ChaCha8Rng>,
     pub(super) ready: Notify,
+    checks: Checks,
     pub(super) unrest: Notify,
     pub(super) lost_links: watch::Sender<u64>,
 }
@@ -75,6 +77,13 @@ pub(super) struct State {
     pub(super) vouched: Vec<Vouched>,
 }
 
+impl State {
+    /// Whether there is nothing to take.
+    fn is_empty(&self) -> bool {
+        !self.alive_changed && !self.links_changed && self.queue.is_empty() && self.votes.is_empty()
+    }
+}
+
 impl fmt::Debug for Inbox {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Inbox").field("me", &self.me).finish_non_exhaustive()
@@ -102,6 +111,7 @@ impl Inbox {
             loss,
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
+            checks: Checks::default(),
             unrest: Notify::new(),
             lost_links: watch::Sender::new(0),
         }
@@ -149,6 +159,9 @@ impl Inbox {
 
     /// Takes everything that has arrived, changes of the neighbourhood first.
     pub(super) fn take(&self) -> Vec<Input> {
+        if self.lock().is_empty() {
+            self.checks.wait();
+        }
         let mut state = self.lock();
         let state = &mut *state;
         let mut inputs = Vec::with_capacity(state.queue.len() + state.votes.len() + 2);
@@ -197,8 +210,8 @@ impl Inbox {
         let bytes = sample.payload().len();
         match taken {
             Ok(()) => {
-                self.account.received(kind, bytes);
                 self.ready.notify_one();
+                self.account.received(kind, bytes);
             }
             Err(cause) => {
                 let found = matches!(cause, Refusal::Distrust(Distrust::Convicted));
@@ -224,6 +237,7 @@ impl Inbox {
         if !matches!(envelope.message, Message::Vote(_)) {
             return Err(Refusal::Kind);
         }
+        let _under_way = self.is_sealed().then(|| self.checks.begin(&self.ready));
         self.believe(&envelope)?;
         let mut state = self.lock();
         if id == self.me {

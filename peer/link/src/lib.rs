@@ -15,6 +15,7 @@ mod believer;
 mod boot;
 mod cells;
 mod census;
+mod checks;
 mod client;
 mod config;
 mod deafness;

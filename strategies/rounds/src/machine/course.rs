@@ -130,7 +130,7 @@ impl Rounds {
         self.enter(id, true, effects);
         (effects.carry_out)(Output::Opened(id));
         self.partners.hurry(self.now, self.config.repair_busy);
-        self.speak(effects);
+        self.speak();
     }
 
     /// Makes this the newest round known, with or without taking part in it.

@@ -92,7 +92,7 @@ impl Rounds {
                 let held = round.agreement.held();
                 held.is_none_or(|held| held.class != holding.class && held.rank() < holding.rank)
             }
-            Some(round) => round.id < holding.round,
+            Some(round) => newer(holding.round, Some(true), round).is_gt(),
             None => true,
         }
     }
@@ -131,20 +131,20 @@ impl Rounds {
         self.round.as_ref().is_some_and(|round| round.is_named(id) || opened_at_once(round))
     }
 
-    /// Where a round that was heard of stands to the newest one known.
-    pub(super) fn compare(&self, id: RoundId) -> Ordering {
+    /// Where a round that was heard of stands to the newest one known. `decided`: whether something was decided in it; `None` while it may yet be.
+    pub(super) fn compare(&self, id: RoundId, decided: Option<bool>) -> Ordering {
         match &self.round {
             None => Ordering::Greater,
             Some(_) if self.is_this_round(id) => Ordering::Equal,
-            Some(round) => id.cmp(&round.id),
+            Some(round) => newer(id, decided, round),
         }
     }
 
     /// The same, of a round that robots are in, `by` whose vote; refuses one too far ahead, or too soon. Rounds opened at the same time
-    /// merge here, on the smaller name; of others with equal counters, the greater name is the newer, for all alike.
+    /// merge here, on the smaller name.
     fn place(
         &mut self,
-        id: RoundId,
+        (id, decided): (RoundId, Option<bool>),
         this: bool,
         by: Option<RobotId>,
         effects: &mut Effects<'_>,
@@ -163,7 +163,7 @@ impl Rounds {
         let order = match &self.round {
             None => Ordering::Greater,
             Some(_) if this => Ordering::Equal,
-            Some(round) => id.cmp(&round.id),
+            Some(round) => newer(id, decided, round),
         };
         if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
             effects.follower.merged(round.id, id);
@@ -230,7 +230,7 @@ impl Rounds {
             return false;
         }
         let this = self.is_this_round(vote.round);
-        let order = match self.place(vote.round, this, Some(robot), effects) {
+        let order = match self.place((vote.round, None), this, Some(robot), effects) {
             Err(refusal) => {
                 if refusal == Refusal::TooSoon {
                     self.keep_waiting(held);
@@ -301,7 +301,7 @@ impl Rounds {
             return Heard::Refused;
         }
         let displaced = !this && self.is_displaced_by(decision.round);
-        match self.place(decision.round, this, None, effects) {
+        match self.place((decision.round, Some(decision.class.is_some())), this, None, effects) {
             Err(_) | Ok(Ordering::Less) => return Heard::Refused,
             // The gesture of a round of this robot's own is still shown.
             Ok(Ordering::Greater) if displaced => {
@@ -367,6 +367,20 @@ impl Rounds {
         self.refusals.add(Refusal::DuplicateId);
         self.duplicate = Some(stamp);
     }
+}
+
+/// Whether a round is newer than the one known here, which belongs to another showing. Of two under one count the greater name is, for all alike; but of two that
+/// are over, one in which nothing was decided gives way to one in which something was: a part of a cut swarm that is too small to decide goes through rounds
+/// of its own.
+fn newer(id: RoundId, decided: Option<bool>, known: &Round) -> Ordering {
+    let known_decided = known.agreement.rank().map(|rank| rank.decided);
+    let by_outcome = match (decided, known_decided) {
+        (Some(decided), Some(known_decided)) if id.counter == known.id.counter && !known.open => {
+            decided.cmp(&known_decided)
+        }
+        _ => Ordering::Equal,
+    };
+    by_outcome.then(id.cmp(&known.id))
 }
 
 /// What became of a decision that was heard.

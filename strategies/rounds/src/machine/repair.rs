@@ -52,7 +52,8 @@ impl Rounds {
             return;
         }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
-        let order = have.round.map_or(Ordering::Less, |id| self.compare(id));
+        let decided = have.decision.map(|rank| rank.decided);
+        let order = have.round.map_or(Ordering::Less, |id| self.compare(id, decided));
         let (give, lacks) = (self.lacking_there(from, order, have), self.lacking_here(order, have));
         // What is given or answered now may be lost.
         if (give.is_some() || lacks)

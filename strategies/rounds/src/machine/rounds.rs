@@ -107,6 +107,8 @@ pub struct Rounds {
     /// What gestures are called that were named since.
     pub(super) names: BTreeMap<ClassId, String>,
     pub(super) signer: Option<Arc<dyn Sign>>,
+    /// The votes that were cast, and that others are yet to be told.
+    pub(super) unsaid: Vec<Envelope>,
     /// The stamp of the last message said.
     pub(super) stamp: Stamp,
     pub(super) now: Duration,
@@ -168,6 +170,7 @@ impl Rounds {
             vocabulary: None,
             names: BTreeMap::new(),
             signer: None,
+            unsaid: Vec::new(),
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
             round: None,
@@ -309,7 +312,7 @@ impl Rounds {
 
     /// Does whatever is due.
     fn advance(&mut self, effects: &mut Effects<'_>) {
-        self.speak(effects);
+        self.speak();
         self.decide(effects);
         if self.closing().is_some_and(|due| self.now >= due) {
             self.close(effects);
@@ -324,6 +327,8 @@ impl Rounds {
         if !self.is_open() {
             self.hear_waiting(effects);
         }
+        // Those of a round that was joined just now.
+        self.say_votes(effects);
         if self.looking_until(effects.follower).is_some_and(|until| self.now >= until) {
             self.stop_looking(effects);
         }

@@ -31,31 +31,42 @@ impl Rounds {
         self.on_alive(others);
     }
 
-    /// Says this robot's vote when it is due.
-    pub(super) fn speak(&mut self, effects: &mut Effects<'_>) {
+    /// Casts this robot's vote when it is due. Others are told of it by [`say_votes`](Self::say_votes).
+    pub(super) fn speak(&mut self) {
         let vocabulary = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
         let Some(round) = self.round.as_mut() else { return };
         let signer = self.signer.as_deref();
         let mut speaker =
             Speaker { me: self.me, stamp: &mut self.stamp, vocabulary, blind: self.blind, signer };
-        let said = round.speak(self.now, &mut speaker, &self.config);
-        if let Some(said) = said {
-            (effects.carry_out)(Output::Broadcast(said));
+        self.unsaid.extend(round.speak(self.now, &mut speaker, &self.config));
+    }
+
+    pub(super) fn say_votes(&mut self, effects: &mut Effects<'_>) {
+        for vote in self.unsaid.drain(..) {
+            (effects.carry_out)(Output::Broadcast(vote));
         }
     }
 
     /// Concludes when the votes suffice or the time is over, and holds the greatest decision known.
     pub(super) fn decide(&mut self, effects: &mut Effects<'_>) {
         self.conclude(effects);
-        let Some(round) = self.round.as_mut() else { return };
-        // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
-        let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
-        if let Some(decision) = round.agreement.settle(self.now, or_none) {
-            effects.follower.settled(decision, self.config.clip);
-            (effects.carry_out)(Output::Hold(decision.clone()));
-            // Signed when it is held already, for that takes as long as all that is done with a vote.
+        let holds = self.settle(effects);
+        // The program around this robot does not wait until others are told: that takes as long as all that is done with a vote, as signing does.
+        self.say_votes(effects);
+        if holds {
             self.say_holding(effects);
         }
+    }
+
+    /// Holds the greatest decision known; whether that is another one than before.
+    fn settle(&mut self, effects: &mut Effects<'_>) -> bool {
+        let Some(round) = self.round.as_mut() else { return false };
+        // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
+        let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
+        let Some(decision) = round.agreement.settle(self.now, or_none) else { return false };
+        effects.follower.settled(decision, self.config.clip);
+        (effects.carry_out)(Output::Hold(decision.clone()));
+        true
     }
 
     fn conclude(&mut self, effects: &mut Effects<'_>) {

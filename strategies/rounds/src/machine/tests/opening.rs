@@ -275,3 +275,44 @@ fn a_round_under_a_count_that_was_used_elsewhere_is_opened_anew() {
     merges.handle(ms(60_100), gives(9, decision(1, Some(2), 3, 9)));
     assert_eq!((merges.round(), merges.held().unwrap().class), (Some(round(1, 1)), Some(ClassId(2))));
 }
+
+/// What robot 9 decided of that round on `counted` votes of it, 5 s after it began.
+fn drawn_late(id: RoundId, class: Option<u32>, counted: u32) -> Decision {
+    let votes = decision(id.counter, Some(0), counted, 9).certificate.votes;
+    let votes = votes.into_iter().map(|counted| {
+        let vote = Vote { round: id, ..counted.vote };
+        gestalt_protocol::CountedVote { vote, ..counted }
+    });
+    let drawn = decided(id, class, votes.collect(), 9);
+    let certificate = gestalt_protocol::Certificate { elapsed_ms: 5000, ..drawn.certificate };
+    Decision { certificate, ..drawn }
+}
+
+#[test]
+fn a_round_in_which_nothing_was_decided_gives_way_to_one_under_its_count_in_which_something_was() {
+    // Robot 7 was cut off, and went through the showing alone; the others had another one later.
+    for (elsewhere, by) in [(1, "the smaller"), (9, "the greater")] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Open);
+        live(&mut mind, ms(9000));
+        assert_eq!((mind.round(), mind.held().unwrap().class), (Some(round(1, 7)), None));
+        let theirs = drawn_late(round(1, elsewhere), Some(0), 3);
+        let have = Have {
+            round: Some(theirs.round),
+            decision: Some(theirs.rank()),
+            holders: 0,
+            votes: vec![],
+            knowledge: None,
+            answer: false,
+        };
+        let out = mind.handle(ms(9001), says(9, 1, Message::Have(have)));
+        let asked = told(&out);
+        assert!(matches!(&asked[..], [(9, Message::Have(_))]), "{by} name: it asks for it: {asked:?}");
+        mind.handle(ms(9002), gives(9, theirs.clone()));
+        assert_eq!(mind.held(), Some(&theirs), "{by} name");
+        assert!(!mind.is_open());
+        // And what was decided gives way to nothing.
+        mind.handle(ms(9003), gives(8, drawn_late(round(1, 12), None, 2)));
+        assert_eq!(mind.held(), Some(&theirs), "{by} name");
+    }
+}

@@ -27,7 +27,7 @@ impl Sign for Scribe {
 }
 
 #[test]
-fn a_decision_is_held_before_anything_about_it_is_signed() {
+fn a_decision_is_held_before_anything_about_it_is_signed_or_anybody_told() {
     let course = Course::default();
     let mut mind = blind(7).signed_by(Arc::new(Scribe(course.clone())));
     let mut note = |output: Output| {
@@ -40,7 +40,7 @@ fn a_decision_is_held_before_anything_about_it_is_signed() {
         course.lock().unwrap().push(done.to_owned());
     };
     mind.handle_into(ms(0), votes(1, 1, vote(1, 2, SURE)), &mut (), &mut note);
-    let expected = ["signs its vote", "votes", "holds", "signs what it holds", "says what it holds"];
+    let expected = ["signs its vote", "holds", "votes", "signs what it holds", "says what it holds"];
     assert_eq!(*course.lock().unwrap(), expected);
     // Whoever asks is answered under a stamp of its own, which is signed when somebody does.
     let before = course.lock().unwrap().len();
