@@ -1,6 +1,7 @@
 //! Whole swarms in the emulated network.
 
 mod certified;
+mod partition;
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,0 +1,28 @@
+//! A swarm that falls apart for a minute and comes together again.
+
+use super::*;
+
+#[test]
+fn five_seconds_after_a_cut_of_a_minute_all_hold_one_decision_and_know_the_same() {
+    let (interval, rounds) = (Duration::from_secs(6), 14);
+    let healed = interval * rounds - Duration::from_secs(5);
+    for seed in 0..10 {
+        // Four and five of a ring, at another moment of the round each time.
+        let cut = Duration::from_millis(12_000 + seed * 137 % 4000);
+        let both = |at, event: fn(RobotId, RobotId) -> Event| {
+            [(1, 9), (4, 5)].map(|(a, b)| Fault { at, event: event(RobotId(a), RobotId(b)) })
+        };
+        let faults = [both(cut, Event::Cut), both(healed, Event::Heal)].concat();
+        let scenario = Scenario { faults, rounds, interval, ..learning(9, 0.5, NetworkShape::Ring) };
+        let mut emulation = emulation(&scenario, seed);
+        while emulation.show_next() {}
+        let known = |i| {
+            let common = emulation.training_set(i).unwrap().common();
+            common.filter_map(|sample| Some((sample.id?, sample.class))).collect::<BTreeSet<_>>()
+        };
+        let first = known(0);
+        assert!(!first.is_empty() && (1..9).all(|i| known(i) == first), "seed {seed}");
+        let (report, _) = emulation.finish();
+        assert!(report.agreed_at_the_end, "seed {seed}: {report:?}");
+    }
+}
