@@ -16,7 +16,8 @@ pub const ROBOTS: usize = 3;
 /// The most messages that are on their way, and the most that are remembered to be said again.
 const MOST: usize = 256;
 
-fn everybody() -> BTreeSet<RobotId> {
+/// The honest robots.
+pub fn everybody() -> BTreeSet<RobotId> {
     (1..=ROBOTS as u32).map(RobotId).collect()
 }
 
