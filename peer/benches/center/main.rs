@@ -2,8 +2,8 @@
 //! interface. Hands come, rest and go before all of them, and rounds are opened by what they see move; then a round stays open all the
 //! while, so that every hand at rest is looked at for as long as it is.
 //!
-//! `cargo bench -p gestalt-peer --bench center`; `GESTALT_LONG=1` keeps the overload up for ten minutes, `GESTALT_PARROTS=50,100` serves so many and no
-//! others. The cameras are a process of their own and send what was encoded before: what is said of processor time and memory is
+//! `cargo bench -p gestalt-peer --bench center`; `GESTALT_PARROTS=50,100` serves so many and no others, and `GESTALT_LONG=1` does so, or keeps
+//! the overload up, for ten minutes. The cameras are a process of their own and send what was encoded before: what is said of processor time and memory is
 //! the centre's alone, though both share the machine.
 
 #[path = "../../vision/benches/bare/mod.rs"]
@@ -48,9 +48,10 @@ fn main() {
         })
     };
     let time = 3 * SCHEDULE.period;
+    let long = std::env::var_os("GESTALT_LONG").map_or(time, |_| Duration::from_secs(600));
     if let Ok(list) = std::env::var("GESTALT_PARROTS") {
         for parrots in list.split(',') {
-            serve(parrots.trim().parse().expect("GESTALT_PARROTS: numbers with commas between them"), time);
+            serve(parrots.trim().parse().expect("GESTALT_PARROTS: numbers with commas between them"), long);
         }
         return;
     }
@@ -65,8 +66,7 @@ fn main() {
         n = too_many.map_or(2 * n, |too_many| served.midpoint(too_many));
     }
     println!("served: {served} Parrots = {:.0} frames/s offered", f64::from(served) * FPS);
-    let long = std::env::var_os("GESTALT_LONG").is_some();
-    serve((2 * served).min(256), if long { Duration::from_secs(600) } else { time });
+    serve((2 * served).min(256), long);
 }
 
 /// Which rounds there are.
