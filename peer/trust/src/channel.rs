@@ -121,7 +121,7 @@ fn secret<S: Scheme>(
     theirs: &PublicKey,
 ) -> Zeroizing<[u8; 32]> {
     let mine = identity.public_key();
-    let (first, second) = if mine < *theirs { (&mine, theirs) } else { (theirs, &mine) };
+    let (first, second) = (mine.min(*theirs), mine.max(*theirs));
     let hash = Sha256::new()
         .chain_update(CHANNEL_DOMAIN)
         .chain_update(swarm.as_bytes())

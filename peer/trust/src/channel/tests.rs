@@ -103,3 +103,10 @@ fn the_tag_never_changes() {
     let tag = channels(1).tag(&roster(1), TWO, b"said").unwrap();
     assert_eq!(gestalt_protocol::hex::Hex(&tag).to_string(), "276f979e99dcf009b8d8c6b3e627dc35");
 }
+
+#[test]
+fn a_log_says_whose_they_are_and_no_secret() {
+    let mut one = channels(1);
+    one.tag(&roster(1), TWO, &have(1, 1)).unwrap();
+    assert_eq!(format!("{one:?}"), "Channels { me: RobotId(1), .. }");
+}
