@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, FusionRule, RobotId, Stamp, Topic};
-use gestalt_strategies::Mind;
+use gestalt_protocol::{FusionRule, RobotId, Stamp, Topic};
 
 use super::WHOEVER_SAYS_SO;
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
@@ -88,7 +87,7 @@ pub const ALL: &[Attack] = &[
         what: "f robots of 8 vote for the same wrong gesture at the clip, f = 1 and 2, every rule, 6 rounds each",
         tier: Tier::T4,
         setting: Setting::Open,
-        expected: "with `liars: f` no decision against what the honest saw; none at all is allowed",
+        expected: "with `liars: f` no wrong decision; none at all is allowed",
         counted: Counted::None("a robot may be wrong: it is outvoted"),
         gap: None,
         play: |seed| wrong_together(seed, true),
@@ -98,7 +97,7 @@ pub const ALL: &[Attack] = &[
         what: "f robots of 8 vote for the same wrong gesture in a swarm that expects no liars",
         tier: Tier::T4,
         setting: Setting::Open,
-        expected: "no decision against what the honest saw",
+        expected: "no wrong decision",
         counted: Counted::None("a robot may be wrong: it is outvoted, or not"),
         gap: Some("`rounds.liars` is 0 by default: who wants liars withstood has to say how many"),
         play: |seed| wrong_together(seed, false),
@@ -146,16 +145,6 @@ fn full_ballot(swarm: &mut Swarm, from: u32) {
     swarm.end(began);
 }
 
-/// Whether its gesture is another one than the votes of the honest, robots 1 to that number, speak for. They may be wrong too, by themselves.
-fn owes_to_liars(decision: &Decision, honest: u32) -> bool {
-    let mut sums = [0.0; CLASSES as usize];
-    for counted in decision.certificate.votes.iter().filter(|counted| counted.robot.0 <= honest) {
-        sums.iter_mut().zip(&counted.vote.evidence).for_each(|(sum, evidence)| *sum += evidence);
-    }
-    let most = sums.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    decision.class.is_some_and(|class| sums[class.index()] < most)
-}
-
 /// Among honest robots that see wrong in every fourth frame.
 fn wrong_together(seed: u64, expected: bool) -> Played {
     let mut wrong = Vec::new();
@@ -179,12 +168,13 @@ fn wrong_together(seed: u64, expected: bool) -> Played {
                 ));
             }
             swarm.end(began);
-            let misled = |mind: &Mind| mind.held().is_some_and(|held| owes_to_liars(held, 8 - liars));
-            for mind in swarm.minds().filter(|mind| misled(mind)) {
-                wrong.push(format!("{rule}, f = {liars}, shown {class}: {:?}", mind.held()));
-            }
             // A liar that does not speak of a round that ends undecided would leave it open into the next.
             swarm.pass(3000 * MS);
+        }
+        for shown in
+            swarm.shown().iter().filter(|shown| shown.held.contains(&Some((shown.class + 3) % CLASSES)))
+        {
+            wrong.push(format!("{rule}, f = {liars}, shown {}: {:?}", shown.class, shown.held));
         }
     }
     let reached = if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) };
