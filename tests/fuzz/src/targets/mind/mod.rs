@@ -9,7 +9,7 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 use gestalt_strategies::Mind;
 
-use self::world::{ROBOTS, World, everybody};
+use self::world::{ROBOTS, World};
 
 /// How long nothing bad happens at the end: what a robot lacks is found when its turn comes, every four seconds.
 const CALM: Duration = Duration::from_secs(60);
@@ -29,12 +29,12 @@ pub fn run(bytes: &[u8]) {
     }
     let minds: Vec<&Mind> = world.robots().iter().map(|robot| robot.mind()).collect();
     for other in &minds[1..] {
-        alike(minds[0], other, world.misled());
+        alike(&world, minds[0], other);
     }
     // What one has forgotten it gives to nobody.
     if !world.robots().iter().any(|robot| robot.forgot()) {
         for (one, other) in [(0, 1), (1, 2), (2, 0)] {
-            saw_the_same(minds[one], minds[other]);
+            saw_the_same(&world, minds[one], minds[other]);
         }
     }
 }
@@ -57,25 +57,27 @@ fn live(bytes: &[u8]) -> World {
     world
 }
 
-fn alike(one: &Mind, other: &Mind, misled: bool) {
+fn alike(world: &World, one: &Mind, other: &Mind) {
     // A round may have another name here than there: whoever opened it under that has forgotten it.
     let counter = |mind: &Mind| mind.round().map(|round| round.counter);
     let gesture = |mind: &Mind| mind.held().and_then(|held| held.class);
     // Whom a stranger has made believe in robots that are not there decides nothing, and believes nobody who counts fewer: it may not even hear of the
     // round that they decided.
-    let is_misled = misled && (gesture(one).is_none() || gesture(other).is_none());
-    if !is_misled {
+    let knows_of_none = |mind: &Mind| world.was_misled(mind.me()) && gesture(mind).is_none();
+    if !knows_of_none(one) && !knows_of_none(other) {
         assert_eq!(counter(one), counter(other), "rounds of robots {} and {}", one.me(), other.me());
+    }
+    let is_misled = world.misled() && (gesture(one).is_none() || gesture(other).is_none());
+    if !is_misled {
         assert_eq!(gesture(one), gesture(other), "robots {} and {}", one.me(), other.me());
     }
     let lessons = |mind: &Mind| mind.learned().map(|learned| learned.lessons);
     assert_eq!(lessons(one), lessons(other), "lessons of robots {} and {}", one.me(), other.me());
 }
 
-fn saw_the_same(one: &Mind, other: &Mind) {
+fn saw_the_same(world: &World, one: &Mind, other: &Mind) {
     let (Some(mine), Some(theirs)) = (one.training_set(), other.training_set()) else { return };
-    // What a stranger shares under names of its own may contradict itself: of two batches that overlap each robot keeps the one that came first.
-    for series in mine.seen().series().filter(|series| everybody().contains(&series.author)) {
+    for series in mine.seen().series().filter(|series| !world.is_contradictory(*series)) {
         let (mine, theirs) = (mine.seen().intervals(series), theirs.seen().intervals(series));
         assert_eq!(mine, theirs, "samples of {series} that robots {} and {} saw", one.me(), other.me());
     }

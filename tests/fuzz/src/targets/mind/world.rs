@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, ClassId, Decision, Envelope, InstructorId, Question, RobotId, RoundId};
+use gestalt_protocol::{
+    Announcement, ClassId, Decision, Envelope, InstructorId, Message, Question, RobotId, RoundId, SampleId,
+    SampleSeries, Samples,
+};
 use gestalt_strategies::{Input, Output};
 
 use crate::gate::Gate;
@@ -16,8 +19,7 @@ pub const ROBOTS: usize = 3;
 /// The most messages that are on their way, and the most that are remembered to be said again.
 const MOST: usize = 256;
 
-/// The honest robots.
-pub fn everybody() -> BTreeSet<RobotId> {
+fn everybody() -> BTreeSet<RobotId> {
     (1..=ROBOTS as u32).map(RobotId).collect()
 }
 
@@ -49,8 +51,12 @@ pub struct World {
     finals: BTreeMap<RoundId, (ClassId, ClassId)>,
     /// Who ever held a gesture, by the counter of its round: names of rounds merge.
     holders: BTreeMap<(u32, ClassId), BTreeSet<usize>>,
-    /// Whether robots are not told who is there.
-    misled: bool,
+    /// The robots that were not told who is there.
+    misled: BTreeSet<RobotId>,
+    /// The batch that each sample was first said in.
+    batches: BTreeMap<SampleId, Samples>,
+    /// Series of which a sample was said in two batches.
+    contradictory: BTreeSet<SampleSeries>,
 }
 
 impl World {
@@ -64,7 +70,9 @@ impl World {
             cut: BTreeSet::new(),
             finals: BTreeMap::new(),
             holders: BTreeMap::new(),
-            misled: false,
+            misled: BTreeSet::new(),
+            batches: BTreeMap::new(),
+            contradictory: BTreeSet::new(),
         };
         world.introduce();
         world
@@ -139,14 +147,19 @@ impl World {
     fn announced(&mut self, decision: &Decision) {
         let Some(class) = decision.class.filter(|_| decision.is_final) else { return };
         let held_by = self.holders.get(&(decision.round.counter, class)).map_or(0, BTreeSet::len);
-        let known = self.misled || 2 * held_by > ROBOTS;
+        let known = self.misled() || 2 * held_by > ROBOTS;
         assert!(known, "gesture {class} is final for {}, and was held by {held_by} robots", decision.round);
         self.finals.entry(decision.round).or_insert((class, class)).1 = class;
     }
 
     /// Whether robots were told of others that are not there, or not of all that are.
     pub fn misled(&self) -> bool {
-        self.misled
+        !self.misled.is_empty()
+    }
+
+    /// Whether that robot was.
+    pub fn was_misled(&self, robot: RobotId) -> bool {
+        self.misled.contains(&robot)
     }
 
     /// A round for which two gestures were final.
@@ -154,9 +167,22 @@ impl World {
         self.finals.iter().find(|(_, (first, last))| first != last).map(|(round, _)| *round)
     }
 
+    /// Whether samples of that series were said in batches that overlap, of which each robot keeps the one that it heard first.
+    pub fn is_contradictory(&self, series: SampleSeries) -> bool {
+        self.contradictory.contains(&series)
+    }
+
+    fn note_batch(&mut self, batch: &Samples) {
+        for sample in &batch.samples {
+            if self.batches.entry(sample.id).or_insert_with(|| batch.clone()) != batch {
+                self.contradictory.insert(sample.id.series());
+            }
+        }
+    }
+
     /// Who is there is not what a robot is told.
     pub fn mislead(&mut self, robot: usize, input: Input) {
-        self.misled = true;
+        self.misled.insert(RobotId(robot as u32 + 1));
         self.input(robot, input);
     }
 
@@ -190,6 +216,13 @@ impl World {
 
     /// A robot hears something, whoever said it: it believes what the members signed.
     pub fn hear(&mut self, robot: usize, said: Said) {
+        match &said {
+            Said::Message(Envelope { message: Message::Samples(batch), .. }) => self.note_batch(batch),
+            Said::Message(Envelope { message: Message::Batches(batches), .. }) => {
+                batches.batches.iter().for_each(|batch| self.note_batch(&batch.samples));
+            }
+            _ => {}
+        }
         let gate = &mut self.gates[robot];
         let input = match said {
             Said::Message(envelope) => match gate.message(self.now, envelope) {
