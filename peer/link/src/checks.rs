@@ -9,7 +9,7 @@ use tokio::sync::Notify;
 /// Nobody is woken early again within this time: a flood of what is refused wakes nobody for nothing.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// The longest that whoever was woken early waits for what it was woken for; a check takes a third of it on a slow core.
+/// The longest that whoever was woken early waits for what it was woken for; a check takes half of it on a slow core.
 const LONGEST: Duration = Duration::from_micros(200);
 
 /// The checks that are under way.
