@@ -73,6 +73,8 @@ mod identity;
 mod judge;
 mod key_file;
 mod membership;
+#[cfg(any(test, feature = "memoised"))]
+mod memoised;
 mod precedence;
 mod public_key;
 mod request;
@@ -101,6 +103,8 @@ pub use identity::Identity;
 pub use judge::Judge;
 pub use key_file::KeyFileError;
 pub use membership::{Instructor, MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
+#[cfg(feature = "memoised")]
+pub use memoised::Memoised;
 pub use precedence::Precedence;
 pub use public_key::PublicKey;
 pub use request::{Applicant, REQUEST_DOMAIN, Request, RequestError};

@@ -1,5 +1,6 @@
 //! Messages as an adversary makes them up. What robots come to sign is signed here too, in one place for each kind.
 
+use crate::trust::{Identity, Speaker, SwarmId, WordHeading, statement, word};
 use gestalt_protocol::{
     Batches, Certificate, ClassId, CountedVote, Decision, Envelope, Give, HeldBatch, HeldVote, Instruction,
     Lesson, Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, SignedWord,
@@ -7,7 +8,6 @@ use gestalt_protocol::{
 };
 use gestalt_strategies::fusion::fuse;
 use gestalt_strategies::{Fuse, MindConfig, decode_vector};
-use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, statement, word};
 
 use crate::swarm::world::{CLASSES, instructor, key, space, vocabulary};
 

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! The emulated robots are those of `gestalt-link` without Zenoh: the same mind, behind a [port](swarm) that takes the same
-//! bytes under the same keys, and in a sealed swarm asks `gestalt-trust` the same questions. `make attack` prints the table.
+//! bytes under the same keys, and in a sealed swarm asks `gestalt-trust` the same questions (of which a thread remembers the answers). `make attack` prints the table.
 
 pub mod attack;
 pub mod attacks;
@@ -20,6 +20,7 @@ mod forged;
 mod on_all_cores;
 pub mod swarm;
 pub mod table;
+mod trust;
 
 pub use attack::{Attack, Counted, Played, Setting, Tier};
 pub use attacks::all;

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
 use gestalt_strategies::is_refuted;
-use gestalt_trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 
 use super::decisions::liar_is_out;
 use crate::attack::{Attack, Counted, Played, Setting, Tier};

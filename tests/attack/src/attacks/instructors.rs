@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use crate::trust::{Speaker, WordHeading, answer, word};
 use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
-use gestalt_trust::{Speaker, WordHeading, answer, word};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::trust::Roster;
 use gestalt_protocol::{
     Announcement, CountedVote, Decision, Envelope, Give, Message, RobotId, RoundId, Stamp, Topic, decode_json,
 };
 use gestalt_strategies::{MindConfig, follows};
-use gestalt_trust::Roster;
 
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::forged;

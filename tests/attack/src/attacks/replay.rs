@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use crate::trust::{Membership, SwarmId, statement};
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
-use gestalt_trust::{Membership, SwarmId, statement};
 
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::beside::{beside, decided_in_time, unmoved};

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::trust::{Budget, MAX_ROSTER, Membership, PublicKey, Roster, RosterError, Verifier};
 use gestalt_protocol::RobotId;
-use gestalt_trust::{Budget, MAX_ROSTER, Membership, PublicKey, Roster, RosterError, Verifier};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -141,7 +141,7 @@ fn flipped(seed: u64) -> Played {
         json[place] ^= bit;
         json
     });
-    let read = |json: &Vec<u8>| Roster::<gestalt_trust::Ed25519>::parse(json).ok();
+    let read = |json: &Vec<u8>| Roster::parse(json).ok();
     let original = read(&truly);
     // White space may be another white space: that is the same roster.
     let others = flips.filter(|json| read(json).is_none_or(|roster| Some(roster) != original));

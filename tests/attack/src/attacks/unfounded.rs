@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use crate::trust::Evidence;
 use gestalt_protocol::{
     Announcement, ClassId, Decision, Envelope, RobotId, Signature, Stamp, Topic, decode_json,
 };
-use gestalt_trust::Evidence;
 
 use super::decisions::{
     FALSE, TRUE, amid_a_round, eight, liar_is_out, of_chosen_votes, once_all_voted, same_gesture,

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use crate::trust::{SwarmId, Tag};
 use gestalt_protocol::{
     Announcement, Decision, Envelope, Give, HeldVote, Instruction, Message, RobotId, RoundId, Stamp, Topic,
 };
 use gestalt_strategies::{Input, MindConfig};
-use gestalt_trust::{SwarmId, Tag};
 
 use crate::forged;
 

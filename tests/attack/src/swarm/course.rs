@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
+use crate::trust::{Roster, Speaker, WordHeading, word};
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
 use gestalt_strategies::{Input, Observation};
-use gestalt_trust::{Roster, Speaker, WordHeading, word};
 use rand::RngExt;
 
 use super::network::{Due, Swarm, json};

@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use crate::trust::{Channels, Roster, answer};
 use gestalt_protocol::{Answer, Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::{Input, Mind, Output};
-use gestalt_trust::{Channels, Roster, answer};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::trust::{Channels, Distrust, Evidence, EvidenceError, Judge, RosterError};
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
     MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
-use gestalt_trust::{Channels, Distrust, Evidence, EvidenceError, Judge, RosterError};
 
 use super::believer::Believer;
 

@@ -5,11 +5,11 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::trust::{Channels, Identity, Judge, Roster, SwarmId, statement};
 use gestalt_protocol::{Envelope, Fnv1a, Keys, RobotId, Signature, Stamp};
 use gestalt_strategies::{
     Input, LearningSetup, Life, Mind, Output, RecordChange, RobotMemory, Sign, is_refuted,
 };
-use gestalt_trust::{Channels, Identity, Judge, Roster, SwarmId, statement};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

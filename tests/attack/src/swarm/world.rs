@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::trust::{Identity, Instructor, Membership, Role, Roles, Roster};
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_strategies::{Classify, ClassifyError, Components, FeatureSpace, ScalingMethod, Vocabulary};
-use gestalt_trust::{Identity, Instructor, Membership, Role, Roles, Roster};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -87,7 +87,7 @@ pub fn key_of(name: &InstructorId) -> Arc<Identity> {
 fn identity(secret: [u8; 32]) -> Arc<Identity> {
     static KNOWN: Mutex<BTreeMap<[u8; 32], Arc<Identity>>> = Mutex::new(BTreeMap::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    known.entry(secret).or_insert_with(|| Arc::new(Identity::from_bytes(&secret))).clone()
+    known.entry(secret).or_insert_with(|| Arc::new(Identity::memoised(&secret))).clone()
 }
 
 /// The number of a key that nobody enrolled.
