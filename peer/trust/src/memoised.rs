@@ -1,8 +1,7 @@
 //! Ed25519 that works nothing out twice.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
-use std::hash::Hash;
+use std::collections::BTreeMap;
 
 use ed25519_dalek::VerifyingKey;
 use gestalt_protocol::Signature;
@@ -25,19 +24,19 @@ const REMEMBERED: usize = 1 << 15;
 
 #[derive(Default)]
 struct Memo {
-    keys: HashMap<PublicKey, Option<VerifyingKey>>,
+    keys: BTreeMap<PublicKey, Option<VerifyingKey>>,
     /// By the secret and the message, and by the public key, the signature and the message; hashed, since messages are long.
-    signatures: HashMap<[u8; 32], Signature>,
-    verified: HashMap<[u8; 32], bool>,
-    agreed: HashMap<([u8; 32], PublicKey), Zeroizing<[u8; 32]>>,
+    signatures: BTreeMap<[u8; 32], Signature>,
+    verified: BTreeMap<[u8; 32], bool>,
+    agreed: BTreeMap<([u8; 32], PublicKey), Zeroizing<[u8; 32]>>,
 }
 
 thread_local! {
     static MEMO: RefCell<Memo> = RefCell::default();
 }
 
-fn remembered<K: Eq + Hash, V: Clone>(
-    of: impl FnOnce(&mut Memo) -> &mut HashMap<K, V>,
+fn remembered<K: Ord, V: Clone>(
+    of: impl FnOnce(&mut Memo) -> &mut BTreeMap<K, V>,
     key: K,
     work_out: impl FnOnce() -> V,
 ) -> V {

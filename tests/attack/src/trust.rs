@@ -3,10 +3,10 @@
 //! that would be half of the time.
 
 use gestalt_trust::Memoised;
-pub use gestalt_trust::*;
+pub(crate) use gestalt_trust::*;
 
-pub type Channels = gestalt_trust::Channels<Memoised>;
-pub type Identity = gestalt_trust::Identity<Memoised>;
-pub type Judge = gestalt_trust::Judge<Memoised>;
-pub type Roster = gestalt_trust::Roster<Memoised>;
-pub type Verifier = gestalt_trust::Verifier<Memoised>;
+pub(crate) type Channels = gestalt_trust::Channels<Memoised>;
+pub(crate) type Identity = gestalt_trust::Identity<Memoised>;
+pub(crate) type Judge = gestalt_trust::Judge<Memoised>;
+pub(crate) type Roster = gestalt_trust::Roster<Memoised>;
+pub(crate) type Verifier = gestalt_trust::Verifier<Memoised>;
