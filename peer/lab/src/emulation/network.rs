@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::iter::Sum;
-use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
@@ -91,7 +91,7 @@ type Hop = (u32, u32);
 struct Parts {
     /// Which part each robot belongs to, of those that are believed alive.
     of: Vec<Option<u32>>,
-    members: Vec<Rc<BTreeSet<RobotId>>>,
+    members: Vec<Arc<BTreeSet<RobotId>>>,
 }
 
 /// The name of the robot of that index.
@@ -111,7 +111,7 @@ pub(super) struct Network {
     /// Links and robots that are believed to work: what routing goes by.
     believed_links: BTreeSet<Link>,
     believed_robots: Vec<bool>,
-    routes: Vec<Option<Rc<[Hop]>>>,
+    routes: Vec<Option<Arc<[Hop]>>>,
     /// Who is alive to whom; worked out when somebody asks.
     parts: Option<Parts>,
     pub traffic: Vec<Traffic>,
@@ -198,7 +198,7 @@ impl Network {
     }
 
     /// The robots that this one believes alive: those it can reach, itself included. All of one part share the list.
-    pub fn reachable(&mut self, robot: usize) -> Rc<BTreeSet<RobotId>> {
+    pub fn reachable(&mut self, robot: usize) -> Arc<BTreeSet<RobotId>> {
         let parts = self.parts.take().unwrap_or_else(|| self.find_parts());
         let reachable = match parts.of[robot] {
             Some(part) => parts.members[part as usize].clone(),
@@ -207,7 +207,7 @@ impl Network {
                 let near: BTreeSet<u32> =
                     self.neighbours(robot).into_iter().filter_map(|other| parts.of[other]).collect();
                 let all = near.iter().flat_map(|part| parts.members[*part as usize].iter().copied());
-                Rc::new(all.chain([name(robot)]).collect())
+                Arc::new(all.chain([name(robot)]).collect())
             }
         };
         self.parts = Some(parts);
@@ -233,17 +233,17 @@ impl Network {
                     }
                 }
             }
-            parts.members.push(Rc::new(members.into_iter().collect()));
+            parts.members.push(Arc::new(members.into_iter().collect()));
         }
         parts
     }
 
-    fn route(&mut self, origin: usize) -> Rc<[Hop]> {
+    fn route(&mut self, origin: usize) -> Arc<[Hop]> {
         if let Some(route) = &self.routes[origin] {
             return route.clone();
         }
         let ways = shortest_ways(origin, self.size(), |robot| self.neighbours(robot));
-        let route: Rc<[Hop]> = ways.into_iter().map(|(from, to)| (from as u32, to as u32)).collect();
+        let route: Arc<[Hop]> = ways.into_iter().map(|(from, to)| (from as u32, to as u32)).collect();
         self.routes[origin] = Some(route.clone());
         route
     }

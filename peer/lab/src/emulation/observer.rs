@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::scenario::View;
 
 /// A robot's eyes in an emulation. Rendered views implement it too.
-pub trait Observer {
+pub trait Observer: Send {
     /// What judges the frames; none for a robot that does not see.
     fn classifier(&self) -> Option<Arc<dyn Classify>>;
 

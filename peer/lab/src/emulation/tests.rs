@@ -1,5 +1,6 @@
 //! Whole swarms in the emulated network.
 
+mod ahead;
 mod certified;
 mod partition;
 

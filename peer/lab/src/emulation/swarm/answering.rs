@@ -13,7 +13,7 @@ use crate::emulation::answering::AskedBy;
 use crate::emulation::teaching::{Feedback, Teaching};
 
 /// How long an instructor takes to answer.
-const THINKS: Duration = Duration::from_millis(800);
+pub(super) const THINKS: Duration = Duration::from_millis(800);
 
 /// Less than this between the two likeliest outcomes is no lead.
 const NO_LEAD: f64 = 0.5;

@@ -5,40 +5,64 @@ use std::time::Duration;
 
 use gestalt_protocol::{Answer, Message};
 use gestalt_strategies::{Input, Output};
-use rand::RngExt;
 
 use super::Swarm;
+use super::deed::{Deed, Turn};
 use super::parcel::{Parcel, as_json, json_bytes, over_the_wire};
 use super::queue::Due;
 use crate::emulation::network::{Kind, Presence};
-use crate::emulation::pupil::Pupil;
 use crate::emulation::trace::Happening;
 
 /// What waits for a frozen robot, at most; what comes after is lost, as in a full buffer.
 const WAITING: usize = 10_000;
 
 impl Swarm<'_> {
-    /// Gives a mind an input and carries out what it wants done.
+    /// Gives a mind an input, and carries out what it wants done.
     pub(super) fn tell_mind(&mut self, i: usize, input: Input) {
         if self.network.presence(i) != Presence::Up {
             return;
         }
-        self.robots[i].read();
-        let Some(mind) = &mut self.robots[i].mind else { return };
-        let outputs = mind.handle(self.now, input);
-        let wake = mind.next_wake();
-        if self.robots[i].wake != wake {
-            self.robots[i].wake = wake;
-            if let Some(wake) = wake {
-                self.at(wake.max(self.now), Due::Wake(i));
+        debug_assert!(
+            self.robots[i].ahead.is_over(),
+            "it is told something that it did not know of when it went ahead"
+        );
+        let mut deeds = Vec::new();
+        self.robots[i].tell(self.now, input, &mut deeds);
+        self.carry_out(i, deeds);
+    }
+
+    /// Lets a robot do what is due for it, if it has not done it ahead, and carries out what it wants done.
+    pub(super) fn take_turn(&mut self, i: usize, turn: &Turn) {
+        let up = self.network.presence(i) == Presence::Up;
+        let robot = &mut self.robots[i];
+        let ahead = robot.ahead.recall(self.now, turn);
+        self.taken_ahead += u64::from(ahead.is_some());
+        let deeds = ahead.unwrap_or_else(|| robot.act(self.now, turn, up, self.school.as_deref()));
+        self.carry_out(i, deeds);
+    }
+
+    pub(super) fn carry_out(&mut self, i: usize, deeds: Vec<Deed>) {
+        let robot = self.robots[i].id;
+        for deed in deeds {
+            match deed {
+                Deed::Wakes(at) => self.at(at, Due::Wake(i)),
+                Deed::Looks(round, first, n) => {
+                    self.note(&Happening::Opened { robot, round });
+                    self.record.open(self.now, i);
+                    self.at(first, Due::Frame(i, n));
+                }
+                Deed::LooksOn(at, n) => self.at(at, Due::Frame(i, n)),
+                Deed::Judges(probabilities) => self.record.frame(&probabilities, self.shown),
+                Deed::Learns(samples) => self.note(&Happening::Learn { robot, samples }),
+                Deed::Remembers(revision) => {
+                    self.at(self.now, Due::Remembered(i, self.robots[i].boot, revision));
+                }
+                Deed::Wants(output) => self.fulfil(i, output),
             }
-        }
-        for output in outputs {
-            self.carry_out(i, output);
         }
     }
 
-    fn carry_out(&mut self, i: usize, output: Output) {
+    fn fulfil(&mut self, i: usize, output: Output) {
         let robot = self.robots[i].id;
         match output {
             Output::Broadcast(envelope) => {
@@ -81,21 +105,9 @@ impl Swarm<'_> {
                 let (question, bytes) = as_json(&question);
                 self.broadcast(i, bytes, Kind::Words, &Parcel::Asked(question));
             }
-            Output::Opened(round) => {
-                self.note(&Happening::Opened { robot, round });
-                self.record.open(self.now, i);
-                let robot = &mut self.robots[i];
-                robot.looking = true;
-                robot.looks += 1;
-                let phase: f64 = robot.rng.random();
-                let (first, looks) = (robot.observer.period() * phase, robot.looks);
-                self.at(self.now + Duration::from_secs_f64(first), Due::Frame(i, looks));
-            }
             Output::Closed(round) => {
                 self.note(&Happening::Closed { robot, round });
                 self.record.close(self.now, i);
-                self.robots[i].looking = false;
-                self.robots[i].pupil.iter_mut().for_each(Pupil::rest);
             }
             Output::Answer(by, answer) => {
                 let Answer { at, outcome, samples, .. } = answer;
@@ -103,17 +115,8 @@ impl Swarm<'_> {
                 let bytes = json_bytes(&answer);
                 self.broadcast(i, bytes, Kind::Words, &Parcel::Answered(by, at, robot));
             }
-            Output::Train(changes) => {
-                if let Some(pupil) = &mut self.robots[i].pupil {
-                    pupil.train_later(changes);
-                }
-            }
-            Output::Remember { revision, changes } => {
-                let boot = self.robots[i].boot;
-                if let Some(pupil) = &mut self.robots[i].pupil {
-                    pupil.remember(revision, changes);
-                    self.at(self.now, Due::Remembered(i, boot, revision));
-                }
+            Output::Opened(_) | Output::Train(_) | Output::Remember { .. } => {
+                unreachable!("a robot does that by itself")
             }
         }
     }
@@ -151,10 +154,13 @@ impl Swarm<'_> {
                 }
             }
             Presence::Up if self.robots[i].lies.is_some() => self.deceive(&parcel),
-            Presence::Up => match parcel {
-                Parcel::Said(envelope) if self.robots[i].may_read_later(&envelope) => self.leave(i, envelope),
-                parcel => self.tell_mind(i, parcel.opened()),
-            },
+            Presence::Up => {
+                let waits = matches!(&parcel, Parcel::Said(said) if self.robots[i].may_read_later(said));
+                self.take_turn(i, &Turn::Hears(parcel));
+                if waits {
+                    self.leave();
+                }
+            }
         }
     }
 }

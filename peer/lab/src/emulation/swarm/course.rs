@@ -1,17 +1,15 @@
 //! The course of events: what is shown, what is seen of it, and what the instructor says.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Gesture, Instruction, InstructorId, RoundId};
-use gestalt_strategies::{Classify, Input, Instructed, Mind};
+use gestalt_strategies::{Input, Instructed, Mind};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 
 use super::Swarm;
 use super::parcel::{Parcel, json_bytes};
 use super::queue::Due;
-use super::robot::Robot;
 use super::seed::{frames, stream};
 use crate::emulation::answering::AskedBy;
 use crate::emulation::network::{Kind, Presence};
@@ -66,34 +64,6 @@ impl Swarm<'_> {
                 self.turn.pop().unwrap_or(ClassId(0))
             }
         }
-    }
-
-    pub(super) fn frame(&mut self, i: usize, looks: u32) {
-        let looks_still = |robot: &Robot| robot.looking && robot.looks == looks;
-        if !looks_still(&self.robots[i]) {
-            return;
-        }
-        // A robot that learns does so before it looks again, not sooner, and only if its judgement is asked for: nobody asks before.
-        let judges = self.robots[i].mind.as_ref().is_some_and(Mind::votes);
-        if judges {
-            self.train(i);
-        }
-        let robot = &mut self.robots[i];
-        let next = self.now + Duration::from_secs_f64(robot.observer.period());
-        if self.network.presence(i) == Presence::Up
-            && let Some(observation) = robot.observer.frame(&mut robot.rng)
-        {
-            let classifier: Option<Arc<dyn Classify>> = match &robot.pupil {
-                Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
-                None => robot.observer.classifier(),
-            };
-            let classifier = classifier.filter(|_| judges);
-            if let Some(p) = classifier.and_then(|c| c.probabilities(&observation.features).ok()) {
-                self.record.frame(&p, self.shown);
-            }
-            self.tell_mind(i, Input::Observed(observation));
-        }
-        self.at(next, Due::Frame(i, looks));
     }
 
     /// The instructor, who stands at that robot, says what it was that was shown.
@@ -152,16 +122,10 @@ impl Swarm<'_> {
     /// Makes a robot's classifier follow its samples.
     pub(super) fn train(&mut self, i: usize) {
         let up = self.network.presence(i) == Presence::Up;
-        self.robots[i].read();
-        let Robot { pupil, mind, .. } = &mut self.robots[i];
-        let (Some(pupil), Some(school)) = (pupil.as_mut().filter(|_| up), &self.school) else { return };
-        if pupil.prepare(mind.as_ref(), school) {
-            pupil.learn();
-        }
-        if let Some(classifier) = pupil.take_news() {
-            let samples = mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
-            self.note(&Happening::Learn { robot: self.robots[i].id, samples });
-            self.tell_mind(i, Input::Learned(classifier));
+        if let Some(school) = self.school.as_ref().filter(|_| up) {
+            let mut deeds = Vec::new();
+            self.robots[i].train(self.now, school, &mut deeds);
+            self.carry_out(i, deeds);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Many minds in one thread: a queue of events, the robots, and what they want done.
+//! Many minds: a queue of events, the robots, and what they want done.
 //!
 //! | file | question |
 //! |---|---|
@@ -7,16 +7,20 @@
 //! | `answering` | what is asked, and what is answered? |
 //! | `faults` | what goes wrong? |
 //! | `lives` | who starts, goes on, and knows of whom? |
-//! | `carry` | what does a mind want done, and what becomes of it? |
+//! | `deed` | what does a robot do by itself? |
+//! | `ahead` | what may it do before it is its turn? |
+//! | `carry` | what does it want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
 //! | `poisoning` | what do poisoners share? |
 //! | `reading` | what may a mind be told later than it comes? |
 //! | `training` | who learns? |
 
+mod ahead;
 mod answering;
 mod carry;
 mod course;
 mod deceive;
+mod deed;
 mod faults;
 mod lives;
 mod parcel;
@@ -33,7 +37,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, RobotId};
-use gestalt_strategies::{Classifier, Input, Mind, Shelf};
+use gestalt_strategies::{Classifier, Mind, Shelf};
 use rand_chacha::ChaCha8Rng;
 
 use super::network::{Network, Traffic};
@@ -48,6 +52,7 @@ use super::statistics::Mean;
 use super::trace::{Happening, Trace};
 use crate::threads::all_cores;
 use answering::Asking;
+use deed::Turn;
 use plot::Plot;
 use poisoning::Poisoner;
 use queue::{Due, Queue};
@@ -77,7 +82,12 @@ pub(super) struct Swarm<'a> {
     /// How much has arrived that minds are told later, and at how much all are told.
     unread: usize,
     pub most_unread: usize,
-    /// On how many threads robots learn, and are told what could wait.
+    /// Until when was looked for what robots may do ahead, and how much there has to be.
+    looked_ahead: Duration,
+    pub worthwhile: usize,
+    /// How many turns robots had taken ahead.
+    pub taken_ahead: u64,
+    /// On how many threads robots learn, go ahead, and are told what could wait.
     pub threads: usize,
 }
 
@@ -123,6 +133,9 @@ impl<'a> Swarm<'a> {
             trace,
             unread: 0,
             most_unread: reading::MANY * scenario.swarm_size(),
+            looked_ahead: Duration::ZERO,
+            worthwhile: ahead::WORTHWHILE,
+            taken_ahead: 0,
             threads: all_cores(),
         };
         if scenario.mind.committee_of(size).is_some() {
@@ -140,9 +153,11 @@ impl<'a> Swarm<'a> {
 
     /// Lets everything happen that is due before that time.
     pub fn pass(&mut self, until: Duration) {
+        self.go_ahead(until);
         while let Some((at, due)) = self.queue.next_before(until) {
             self.now = at;
             self.happen(due);
+            self.go_ahead(until);
         }
         self.read_all();
     }
@@ -194,22 +209,13 @@ impl<'a> Swarm<'a> {
                 self.network.notice(change);
                 self.tell_who_is_there();
             }
-            Due::Wake(robot) => {
-                if self.robots[robot].wake == Some(self.now) {
-                    self.robots[robot].wake = None;
-                    self.tell_mind(robot, Input::Tick);
-                }
-            }
-            Due::Frame(robot, looks) => self.frame(robot, looks),
+            Due::Wake(robot) => self.take_turn(robot, &Turn::Wakes),
+            Due::Frame(robot, n) => self.take_turn(robot, &Turn::Looks(n)),
             Due::Arrive(robot, parcel) => self.arrive(robot, parcel),
             Due::Spread(arrivals, parcel) => self.spread(arrivals, parcel),
             Due::Teach(n, robot) => self.teach(n, robot),
             Due::Reply(robot, round, ask) => self.reply(robot, round, ask),
-            Due::Remembered(robot, boot, revision) => {
-                if self.robots[robot].boot == boot {
-                    self.tell_mind(robot, Input::Remembered(revision));
-                }
-            }
+            Due::Remembered(robot, boot, revision) => self.take_turn(robot, &Turn::Has(boot, revision)),
         }
     }
 

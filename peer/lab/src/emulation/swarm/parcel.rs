@@ -19,13 +19,13 @@ pub(super) enum Parcel {
 
 impl Parcel {
     /// What a mind is told when it arrives.
-    pub fn opened(self) -> Input {
+    pub fn opened(&self) -> Input {
         match self {
-            Self::Said(envelope) => Input::Received((*envelope).clone()),
-            Self::Announced(announcement) => Input::Announced((*announcement).clone()),
-            Self::Asked(question) => Input::Asked((*question).clone()),
-            Self::Instructed(instructed) => Input::Instructed((*instructed).clone()),
-            Self::Answered(by, at, robot) => Input::Answered(by, at, robot),
+            Self::Said(envelope) => Input::Received((**envelope).clone()),
+            Self::Announced(announcement) => Input::Announced((**announcement).clone()),
+            Self::Asked(question) => Input::Asked((**question).clone()),
+            Self::Instructed(instructed) => Input::Instructed((**instructed).clone()),
+            Self::Answered(by, at, robot) => Input::Answered(by.clone(), *at, *robot),
         }
     }
 }

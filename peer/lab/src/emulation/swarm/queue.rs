@@ -29,6 +29,31 @@ pub(super) enum Due {
     Remembered(usize, u32, u64),
 }
 
+impl Due {
+    /// Whether it may change what any robot does at once.
+    pub fn is_for_all(&self) -> bool {
+        match self {
+            Self::Show(_)
+            | Self::Fault(_)
+            | Self::Churn
+            | Self::Notice(_)
+            | Self::Teach(..)
+            | Self::Reply(..) => true,
+            Self::Wake(_) | Self::Frame(..) | Self::Arrive(..) | Self::Spread(..) | Self::Remembered(..) => {
+                false
+            }
+        }
+    }
+
+    /// How many robots have something to do for it before that time.
+    pub fn turns_before(&self, end: Duration) -> usize {
+        match self {
+            Self::Spread(arrivals, _) => arrivals.iter().take_while(|(at, _)| *at < end).count(),
+            _ => 1,
+        }
+    }
+}
+
 /// All that is planned.
 #[derive(Default)]
 pub(super) struct Queue {
@@ -40,6 +65,16 @@ impl Queue {
     pub fn at(&mut self, at: Duration, due: Due) {
         self.due.insert((at, self.planned), due);
         self.planned += 1;
+    }
+
+    /// When the next is due.
+    pub fn next(&self) -> Option<Duration> {
+        self.due.first_key_value().map(|((at, _), _)| *at)
+    }
+
+    /// All that is due before that time, in its order.
+    pub fn before(&self, end: Duration) -> impl Iterator<Item = (Duration, &Due)> {
+        self.due.range(..(end, 0)).map(|((at, _), due)| (*at, due))
     }
 
     /// Takes what is next, if it is due before that time.

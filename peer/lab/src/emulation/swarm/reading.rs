@@ -19,9 +19,8 @@ use crate::threads::on_each;
 pub(super) const MANY: usize = 8;
 
 impl Swarm<'_> {
-    /// Leaves what has arrived to be told later.
-    pub(super) fn leave(&mut self, i: usize, envelope: Arc<Envelope>) {
-        self.robots[i].unread.push((self.now, envelope));
+    /// One more thing waits to be told.
+    pub(super) fn leave(&mut self) {
         self.unread += 1;
         if self.unread >= self.most_unread {
             self.read_all();

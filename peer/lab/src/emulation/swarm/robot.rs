@@ -1,7 +1,6 @@
 //! One robot: its mind, its eyes, and what waits for it.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,6 +8,7 @@ use gestalt_protocol::{Envelope, RobotId};
 use gestalt_strategies::Mind;
 use rand_chacha::ChaCha8Rng;
 
+use super::ahead::Ahead;
 use super::parcel::Parcel;
 use super::poisoning::Poisoner;
 use super::seed::stream;
@@ -30,10 +30,11 @@ pub(super) struct Robot {
     pub waiting: VecDeque<Parcel>,
     /// What has arrived, and when, that its mind may be told later.
     pub unread: Vec<(Duration, Arc<Envelope>)>,
+    pub ahead: Ahead,
     /// None of a robot that does not learn.
     pub pupil: Option<Pupil>,
     /// Whom it believes alive, and whom it believes itself linked to.
-    pub knows: (Rc<BTreeSet<RobotId>>, Vec<usize>),
+    pub knows: (Arc<BTreeSet<RobotId>>, Vec<usize>),
     pub lies: Option<Lies>,
     pub poison: Option<Poisoner>,
 }
@@ -58,6 +59,7 @@ impl Robot {
             looks: 0,
             waiting: VecDeque::new(),
             unread: Vec::new(),
+            ahead: Ahead::default(),
             pupil: learns.map(Pupil::new),
             knows: Default::default(),
             lies,

@@ -1,0 +1,160 @@
+//! What a robot does by itself with what is due: it concerns no other robot until what it wants done is carried out.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use gestalt_protocol::RoundId;
+use gestalt_strategies::{Classify, Input, Mind, Output};
+use rand::RngExt;
+
+use super::parcel::Parcel;
+use super::robot::Robot;
+use crate::emulation::pupil::Pupil;
+use crate::emulation::school::School;
+
+/// What a robot did or wants done, in the order of it.
+pub(super) enum Deed {
+    /// It is to be woken then.
+    Wakes(Duration),
+    /// It takes part in a round: its first frame comes then, of its `n`th look.
+    Looks(RoundId, Duration, u32),
+    /// Its next frame comes then, of the same look.
+    LooksOn(Duration, u32),
+    /// It judged a frame so.
+    Judges(Vec<f64>),
+    /// It learned from so many samples.
+    Learns(usize),
+    /// What it is to remember up to that revision is on its way to its disk.
+    Remembers(u64),
+    /// Its mind wants that done, and it concerns others.
+    Wants(Output),
+}
+
+/// What is due for one robot.
+pub(super) enum Turn {
+    Wakes,
+    /// It looks at the next frame of its `n`th look.
+    Looks(u32),
+    Hears(Parcel),
+    /// What it was to remember in that life, up to that revision, is on its disk.
+    Has(u32, u64),
+}
+
+impl Turn {
+    /// Whether that is the same, if it is due for the same robot at the same time, at which it hears nothing else.
+    pub fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Wakes, Self::Wakes) | (Self::Hears(_), Self::Hears(_)) => true,
+            (Self::Looks(n), Self::Looks(m)) => n == m,
+            (Self::Has(boot, n), Self::Has(life, m)) => (boot, n) == (life, m),
+            _ => false,
+        }
+    }
+}
+
+impl Robot {
+    /// Does its part of what is due for it now; it is up, or stands still.
+    pub fn act(&mut self, now: Duration, turn: &Turn, up: bool, school: Option<&School>) -> Vec<Deed> {
+        let mut deeds = Vec::new();
+        match turn {
+            // Another time may have been set since.
+            Turn::Wakes if self.wake == Some(now) => {
+                self.wake = None;
+                if up {
+                    self.tell(now, Input::Tick, &mut deeds);
+                }
+            }
+            Turn::Looks(n) if self.looking && self.looks == *n => {
+                self.look(now, school.filter(|_| up), up, &mut deeds);
+            }
+            Turn::Hears(Parcel::Said(envelope)) if self.may_read_later(envelope) => {
+                self.unread.push((now, envelope.clone()));
+            }
+            Turn::Hears(parcel) if up => self.tell(now, parcel.opened(), &mut deeds),
+            Turn::Has(boot, revision) if up && self.boot == *boot => {
+                self.tell(now, Input::Remembered(*revision), &mut deeds)
+            }
+            Turn::Wakes | Turn::Looks(_) | Turn::Hears(_) | Turn::Has(..) => {}
+        }
+        deeds
+    }
+
+    /// Tells its mind that, once it was told all before.
+    pub fn tell(&mut self, now: Duration, input: Input, deeds: &mut Vec<Deed>) {
+        self.read();
+        let Some(mind) = &mut self.mind else { return };
+        let outputs = mind.handle(now, input);
+        let wake = mind.next_wake();
+        if self.wake != wake {
+            self.wake = wake;
+            deeds.extend(wake.map(|wake| Deed::Wakes(wake.max(now))));
+        }
+        deeds.reserve(outputs.len());
+        for output in outputs {
+            deeds.extend(self.done(now, output));
+        }
+    }
+
+    /// What is left to be done of that, when it has done its own part.
+    fn done(&mut self, now: Duration, output: Output) -> Option<Deed> {
+        match output {
+            Output::Opened(round) => {
+                self.looking = true;
+                self.looks += 1;
+                let phase: f64 = self.rng.random();
+                let first = now + Duration::from_secs_f64(self.observer.period() * phase);
+                Some(Deed::Looks(round, first, self.looks))
+            }
+            Output::Closed(_) => {
+                self.looking = false;
+                self.pupil.iter_mut().for_each(Pupil::rest);
+                Some(Deed::Wants(output))
+            }
+            Output::Train(changes) => {
+                self.pupil.as_mut()?.train_later(changes);
+                None
+            }
+            Output::Remember { revision, changes } => {
+                self.pupil.as_mut()?.remember(revision, changes);
+                Some(Deed::Remembers(revision))
+            }
+            output => Some(Deed::Wants(output)),
+        }
+    }
+
+    /// The next frame is there. One that stands still sees nothing of it.
+    fn look(&mut self, now: Duration, school: Option<&School>, up: bool, deeds: &mut Vec<Deed>) {
+        // A robot that learns does so before it looks again, not sooner, and only if its judgement is asked for: nobody asks before.
+        let judges = self.mind.as_ref().is_some_and(Mind::votes);
+        if let Some(school) = school.filter(|_| judges) {
+            self.train(now, school, deeds);
+        }
+        let next = now + Duration::from_secs_f64(self.observer.period());
+        if up && let Some(observation) = self.observer.frame(&mut self.rng) {
+            let classifier: Option<Arc<dyn Classify>> = match &self.pupil {
+                Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
+                None => self.observer.classifier(),
+            };
+            let classifier = classifier.filter(|_| judges);
+            let judged = classifier.and_then(|c| c.probabilities(&observation.features).ok());
+            deeds.extend(judged.map(Deed::Judges));
+            self.tell(now, Input::Observed(observation), deeds);
+        }
+        deeds.push(Deed::LooksOn(next, self.looks));
+    }
+
+    /// Its classifier follows its samples.
+    pub fn train(&mut self, now: Duration, school: &School, deeds: &mut Vec<Deed>) {
+        self.read();
+        let Self { pupil, mind, .. } = self;
+        let Some(pupil) = pupil else { return };
+        if pupil.prepare(mind.as_ref(), school) {
+            pupil.learn();
+        }
+        if let Some(classifier) = pupil.take_news() {
+            let samples = mind.as_ref().and_then(Mind::training_set).map_or(0, |set| set.len());
+            deeds.push(Deed::Learns(samples));
+            self.tell(now, Input::Learned(classifier), deeds);
+        }
+    }
+}
