@@ -16,13 +16,15 @@ pub(crate) fn on_each<T: Send>(threads: usize, all: Vec<T>, work: impl Fn(T) + S
     }
     let left = Mutex::new(all.into_iter());
     let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                while let Some(one) = next() {
-                    work(one);
-                }
-            });
+    let work_on = || {
+        while let Some(one) = next() {
+            work(one);
         }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work_on);
+        }
+        work_on();
     });
 }

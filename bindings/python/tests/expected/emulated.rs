@@ -1,8 +1,6 @@
 //! What an emulated swarm saw and what it decided, for minds in Python to see and to decide as well.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use gestalt_lab::emulation::{Emulation, Observer, Scenario, StatisticalObserver, Trace, View};
 use gestalt_protocol::ClassId;
@@ -17,7 +15,7 @@ const SCENARIO: &str = r#"{
 }"#;
 
 /// What each robot saw of each showing, as probabilities.
-type Seen = Rc<RefCell<Vec<Vec<Vec<f64>>>>>;
+type Seen = Arc<Mutex<Vec<Vec<Vec<f64>>>>>;
 
 /// Eyes that write down what they see.
 struct Noted {
@@ -39,7 +37,7 @@ impl Observer for Noted {
     }
 
     fn show(&mut self, shown: ClassId, rng: &mut dyn rand::Rng) {
-        self.seen.borrow_mut().push(Vec::new());
+        self.seen.lock().expect("nobody panics").push(Vec::new());
         self.eyes.show(shown, rng);
     }
 
@@ -47,7 +45,7 @@ impl Observer for Noted {
         let observation = self.eyes.frame(rng)?;
         let classifier = self.eyes.classifier().expect("they see");
         let probabilities = classifier.probabilities(&observation.features).expect("scores of all classes");
-        self.seen.borrow_mut().last_mut().expect("something is shown").push(probabilities);
+        self.seen.lock().expect("nobody panics").last_mut().expect("something is shown").push(probabilities);
         Some(observation)
     }
 }
@@ -77,7 +75,8 @@ fn swarm(seed: u64) -> Value {
         match (line["what"].as_str(), showings.last_mut()) {
             (Some("shown"), _) => {
                 let n = showings.len();
-                let looks: Vec<Vec<Vec<f64>>> = seen.iter().map(|seen| seen.borrow()[n].clone()).collect();
+                let looks: Vec<Vec<Vec<f64>>> =
+                    seen.iter().map(|seen| seen.lock().expect("nobody panics")[n].clone()).collect();
                 showings.push(json!({
                     "shown": line["class"], "opener": line["opener"], "looks": looks, "held": vec![Value::Null; robots],
                 }));

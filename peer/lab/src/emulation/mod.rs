@@ -1,7 +1,7 @@
 //! The emulated network: a seeded discrete-event host of the same minds that Zenoh hosts.
 //!
-//! One thread, no clock: a run of a [`Scenario`] with a seed gives the same [`Report`] and the same [`Trace`] on
-//! every machine, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
+//! No clock: a run of a [`Scenario`] with a seed gives the same [`Report`] and the same [`Trace`] on
+//! every machine and any number of threads, byte for byte. Every message is encoded, counted and decoded on its way; broadcasts run along the
 //! shortest ways of what the robots believe to be connected, and are lost hop by hop.
 
 mod answering;

@@ -18,7 +18,7 @@ use crate::emulation::school::School;
 use crate::threads::on_each;
 
 /// Fewer turns than this are done sooner than other cores are woken.
-pub(super) const WORTHWHILE: usize = 200;
+pub(super) const WORTHWHILE: usize = 32;
 
 /// What one robot is to do ahead, and has done.
 #[derive(Default)]

@@ -13,6 +13,7 @@ use crate::emulation::pupil::Pupil;
 use crate::emulation::school::School;
 
 /// What a robot did or wants done, in the order of it.
+#[expect(clippy::large_enum_variant, reason = "nearly all are what a mind wants")]
 pub(super) enum Deed {
     /// It is to be woken then.
     Wakes(Duration),

@@ -1,7 +1,7 @@
 //! What each camera sees of each gesture of a seed: drawn and looked at once, for all swarms it takes part in.
 
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::Observation;
@@ -15,7 +15,7 @@ use gestalt_vision::perception::{HandConfig, LayerConfig, Perception};
 use gestalt_vision::source::{RenderedSource, Scene, Source, through_jpeg};
 
 /// The frames that a robot takes of one showing; `None`: no hand was found.
-pub type Take = Rc<Vec<Option<Observation>>>;
+pub type Take = Arc<Vec<Option<Observation>>>;
 
 /// All takes of a seed so far.
 pub struct Takes {
@@ -42,7 +42,7 @@ impl Takes {
         if let Some(take) = self.seen.get(&key) {
             return Ok(take.clone());
         }
-        let take = Rc::new(self.look(kind, layer, robot, (showing, shown))?);
+        let take = Arc::new(self.look(kind, layer, robot, (showing, shown))?);
         self.seen.insert(key, take.clone());
         Ok(take)
     }

@@ -1,9 +1,7 @@
 //! One seed: every swarm is shown the same gestures.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use gestalt_protocol::ClassId;
@@ -29,7 +27,7 @@ pub fn run(
     seed: u64,
     stop: &AtomicBool,
 ) -> Result<Vec<Outcome>, ExperimentError> {
-    let seen = Rc::new(RefCell::new(Takes::new(plan.clone(), seed)));
+    let seen = Arc::new(Mutex::new(Takes::new(plan.clone(), seed)));
     plan.swarms.iter().map(|swarm| show(plan, swarm, classifiers.of(swarm), &seen, (seed, stop))).collect()
 }
 
@@ -37,7 +35,7 @@ fn show(
     plan: &Recognition,
     swarm: &SwarmPlan,
     classifier: &Arc<Classifier>,
-    seen: &Rc<RefCell<Takes>>,
+    seen: &Arc<Mutex<Takes>>,
     (seed, stop): (u64, &AtomicBool),
 ) -> Result<Outcome, ExperimentError> {
     let scenario = Scenario {
@@ -61,7 +59,7 @@ fn show(
         compare: Vec::new(),
         seeds: 1,
     };
-    let failure = Rc::new(RefCell::new(None));
+    let failure = Arc::new(Mutex::new(None));
     let mut observers: Vec<Box<dyn Observer>> = Vec::new();
     for kind in &swarm.robots {
         for robot in 0..kind.count {
@@ -81,7 +79,7 @@ fn show(
     }
     let mut emulation = Emulation::new(&scenario, seed, observers, None, Trace::none())?;
     while emulation.show_next() {
-        if let Some(failure) = failure.take() {
+        if let Some(failure) = lock(&failure).take() {
             return Err(failure);
         }
         if stop.load(Ordering::Relaxed) {
@@ -98,10 +96,14 @@ fn show(
     })
 }
 
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A robot's eyes: they see what was taken for its kind and number.
 struct Eyes {
-    seen: Rc<RefCell<Takes>>,
-    failure: Rc<RefCell<Option<ExperimentError>>>,
+    seen: Arc<Mutex<Takes>>,
+    failure: Arc<Mutex<Option<ExperimentError>>>,
     classifier: Arc<Classifier>,
     kind: Kind,
     layer: LayerConfig,
@@ -124,9 +126,9 @@ impl Observer for Eyes {
     fn show(&mut self, shown: ClassId, _: &mut dyn rand::Rng) {
         self.showing += 1;
         self.next = 0;
-        let take = self.seen.borrow_mut().of(&self.kind, self.layer, self.robot, (self.showing, shown));
+        let take = lock(&self.seen).of(&self.kind, self.layer, self.robot, (self.showing, shown));
         self.take = take.unwrap_or_else(|error| {
-            self.failure.borrow_mut().get_or_insert(error);
+            lock(&self.failure).get_or_insert(error);
             Take::default()
         });
     }
