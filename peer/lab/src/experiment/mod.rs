@@ -8,6 +8,7 @@
 
 mod asking;
 mod chart;
+mod drift;
 mod error;
 mod eyes;
 mod figures;

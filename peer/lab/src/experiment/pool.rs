@@ -59,7 +59,8 @@ type Views = Vec<Option<(Vec<f32>, f32)>>;
 #[derive(Clone, Debug, Serialize)]
 struct Take {
     moment: Moment,
-    dim: bool,
+    /// Whether it is taken by the other of the two cameras of a place.
+    other: bool,
     shown: Shown,
 }
 
@@ -103,7 +104,7 @@ impl Pool {
         if let Some(pool) = Self::read(&kept) {
             return Ok(pool);
         }
-        let views = look_at(&takes, hands, step)?;
+        let views = look_at(&takes, hands, drift, step)?;
         let moments = takes.iter().map(|take| take.moment).collect();
         let pool = Self { gestures, places: hands.places, moments, views };
         pool.write(&kept).map_err(|source| ExperimentError::Write { path: kept, source })?;
@@ -161,7 +162,7 @@ fn rendered(hands: &Hands, drift: Drift) -> Result<(Vec<String>, Vec<Take>), Exp
     let people = hands.people as u64;
     let (people, takes, shift) = match drift {
         Drift::None => (vec![(false, 0..people)], 1, 0),
-        Drift::Light => (vec![(false, 0..people), (true, 0..people)], 1, 0),
+        Drift::Light | Drift::Camera => (vec![(false, 0..people), (true, 0..people)], 1, 0),
         Drift::Person => {
             let n = PEOPLE_OF_A_DRIFT;
             (vec![(false, 0..n), (true, n..2 * n)], TAKES, 1000)
@@ -173,10 +174,10 @@ fn rendered(hands: &Hands, drift: Drift) -> Result<(Vec<String>, Vec<Take>), Exp
             for (fingers, (_, pose)) in (0_u8..).zip(&shown) {
                 let moment =
                     Moment { class: ClassId(u32::from(fingers)), person: Some(person as u32), after };
-                let dim = after && drift == Drift::Light;
+                let other = after && changes_cameras(drift);
                 all.push(Take {
                     moment,
-                    dim,
+                    other,
                     shown: Shown::Rendered { fingers, seed: shift + person, take, pose: *pose },
                 });
             }
@@ -206,11 +207,11 @@ fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, 
             let shown = Shown::Picture(image.path.clone(), fingerprint);
             let mut take = |after| {
                 let moment = Moment { class: image.class, person, after };
-                takes.push(Take { moment, dim: after && drift == Drift::Light, shown: shown.clone() });
+                takes.push(Take { moment, other: after && changes_cameras(drift), shown: shown.clone() });
             };
             match drift {
                 Drift::None => take(false),
-                Drift::Light => [false, true].into_iter().for_each(take),
+                Drift::Light | Drift::Camera => [false, true].into_iter().for_each(take),
                 Drift::Person => take(later),
             }
         }
@@ -229,9 +230,10 @@ fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, 
 fn look_at(
     takes: &[Take],
     hands: &Hands,
+    drift: Drift,
     step: impl Fn(usize, usize) + Sync,
 ) -> Result<Views, ExperimentError> {
-    let cameras = cameras(hands)?;
+    let cameras = cameras(hands, drift)?;
     let done = AtomicUsize::new(0);
     let look = |(n, take): (usize, &Take)| -> Result<Views, ExperimentError> {
         let mut perception = Perception::new(hands.features, HandConfig::default())?;
@@ -243,17 +245,29 @@ fn look_at(
     Ok(seen.concat())
 }
 
-/// The camera at each place, before and after the drift of light.
-fn cameras(hands: &Hands) -> Result<Vec<(Pose, [CameraModel; 2])>, ExperimentError> {
-    let model = CameraModel::named(&hands.camera).ok_or_else(|| {
-        ExperimentError::Setting("the camera is none of footbot, parrot and laptop".to_owned())
-    })?;
+/// Whether what changes half-way is seen by other cameras: other ones, or the same in another light.
+fn changes_cameras(drift: Drift) -> bool {
+    matches!(drift, Drift::Light | Drift::Camera)
+}
+
+/// The camera at each place, before and after the drift.
+fn cameras(hands: &Hands, drift: Drift) -> Result<Vec<(Pose, [CameraModel; 2])>, ExperimentError> {
+    let named = |name: &str| {
+        CameraModel::named(name).ok_or_else(|| {
+            ExperimentError::Setting("the camera is none of footbot, parrot and laptop".to_owned())
+        })
+    };
+    let model = named(&hands.camera)?;
+    let of_others = named(if hands.camera == "footbot" { "parrot" } else { "footbot" })?;
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let places = hands.placement.place(hands.places, 1);
     Ok(places
         .into_iter()
         .map(|pose| {
             let bright = model.specimen(&mut rng);
+            if drift == Drift::Camera {
+                return (pose, [bright, of_others.specimen(&mut rng)]);
+            }
             let [blue, green, red] = bright.cast_bgr;
             let dim = CameraModel {
                 gain: (bright.gain * 0.7).max(0.1),
@@ -278,8 +292,8 @@ fn look_from_all(
         Shown::Rendered { .. } => None,
     };
     let mut views = Vec::with_capacity(cameras.len());
-    for (place, (pose, by_light)) in cameras.iter().enumerate() {
-        let camera = by_light[usize::from(take.dim)].clone();
+    for (place, (pose, both)) in cameras.iter().enumerate() {
+        let camera = both[usize::from(take.other)].clone();
         let seed = (n as u64) << 16 | place as u64;
         let frame = match (&take.shown, &picture) {
             (Shown::Picture(..), Some(picture)) => {

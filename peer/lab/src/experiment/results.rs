@@ -31,6 +31,7 @@ struct Row {
     heeded_liars: f64,
     least_heeded: f64,
     certified: f64,
+    unknown: f64,
 }
 
 /// `results.csv`: all rounds of each run that ended.
@@ -110,6 +111,7 @@ fn row((line, value, seed): &Run, standing: &Standing) -> Row {
         heeded_liars: standing.heeded_liars,
         least_heeded: standing.least_heeded,
         certified: standing.certified,
+        unknown: standing.unknown,
     }
 }
 
@@ -128,6 +130,7 @@ fn taken_apart(row: Row) -> (Run, Standing) {
         heeded_liars: row.heeded_liars,
         least_heeded: row.least_heeded,
         certified: row.certified,
+        unknown: row.unknown,
     };
     ((row.line, row.value, row.seed), standing)
 }
@@ -151,6 +154,7 @@ mod tests {
             heeded_liars: 1.0,
             least_heeded: 1.0,
             certified: 0.0,
+            unknown: 0.2,
         };
         (0..=rounds).map(standing).collect()
     }

@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::asking::asking;
+use super::drift::drift;
 use super::error::ExperimentError;
 use super::figures::figures;
 use super::fingerprint::this_program;
@@ -83,8 +84,9 @@ pub fn conduct_by(
     let runs = run_what_is_left(&taught, &pool, results, seeds, &progress)?.finish()?;
 
     let summary = Summary::of(&experiment, &cells, &runs, seeds);
-    let table =
-        summary.markdown(&pool, materials) + &asking(&experiment, &cells, &runs, seeds).unwrap_or_default();
+    let table = summary.markdown(&pool, materials)
+        + &asking(&experiment, &cells, &runs, seeds).unwrap_or_default()
+        + &drift(&experiment, &cells, &runs, seeds).unwrap_or_default();
     let path = folder.join("results.md");
     replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &figures(&summary))?;

@@ -121,6 +121,8 @@ pub enum Drift {
     Light,
     /// The people who show gestures.
     Person,
+    /// The cameras: those of another model, Parrots' in place of Foot-bots', Foot-bots' in place of Parrots' and laptops'.
+    Camera,
 }
 
 impl Default for Setting {

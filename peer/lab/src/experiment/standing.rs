@@ -30,4 +30,6 @@ pub struct Standing {
     pub least_heeded: f64,
     /// Where robots learn from groups of authors apart: the share of held-out views that they judge rightly, whatever as many others said as lie, or one. 0 elsewhere.
     pub certified: f64,
+    /// The logarithm of the odds that robots give that a held-out view shows nothing that they were taught, on average, of those that can tell: nats.
+    pub unknown: f64,
 }

@@ -153,8 +153,8 @@ fn split(pool: &Pool, rng: &mut ChaCha8Rng) -> Result<Split, ExperimentError> {
     Ok(split)
 }
 
-/// What is right, and the coordinates from each place.
-type Question = (ClassId, BTreeMap<usize, Vec<f32>>);
+/// What is right, and the features and coordinates from each place.
+type Question<'a> = (ClassId, BTreeMap<usize, (&'a [f32], Vec<f32>)>);
 
 /// What a robot makes of what it sees.
 #[derive(Clone)]
@@ -163,16 +163,18 @@ struct Verdict {
     is_certain: bool,
     /// None where it has learned nothing.
     probabilities: Option<Vec<f64>>,
+    /// For how much it takes it to show nothing that it was taught, in nats, if it can tell.
+    unknown: Option<f64>,
 }
 
 /// Held-out moments as all robots see them, in the space they learn in. Robots at one place see the same.
-struct Exam {
+struct Exam<'a> {
     classes: usize,
     /// All that are honest.
     robots: usize,
     /// Those that are examined.
     examined: Vec<usize>,
-    questions: Vec<Question>,
+    questions: Vec<Question<'a>>,
     places: Vec<usize>,
     /// By which a swarm judges.
     fusion: Arc<dyn Fuse>,
@@ -182,9 +184,9 @@ struct Exam {
     doubt: bool,
 }
 
-impl Exam {
+impl<'a> Exam<'a> {
     fn new(
-        pool: &Pool,
+        pool: &'a Pool,
         school: &School,
         moments: &[usize],
         (places, examined): (&[usize], &[usize]),
@@ -195,7 +197,7 @@ impl Exam {
         let question = |moment: &usize| {
             let seen = places.iter().filter_map(|place| {
                 let (features, _) = pool.features(*moment, *place)?;
-                Some((*place, school.space().project(features).ok()?))
+                Some((*place, (features, school.space().project(features).ok()?)))
             });
             (pool.moments[*moment].class, seen.collect())
         };
@@ -214,11 +216,17 @@ impl Exam {
     }
 
     /// What a robot makes of what it sees of a hand that shows that.
-    fn verdict(&self, classifier: Option<&Classifier>, view: &[f32], class: ClassId) -> Verdict {
+    fn verdict(
+        &self,
+        classifier: Option<&Classifier>,
+        (features, view): (&[f32], &[f32]),
+        class: ClassId,
+    ) -> Verdict {
         let certain = classifier.and_then(|classifier| classifier.certified(view));
         Verdict {
             is_certain: certain.is_some_and(|it| it.class == class && it.tolerates >= self.liars),
             probabilities: classifier.and_then(|classifier| classifier.probabilities_in_space(view)),
+            unknown: classifier.and_then(|it| it.unknown(features)).map(|odds| odds.ln().clamp(-CLIP, CLIP)),
         }
     }
 
@@ -229,16 +237,18 @@ impl Exam {
         let mut verdicts: Vec<Vec<Option<Verdict>>> = vec![Vec::new(); classifiers.len()];
         let all = verdicts.iter_mut().zip(classifiers.iter().zip(&self.places)).collect();
         on_each(all_cores(), all, |(verdicts, (classifier, place))| {
-            let verdict = |(class, views): &Question| {
-                Some(self.verdict(classifier.as_deref(), views.get(place)?, *class))
+            let verdict = |(class, views): &Question<'_>| {
+                let (features, view) = views.get(place)?;
+                Some(self.verdict(classifier.as_deref(), (features, view), *class))
             };
             verdicts.extend(self.questions.iter().map(verdict));
         });
         let chance = 1.0 / self.classes as f64;
         let (mut single, mut certified, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let unknown: Vec<f64> = verdicts.iter().flatten().flatten().filter_map(|it| it.unknown).collect();
         for (n, (class, _)) in self.questions.iter().enumerate() {
             let mut evidence: Vec<Vec<f32>> = Vec::new();
-            for Verdict { is_certain, probabilities } in
+            for Verdict { is_certain, probabilities, .. } in
                 verdicts.iter().filter_map(|of_robot| of_robot[n].as_ref())
             {
                 seen += 1.0;
@@ -284,6 +294,7 @@ impl Exam {
             heeded_liars: share(&of_liars),
             least_heeded: of_honest.iter().map(|of| share([of])).fold(1.0, f64::min),
             certified: certified / f64::max(seen, 1.0),
+            unknown: unknown.iter().sum::<f64>() / unknown.len().max(1) as f64,
         }
     }
 }
