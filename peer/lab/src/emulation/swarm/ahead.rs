@@ -5,45 +5,19 @@
 //! of time; then all parts are carried out in the order of all, as if each had been done at its turn. What comes of it is the same on any
 //! number of threads, and on one, where nothing is done ahead.
 
-use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::Swarm;
 use super::answering::THINKS;
-use super::deed::{Deed, Turn};
 use super::queue::Due;
 use super::robot::Robot;
+use super::turn::{Deed, Turn};
 use crate::emulation::network::Presence;
 use crate::emulation::school::School;
 use crate::threads::on_each;
 
 /// Fewer turns than this are done sooner than other cores are woken.
 pub(super) const WORTHWHILE: usize = 32;
-
-/// What one robot is to do ahead, and has done.
-#[derive(Default)]
-pub(super) struct Ahead {
-    due: Vec<(Duration, Turn)>,
-    /// The first first.
-    done: VecDeque<(Duration, Turn, Vec<Deed>)>,
-}
-
-impl Ahead {
-    /// What was done ahead when that was due; nothing if that comes to nothing, as when it wakes though it wanted to be woken at another time.
-    /// `None` where nothing is left that was done ahead: it is to be done now.
-    pub fn recall(&mut self, now: Duration, turn: &Turn) -> Option<Vec<Deed>> {
-        let (at, next, _) = self.done.front()?;
-        debug_assert!(*at >= now, "what was done ahead was never due");
-        if *at > now || !next.is(turn) {
-            return Some(Vec::new());
-        }
-        self.done.pop_front().map(|(.., deeds)| deeds)
-    }
-
-    pub fn is_over(&self) -> bool {
-        self.done.is_empty()
-    }
-}
 
 impl Swarm<'_> {
     /// Lets robots do what is due for them within the time of a message, and before that time, if it is worth it.

@@ -7,9 +7,9 @@ use gestalt_protocol::{Answer, Message};
 use gestalt_strategies::{Input, Output};
 
 use super::Swarm;
-use super::deed::{Deed, Turn};
 use super::parcel::{Parcel, as_json, json_bytes, over_the_wire};
 use super::queue::Due;
+use super::turn::{Deed, Turn};
 use crate::emulation::network::{Kind, Presence};
 use crate::emulation::trace::Happening;
 

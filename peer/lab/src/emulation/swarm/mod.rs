@@ -7,7 +7,8 @@
 //! | `answering` | what is asked, and what is answered? |
 //! | `faults` | what goes wrong? |
 //! | `lives` | who starts, goes on, and knows of whom? |
-//! | `deed` | what does a robot do by itself? |
+//! | `turn` | what is due for one robot, and what did it do of it? |
+//! | `acting` | what does a robot do by itself? |
 //! | `ahead` | what may it do before it is its turn? |
 //! | `carry` | what does it want done, and what becomes of it? |
 //! | `deceive` | what do liars say? |
@@ -15,12 +16,12 @@
 //! | `reading` | what may a mind be told later than it comes? |
 //! | `training` | who learns? |
 
+mod acting;
 mod ahead;
 mod answering;
 mod carry;
 mod course;
 mod deceive;
-mod deed;
 mod faults;
 mod lives;
 mod parcel;
@@ -31,6 +32,7 @@ mod reading;
 mod robot;
 mod seed;
 mod training;
+mod turn;
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -52,12 +54,12 @@ use super::statistics::Mean;
 use super::trace::{Happening, Trace};
 use crate::threads::all_cores;
 use answering::Asking;
-use deed::Turn;
 use plot::Plot;
 use poisoning::Poisoner;
 use queue::{Due, Queue};
 use robot::Robot;
 use seed::{ANSWERS, COURSE, NETWORK, stream};
+use turn::Turn;
 
 /// A run of a scenario.
 pub(super) struct Swarm<'a> {

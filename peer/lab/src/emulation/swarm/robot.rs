@@ -8,10 +8,10 @@ use gestalt_protocol::{Envelope, RobotId};
 use gestalt_strategies::Mind;
 use rand_chacha::ChaCha8Rng;
 
-use super::ahead::Ahead;
 use super::parcel::Parcel;
 use super::poisoning::Poisoner;
 use super::seed::stream;
+use super::turn::Ahead;
 use crate::emulation::observer::Observer;
 use crate::emulation::pupil::Pupil;
 use crate::emulation::scenario::Lies;

@@ -3,55 +3,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::RoundId;
 use gestalt_strategies::{Classify, Input, Mind, Output};
 use rand::RngExt;
 
 use super::parcel::Parcel;
 use super::robot::Robot;
+use super::turn::{Deed, Turn};
 use crate::emulation::pupil::Pupil;
 use crate::emulation::school::School;
-
-/// What a robot did or wants done, in the order of it.
-#[expect(clippy::large_enum_variant, reason = "nearly all are what a mind wants")]
-pub(super) enum Deed {
-    /// It is to be woken then.
-    Wakes(Duration),
-    /// It takes part in a round: its first frame comes then, of its `n`th look.
-    Looks(RoundId, Duration, u32),
-    /// Its next frame comes then, of the same look.
-    LooksOn(Duration, u32),
-    /// It judged a frame so.
-    Judges(Vec<f64>),
-    /// It learned from so many samples.
-    Learns(usize),
-    /// What it is to remember up to that revision is on its way to its disk.
-    Remembers(u64),
-    /// Its mind wants that done, and it concerns others.
-    Wants(Output),
-}
-
-/// What is due for one robot.
-pub(super) enum Turn {
-    Wakes,
-    /// It looks at the next frame of its `n`th look.
-    Looks(u32),
-    Hears(Parcel),
-    /// What it was to remember in that life, up to that revision, is on its disk.
-    Has(u32, u64),
-}
-
-impl Turn {
-    /// Whether that is the same, if it is due for the same robot at the same time, at which it hears nothing else.
-    pub fn is(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Wakes, Self::Wakes) | (Self::Hears(_), Self::Hears(_)) => true,
-            (Self::Looks(n), Self::Looks(m)) => n == m,
-            (Self::Has(boot, n), Self::Has(life, m)) => (boot, n) == (life, m),
-            _ => false,
-        }
-    }
-}
 
 impl Robot {
     /// Does its part of what is due for it now; it is up, or stands still.
