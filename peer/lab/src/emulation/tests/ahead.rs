@@ -80,6 +80,14 @@ fn so_they_do_among_liars_poisoners_and_robots_that_stop_die_and_start_again() {
         fault(15_250, Event::Restart(dies)),
     ];
     is_the_same_ahead("faults", &scenario, 0..4);
+    // They say what follows from what they hold just then, while much comes in.
+    let mut poisoned = scenario.clone();
+    poisoned.faults.clear();
+    poisoned.link.latency = Duration::from_millis(600);
+    for poison in [Poison::Copycat, Poison::NearBoundary] {
+        poisoned.robots[1].poison = Some(poison);
+        is_the_same_ahead("poison", &poisoned, 0..3);
+    }
     for feedback in [Feedback::Partial, Feedback::Asked] {
         scenario.learning.as_mut().unwrap().feedback = feedback;
         scenario.link.latency = Duration::from_secs(1);
