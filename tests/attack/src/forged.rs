@@ -1,6 +1,5 @@
 //! Messages as an adversary makes them up. What robots come to sign is signed here too, in one place for each kind.
 
-use crate::trust::{Identity, Speaker, SwarmId, WordHeading, statement, word};
 use gestalt_protocol::{
     Batches, Certificate, ClassId, CountedVote, Decision, Envelope, Give, HeldBatch, HeldVote, Instruction,
     Lesson, Lessons, MAX_SAMPLES, Message, RobotId, RoundId, SampleId, Samples, SharedSample, SignedWord,
@@ -10,6 +9,7 @@ use gestalt_strategies::fusion::fuse;
 use gestalt_strategies::{Fuse, MindConfig, decode_vector};
 
 use crate::swarm::world::{CLASSES, instructor, key, space, vocabulary};
+use crate::trust::{Identity, Speaker, SwarmId, WordHeading, statement, word};
 
 /// The highest stamp there is.
 pub const LAST: Stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };

@@ -48,6 +48,12 @@ impl Mean {
         Self::of(&measured.collect::<Vec<_>>())
     }
 
+    /// The mean of shares with its interval, in percent, for a table.
+    #[must_use]
+    pub fn percent(self) -> String {
+        format!("{:.1} ± {:.1}", 100.0 * self.mean, 100.0 * self.half_width)
+    }
+
     /// The mean with its interval by Student's t.
     #[must_use]
     pub fn of(numbers: &[f64]) -> Self {

@@ -32,10 +32,7 @@ pub fn asking(
     if !asked {
         return None;
     }
-    let runs_of = |cell: &Cell| -> BTreeMap<u64, &[Standing]> {
-        let run = |seed| runs.get(&(cell.line.clone(), cell.value.clone(), seed)).map(Vec::as_slice);
-        (0..u64::from(seeds)).filter_map(|seed| Some((seed, run(seed)?))).collect()
-    };
+    let runs_of = |cell: &Cell| cell.runs(runs, seeds);
     let mut text = "\n## Labels and questions\n\n".to_owned();
     // Writing to a string cannot fail.
     let _ =
@@ -53,17 +50,15 @@ pub fn asking(
         let last = |measure: Measure| {
             Mean::of(&of_cell.values().filter_map(|run| run.last()).map(measure).collect::<Vec<_>>())
         };
-        let percent = |mean: Mean| format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
         let pairs = of_cell.iter().filter_map(|(seed, run)| Some((run.last()?, firsts.get(seed)?.last()?)));
         let gain = Mean::of(&pairs.map(|(run, first)| run.swarm - first.swarm).collect::<Vec<_>>());
-        let name =
-            if cell.line.is_empty() { cell.value.clone() } else { format!("{}, {}", cell.line, cell.value) };
+        let name = cell.name();
         let _ = write!(
             text,
             "| {name} | {:.1} | {} | {} | {:+.1} ± {:.1} ",
             last(|standing| standing.labels).mean,
-            percent(last(|standing| standing.swarm)),
-            percent(last(|standing| standing.single)),
+            Mean::percent(last(|standing| standing.swarm)),
+            Mean::percent(last(|standing| standing.single)),
             100.0 * gain.mean,
             100.0 * gain.half_width,
         );

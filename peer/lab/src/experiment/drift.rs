@@ -55,13 +55,9 @@ pub fn drift(
     );
     let _ = writeln!(text, "|{}", "---|".repeat(10));
     for cell in cells {
-        let run = |seed| runs.get(&(cell.line.clone(), cell.value.clone(), seed));
-        let around: Vec<Around<'_>> =
-            (0..u64::from(seeds)).filter_map(run).filter_map(|run| Around::of(run)).collect();
-        let name =
-            if cell.line.is_empty() { cell.value.clone() } else { format!("{}, {}", cell.line, cell.value) };
-        let _ = write!(text, "| {name} ");
-        let columns: [(Measure, Written); 2] = [(|it| it.unknown, nats), (|it| it.single, percent)];
+        let around: Vec<Around<'_>> = cell.runs(runs, seeds).into_values().filter_map(Around::of).collect();
+        let _ = write!(text, "| {} ", cell.name());
+        let columns: [(Measure, Written); 2] = [(|it| it.unknown, nats), (|it| it.single, Mean::percent)];
         for (measure, written) in columns {
             let before = |it: &Around<'_>| it.before.iter().map(measure).sum::<f64>() / BEFORE as f64;
             let _ = write!(
@@ -76,7 +72,7 @@ pub fn drift(
         let after = alarms.iter().map(|(after, _)| f64::from(u8::from(*after)));
         let before = alarms.iter().map(|(_, before)| *before);
         let _ =
-            writeln!(text, "| {} | {} | {} |", percent(mean(after)), percent(mean(before)), auroc(&around));
+            writeln!(text, "| {} | {} | {} |", mean(after).percent(), mean(before).percent(), auroc(&around));
     }
     let _ = writeln!(
         text,
@@ -112,10 +108,6 @@ fn auroc(around: &[Around<'_>]) -> String {
 
 fn mean(values: impl Iterator<Item = f64>) -> Mean {
     Mean::of(&values.collect::<Vec<_>>())
-}
-
-fn percent(mean: Mean) -> String {
-    format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width)
 }
 
 fn nats(mean: Mean) -> String {

@@ -1,12 +1,15 @@
 //! An experiment file: a base setting, what is varied, and how often.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::error::ExperimentError;
+use super::results::Run;
 use super::setting::{Drift, Method, Setting, Start};
+use super::standing::Standing;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::perception::FeatureSet;
 use gestalt_vision::pose::Placement;
@@ -148,6 +151,30 @@ pub struct Cell {
     pub value: String,
     /// What is run.
     pub setting: Setting,
+}
+
+impl Cell {
+    /// What its run with that seed is called.
+    #[must_use]
+    pub fn run(&self, seed: u64) -> Run {
+        (self.line.clone(), self.value.clone(), seed)
+    }
+
+    /// Its runs, of the seeds from 0 up to `seeds`.
+    #[must_use]
+    pub fn runs<'a>(
+        &self,
+        all: &'a BTreeMap<Run, Vec<Standing>>,
+        seeds: u32,
+    ) -> BTreeMap<u64, &'a [Standing]> {
+        (0..u64::from(seeds)).filter_map(|seed| Some((seed, all.get(&self.run(seed))?.as_slice()))).collect()
+    }
+
+    /// What it is called in tables that have no column for lines.
+    #[must_use]
+    pub fn name(&self) -> String {
+        if self.line.is_empty() { self.value.clone() } else { format!("{}, {}", self.line, self.value) }
+    }
 }
 
 impl Experiment {

@@ -18,7 +18,7 @@ use super::plan::{Cell, Experiment};
 use super::pool::Pool;
 use super::progress::Progress;
 use super::replace::replace;
-use super::results::{Results, Run};
+use super::results::Results;
 use super::school::Schools;
 use super::summary::Summary;
 use super::{chart, trial};
@@ -121,10 +121,9 @@ fn run_what_is_left(
     seeds: u32,
     progress: &(impl Fn(Progress) + Sync),
 ) -> Result<Results, ExperimentError> {
-    let named = |cell: &Cell, seed| -> Run { (cell.line.clone(), cell.value.clone(), seed) };
     let all = (0..u64::from(seeds)).flat_map(|seed| cells.iter().map(move |cell| (cell, seed)));
     let left: Vec<_> =
-        all.filter(|(taught, seed)| !results.runs.contains_key(&named(taught.cell, *seed))).collect();
+        all.filter(|(taught, seed)| !results.runs.contains_key(&taught.cell.run(*seed))).collect();
     let total = seeds as usize * cells.len();
     let ran = total - left.len();
     progress(Progress::Ran(ran, total));
@@ -136,7 +135,7 @@ fn run_what_is_left(
         let standings = trial::run(&cell.setting, school, pool, *seed, (rules, &stop))?;
         let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
         let (results, ran) = &mut *results;
-        results.add(named(cell, *seed), standings)?;
+        results.add(cell.run(*seed), standings)?;
         *ran += 1;
         progress(Progress::Ran(*ran, total));
         Ok(())

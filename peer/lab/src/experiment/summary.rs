@@ -63,13 +63,9 @@ impl Summary {
         runs: &BTreeMap<Run, Vec<Standing>>,
         seeds: u32,
     ) -> Self {
-        let of_cell = |cell: &Cell| -> BTreeMap<u64, &Vec<Standing>> {
-            let run = |seed| runs.get(&(cell.line.clone(), cell.value.clone(), seed));
-            (0..u64::from(seeds)).filter_map(|seed| Some((seed, run(seed)?))).collect()
-        };
-        let first = cells.first().map(of_cell).unwrap_or_default();
+        let first = cells.first().map(|cell| cell.runs(runs, seeds)).unwrap_or_default();
         let curves = |cell: &Cell| {
-            let of_cell = of_cell(cell);
+            let of_cell = cell.runs(runs, seeds);
             let over = |measure: &dyn Fn(&Standing) -> f64| -> Vec<Mean> {
                 (0..=cell.setting.rounds as usize)
                     .map(|round| {
@@ -132,7 +128,6 @@ impl Summary {
         let _ = writeln!(text, "|{}", "---|".repeat(13 + usize::from(self.lines)));
         for (cell, curves) in &self.cells {
             let last = |means: &[Mean]| means.last().copied().unwrap_or(Mean::of(&[]));
-            let percent = |mean: Mean| format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
             let signed = |mean: Mean| format!("{:+.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
             let bytes = |mean: Mean| format!("{:.0} ± {:.0}", mean.mean, mean.half_width);
             let [low, high] =
@@ -142,11 +137,11 @@ impl Summary {
                 text,
                 "| {line}{} | {} | {} | {} | {} | {} | {} | {} | {low} | {high} | {} | {} | {} |",
                 cell.value,
-                percent(curves.single.first().copied().unwrap_or(Mean::of(&[]))),
-                percent(last(&curves.single)),
-                percent(last(&curves.swarm)),
-                percent(last(&curves.majority)),
-                percent(curves.over_rounds),
+                Mean::percent(curves.single.first().copied().unwrap_or(Mean::of(&[]))),
+                Mean::percent(last(&curves.single)),
+                Mean::percent(last(&curves.swarm)),
+                Mean::percent(last(&curves.majority)),
+                Mean::percent(curves.over_rounds),
                 signed(curves.gain_at_the_end),
                 signed(curves.gain_over_rounds),
                 bytes(last(&curves.published)),

@@ -223,10 +223,12 @@ impl<'a> Exam<'a> {
         class: ClassId,
     ) -> Verdict {
         let certain = classifier.and_then(|classifier| classifier.certified(view));
+        let judged = classifier.and_then(|classifier| classifier.judge(features).ok());
+        let unknown = judged.as_ref().and_then(|judged| judged.unknown);
         Verdict {
             is_certain: certain.is_some_and(|it| it.class == class && it.tolerates >= self.liars),
-            probabilities: classifier.and_then(|classifier| classifier.probabilities_in_space(view)),
-            unknown: classifier.and_then(|it| it.unknown(features)).map(|odds| odds.ln().clamp(-CLIP, CLIP)),
+            unknown: unknown.map(|odds| odds.ln().clamp(-CLIP, CLIP)),
+            probabilities: judged.map(|judged| judged.probabilities),
         }
     }
 

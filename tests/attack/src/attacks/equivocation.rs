@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
 use gestalt_strategies::is_refuted;
 
@@ -13,6 +12,7 @@ use crate::beside::{beside, decided_alike};
 use crate::forged;
 use crate::swarm::world::{key, roster};
 use crate::swarm::{Plan, Swarm};
+use crate::trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
-use crate::trust::{Speaker, WordHeading, answer, word};
 use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};
 use crate::swarm::world::{STRANGER, instructor, key};
 use crate::swarm::{Plan, Swarm};
+use crate::trust::{Speaker, WordHeading, answer, word};
 
 pub const ALL: &[Attack] = &[
     Attack {

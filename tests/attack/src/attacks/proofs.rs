@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::trust::Roster;
 use gestalt_protocol::{
     Announcement, CountedVote, Decision, Envelope, Give, Message, RobotId, RoundId, Stamp, Topic, decode_json,
 };
@@ -14,6 +13,7 @@ use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::forged;
 use crate::swarm::world::{key, members, roster};
 use crate::swarm::{Plan, Swarm};
+use crate::trust::Roster;
 
 pub const ALL: &[Attack] = &[
     Attack {

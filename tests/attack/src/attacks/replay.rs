@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::trust::{Membership, SwarmId, statement};
 use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
 
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
@@ -11,6 +10,7 @@ use crate::beside::{beside, decided_in_time, unmoved};
 use crate::forged;
 use crate::swarm::world::{authority, key, members};
 use crate::swarm::{Parcel, Plan, Swarm};
+use crate::trust::{Membership, SwarmId, statement};
 
 const MS: Duration = Duration::from_millis(1);
 

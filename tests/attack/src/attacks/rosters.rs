@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::trust::{Budget, MAX_ROSTER, Membership, PublicKey, Roster, RosterError, Verifier};
 use gestalt_protocol::RobotId;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::swarm::world::{authority, key, members};
+use crate::trust::{Budget, MAX_ROSTER, Membership, PublicKey, Roster, RosterError, Verifier};
 
 /// The members that the robots hold.
 const HELD: u64 = 5;

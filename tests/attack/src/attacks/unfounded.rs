@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use crate::trust::Evidence;
 use gestalt_protocol::{
     Announcement, ClassId, Decision, Envelope, RobotId, Signature, Stamp, Topic, decode_json,
 };
@@ -15,6 +14,7 @@ use crate::beside::{beside, unmoved};
 use crate::forged;
 use crate::swarm::Swarm;
 use crate::swarm::world::key;
+use crate::trust::Evidence;
 
 const MS: Duration = Duration::from_millis(1);
 

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use crate::trust::{SwarmId, Tag};
 use gestalt_protocol::{
     Announcement, Decision, Envelope, Give, HeldVote, Instruction, Message, RobotId, RoundId, Stamp, Topic,
 };
 use gestalt_strategies::{Input, MindConfig};
 
 use crate::forged;
+use crate::trust::{SwarmId, Tag};
 
 use super::network::{Swarm, json};
 use super::port::Parcel;

@@ -1,8 +1,9 @@
 //! Whose words count by the roster, as in `gestalt-link`.
 
-use crate::trust::{Role, Roster, Speaker};
 use gestalt_protocol::{InstructorId, SignedWord};
 use gestalt_strategies::{Believe, Standing};
+
+use crate::trust::{Role, Roster, Speaker};
 
 /// Knows who may teach.
 #[derive(Debug)]

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use crate::trust::{Roster, Speaker, WordHeading, word};
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
 use gestalt_strategies::{Input, Observation};
 use rand::RngExt;
@@ -13,6 +12,7 @@ use super::port::Parcel;
 use super::shown::Shown;
 use super::world::{CLASSES, features, instructor, key_of};
 use crate::attack::Setting;
+use crate::trust::{Roster, Speaker, WordHeading, word};
 
 /// How long a gesture is shown.
 const SHOWN_FOR: Duration = Duration::from_secs(3);

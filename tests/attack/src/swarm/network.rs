@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use crate::trust::{Channels, Roster, answer};
 use gestalt_protocol::{Answer, Decision, Envelope, Keys, Message, RobotId, Topic};
 use gestalt_strategies::{Input, Mind, Output};
 use rand::{RngExt, SeedableRng};
@@ -15,6 +14,7 @@ use super::robot::{Account, Robot, is_vote};
 use super::shown::Shown;
 use super::world::{SWARM, key, roster};
 use crate::attack::Setting;
+use crate::trust::{Channels, Roster, answer};
 
 /// What is to happen.
 #[derive(Debug)]

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::trust::{Channels, Distrust, Evidence, EvidenceError, Judge, RosterError};
 use gestalt_protocol::{
     Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
     MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
@@ -12,6 +11,7 @@ use gestalt_protocol::{
 use gestalt_strategies::{Believe, Input, Instructed};
 
 use super::believer::Believer;
+use crate::trust::{Channels, Distrust, Evidence, EvidenceError, Judge, RosterError};
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;

@@ -5,7 +5,6 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::trust::{Channels, Identity, Judge, Roster, SwarmId, statement};
 use gestalt_protocol::{Envelope, Fnv1a, Keys, RobotId, Signature, Stamp};
 use gestalt_strategies::{
     Input, LearningSetup, Life, Mind, Output, RecordChange, RobotMemory, Sign, is_refuted,
@@ -16,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use super::plan::Plan;
 use super::port::Port;
 use super::world::{ByFirst, SWARM, key, space, vocabulary};
+use crate::trust::{Channels, Identity, Judge, Roster, SwarmId, statement};
 
 /// An honest robot.
 #[derive(Debug)]

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::trust::{Identity, Instructor, Membership, Role, Roles, Roster};
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_strategies::{Classify, ClassifyError, Components, FeatureSpace, ScalingMethod, Vocabulary};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::trust::{Identity, Instructor, Membership, Role, Roles, Roster};
 
 /// How many gestures there are.
 pub const CLASSES: u32 = 6;

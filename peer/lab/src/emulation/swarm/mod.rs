@@ -155,11 +155,11 @@ impl<'a> Swarm<'a> {
 
     /// Lets everything happen that is due before that time.
     pub fn pass(&mut self, until: Duration) {
-        self.go_ahead(until);
-        while let Some((at, due)) = self.queue.next_before(until) {
+        loop {
+            self.go_ahead(until);
+            let Some((at, due)) = self.queue.next_before(until) else { break };
             self.now = at;
             self.happen(due);
-            self.go_ahead(until);
         }
         self.read_all();
     }

@@ -57,7 +57,6 @@ impl Summary {
 
     /// The table, with a word on how to read it.
     pub fn markdown(&self) -> String {
-        let percent = |mean: Mean| format!("{:.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
         // Who never decides takes no time over it.
         let seconds = |mean: Mean| match mean.n {
             0 => "–".to_owned(),
@@ -77,12 +76,12 @@ impl Summary {
                 "| {} | {} | {} | {} | {} | {:+.1} ± {:.1} | {} | {} |",
                 row.line,
                 row.made_of,
-                percent(row.right),
-                percent(row.wrong),
-                percent(row.undecided),
+                row.right.percent(),
+                row.wrong.percent(),
+                row.undecided.percent(),
                 100.0 * row.gain.mean,
                 100.0 * row.gain.half_width,
-                percent(row.frames_right),
+                row.frames_right.percent(),
                 seconds(row.decided_s),
             );
         }
