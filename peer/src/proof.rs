@@ -122,7 +122,7 @@ mod tests {
         for k in 0..4 {
             let vocabulary = Vocabulary::new(["a", "b"]).unwrap();
             due.push((k, Input::Learned(Arc::new(Verbatim(vocabulary)))));
-            due.push((k, Input::Alive((1..=4).map(RobotId).collect())));
+            due.push((k, Input::Alive(Arc::new((1..=4).map(RobotId).collect()))));
             due.push((k, Input::Blind(k == 3)));
             due.push((k, Input::Open));
             if k < 3 {

@@ -46,7 +46,7 @@ fn one_of(me: u32, robots: &BTreeSet<RobotId>, classifier: &Arc<Verbatim>, alpha
     let config = MindConfig { alpha: Some(alpha), ..MindConfig::default() };
     let mut mind = Mind::new(RobotId(me), Life { boot: 1, nonce: me }, config).expect("it is valid");
     mind.handle(ms(0), Input::Learned(classifier.clone()));
-    mind.handle(ms(0), Input::Alive(robots.clone()));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots.clone())));
     mind
 }
 

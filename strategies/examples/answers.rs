@@ -44,7 +44,7 @@ fn decided(classifier: &Arc<Classifier>, rng: &mut ChaCha8Rng) -> Result<Vec<Dec
     for id in ids.clone() {
         let mut mind = Mind::new(id, Life { boot: 1, nonce: id.0 }, MindConfig::default())?;
         mind.handle(Duration::ZERO, Input::Learned(classifier.clone()));
-        mind.handle(Duration::ZERO, Input::Alive(ids.clone().collect()));
+        mind.handle(Duration::ZERO, Input::Alive(Arc::new(ids.clone().collect())));
         minds.push(mind);
     }
     let mut held = Vec::new();

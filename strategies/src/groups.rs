@@ -43,6 +43,8 @@ impl Groups {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
     use proptest::prelude::*;
     use rand::SeedableRng;
@@ -66,7 +68,7 @@ mod tests {
             ForgettingRule::default().build(),
         );
         let mut set = set.in_groups(Groups::new(3));
-        set.meet(&(1..9).map(RobotId).collect());
+        set.meet(Arc::new((1..9).map(RobotId).collect()));
         let mut lies = lies.iter();
         for (index, mut next) in (0..).zip(coming.iter()) {
             let author = next.0;

@@ -105,12 +105,7 @@ impl TrainingSet {
     /// and when more series were seen than are kept track of, those of robots that are not there give way: each other robot
     /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
     /// Gives those that were not alive before.
-    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
-        self.meet_all(Arc::new(alive.clone()))
-    }
-
-    /// The same, of a list that other robots of the process hold as well.
-    pub(crate) fn meet_all(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
+    pub fn meet(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
         self.shares.meet(self.me(), alive)
     }
 
@@ -245,7 +240,7 @@ impl TrainingSet {
     /// Whether there is no room for that series, which is new. A place is kept for this robot's own.
     fn is_full_for(&self, series: SampleSeries) -> bool {
         let spoke = series == self.series || !self.seen.intervals(self.series).is_empty();
-        self.seen.series().len() >= MAX_SERIES - usize::from(!spoke)
+        self.seen.series_count() >= MAX_SERIES - usize::from(!spoke)
     }
 
     /// Where a series is one too many, forgets the one of which the least is held, and what that is: of its author's other

@@ -293,7 +293,7 @@ impl PortableMind {
     /// [`MindError::TooMany`].
     pub fn set_alive(&mut self, now: Duration, robots: &[u32]) -> Result<(), MindError> {
         let robots = robots_of(robots)?;
-        self.tell(now, Input::Alive(robots));
+        self.tell(now, Input::Alive(Arc::new(robots)));
         Ok(())
     }
 

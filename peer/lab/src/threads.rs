@@ -1,30 +1,69 @@
 //! Work on many robots that is done in any order.
 
 use std::num::NonZero;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// As many threads as the machine has cores for.
-pub(crate) fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Threads that stay, for work that comes a thousand times a second: to start some each time takes as long as a little work, and what threads leave of the
+/// memory that they had is a tenth of all.
+///
+/// Whoever has work done is to be no thread of rayon's, see [`apart`].
+pub(crate) struct Crew {
+    threads: usize,
+    /// All but the one that has work done, from the first time on that they are wanted.
+    others: OnceLock<ThreadPool>,
 }
 
-/// Does that with each of these, on so many threads at most.
-pub(crate) fn on_each<T: Send>(threads: usize, all: Vec<T>, work: impl Fn(T) + Sync) {
-    let threads = threads.min(all.len());
-    if threads <= 1 {
-        return all.into_iter().for_each(work);
+impl Crew {
+    /// So many threads, the one that has work done among them.
+    pub fn of(threads: usize) -> Self {
+        Self { threads: threads.max(1), others: OnceLock::new() }
     }
-    let left = Mutex::new(all.into_iter());
-    let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let work_on = || {
-        while let Some(one) = next() {
-            work(one);
+
+    /// As many threads as the machine has cores for.
+    pub fn on_all_cores() -> Self {
+        Self::of(std::thread::available_parallelism().map_or(1, NonZero::get))
+    }
+
+    /// Whether there is nobody but the one that has work done.
+    pub fn is_alone(&self) -> bool {
+        self.threads == 1
+    }
+
+    /// Does that with each of these.
+    pub fn on_each<T: Send>(&self, all: Vec<T>, work: impl Fn(T) + Sync) {
+        if self.is_alone() || all.len() < 2 {
+            return all.into_iter().for_each(work);
         }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..threads {
-            scope.spawn(work_on);
-        }
-        work_on();
-    });
+        let others = self.threads.min(all.len()) - 1;
+        let left = Mutex::new(all.into_iter());
+        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let work_on = || {
+            while let Some(one) = next() {
+                work(one);
+            }
+        };
+        self.others().in_place_scope(|scope| {
+            for _ in 0..others {
+                scope.spawn(|_| work_on());
+            }
+            work_on();
+        });
+    }
+
+    /// The threads that wait for work.
+    fn others(&self) -> &ThreadPool {
+        self.others.get_or_init(|| {
+            let threads = ThreadPoolBuilder::new().num_threads(self.threads - 1);
+            threads.build().expect("the system gives an emulation its threads")
+        })
+    }
+}
+
+/// Does that on a thread of its own. A thread of rayon's that waits for others takes up other work meanwhile, which may be a whole emulation.
+#[cfg(feature = "experiments")]
+pub(crate) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let done = std::thread::scope(|scope| scope.spawn(work).join());
+    done.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }

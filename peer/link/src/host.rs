@@ -105,7 +105,7 @@ impl Host {
     fn note(&mut self, input: Input) -> Option<Input> {
         match &input {
             Input::Alive(alive) => {
-                self.tell_alive(alive | &self.guests.present());
+                self.tell_alive(&**alive | &self.guests.present());
             }
             Input::Guests(guests) => {
                 let tokens = self.inbox.tokens();
@@ -181,7 +181,7 @@ impl Host {
         if let Some(classifier) = classifier {
             self.step(Input::Learned(classifier));
         }
-        self.step(Input::Alive(self.inbox.tokens()));
+        self.step(Input::Alive(Arc::new(self.inbox.tokens())));
         self.step(Input::Neighbours(self.inbox.links().into_values().collect()));
         self.step(Input::Guests(self.guests.present()));
     }

@@ -166,7 +166,7 @@ impl Inbox {
         let state = &mut *state;
         let mut inputs = Vec::with_capacity(state.queue.len() + state.votes.len() + 2);
         if std::mem::take(&mut state.alive_changed) {
-            inputs.push(Input::Alive(state.alive.clone()));
+            inputs.push(Input::Alive(Arc::new(state.alive.clone())));
         }
         if std::mem::take(&mut state.links_changed) {
             inputs.push(Input::Neighbours(state.links.values().copied().collect()));

@@ -1,6 +1,7 @@
 //! How the decisions of one round become one: the greatest wins, and one robot says it aloud.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Decision, Fnv1a, Holder, MAX_ROBOTS, Rank, RobotId, Stamp};
@@ -10,7 +11,7 @@ use gestalt_protocol::{ClassId, Decision, Fnv1a, Holder, MAX_ROBOTS, Rank, Robot
 /// Believing commutes and repeats harmlessly: the greatest decision is kept, whatever the order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Agreement {
-    best: Option<Decision>,
+    best: Option<Arc<Decision>>,
     /// Its rank, which all its votes are added up for.
     best_rank: Option<Rank>,
     /// What each robot said last that it holds, this one among them. At most [`MAX_ROBOTS`].
@@ -23,7 +24,7 @@ pub struct Agreement {
 
 #[derive(Clone, Debug, PartialEq)]
 struct Held {
-    decision: Decision,
+    decision: Arc<Decision>,
     rank: Rank,
     since: Duration,
     /// When the class last changed, or was first contradicted by an announcement.
@@ -123,7 +124,7 @@ impl Agreement {
         let rank = decision.rank();
         let greater = self.best_rank.is_none_or(|best| rank > best);
         if greater {
-            (self.best, self.best_rank) = (Some(decision), Some(rank));
+            (self.best, self.best_rank) = (Some(Arc::new(decision)), Some(rank));
         }
         greater
     }
@@ -150,13 +151,13 @@ impl Agreement {
     /// The decision held.
     #[must_use]
     pub fn held(&self) -> Option<&Decision> {
-        self.held.as_ref().map(|held| &held.decision)
+        self.held.as_ref().map(|held| &*held.decision)
     }
 
     /// The greatest decision that may be held.
     #[must_use]
     pub fn best(&self) -> Option<&Decision> {
-        self.best.as_ref()
+        self.best.as_deref()
     }
 
     /// Since when one is held.

@@ -1,10 +1,11 @@
 //! Of whom the majority is: the robots heard lately.
 
-use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{MAX_ROBOTS, RobotId};
+
+use crate::others::Others;
 
 /// Who counts as one of the swarm, whether or not it can be reached now.
 ///
@@ -53,29 +54,29 @@ impl Electorate {
     }
 
     /// Those were alive, and these are now.
-    pub fn change(&mut self, before: &BTreeSet<RobotId>, robots: &BTreeSet<RobotId>, now: Duration) {
-        for robot in before.difference(robots).filter(|robot| !self.silent.contains(robot)) {
+    pub fn change(&mut self, before: &Others, robots: &Others, now: Duration) {
+        for robot in before.since(robots).filter(|robot| !self.silent.contains(robot)) {
             if self.gone.len() < MAX_ROBOTS {
-                self.gone.insert(*robot, now);
+                self.gone.insert(robot, now);
             }
         }
-        self.gone.retain(|robot, _| !robots.contains(robot));
+        self.gone.retain(|robot, _| !robots.contains(*robot));
         self.alive(robots, now);
     }
 
     /// These are alive now.
-    pub fn alive(&mut self, robots: &BTreeSet<RobotId>, now: Duration) {
+    pub fn alive(&mut self, robots: &Others, now: Duration) {
         self.alive = robots.len();
-        self.unheard.retain(|robot, _| robots.contains(robot));
-        self.silent.retain(|robot| robots.contains(robot));
+        self.unheard.retain(|robot, _| robots.contains(*robot));
+        self.silent.retain(|robot| robots.contains(*robot));
         self.large = self.counted_large().is_some();
         if self.large {
             self.unheard.clear();
             return;
         }
         for robot in robots.iter().take(MAX_ROBOTS) {
-            if !self.heard.contains_key(robot) && !self.silent.contains(robot) {
-                self.unheard.entry(*robot).or_insert(now);
+            if !self.heard.contains_key(&robot) && !self.silent.contains(&robot) {
+                self.unheard.entry(robot).or_insert(now);
             }
         }
     }
@@ -105,15 +106,12 @@ impl Electorate {
     }
 
     /// Those of the living of whom anything is to be expected.
-    pub fn expected<'a>(&self, alive: &'a BTreeSet<RobotId>) -> Cow<'a, BTreeSet<RobotId>> {
-        match self.silent.is_empty() {
-            true => Cow::Borrowed(alive),
-            false => Cow::Owned(alive - &self.silent),
-        }
+    pub fn expected<'a>(&'a self, alive: &'a Others) -> Expected<'a> {
+        Expected::Living { alive, silent: &self.silent }
     }
 
     /// Forgets who was not heard for that long; these are alive.
-    pub fn forget(&mut self, now: Duration, lately: Duration, alive: &BTreeSet<RobotId>) {
+    pub fn forget(&mut self, now: Duration, lately: Duration, alive: &Others) {
         self.heard.retain(|_, at| now.saturating_sub(*at) <= lately);
         self.gone.retain(|_, at| now.saturating_sub(*at) <= lately);
         if self.large && self.counted_large().is_none() {
@@ -141,15 +139,42 @@ impl Electorate {
     }
 
     /// The other robots, where only some of them are asked.
-    pub fn members<'a>(&'a self, alive: &'a BTreeSet<RobotId>) -> impl Iterator<Item = RobotId> + Clone + 'a {
+    pub fn members<'a>(&'a self, alive: &'a Others) -> impl Iterator<Item = RobotId> + Clone + 'a {
         let some_silent = !self.silent.is_empty();
-        let speaks = move |robot: &&RobotId| !(some_silent && self.silent.contains(*robot));
-        alive.iter().filter(speaks).chain(self.gone.keys()).copied()
+        let speaks = move |robot: &RobotId| !(some_silent && self.silent.contains(robot));
+        alive.iter().filter(speaks).chain(self.gone.keys().copied())
+    }
+}
+
+/// The other robots of whom a vote is to be expected.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Expected<'a> {
+    /// Those who were drawn.
+    Drawn(&'a BTreeSet<RobotId>),
+    /// All who are alive but for those that say nothing, who are among them.
+    Living { alive: &'a Others, silent: &'a BTreeSet<RobotId> },
+}
+
+impl Expected<'_> {
+    pub fn len(self) -> usize {
+        match self {
+            Self::Drawn(robots) => robots.len(),
+            Self::Living { alive, silent } => alive.len().saturating_sub(silent.len()),
+        }
+    }
+
+    pub fn all(self, holds: impl Fn(RobotId) -> bool) -> bool {
+        match self {
+            Self::Drawn(robots) => robots.iter().copied().all(holds),
+            Self::Living { alive, silent } => alive.iter().filter(|robot| !silent.contains(robot)).all(holds),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
 
     const LATELY: Duration = Duration::from_secs(60);
@@ -158,8 +183,8 @@ mod tests {
         Duration::from_secs(seconds)
     }
 
-    fn robots(ids: impl IntoIterator<Item = u32>) -> BTreeSet<RobotId> {
-        ids.into_iter().map(RobotId).collect()
+    fn robots(ids: impl IntoIterator<Item = u32>) -> Others {
+        Others::new(RobotId(0), Arc::new(ids.into_iter().map(RobotId).collect()))
     }
 
     #[test]
@@ -181,8 +206,10 @@ mod tests {
     #[test]
     fn a_name_without_a_robot_counts_for_one_round() {
         let mut electorate = Electorate::default();
-        let expects =
-            |electorate: &Electorate, robot| electorate.expected(&robots(1..=3)).contains(&RobotId(robot));
+        let expects = |electorate: &Electorate, robot| {
+            let alive = robots(1..=3);
+            !electorate.expected(&alive).all(|expected| expected != RobotId(robot))
+        };
         electorate.alive(&robots(1..=2), at(0));
         electorate.hear(RobotId(1), at(1));
         electorate.round_over(at(0));

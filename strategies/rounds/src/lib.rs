@@ -29,6 +29,7 @@ mod life;
 mod lot;
 mod machine;
 mod observation;
+mod others;
 mod outcome;
 mod proof;
 mod quorum;

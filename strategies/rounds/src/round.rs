@@ -13,6 +13,7 @@ use crate::ballot::{Ballot, Scale};
 use crate::classify::{Classify, Judgement};
 use crate::columns::Columns;
 use crate::config::RoundsConfig;
+use crate::electorate::Expected;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
@@ -270,11 +271,11 @@ impl Round {
     /// Whether nothing is to be waited for any more. A robot that has not seen anything yet may be about to: its camera may take a frame in half a
     /// second.
     fn has_heard_all(&self, now: Duration, view: &View<'_>, config: &RoundsConfig) -> bool {
-        let own = Some(&view.me).filter(|_| self.voice == Voice::Votes);
-        let mut robots = view.expected.iter().chain(own);
+        let own = Some(view.me).filter(|_| self.voice == Voice::Votes);
+        let spoke = |robot| self.ballot.has_spoken(robot);
         self.hurried
             || now >= self.since + config.patience
-            || robots.all(|robot| self.ballot.has_spoken(*robot))
+            || own.is_none_or(spoke) && view.expected.all(spoke)
     }
 
     /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too. Where liars are expected they may have
@@ -424,7 +425,7 @@ pub(crate) struct Speaker<'a> {
 pub(crate) struct View<'a> {
     pub me: RobotId,
     /// The other robots that are alive and may yet say something.
-    pub expected: &'a BTreeSet<RobotId>,
+    pub expected: Expected<'a>,
     /// How many robots there are.
     pub robots: u32,
     /// Who was drawn to vote, where not all are.

@@ -195,7 +195,7 @@ mod tests {
         let mut mind = Rounds::new(RobotId(7), Life { boot: 3, nonce: 7 }, RoundsConfig::default()).unwrap();
         mind.handle(ms(0), Input::Learned(echo(["a", "b"])));
         // Somebody who sees nothing keeps the round open.
-        mind.handle(ms(0), Input::Alive([RobotId(1)].into()));
+        mind.handle(ms(0), Input::Alive(Arc::new([RobotId(1)].into())));
         let mut voter = voter();
         let mut of_mind = Vec::new();
         let mut of_voter = Vec::new();

@@ -98,7 +98,7 @@ fn vote(author: u32, evidence: [f32; 2]) -> Input {
 /// The decisions a robot holds on two votes that contradict each other, until long after the deadline.
 fn decided(rounds: &mut Rounds) -> Vec<Decision> {
     // It waits for both.
-    rounds.handle(Duration::ZERO, Input::Alive([RobotId(1), RobotId(2)].into()));
+    rounds.handle(Duration::ZERO, Input::Alive(Arc::new([RobotId(1), RobotId(2)].into())));
     rounds.handle(Duration::ZERO, vote(1, [-0.1, 0.1]));
     let mut held = Vec::new();
     let mut input = vote(2, [6.0, -6.0]);

@@ -137,7 +137,7 @@ impl Swarm {
         let mut swarm =
             Self { rng, robots, learned, due: Vec::new(), given: Vec::new(), cut: BTreeSet::new() };
         for robot in 0..swarm.robots.len() {
-            swarm.tell(Duration::ZERO, robot, Input::Alive((0..count).map(RobotId).collect()));
+            swarm.tell(Duration::ZERO, robot, Input::Alive(Arc::new((0..count).map(RobotId).collect())));
             let near = (0..count).filter(|other| other.abs_diff(robot as u32) <= 2);
             swarm.tell(Duration::ZERO, robot, Input::Neighbours(near.map(RobotId).collect()));
         }
@@ -196,7 +196,7 @@ impl Swarm {
                 for robot in 0..count {
                     match event.0 {
                         0 => self.tell(now, robot, Input::Expelled(them())),
-                        1 => self.tell(now, robot, Input::Alive(alive.clone())),
+                        1 => self.tell(now, robot, Input::Alive(Arc::new(alive.clone()))),
                         2 => self.tell(now, robot, Input::Left),
                         _ => {}
                     }

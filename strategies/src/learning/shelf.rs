@@ -1,7 +1,7 @@
 //! What robots of one process hold alike, held once.
 
 use std::borrow::Borrow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use gestalt_protocol::{HeldBatch, HeldVote, RobotId, RoundId, SampleId, Stamp};
@@ -11,16 +11,13 @@ use smallvec::SmallVec;
 use super::weighed::Weighed;
 use crate::lessons::Verdict;
 
-/// By which lists of who is alive are found: how many they are, and the first.
-type Alive = (usize, Option<RobotId>);
-
 /// How many things a board holds at least before it is looked through for those that nobody holds any more.
 const FEW: usize = 1024;
 
 /// How many different things of one name are held once: robots that heard a round's votes in another order may have decided on others of them.
 const VERSIONS: usize = 16;
 
-/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, what those of a round came to and say, who is alive. Each still takes in
+/// Where robots that live in one process put what all of them hold: shared samples, the batches they came in, votes, what those of a round came to and say. Each still takes in
 /// what it hears by itself, and what one of them is told otherwise than the others stays its own: only what is equal is held once. So what a robot does is
 /// the same with a shelf and without; a thousand that hold the same thousand samples hold them once.
 ///
@@ -32,7 +29,6 @@ pub struct Shelf {
     votes: Mutex<Board<(RobotId, Stamp), HeldVote>>,
     testimonies: Mutex<Board<RoundId, Testimony>>,
     weighed: Mutex<Board<RoundId, Weighed>>,
-    alive: Mutex<Board<Alive, BTreeSet<RobotId>>>,
 }
 
 impl Shelf {
@@ -66,10 +62,6 @@ impl Shelf {
         let weighed = Arc::new(Weighed::new(testimony.clone(), verdict)?);
         lock(&self.weighed).put(round, &weighed);
         Some(weighed)
-    }
-
-    pub(super) fn alive(&self, robots: &BTreeSet<RobotId>) -> Arc<BTreeSet<RobotId>> {
-        put(&self.alive, (robots.len(), robots.first().copied()), robots.clone())
     }
 }
 
@@ -148,17 +140,6 @@ mod tests {
             "each of both is held once"
         );
         assert!(!Arc::ptr_eq(&first, &shelf.vector(id(2), vec![1.0, 2.0])), "of another name");
-    }
-
-    #[test]
-    fn robots_that_see_the_same_robots_hold_one_list_of_them() {
-        let shelf = Shelf::default();
-        let all: BTreeSet<RobotId> = (1..=50).map(RobotId).collect();
-        let held = shelf.alive(&all);
-        assert!(Arc::ptr_eq(&held, &shelf.alive(&all.clone())));
-        let others: BTreeSet<RobotId> = (1..50).chain([60]).map(RobotId).collect();
-        assert_eq!(*shelf.alive(&others), others, "as many, from the same one on");
-        assert_eq!(*held, all);
     }
 
     #[test]

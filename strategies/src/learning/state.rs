@@ -216,8 +216,8 @@ impl Learning {
     }
 
     /// These robots are alive now: their samples come before those of strangers. Gives those that were not alive before.
-    pub fn meet(&mut self, alive: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
-        self.set.meet_all(self.shelf.alive(alive))
+    pub fn meet(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
+        self.set.meet(alive)
     }
 
     /// Whether this robot knows anything of a round.

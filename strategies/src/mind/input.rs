@@ -40,7 +40,7 @@ pub enum Input {
     /// Another robot asked that in the name of the swarm (`question`).
     Asked(Question),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
-    Alive(BTreeSet<RobotId>),
+    Alive(Arc<BTreeSet<RobotId>>),
     /// The robots that see and vote through this robot's host, and leave deciding and announcing to this mind.
     Guests(BTreeSet<RobotId>),
     /// The robots this one is directly linked to now.

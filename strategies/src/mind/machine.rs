@@ -222,7 +222,7 @@ impl Mind {
             }
             AboutRounds::Alive(robots) => {
                 if let Some(learning) = &mut self.learning {
-                    self.exchanges.readmit(&learning.meet(robots));
+                    self.exchanges.readmit(&learning.meet(robots.clone()));
                 }
             }
             AboutRounds::Neighbours(robots) => self.exchanges.keep(|robot| robots.contains(&robot)),

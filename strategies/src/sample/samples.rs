@@ -1,6 +1,6 @@
 //! The samples a robot holds, found by key, by identifier, by class and by part.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use gestalt_protocol::{ClassId, RobotId, SampleId};
 use rand::{Rng, RngExt};
@@ -15,10 +15,10 @@ pub struct HeldSamples {
     held: InOrder,
     ids: BTreeMap<SampleId, u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
-    /// How many external ones there are, by author.
-    authors: BTreeMap<RobotId, u32>,
+    /// How many external ones there are, by author. Of most authors there are few, so there are many authors: a tree of them would be twice as large.
+    authors: Vec<(RobotId, u32)>,
     /// The same the other way round: who has most is asked for each sample that comes into a full set.
-    by_number: BTreeSet<(u32, RobotId)>,
+    by_number: Vec<(u32, RobotId)>,
     arrivals: u64,
 }
 
@@ -80,11 +80,22 @@ impl HeldSamples {
         self.by_number.iter().rev().map(|(held, author)| (*author, *held as usize))
     }
 
-    fn count_author(&mut self, author: RobotId, held: u32) {
-        let before = if held == 0 { self.authors.remove(&author) } else { self.authors.insert(author, held) };
-        self.by_number.remove(&(before.unwrap_or_default(), author));
-        if held > 0 {
-            self.by_number.insert((held, author));
+    /// One more external sample of that author, or one less.
+    fn count_author(&mut self, author: RobotId, comes: bool) {
+        let place = self.authors.binary_search_by_key(&author, |(author, _)| *author);
+        let before = place.map_or(0, |place| self.authors[place].1);
+        let held = if comes { before + 1 } else { before.saturating_sub(1) };
+        match place {
+            Ok(place) if held == 0 => drop(self.authors.remove(place)),
+            Ok(place) => self.authors[place].1 = held,
+            Err(place) if held > 0 => self.authors.insert(place, (author, held)),
+            Err(_) => {}
+        }
+        if let Ok(place) = self.by_number.binary_search(&(before, author)) {
+            self.by_number.remove(place);
+        }
+        if let (true, Err(place)) = (held > 0, self.by_number.binary_search(&(held, author))) {
+            self.by_number.insert(place, (held, author));
         }
     }
 
@@ -152,8 +163,7 @@ impl HeldSamples {
         if let Some(id) = sample.id {
             self.ids.insert(id, sample.key);
             if sample.part == SetPart::External {
-                let held = self.authors.get(&id.author).copied().unwrap_or_default();
-                self.count_author(id.author, held + 1);
+                self.count_author(id.author, true);
             }
         }
         let keys = self.classes.entry(sample.class).or_default();
@@ -168,9 +178,8 @@ impl HeldSamples {
         let sample = self.held.remove(key)?;
         if let Some(id) = sample.id {
             self.ids.remove(&id);
-            let held = self.authors.get(&id.author).filter(|_| sample.part == SetPart::External);
-            if let Some(held) = held.copied() {
-                self.count_author(id.author, held.saturating_sub(1));
+            if sample.part == SetPart::External {
+                self.count_author(id.author, false);
             }
         }
         if let Some(keys) = self.classes.get_mut(&sample.class) {

@@ -217,7 +217,7 @@ impl Robot {
         if let (Some(set), Some(learned)) = (self.mind.training_set(), self.mind.learned()) {
             assert!(set.len() <= set.capacity() && learned.lessons <= MAX_LESSONS);
             assert!(
-                set.seen().series().len() <= MAX_SERIES && learned.aside <= LearningConfig::default().aside
+                set.seen().series_count() <= MAX_SERIES && learned.aside <= LearningConfig::default().aside
             );
         }
     }

@@ -46,6 +46,8 @@ use gestalt_strategies::{Classifier, Mind, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
+use crate::threads::Crew;
+
 /// Runs a scenario with the statistical views it describes.
 ///
 /// # Errors
@@ -164,7 +166,7 @@ impl<'a> Emulation<'a> {
     /// The same run, in which robots learn on so many threads, in place of as many as the machine has. What comes of it is the same.
     #[must_use]
     pub fn on_threads(mut self, threads: usize) -> Self {
-        self.swarm.threads = threads.max(1);
+        self.swarm.crew = Crew::of(threads);
         self
     }
 

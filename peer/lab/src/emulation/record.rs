@@ -1,8 +1,12 @@
 //! What came of a run, gathered while it runs.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Decision};
+
+/// So many different decisions are compared with each that a robot comes to hold.
+const DIFFERENT: usize = 16;
 
 /// One gesture shown.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +46,9 @@ pub(super) struct Record {
     pub honest: Vec<bool>,
     pub showings: Vec<Showing>,
     /// The newest decision each robot holds.
-    pub holds: Vec<Option<Decision>>,
+    pub holds: Vec<Option<Arc<Decision>>>,
+    /// The latest of them that differ: most robots come to hold the same.
+    latest: Vec<Arc<Decision>>,
     /// Frames judged before the instructor said what they show: afterwards robots have learned these very ones.
     pub frames: u64,
     pub frames_right: u64,
@@ -60,6 +66,7 @@ impl Record {
             honest,
             showings: Vec::new(),
             holds: vec![None; robots],
+            latest: Vec::new(),
             frames: 0,
             frames_right: 0,
             told: false,
@@ -94,7 +101,7 @@ impl Record {
         }
         let Some(showing) = self.showings.last_mut() else { return };
         let held = up.iter().map(|robot| {
-            self.holds[*robot].as_ref().filter(|held| Some(held.round.counter) == showing.counter)
+            self.holds[*robot].as_deref().filter(|held| Some(held.round.counter) == showing.counter)
         });
         let decisions: Vec<&Decision> = held.clone().flatten().collect();
         let conflict = decisions.windows(2).any(|pair| pair[0].class != pair[1].class);
@@ -126,7 +133,15 @@ impl Record {
             }
             showing.last_held = Some(now);
         }
-        self.holds[robot] = Some(decision.clone());
+        let held = self.latest.iter().find(|held| ***held == *decision).cloned().unwrap_or_else(|| {
+            let held = Arc::new(decision.clone());
+            if self.latest.len() == DIFFERENT {
+                self.latest.remove(0);
+            }
+            self.latest.push(held.clone());
+            held
+        });
+        self.holds[robot] = Some(held);
     }
 
     pub fn announce(&mut self, decision: &Decision) {

@@ -23,6 +23,7 @@ use super::school::Schools;
 use super::summary::Summary;
 use super::{chart, trial};
 use crate::emulation::{Rules, School};
+use crate::threads::apart;
 
 /// Conducts an experiment, or what is left of it, and writes into `folder`:
 ///
@@ -132,7 +133,7 @@ fn run_what_is_left(
     let results = Mutex::new((results, ran));
     let run = |(taught, seed): &(&Taught<'_>, u64)| -> Result<(), ExperimentError> {
         let Taught { cell, school, rules } = taught;
-        let standings = trial::run(&cell.setting, school, pool, *seed, (rules, &stop))?;
+        let standings = apart(|| trial::run(&cell.setting, school, pool, *seed, (rules, &stop)))?;
         let mut results = results.lock().unwrap_or_else(PoisonError::into_inner);
         let (results, ran) = &mut *results;
         results.add(cell.run(*seed), standings)?;

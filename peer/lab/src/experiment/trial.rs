@@ -17,7 +17,7 @@ use super::pool::{Moment, Pool};
 use super::setting::{Drift, Setting};
 use super::standing::Standing;
 use crate::emulation::{Emulation, Observer, Rules, School, Trace, likeliest};
-use crate::threads::{all_cores, on_each};
+use crate::threads::Crew;
 
 /// The most robots of which all are examined after each round, and how many are of more: all who are train for it.
 pub(super) const ALL_EXAMINED: usize = 100;
@@ -64,8 +64,10 @@ pub fn run(
         Emulation::by(&scenario, seed, observers, Some(school.clone()), rules.clone(), Trace::none())?;
     let honest = &places[..setting.robots - setting.liars];
     let examined = examined(honest.len(), seed);
-    let exams = [0, 1]
-        .map(|after| Exam::new(pool, school, &split.held_out[after], (honest, &examined), (rules, setting)));
+    let crew = Crew::on_all_cores();
+    let exams = [0, 1].map(|after| {
+        Exam::new(pool, school, &split.held_out[after], (honest, &examined), (rules, setting), &crew)
+    });
     let mut standings = vec![exams[0].sit(&mut emulation, 0)];
     while emulation.show_next() {
         if stop.load(Ordering::Relaxed) {
@@ -176,6 +178,7 @@ struct Exam<'a> {
     examined: Vec<usize>,
     questions: Vec<Question<'a>>,
     places: Vec<usize>,
+    crew: &'a Crew,
     /// By which a swarm judges.
     fusion: Arc<dyn Fuse>,
     /// Against how many liars a judgement is to be certain.
@@ -191,6 +194,7 @@ impl<'a> Exam<'a> {
         moments: &[usize],
         (places, examined): (&[usize], &[usize]),
         (rules, setting): (&Rules, &Setting),
+        crew: &'a Crew,
     ) -> Self {
         let (robots, places) =
             (places.len(), examined.iter().map(|robot| places[*robot]).collect::<Vec<_>>());
@@ -210,6 +214,7 @@ impl<'a> Exam<'a> {
             questions,
             places,
             fusion,
+            crew,
             liars: setting.liars.max(1),
             doubt: setting.learning.poison != PoisonDefence::default(),
         }
@@ -238,7 +243,7 @@ impl<'a> Exam<'a> {
             self.examined.iter().map(|robot| emulation.classifier(*robot)).collect();
         let mut verdicts: Vec<Vec<Option<Verdict>>> = vec![Vec::new(); classifiers.len()];
         let all = verdicts.iter_mut().zip(classifiers.iter().zip(&self.places)).collect();
-        on_each(all_cores(), all, |(verdicts, (classifier, place))| {
+        self.crew.on_each(all, |(verdicts, (classifier, place))| {
             let verdict = |(class, views): &Question<'_>| {
                 let (features, view) = views.get(place)?;
                 Some(self.verdict(classifier.as_deref(), (features, view), *class))

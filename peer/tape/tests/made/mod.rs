@@ -60,7 +60,7 @@ pub fn round(config: &RoundsConfig, sees: &[Option<[f32; 3]>], at: u64) -> Vec<P
     let mut due: Vec<(usize, Input)> = Vec::new();
     for (k, seen) in sees.iter().enumerate() {
         due.push((k, Input::Learned(Arc::new(Verbatim(vocabulary())))));
-        due.push((k, Input::Alive(all.clone())));
+        due.push((k, Input::Alive(Arc::new(all.clone()))));
         due.push((k, Input::Blind(seen.is_none())));
     }
     let mut passed = Vec::new();

@@ -21,7 +21,7 @@ impl Rounds {
             let members = self.electorate.members(&self.alive).chain([self.me]);
             let members = draw(round.id.counter, size, count, members);
             let late = before.into_iter().flat_map(|before| before.late).chain(new.iter().copied()).collect();
-            let expected = members.iter().copied().filter(|robot| self.alive.contains(robot)).collect();
+            let expected = members.iter().copied().filter(|robot| self.alive.contains(*robot)).collect();
             Committee { members, expected, late }
         });
         let is_member = self.committee.as_ref().is_none_or(|committee| committee.members.contains(&self.me));
@@ -52,7 +52,7 @@ impl Rounds {
                 .members
                 .difference(&committee.late)
                 .copied()
-                .filter(|robot| self.alive.contains(robot) && round.ballot.stamp(*robot).is_none());
+                .filter(|robot| self.alive.contains(*robot) && round.ballot.stamp(*robot).is_none());
             self.electorate.asked_in_vain(silent);
         }
     }

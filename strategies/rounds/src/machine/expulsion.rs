@@ -1,6 +1,7 @@
 //! Robots that belong to the swarm no more: what they said is taken out of what is still to be decided.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use gestalt_protocol::RobotId;
 
@@ -10,10 +11,10 @@ impl Rounds {
     /// Nothing that these said counts any more, in the midst of a round. A decision that counted them is no decision now: the round is
     /// concluded anew from the votes of the others. One of a round that is over stands, as what was true of the swarm then.
     pub(super) fn on_expelled(&mut self, robots: &BTreeSet<RobotId>) {
-        let mut alive = &self.alive - &self.guests;
-        alive.retain(|robot| !robots.contains(robot));
+        let stays = |robot: &RobotId| !self.guests.contains(robot) && !robots.contains(robot);
+        let alive = self.alive.iter().filter(stays).collect();
         self.electorate.expel(robots);
-        self.on_alive(alive);
+        self.on_alive(Arc::new(alive));
         self.wanted.take_if(|wanted| robots.contains(&wanted.holder));
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.expel(robots);

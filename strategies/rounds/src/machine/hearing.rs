@@ -250,7 +250,7 @@ impl Rounds {
         let is_news = match round.ballot.cast(effects.follower.keep(held)) {
             Cast::Counted => {
                 self.electorate.hear(robot, self.now);
-                if !self.alive.contains(&robot) {
+                if !self.alive.contains(robot) {
                     self.electorate.hear_absent(robot, self.now);
                 }
                 self.draw_if_the_size_calls_for_it();
@@ -321,7 +321,7 @@ impl Rounds {
                 round.ballot.cast(counted.held());
             }
         }
-        let view = View { me: self.me, expected: &expected, robots, committee, scale };
+        let view = View { me: self.me, expected, robots, committee, scale };
         if self.config.liars > 0
             && decision.class.is_some()
             && !round.bears_out(self.now, &decision, &view, &*self.fusion, &self.config)

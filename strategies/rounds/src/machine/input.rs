@@ -32,7 +32,7 @@ pub enum Input {
     /// This was announced for the swarm (`decision`).
     Announced(Announcement),
     /// The robots alive now, by liveliness; whether it includes this robot makes no difference.
-    Alive(BTreeSet<RobotId>),
+    Alive(Arc<BTreeSet<RobotId>>),
     /// The robots that see and vote through this robot's host, and leave deciding and announcing to this one.
     Guests(BTreeSet<RobotId>),
     /// The robots this one is directly linked to now.

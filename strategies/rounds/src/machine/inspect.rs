@@ -1,6 +1,5 @@
 //! What a host may want to know of the rounds, and to show.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -74,10 +73,9 @@ impl Rounds {
         self.classifier.as_ref()
     }
 
-    /// The other robots alive, guests among them.
-    #[must_use]
-    pub fn alive(&self) -> &BTreeSet<RobotId> {
-        &self.alive
+    /// The other robots alive, guests among them, ascending.
+    pub fn alive(&self) -> impl Iterator<Item = RobotId> + '_ {
+        self.alive.iter()
     }
 
     /// The robots this one is directly linked to.

@@ -1,11 +1,11 @@
 //! Who was drawn to vote in the newest round, of a large swarm.
 
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use gestalt_protocol::RobotId;
 
-use crate::electorate::Electorate;
+use crate::electorate::{Electorate, Expected};
+use crate::others::Others;
 
 /// The committee of the newest round, as this robot draws it from all that it knows of.
 #[derive(Clone, Debug)]
@@ -20,11 +20,11 @@ pub(super) struct Committee {
 /// The other robots of whom a vote is to be expected in the newest round.
 pub(super) fn expected<'a>(
     committee: Option<&'a Committee>,
-    electorate: &Electorate,
-    alive: &'a BTreeSet<RobotId>,
-) -> Cow<'a, BTreeSet<RobotId>> {
+    electorate: &'a Electorate,
+    alive: &'a Others,
+) -> Expected<'a> {
     match committee {
-        Some(committee) => Cow::Borrowed(&committee.expected),
+        Some(committee) => Expected::Drawn(&committee.expected),
         None => electorate.expected(alive),
     }
 }

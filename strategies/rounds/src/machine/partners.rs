@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use gestalt_protocol::{Rank, RobotId, RoundId};
 
+use crate::others::Others;
+
 /// After a change of the neighbourhood, repair stays busy for this long.
 const UNREST: Duration = Duration::from_secs(5);
 
@@ -143,7 +145,7 @@ impl Partners {
     }
 
     /// When the next repair is due; never for a robot that knows of no other.
-    pub fn due(&self, alive: &BTreeSet<RobotId>) -> Option<Duration> {
+    pub fn due(&self, alive: &Others) -> Option<Duration> {
         let alone = self.neighbours.is_empty() && alive.is_empty();
         (!alone).then_some(self.next)
     }
@@ -189,7 +191,7 @@ impl Partners {
     }
 
     /// Whom to turn to: those for whom there is news, then the neighbours in turn, or, where none is known, all the living in turn.
-    pub fn turn(&mut self, alive: &BTreeSet<RobotId>) -> Option<RobotId> {
+    pub fn turn(&mut self, alive: &Others) -> Option<RobotId> {
         while let Some(robot) = self.soon.pop_first() {
             if self.is_neighbour(robot) {
                 return Some(robot);
@@ -197,7 +199,7 @@ impl Partners {
         }
         let after = |robot: &RobotId| Some(*robot) > self.last;
         let next = if self.neighbours.is_empty() {
-            alive.iter().copied().find(after).or(alive.first().copied())
+            alive.iter().find(after).or(alive.iter().next())
         } else {
             self.neighbours().find(after).or(self.neighbours().next())
         };
@@ -243,7 +245,7 @@ mod tests {
             if !partners.is_due(now, false, (busy, IDLE)) {
                 return None;
             }
-            let robot = partners.turn(&BTreeSet::new())?;
+            let robot = partners.turn(&Others::new(RobotId(0), Default::default()))?;
             partners.tell(now, robot);
             Some(robot.0)
         };

@@ -54,7 +54,7 @@ impl Rounds {
     /// Keeps waiting those alone who are there.
     pub(super) fn forget_waiting(&mut self) {
         let (alive, partners) = (&self.alive, &self.partners);
-        self.waiting.retain(|robot, _| alive.contains(robot) || partners.is_neighbour(*robot));
+        self.waiting.retain(|robot, _| alive.contains(*robot) || partners.is_neighbour(*robot));
     }
 
     /// Counts the votes that wait for it, once the open round is over, or where the swarm has gone on: in the order of their rounds.

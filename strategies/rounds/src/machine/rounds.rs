@@ -18,6 +18,7 @@ use crate::config::{RoundsConfig, RoundsConfigError};
 use crate::electorate::Electorate;
 use crate::fuse::Fuse;
 use crate::life::Life;
+use crate::others::Others;
 use crate::refusal::Refusals;
 use crate::round::Round;
 use crate::sign::Sign;
@@ -65,7 +66,7 @@ const BURST: u32 = 16;
 ///     let mut rounds = Rounds::new(robot, life, RoundsConfig::default())?;
 ///     let vocabulary = Vocabulary::new(["left", "right"])?;
 ///     rounds.handle(now, Input::Learned(Arc::new(Verbatim(vocabulary))));
-///     rounds.handle(now, Input::Alive(robots.into()));
+///     rounds.handle(now, Input::Alive(Arc::new(robots.into())));
 ///     swarm.push(rounds);
 /// }
 ///
@@ -124,7 +125,7 @@ pub struct Rounds {
     /// The greatest decision that a robot said it holds and that is lacking here, and when it is asked for.
     pub(super) wanted: Option<Wanted>,
     /// The other robots alive, guests among them.
-    pub(super) alive: BTreeSet<RobotId>,
+    pub(super) alive: Others,
     /// How many of them have a smaller id: whoever speaks for the swarm waits this many turns.
     pub(super) turns: u32,
     pub(super) guests: BTreeSet<RobotId>,
@@ -179,7 +180,7 @@ impl Rounds {
             electorate: Electorate::new(config.all_vote_up_to()),
             committee: None,
             wanted: None,
-            alive: BTreeSet::new(),
+            alive: Others::new(me, Arc::default()),
             turns: 0,
             guests: BTreeSet::new(),
             partners: Partners::new(config.repair_idle),
@@ -338,13 +339,13 @@ impl Rounds {
 
     /// A robot by its name, if there is reason to believe that there is one.
     pub(super) fn known(&self, robot: RobotId) -> Option<RobotId> {
-        Some(robot).filter(|robot| self.partners.is_neighbour(*robot) || self.alive.contains(robot))
+        Some(robot).filter(|robot| self.partners.is_neighbour(*robot) || self.alive.contains(*robot))
     }
 
     /// Keeps an account of those alone who are there.
     pub(super) fn forget_accounts(&mut self) {
         let (now, alive, partners) = (self.now, &self.alive, &self.partners);
-        let known = |robot: RobotId| alive.contains(&robot) || partners.is_neighbour(robot);
+        let known = |robot: RobotId| alive.contains(robot) || partners.is_neighbour(robot);
         for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
             allowance.forget(now, known);
         }

@@ -1,6 +1,7 @@
 //! What a robot says itself: its vote, the decision it holds, and, when it is its turn, that of the swarm.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Announced, Announcement, Decision, Envelope, Holder, Message, RobotId};
@@ -10,25 +11,25 @@ use super::output::Output;
 use super::rounds::{Effects, Rounds};
 use crate::agreement::Agreement;
 use crate::ballot::Scale;
+use crate::others::Others;
 use crate::round::{Round, Speaker, View};
 
 impl Rounds {
-    pub(super) fn on_alive(&mut self, robots: BTreeSet<RobotId>) {
-        let mut alive = &robots | &self.guests;
-        alive.remove(&self.me);
-        let before = std::mem::replace(&mut self.alive, alive);
+    pub(super) fn on_alive(&mut self, robots: Arc<BTreeSet<RobotId>>) {
+        let all = if self.guests.is_subset(&robots) { robots } else { Arc::new(&*robots | &self.guests) };
+        let before = std::mem::replace(&mut self.alive, Others::new(self.me, all));
         self.electorate.change(&before, &self.alive, self.now);
-        self.draw(&(&self.alive - &before));
+        self.draw(&self.alive.since(&before).collect());
         self.forget_accounts();
         // This robot speaks for its guests too: its turn is that of the smallest of them all.
         let first = self.guests.first().map_or(self.me, |guest| self.me.min(*guest));
-        self.turns = u32::try_from(self.alive.range(..first).count()).unwrap_or(u32::MAX);
+        self.turns = u32::try_from(self.alive.below(first)).unwrap_or(u32::MAX);
     }
 
     pub(super) fn on_guests(&mut self, robots: BTreeSet<RobotId>) {
-        let others: BTreeSet<RobotId> = self.alive.difference(&self.guests).copied().collect();
+        let others = self.alive.iter().filter(|robot| !self.guests.contains(robot)).collect();
         self.guests = robots;
-        self.on_alive(others);
+        self.on_alive(Arc::new(others));
     }
 
     /// Casts this robot's vote when it is due. Others are told of it by [`say_votes`](Self::say_votes).
@@ -78,7 +79,7 @@ impl Rounds {
         let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
         let committee = self.committee.as_ref().map(|committee| &committee.members);
         let robots = self.electorate.count();
-        let view = View { me: self.me, expected: &expected, robots, committee, scale };
+        let view = View { me: self.me, expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
         let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };

@@ -147,7 +147,7 @@ fn who_speaks_for_the_swarm_after_another_counts_what_that_asked() {
     swarm.restart(0);
     let left: BTreeSet<RobotId> = [RobotId(2), RobotId(3)].into();
     for i in 1..3 {
-        swarm.input(i, Input::Alive(left.clone()));
+        swarm.input(i, Input::Alive(Arc::new(left.clone())));
     }
     let asked = |swarm: &Swarm| swarm.asked.iter().filter(|(_, it)| it.robot == RobotId(2)).count();
     for _ in 0..2 {
@@ -165,7 +165,7 @@ fn who_was_never_taught_anything_asks_for_a_name_when_it_is_shown_twice() {
     for i in 0..2 {
         swarm.minds[i] = swarm.waken(i);
         let both: BTreeSet<RobotId> = [RobotId(1), RobotId(2)].into();
-        swarm.input(i, Input::Alive(both.clone()));
+        swarm.input(i, Input::Alive(Arc::new(both.clone())));
         swarm.input(i, Input::Neighbours(both));
     }
     let rounds: Vec<RoundId> = (0..3).map(|_| show(&mut swarm, 4, &[1.0, 1.0])).collect();

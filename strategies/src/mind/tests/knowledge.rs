@@ -14,7 +14,7 @@ fn what_half_of_a_line_learned_is_known_at_its_end_in_less_than_a_busy_period_a_
         swarm.disks[i].clear();
         swarm.minds[i] = swarm.waken(i);
         swarm.input(i, Input::Learned(Arc::new(ByFirst)));
-        swarm.input(i, Input::Alive(all.clone()));
+        swarm.input(i, Input::Alive(Arc::new(all.clone())));
     }
     let mut meet = |i: usize, beside: &[u32]| {
         swarm.input(i, Input::Neighbours(beside.iter().copied().map(RobotId).collect()));

@@ -161,7 +161,7 @@ impl Swarm {
             self.input(i, Input::Believe(believer));
         }
         self.input(i, Input::Learned(Arc::new(ByFirst)));
-        self.input(i, Input::Alive(others.clone()));
+        self.input(i, Input::Alive(Arc::new(others.clone())));
         self.input(i, Input::Neighbours(others));
     }
 

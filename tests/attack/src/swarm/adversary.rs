@@ -1,6 +1,7 @@
 //! What can be said without being a robot. In peace all of it is left unsaid.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
@@ -220,7 +221,7 @@ impl Swarm {
             self.tokens.iter().copied().chain(ghosts.into_iter().map(RobotId)).collect();
         for i in 0..self.robots.len() {
             let tokens = self.robots[i].port.tokens(&tokens);
-            self.tell(i, Input::Alive(tokens));
+            self.tell(i, Input::Alive(Arc::new(tokens)));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What is shown and taught.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, Outcome, RobotId, RoundId, Topic};
@@ -141,7 +142,7 @@ impl Swarm {
             if off.contains(&self.robots[i].id) {
                 self.tell(i, Input::Blind(true));
             } else {
-                self.tell(i, Input::Alive(self.tokens.clone()));
+                self.tell(i, Input::Alive(Arc::new(self.tokens.clone())));
             }
         }
     }

@@ -105,7 +105,7 @@ impl Robot {
         let believe = self.port.believer().map(Input::Believe);
         let others = [
             Input::Learned(Arc::new(ByFirst)),
-            Input::Alive(alive.clone()),
+            Input::Alive(Arc::new(alive.clone())),
             Input::Neighbours(neighbours.clone()),
         ];
         believe.into_iter().chain(others).collect()

@@ -14,7 +14,6 @@ use super::robot::Robot;
 use super::turn::{Deed, Turn};
 use crate::emulation::network::Presence;
 use crate::emulation::school::School;
-use crate::threads::on_each;
 
 /// Fewer turns than this are done sooner than other cores are woken.
 pub(super) const WORTHWHILE: usize = 32;
@@ -23,7 +22,7 @@ impl Swarm<'_> {
     /// Lets robots do what is due for them within the time of a message, and before that time, if it is worth it.
     pub(super) fn go_ahead(&mut self, until: Duration) {
         let Some(start) = self.queue.next() else { return };
-        if self.threads == 1 || start < self.looked_ahead {
+        if self.crew.is_alone() || start < self.looked_ahead {
             return;
         }
         let end = until.min(start + self.scenario.link.latency.min(THINKS));
@@ -61,7 +60,7 @@ impl Swarm<'_> {
         }
         let school = self.school.as_deref();
         let busy = robots.iter_mut().filter(|robot| !robot.ahead.due.is_empty()).collect();
-        on_each(self.threads, busy, |robot: &mut Robot| robot.go_ahead(start, end, school));
+        self.crew.on_each(busy, |robot: &mut Robot| robot.go_ahead(start, end, school));
     }
 }
 

@@ -65,7 +65,7 @@ impl Swarm<'_> {
             let now = (self.network.reachable(i), self.network.neighbours(i));
             let before = std::mem::replace(&mut self.robots[i].knows, now.clone());
             if before.0 != now.0 {
-                self.tell_mind(i, Input::Alive((*now.0).clone()));
+                self.tell_mind(i, Input::Alive(now.0.clone()));
             }
             if before.1 != now.1 {
                 let neighbours = now.1.into_iter().map(|i| RobotId(i as u32 + 1)).collect();

@@ -52,7 +52,7 @@ use super::scenario::{Event, Fault, Scenario};
 use super::school::School;
 use super::statistics::Mean;
 use super::trace::{Happening, Trace};
-use crate::threads::all_cores;
+use crate::threads::Crew;
 use answering::Asking;
 use plot::Plot;
 use poisoning::Poisoner;
@@ -89,8 +89,8 @@ pub(super) struct Swarm<'a> {
     pub worthwhile: usize,
     /// How many turns robots had taken ahead.
     pub taken_ahead: u64,
-    /// On how many threads robots learn, go ahead, and are told what could wait.
-    pub threads: usize,
+    /// By whom robots learn, go ahead, and are told what could wait.
+    pub crew: Crew,
 }
 
 impl<'a> Swarm<'a> {
@@ -138,7 +138,7 @@ impl<'a> Swarm<'a> {
             looked_ahead: Duration::ZERO,
             worthwhile: ahead::WORTHWHILE,
             taken_ahead: 0,
-            threads: all_cores(),
+            crew: Crew::on_all_cores(),
         };
         if scenario.mind.committee_of(size).is_some() {
             swarm.robots.iter_mut().filter_map(|robot| robot.pupil.as_mut()).for_each(Pupil::start_over);

@@ -13,7 +13,6 @@ use gestalt_strategies::{Input, Mind, Output};
 use super::Swarm;
 use super::robot::Robot;
 use crate::emulation::pupil::Pupil;
-use crate::threads::on_each;
 
 /// How much waits for a robot, on the average, when all are told.
 pub(super) const MANY: usize = 8;
@@ -33,7 +32,7 @@ impl Swarm<'_> {
             return;
         }
         let readers = self.robots.iter_mut().filter_map(Robot::reader).collect();
-        on_each(self.threads, readers, Reader::read);
+        self.crew.on_each(readers, Reader::read);
     }
 }
 

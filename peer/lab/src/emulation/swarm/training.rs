@@ -6,7 +6,6 @@ use super::Swarm;
 use super::robot::Robot;
 use crate::emulation::network::Presence;
 use crate::emulation::pupil::Pupil;
-use crate::threads::on_each;
 
 impl Swarm<'_> {
     /// Those who will be asked to vote in the round of that counter, which that robot opened, learn from all they hold, where a committee votes. They
@@ -43,6 +42,6 @@ impl Swarm<'_> {
                 pupil.as_mut().and_then(|pupil| pupil.prepare(mind.as_ref(), school).then_some(pupil))
             })
             .collect();
-        on_each(self.threads, behind, Pupil::learn);
+        self.crew.on_each(behind, Pupil::learn);
     }
 }

@@ -14,7 +14,7 @@ fn the_greater_decision_replaces_the_held_one_and_is_held_aloud() {
 #[test]
 fn the_smallest_live_robot_announces_once_settled_and_only_once() {
     let mut mind = mind(2);
-    mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([2, 5, 9]))));
     mind.handle(ms(100), Input::Open);
     mind.handle(ms(100), gives(5, decision(1, Some(0), 3, 5)));
     mind.handle(ms(100), says_it_holds(5, &decision(1, Some(0), 3, 5)));
@@ -31,7 +31,7 @@ fn the_smallest_live_robot_announces_once_settled_and_only_once() {
 fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
     let next = |heard: bool| {
         let mut mind = mind(9);
-        mind.handle(ms(0), Input::Alive(robots([2, 5, 9])));
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([2, 5, 9]))));
         mind.handle(ms(0), Input::Open);
         mind.handle(ms(0), gives(5, decision(1, Some(0), 3, 5)));
         mind.handle(ms(0), says_it_holds(5, &decision(1, Some(0), 3, 5)));
@@ -49,7 +49,7 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
 fn who_has_guests_speaks_for_them_too() {
     let mut host = mind(8);
     host.handle(ms(0), Input::Guests(robots([2, 3])));
-    host.handle(ms(0), Input::Alive(robots([1, 5])));
+    host.handle(ms(0), Input::Alive(Arc::new(robots([1, 5]))));
     host.handle(ms(0), Input::Open);
     host.handle(ms(0), gives(5, decision(1, Some(1), 3, 5)));
     let times = (1..40).map(|k| ms(k * 50));
@@ -59,7 +59,7 @@ fn who_has_guests_speaks_for_them_too() {
     // Robot 1 comes first, guests wait for nobody but it.
     assert_eq!(announced(&mut host, Box::new(times.clone())), Some(ms(600)));
     let mut host = mind(8);
-    host.handle(ms(0), Input::Alive(robots([2, 5])));
+    host.handle(ms(0), Input::Alive(Arc::new(robots([2, 5]))));
     host.handle(ms(0), Input::Guests(robots([2])));
     host.handle(ms(0), Input::Open);
     host.handle(ms(0), gives(5, decision(1, Some(1), 3, 5)));
@@ -132,7 +132,7 @@ fn a_decision_that_this_robot_would_not_make_itself_is_not_adopted() {
         ),
     ] {
         let mut mind = mind_with(7, config.clone());
-        mind.handle(ms(0), Input::Alive(robots([99])));
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([99]))));
         mind.handle(ms(0), votes(11, 2, vote(1, 1, SURE)));
         mind.handle(ms(0), gives(5, lie.clone()));
         assert_eq!((mind.held(), mind.refusals().count(refusal)), (None, 1), "{lie:?}");
@@ -169,7 +169,7 @@ fn what_a_robot_says_it_holds_is_asked_for_and_not_believed() {
 fn a_gesture_is_final_once_a_majority_is_known_to_hold_it() {
     let announced = |holders: &[u32]| {
         let mut mind = mind(1);
-        mind.handle(ms(0), Input::Alive(robots(2..=5)));
+        mind.handle(ms(0), Input::Alive(Arc::new(robots(2..=5))));
         mind.handle(ms(0), Input::Open);
         mind.handle(ms(0), gives(9, decision(1, Some(1), 5, 9)));
         for holder in holders {
@@ -191,7 +191,7 @@ fn a_gesture_is_final_once_a_majority_is_known_to_hold_it() {
 #[test]
 fn who_drew_a_decision_or_has_it_counts_for_none_that_did_not_say_that_it_holds_it() {
     let mut mind = mind(1);
-    mind.handle(ms(0), Input::Alive(robots(2..=5)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(2..=5))));
     mind.handle(ms(0), Input::Open);
     for author in 2..=5 {
         mind.handle(ms(0), gives(author, decision(1, Some(1), 5, author)));
@@ -229,13 +229,13 @@ fn a_robot_says_which_gesture_it_holds_once_and_whether_it_was_another_before() 
 fn what_robots_said_that_they_hold_reaches_who_could_not_hear_it() {
     let held = decision(1, Some(1), 5, 9);
     let mut knows = mind(7);
-    knows.handle(ms(0), Input::Alive(robots([2, 3, 4, 8])));
+    knows.handle(ms(0), Input::Alive(Arc::new(robots([2, 3, 4, 8]))));
     knows.handle(ms(0), gives(9, held.clone()));
     for robot in [2, 3] {
         knows.handle(ms(1), says_it_holds(robot, &held));
     }
     let mut lacks = mind(8);
-    lacks.handle(ms(0), Input::Alive(robots([2, 3, 4, 7])));
+    lacks.handle(ms(0), Input::Alive(Arc::new(robots([2, 3, 4, 7]))));
     lacks.handle(ms(0), Input::Neighbours(robots([4, 7])));
     lacks.handle(ms(0), gives(9, held));
     let is_final = |mind: &mut Rounds| mind.held_aloud().unwrap().decision.is_final;

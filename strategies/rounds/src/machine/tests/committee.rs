@@ -18,7 +18,7 @@ fn drawn(counter: u32) -> (Vec<u32>, Vec<u32>) {
 fn one_of_many(me: u32, config: RoundsConfig) -> Rounds {
     let mut mind = Rounds::new(RobotId(me), Life { boot: 1, nonce: 7 }, config).unwrap();
     mind.handle(ms(0), Input::Learned(Arc::new(Verbatim(vocabulary()))));
-    mind.handle(ms(0), Input::Alive(robots(1..=SWARM)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(1..=SWARM))));
     mind
 }
 
@@ -127,14 +127,14 @@ fn a_decision_that_others_made_among_themselves_is_refused() {
 fn where_most_of_the_swarm_cannot_be_seen_nobody_votes() {
     let (members, _) = drawn(1);
     let mut mind = one_of_many(members[0], adding_up());
-    mind.handle(ms(1000), Input::Alive(robots((1..=499).chain([members[0]]))));
+    mind.handle(ms(1000), Input::Alive(Arc::new(robots((1..=499).chain([members[0]])))));
     let out = mind.handle(ms(2000), votes(2, 1, null(1)));
     assert!(!mind.votes() && broadcast(&out).is_empty(), "{out:?}");
-    let out = mind.handle(ms(3000), Input::Alive(robots((1..=600).chain([members[0]]))));
+    let out = mind.handle(ms(3000), Input::Alive(Arc::new(robots((1..=600).chain([members[0]])))));
     assert!(mind.votes());
     assert_eq!(broadcast(&out).len(), 1);
     // After two minutes those who are left are the swarm.
-    mind.handle(ms(4000), Input::Alive(robots((1..=400).chain([members[0]]))));
+    mind.handle(ms(4000), Input::Alive(Arc::new(robots((1..=400).chain([members[0]])))));
     assert!(!mind.votes());
     live(&mut mind, ms(9000));
     mind.handle(ms(130_000), votes(2, 2, null(2)));
@@ -184,7 +184,7 @@ fn a_decision_is_final_once_most_of_the_committee_are_known_to_hold_it() {
 #[test]
 fn a_hundred_robots_all_vote() {
     let mut mind = mind(5);
-    mind.handle(ms(0), Input::Alive(robots(1..=108)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(1..=108))));
     for counter in 1..=20 {
         let at = ms(u64::from(counter) * 10_000);
         let out = mind.handle(at, votes(2, counter, null(counter)));

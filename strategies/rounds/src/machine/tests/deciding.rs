@@ -23,7 +23,7 @@ fn one_sure_robot_decides_alone_and_says_what_the_decision_rests_on() {
 fn a_round_waits_until_every_live_robot_has_seen_something_but_not_beyond_patience() {
     let open = || {
         let mut mind = mind(7);
-        mind.handle(ms(0), Input::Alive(robots([1, 2])));
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 2]))));
         mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
         mind
     };
@@ -113,14 +113,14 @@ fn with_liars_a_decision_heard_needs_more_than_two_votes_for_each_and_their_marg
 #[test]
 fn a_part_without_a_majority_decides_nothing_and_says_how_many_it_lacks() {
     let mut mind = mind(1);
-    mind.handle(ms(0), Input::Alive(robots(2..=9)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(2..=9))));
     for robot in 2..=9 {
         mind.handle(ms(1), votes(robot, 1, vote(1, 0, SURE)));
     }
     assert_eq!(mind.held().map(|held| held.certificate.robots), Some(9));
     live(&mut mind, ms(10_000));
     // Five of them are cut off.
-    mind.handle(ms(10_000), Input::Alive(robots(2..=4)));
+    mind.handle(ms(10_000), Input::Alive(Arc::new(robots(2..=4))));
     for robot in 2..=4 {
         mind.handle(ms(10_001), votes(robot, 2, vote(2, 0, SURE)));
     }
@@ -139,7 +139,7 @@ fn a_part_without_a_majority_decides_nothing_and_says_how_many_it_lacks() {
 #[test]
 fn robots_that_see_nothing_count_for_the_majority() {
     let mut mind = mind(1);
-    mind.handle(ms(0), Input::Alive(robots(2..=9)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(2..=9))));
     mind.handle(ms(1), votes(2, 1, vote(1, 0, SURE)));
     for robot in 3..=4 {
         mind.handle(ms(2), votes(robot, 1, null(1)));
@@ -157,7 +157,7 @@ fn robots_that_see_nothing_count_for_the_majority() {
 #[test]
 fn names_without_robots_delay_one_round_and_no_other() {
     let mut mind = mind(1);
-    mind.handle(ms(0), Input::Alive(robots([2].into_iter().chain(100..140))));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([2].into_iter().chain(100..140)))));
     mind.handle(ms(1), votes(2, 1, vote(1, 0, SURE)));
     live(&mut mind, ms(9000));
     assert_eq!(mind.held().unwrap().class, None);
@@ -221,7 +221,7 @@ fn where_liars_are_expected_a_decision_that_leaves_out_what_is_known_is_not_beli
     mind.handle(ms(1), forged());
     assert_ne!(mind.held().and_then(|held| held.class), Some(ClassId(2)));
     // Before all have spoken, too.
-    early.handle(ms(0), Input::Alive(robots([1, 2])));
+    early.handle(ms(0), Input::Alive(Arc::new(robots([1, 2]))));
     early.handle(ms(0), votes(1, 1, null(1)));
     early.handle(ms(1), forged());
     assert_eq!(

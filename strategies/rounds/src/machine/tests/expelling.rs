@@ -9,7 +9,7 @@ fn counted(decision: &Decision) -> Vec<u32> {
 #[test]
 fn who_is_expelled_is_taken_out_of_what_is_still_to_be_decided() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([1, 2, 3])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 2, 3]))));
     mind.handle(ms(1), votes(3, 1, vote(1, 1, SURE)));
     mind.handle(ms(2), votes(1, 1, vote(1, 0, LEANING)));
     assert_eq!(mind.held(), None, "robot 2 may be about to see");
@@ -22,7 +22,7 @@ fn who_is_expelled_is_taken_out_of_what_is_still_to_be_decided() {
 #[test]
 fn a_decision_that_counted_one_who_is_expelled_is_drawn_anew() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([1, 3])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 3]))));
     mind.handle(ms(1), votes(1, 1, vote(1, 0, LEANING)));
     mind.handle(ms(2), votes(3, 1, vote(1, 1, SURE)));
     assert_eq!(mind.held().map(counted), Some(vec![1, 3]));
@@ -36,7 +36,7 @@ fn a_decision_that_counted_one_who_is_expelled_is_drawn_anew() {
 #[test]
 fn a_decision_of_a_round_that_is_over_stands() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3]))));
     mind.handle(ms(1), votes(3, 1, vote(1, 1, SURE)));
     live(&mut mind, ms(3000));
     let before = mind.held().cloned();
@@ -48,7 +48,7 @@ fn a_decision_of_a_round_that_is_over_stands() {
 #[test]
 fn nobody_waits_for_who_is_expelled() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([1, 3])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 3]))));
     mind.handle(ms(1), votes(1, 1, vote(1, 0, SURE)));
     assert_eq!(mind.held(), None, "robot 3 may be about to see");
     mind.handle(ms(2), Input::Expelled(robots([3])));

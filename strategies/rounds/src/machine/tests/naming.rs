@@ -22,7 +22,7 @@ fn for_unknown(counter: u32) -> Vote {
 fn a_gesture_that_some_know_is_decided_by_all_and_its_proof_stands() {
     let mut mind = mind(7);
     mind.call([(circle(), "circle".to_owned())].into());
-    mind.handle(ms(0), Input::Alive(robots(1..4)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(1..4))));
     for (robot, said) in [(1, for_circle(1)), (2, for_circle(1)), (3, for_unknown(1))] {
         mind.handle(ms(u64::from(robot)), votes(robot, 1, said));
     }
@@ -45,7 +45,7 @@ fn a_gesture_that_some_know_is_decided_by_all_and_its_proof_stands() {
 #[test]
 fn robots_that_know_it_and_robots_that_do_not_decide_gestures_of_the_list_together() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots(1..4)));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots(1..4))));
     let knows = Vote {
         evidence: vec![SURE, -1.0, -1.0, -2.0],
         unknown: Some(-SURE),

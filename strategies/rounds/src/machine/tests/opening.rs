@@ -120,7 +120,7 @@ fn when_the_counters_are_used_up_no_round_opens_and_it_is_counted() {
 #[test]
 fn a_round_in_which_others_take_part_has_its_time_whatever_is_said_of_newer_ones() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3, 66, 99])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 66, 99]))));
     mind.handle(ms(0), votes(3, 1, vote(1, 0, LEANING)));
     for k in 0..4 {
         mind.handle(ms(100 * u64::from(k) + 100), votes(66, k, null(2 + k)));
@@ -133,7 +133,7 @@ fn a_round_in_which_others_take_part_has_its_time_whatever_is_said_of_newer_ones
 #[test]
 fn who_begins_one_round_after_the_other_ends_one_within_a_deadline() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 66]))));
     mind.handle(ms(0), votes(3, 1, vote(1, 0, LEANING)));
     let heard = |mind: &mut Rounds, at, author, sequence, vote| {
         mind.handle(ms(at), votes(author, sequence, vote));
@@ -151,7 +151,7 @@ fn who_begins_one_round_after_the_other_ends_one_within_a_deadline() {
 #[test]
 fn who_is_left_behind_in_a_round_goes_where_most_have_gone() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3, 4, 5, 66])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 5, 66]))));
     mind.handle(ms(0), votes(3, 1, null(1)));
     let heard = |mind: &mut Rounds, at, author, counter| {
         mind.handle(ms(at), votes(author, counter, null(counter)));
@@ -172,7 +172,7 @@ fn who_is_left_behind_in_a_round_goes_where_most_have_gone() {
 #[test]
 fn made_up_robots_make_no_majority_and_the_last_of_them_is_heard_when_the_round_is_over() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3, 4])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4]))));
     mind.handle(ms(0), votes(3, 1, null(1)));
     assert_eq!((mind.round().unwrap().counter, mind.is_open()), (1, true));
     // They share what they may do, and have done it.
@@ -188,7 +188,7 @@ fn made_up_robots_make_no_majority_and_the_last_of_them_is_heard_when_the_round_
 #[test]
 fn a_round_whose_votes_suffice_is_decided_before_a_newer_one_ends_it() {
     let mut mind = mind(7);
-    mind.handle(ms(0), Input::Alive(robots([3, 4, 66])));
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 66]))));
     mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
     mind.handle(ms(0), votes(4, 1, vote(1, 0, SURE)));
     assert_eq!(mind.held(), None, "one of them may yet say something");

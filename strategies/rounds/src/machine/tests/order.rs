@@ -47,7 +47,7 @@ fn outcome(heard: &[Input]) -> (Option<RoundId>, BTreeMap<RobotId, Stamp>, Optio
     let quorum = Quorum::Evidence(1);
     let mut mind = mind_with(100, RoundsConfig { quorum, refractory: ms(0), ..adding_up() });
     // Of a robot that nobody saw arrive only the newest vote waits until it was, so that whose it is matters.
-    mind.handle(ms(1), Input::Alive(robots((1..6).chain([99]))));
+    mind.handle(ms(1), Input::Alive(Arc::new(robots((1..6).chain([99])))));
     for input in heard {
         mind.handle(ms(1), input.clone());
     }

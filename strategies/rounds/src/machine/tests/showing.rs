@@ -52,7 +52,7 @@ fn nobody_waits_for_a_robot_that_says_it_is_blind() {
     let said = blinded.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
     let [theirs] = broadcast(&said)[..] else { panic!("{said:?}") };
     let mut other = mind(7);
-    other.handle(ms(0), Input::Alive(robots([1, 2])));
+    other.handle(ms(0), Input::Alive(Arc::new(robots([1, 2]))));
     other.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
     assert_eq!(other.held(), None);
     assert_eq!(holds(&other.handle(ms(20), votes(2, 1, theirs.clone()))), [Some(0)]);
@@ -66,7 +66,7 @@ fn nobody_waits_for_a_robot_that_says_it_is_blind() {
 fn a_robot_that_may_still_see_waits_for_itself_as_the_others_do_for_it() {
     let mut slow = mind(7);
     slow.handle(ms(0), Input::Blind(false));
-    slow.handle(ms(0), Input::Alive(robots([1])));
+    slow.handle(ms(0), Input::Alive(Arc::new(robots([1]))));
     slow.handle(ms(10), votes(1, 1, vote(1, 0, SURE)));
     slow.handle(ms(300), Input::Tick);
     assert_eq!(slow.held(), None, "its own frame is due");

@@ -1,6 +1,7 @@
 //! What happens to three robots: what they see, what the network does, and what a stranger says.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Envelope, Instruction, Message, RobotId, RoundId};
@@ -105,7 +106,7 @@ pub fn event(world: &mut World, events: &mut Events<'_>) -> Option<()> {
                 (0..7).filter(|bit| who >> bit & 1 == 1).map(|bit| RobotId(bit + 1)).collect();
             world.mislead(
                 robot,
-                if who & 128 == 0 { Input::Alive(robots) } else { Input::Neighbours(robots) },
+                if who & 128 == 0 { Input::Alive(Arc::new(robots)) } else { Input::Neighbours(robots) },
             );
         }
         13 => {
@@ -241,7 +242,7 @@ fn many(world: &mut World, events: &mut Events<'_>) {
         }
         _ => {
             let robots = (0..most * 8).map(RobotId).collect();
-            return world.mislead(to, Input::Alive(robots));
+            return world.mislead(to, Input::Alive(Arc::new(robots)));
         }
     };
     say(world, to, robot(to + 1), message, chance);

@@ -86,7 +86,7 @@ impl World {
     }
 
     fn introduce_to(&mut self, robot: usize, all: &BTreeSet<RobotId>) {
-        self.input(robot, Input::Alive(all.clone()));
+        self.input(robot, Input::Alive(Arc::new(all.clone())));
         self.input(robot, Input::Neighbours(all.clone()));
     }
 
