@@ -329,21 +329,25 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     aside = [held for held in others if votes and held["vote"]["vocabulary"] == certificate["vocabulary"]]
     require(not any(len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) == listed for held in aside), "a vote laid aside")
     # What a robot said before it saw anything proves nothing where liars are expected.
-    counting, all_of, needed = votes if given.liars else votes + others, certificate["robots"], 0
-    committee, gave = given.committee + 4 * given.liars, votes
-    if given.committee and all_of > committee + committee // 2:
-        # Only those count who were drawn, or may have been by robots that know of half as many.
-        drawn = {held["robot"] for held in votes + others
-                 if lot(decision["round"]["counter"], held["robot"]) < min((committee << 65) // all_of, WORD)}
-        counting, gave = ([held for held in of if held["robot"] in drawn] for of in (counting, gave))
-        needed = committee // 2 + 1 + given.liars
-    majority = len(counting) >= (needed or (all_of + given.liars) // 2 + 1)
-    enough = given.liars == 0 or len(gave) > 2 * given.liars
+
+    def suffice(all_of: int) -> tuple:
+        """How many of so many robots are to take part, whether they do, and whether enough of them gave evidence."""
+        counting, gave, needed = votes if given.liars else votes + others, votes, (all_of + given.liars) // 2 + 1
+        committee = given.committee + 4 * given.liars
+        if given.committee and all_of > committee + committee // 2:
+            # Only those count who were drawn, or may have been by robots that know of half as many.
+            drawn = {held["robot"] for held in votes + others
+                     if lot(decision["round"]["counter"], held["robot"]) < min((committee << 65) // all_of, WORD)}
+            counting, gave = ([held for held in of if held["robot"] in drawn] for of in (counting, gave))
+            needed = committee // 2 + 1 + given.liars
+        return needed, len(counting) >= needed, given.liars == 0 or len(gave) > 2 * given.liars
+
+    needed, majority, enough = suffice(certificate["robots"])
     rule = certificate["rule"]
     alpha = given.alpha or ALPHA.get(rule, 0.5)
     terms = {"clip": given.clip, "alpha": alpha, "majority": True, "liars": given.liars, "committee": given.committee}
     require(certificate["terms"] == terms, f"decided by other terms than {terms}")
-    require(certificate["quorum"] == (needed or (all_of + given.liars) // 2 + 1), "another quorum than that of so many robots")
+    require(certificate["quorum"] == needed, "another quorum than that of so many robots")
     pool, unknown = certificate.get("pool"), certificate.get("unknown")
     require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
     require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
@@ -357,6 +361,8 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
             require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")
         return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
     require(majority, "no majority took part")
+    # How many robots there were is its author's word.
+    require(suffice(max(certificate["robots"], given.robots))[1:] == (True, True), f"too few of {given.robots} robots took part")
     require(enough, "too few votes for so many liars")
     probabilities, sure = judge(rule, evidence, given, pool)
     places = list(range(listed)) + named
@@ -379,6 +385,7 @@ def main() -> None:
     arguments.add_argument("--clip", type=float, default=6.0)
     arguments.add_argument("--liars", type=int, default=0)
     arguments.add_argument("--committee", type=int, default=72, help="of more robots than half as many again, so many vote; 0: always all")
+    arguments.add_argument("--robots", type=int, default=1, help="how many robots there were at least, if that is known: of how many it was is its author's word")
     given = arguments.parse_args()
     with sys.stdin if given.decision == "-" else open(given.decision, encoding="utf-8") as file:
         decision = json.load(file)

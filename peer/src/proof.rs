@@ -38,20 +38,31 @@ pub enum Unproven {
 }
 
 /// Whether a member of the swarm announced that, to the last word; every vote that it rests on was signed by a member, and it follows from
-/// them by the rounds of that configuration. Who drew it, how long that took and whether it is final is its announcer's word alone.
+/// them by the rounds of that configuration, in a swarm of at least so many `robots`. Who drew it, how long that took, of how many more robots, and
+/// whether it is final is its announcer's word alone: for a robot that says it is alone, its own vote suffices.
 ///
 /// # Errors
 /// The first [`Unproven`] found.
-pub fn check(announcement: &Announcement, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
+pub fn check(
+    announcement: &Announcement,
+    roster: &Roster,
+    rounds: &MindConfig,
+    robots: u32,
+) -> Result<(), Unproven> {
     let robot = announcement.announcer;
     let said = Envelope::from(announcement.clone());
     let signature = said.signature.ok_or(Unproven::Announcement { robot, cause: Distrust::Unsigned })?;
     let checked = roster.check(&said.statement(), &signature);
     checked.map_err(|cause| Unproven::Announcement { robot, cause })?;
-    check_votes(&announcement.decision, roster, rounds)
+    check_votes(&announcement.decision, roster, rounds, robots)
 }
 
-fn check_votes(decision: &Decision, roster: &Roster, rounds: &MindConfig) -> Result<(), Unproven> {
+fn check_votes(
+    decision: &Decision,
+    roster: &Roster,
+    rounds: &MindConfig,
+    robots: u32,
+) -> Result<(), Unproven> {
     let certificate = &decision.certificate;
     let votes = certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned());
     for held in votes {
@@ -64,7 +75,7 @@ fn check_votes(decision: &Decision, roster: &Roster, rounds: &MindConfig) -> Res
     if certificate.rule != rounds.rule {
         return Err(Unproven::Rule { found: certificate.rule, expected: rounds.rule });
     }
-    match follows(decision, &rounds.rule, rounds, certificate.robots) {
+    match follows(decision, &rounds.rule, rounds, certificate.robots.max(robots)) {
         true => Ok(()),
         false => Err(Unproven::Follows),
     }
@@ -153,15 +164,18 @@ mod tests {
         let rounds = MindConfig::default();
         assert_eq!((decision.class, decision.certificate.votes.len()), (Some(ClassId(1)), 3));
         assert_eq!(decision.certificate.others.len(), 1, "who saw nothing took part");
-        assert_eq!(check_votes(&decision, &roster, &rounds), Ok(()));
+        assert_eq!(check_votes(&decision, &roster, &rounds, 1), Ok(()));
         // What its author says of itself is not part of that.
         let mut vain = decision.clone();
         (vain.author, vain.certificate.elapsed_ms, vain.is_final) = (RobotId(4), 0, true);
-        assert_eq!(check_votes(&vain, &roster, &rounds), Ok(()));
+        assert_eq!(check_votes(&vain, &roster, &rounds, 1), Ok(()));
+        assert_eq!(check_votes(&decision, &roster, &rounds, 7), Ok(()), "four of seven");
+        let of_more = check_votes(&decision, &roster, &rounds, 8);
+        assert_eq!(of_more, Err(Unproven::Follows), "whatever it says of how many there were");
         let unproven = |change: &dyn Fn(&mut Decision)| {
             let mut decision = decision.clone();
             change(&mut decision);
-            check_votes(&decision, &roster, &rounds).unwrap_err()
+            check_votes(&decision, &roster, &rounds, 1).unwrap_err()
         };
         assert_eq!(unproven(&|d| d.class = Some(ClassId(0))), Unproven::Follows);
         assert_eq!(unproven(&|d| d.confidence += 1e-6), Unproven::Follows);
@@ -187,15 +201,15 @@ mod tests {
             Announcement { signature, ..unsigned }
         };
         let announced = said(decision.clone(), 2);
-        assert_eq!(check(&announced, &roster, &rounds), Ok(()));
+        assert_eq!(check(&announced, &roster, &rounds, 1), Ok(()));
         // As a client reads it.
         let json = serde_json::to_vec(&announced).unwrap();
-        assert_eq!(check(&decode_json(&json).unwrap(), &roster, &rounds), Ok(()));
+        assert_eq!(check(&decode_json(&json).unwrap(), &roster, &rounds, 1), Ok(()));
         let robot = RobotId(2);
         let refused = |cause| Err(Unproven::Announcement { robot, cause });
-        assert_eq!(check(&said(decision.clone(), 3), &roster, &rounds), refused(Distrust::Forged));
+        assert_eq!(check(&said(decision.clone(), 3), &roster, &rounds, 1), refused(Distrust::Forged));
         let unsigned = Announcement { signature: None, ..announced.clone() };
-        assert_eq!(check(&unsigned, &roster, &rounds), refused(Distrust::Unsigned));
+        assert_eq!(check(&unsigned, &roster, &rounds, 1), refused(Distrust::Unsigned));
         type Change = fn(&mut Decision);
         let changes: [Change; 7] = [
             |d| d.is_final ^= true,
@@ -209,11 +223,11 @@ mod tests {
         for change in changes {
             let mut changed = announced.clone();
             change(&mut changed.decision);
-            assert_eq!(check(&changed, &roster, &rounds), refused(Distrust::Forged), "{changed:?}");
+            assert_eq!(check(&changed, &roster, &rounds, 1), refused(Distrust::Forged), "{changed:?}");
         }
         // Nor can a member say that votes which decide decide nothing.
         let undecided = said(Decision { class: None, ..decision }, 2);
-        assert_eq!(check(&undecided, &roster, &rounds), Err(Unproven::Follows));
+        assert_eq!(check(&undecided, &roster, &rounds, 1), Err(Unproven::Follows));
     }
 
     #[test]
@@ -236,7 +250,7 @@ mod tests {
                 (counted.robot, counted.stamp, counted.vote, counted.signature) =
                     (author, stamp, said, signature);
                 assert!(
-                    check_votes(&forged, &roster, &MindConfig::default()).is_err(),
+                    check_votes(&forged, &roster, &MindConfig::default(), 1).is_err(),
                     "byte {place} of vote {vote}"
                 );
             }

@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RoundId, SignedWord, Word};
+use gestalt_protocol::{ClassId, InstructorId, Lesson, MAX_LESSONS, RobotId, RoundId, SignedWord, Word};
 use siphasher::sip::SipHasher24;
 
 use crate::believe::Standing;
@@ -325,6 +325,12 @@ impl LessonBook {
     #[must_use]
     pub fn contains(&self, round: RoundId) -> bool {
         self.rounds.contains_key(&round)
+    }
+
+    /// The rounds under that count of which something is known.
+    pub fn under(&self, counter: u32) -> impl Iterator<Item = RoundId> + '_ {
+        let name = |most| RoundId { counter, opener: RobotId(most), life: most };
+        self.rounds.range(name(0)..=name(u32::MAX)).map(|(round, _)| *round)
     }
 
     /// Of how many rounds something is known.

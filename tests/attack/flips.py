@@ -15,7 +15,7 @@ spec = importlib.util.spec_from_file_location("verify", HERE.parents[2] / "examp
 verify = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(verify)
 
-RULES = argparse.Namespace(alpha=0.05, clip=6.0, liars=0, committee=72)
+RULES = argparse.Namespace(alpha=0.05, clip=6.0, liars=0, committee=72, robots=1)
 NO_DECISION = (verify.Refused, verify.InvalidSignature, KeyError, IndexError, TypeError, ValueError, struct.error,
                AttributeError, OverflowError)
 

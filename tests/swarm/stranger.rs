@@ -317,21 +317,24 @@ pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
     if !python {
         eprintln!("skipped: verify.py: python3 has no package cryptography");
     }
-    let verdicts = |decision: &Value| {
+    let verdicts = |decision: &Value, robots: &str| {
         std::fs::write(&file, decision.to_string()).unwrap();
         let file = file.to_str().unwrap();
-        let by_rust = gestalt(&["verify", file, "--roster", roster]);
+        let by_rust = gestalt(&["verify", file, "--roster", roster, "--robots", robots]);
         let mut verdicts =
             vec![(by_rust.status.success(), String::from_utf8_lossy(&by_rust.stderr).into_owned())];
         if python {
             let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/verify.py");
-            let ran = Command::new("python3").arg(program).args([file, "--roster", roster]).output().unwrap();
+            let words = [file, "--roster", roster, "--robots", robots];
+            let ran = Command::new("python3").arg(program).args(words).output().unwrap();
             verdicts.push((ran.status.success(), String::from_utf8_lossy(&ran.stderr).into_owned()));
         }
         verdicts
     };
-    for (proven, why) in verdicts(&decision) {
-        assert!(proven, "{why}: {decision}");
+    for (robots, enough) in [("1", true), ("3", true), ("20", false)] {
+        for (proven, why) in verdicts(&decision, robots) {
+            assert_eq!(proven, enough, "of {robots}: {why}: {decision}");
+        }
     }
     let forgeries: [&dyn Fn(&mut Value); 16] = [
         &|d| d["class"] = ((d["class"].as_u64().unwrap() + 1) % 6).into(),
@@ -355,7 +358,7 @@ pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
     for (n, forge) in forgeries.iter().enumerate() {
         let mut forged = decision.clone();
         forge(&mut forged);
-        for (proven, why) in verdicts(&forged) {
+        for (proven, why) in verdicts(&forged, "1") {
             assert!(!proven && !why.contains("Traceback"), "forgery {n} is taken for a decision: {why}");
         }
     }

@@ -26,6 +26,9 @@ pub struct Args {
     /// Configuration of a robot of the swarm, for its rounds [default: the defaults]
     #[arg(short, long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// How many robots the swarm had at least, where that is known: of how many it is, a decision says itself
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    robots: u32,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -39,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let announcement: Announcement = decode_json(&read(&args.decision)?)?;
     let roster: Roster = Roster::read(&args.roster)?;
     let config = args.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
-    proof::check(&announcement, &roster, &config.rounds)?;
+    proof::check(&announcement, &roster, &config.rounds, args.robots)?;
     let decision = announcement.decision;
     let certificate = &decision.certificate;
     let reached = certificate.reached();

@@ -9,15 +9,15 @@ use crate::others::Others;
 
 /// Who counts as one of the swarm, whether or not it can be reached now.
 ///
-/// A robot that voted counts for a while after its last vote: a part of the swarm that is cut off remembers how many there
-/// are elsewhere. One that is said to be alive and was never heard counts until a whole round has passed in which it said
-/// nothing: names without robots keep nobody from deciding for long.
+/// A robot that voted counts for a while after its last vote, and after it was last alive, however long nothing was shown before that: a part of the swarm
+/// that is cut off remembers how many there are elsewhere. One that is said to be alive and was not heard lately, or never, counts until a whole round has
+/// passed in which it said nothing: names without robots keep nobody from deciding for long.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Electorate {
     /// When each other robot last voted. At most [`MAX_ROBOTS`].
     heard: BTreeMap<RobotId, Duration>,
-    /// Alive and never heard, by now: since when.
-    unheard: BTreeMap<RobotId, Duration>,
+    /// Alive and not heard lately, by now.
+    unheard: BTreeMap<RobotId, Unheard>,
     /// Alive through a whole round, and never heard.
     silent: BTreeSet<RobotId>,
     /// Heard, or alive, and not alive now: since when. At most [`MAX_ROBOTS`].
@@ -29,6 +29,14 @@ pub(crate) struct Electorate {
     most_asked: Option<u32>,
     /// Whether there were more at last.
     large: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Unheard {
+    /// Since when it is waited for.
+    since: Duration,
+    /// Whether it was heard before.
+    voted: bool,
 }
 
 impl Electorate {
@@ -59,6 +67,10 @@ impl Electorate {
             if self.gone.len() < MAX_ROBOTS {
                 self.gone.insert(robot, now);
             }
+            let voted = self.unheard.get(&robot).is_some_and(|unheard| unheard.voted);
+            if voted && self.heard.len() < MAX_ROBOTS || self.heard.contains_key(&robot) {
+                self.heard.insert(robot, now);
+            }
         }
         self.gone.retain(|robot, _| !robots.contains(*robot));
         self.alive(robots, now);
@@ -76,7 +88,7 @@ impl Electorate {
         }
         for robot in robots.iter().take(MAX_ROBOTS) {
             if !self.heard.contains_key(&robot) && !self.silent.contains(&robot) {
-                self.unheard.entry(robot).or_insert(now);
+                self.unheard.entry(robot).or_insert(Unheard { since: now, voted: false });
             }
         }
     }
@@ -92,8 +104,12 @@ impl Electorate {
     /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
     /// without a robot.
     pub fn round_over(&mut self, since: Duration) {
-        let silent: Vec<RobotId> =
-            self.unheard.iter().filter(|(_, alive)| **alive <= since).map(|(robot, _)| *robot).collect();
+        let silent: Vec<RobotId> = self
+            .unheard
+            .iter()
+            .filter(|(_, unheard)| unheard.since <= since)
+            .map(|(robot, _)| *robot)
+            .collect();
         for robot in silent {
             self.unheard.remove(&robot);
             self.silent.insert(robot);
@@ -110,9 +126,16 @@ impl Electorate {
         Expected::Living { alive, silent: &self.silent }
     }
 
-    /// Forgets who was not heard for that long; these are alive.
+    /// Forgets who was not heard for that long; these are alive, and waited for instead.
     pub fn forget(&mut self, now: Duration, lately: Duration, alive: &Others) {
-        self.heard.retain(|_, at| now.saturating_sub(*at) <= lately);
+        let (unheard, large) = (&mut self.unheard, self.large);
+        self.heard.retain(|robot, at| {
+            let stays = now.saturating_sub(*at) <= lately;
+            if !stays && !large && alive.contains(*robot) {
+                unheard.insert(*robot, Unheard { since: now, voted: true });
+            }
+            stays
+        });
         self.gone.retain(|_, at| now.saturating_sub(*at) <= lately);
         if self.large && self.counted_large().is_none() {
             // From now on all are asked again.
@@ -200,6 +223,37 @@ mod tests {
         electorate.forget(at(61), LATELY, &robots(1..=3));
         assert_eq!(electorate.count(), 9);
         electorate.forget(at(62), LATELY, &robots(1..=3));
+        assert_eq!(electorate.count(), 4, "three are there yet");
+        electorate.round_over(at(62));
+        assert_eq!(electorate.count(), 1, "and said nothing");
+    }
+
+    /// Nothing was shown for long, and then the swarm was cut: before, or after, a hand is seen.
+    #[test]
+    fn who_was_there_until_now_counts_however_long_ago_it_voted() {
+        for cut_first in [true, false] {
+            let mut electorate = Electorate::default();
+            let (all, none) = (robots(1..=4), robots([]));
+            electorate.alive(&all, at(0));
+            (1..=4).for_each(|robot| electorate.hear(RobotId(robot), at(1)));
+            if cut_first {
+                electorate.change(&all, &none, at(300));
+                electorate.forget(at(301), LATELY, &none);
+            } else {
+                electorate.forget(at(300), LATELY, &all);
+                electorate.change(&all, &none, at(301));
+            }
+            assert_eq!(electorate.count(), 5, "the others are elsewhere, {cut_first}");
+            electorate.forget(at(422), LATELY, &none);
+            assert_eq!(electorate.count(), 1, "they stayed away");
+        }
+    }
+
+    #[test]
+    fn a_name_that_came_and_went_and_never_voted_counts_no_more() {
+        let mut electorate = Electorate::default();
+        electorate.alive(&robots(1..=100), at(0));
+        electorate.change(&robots(1..=100), &robots([]), at(1));
         assert_eq!(electorate.count(), 1);
     }
 

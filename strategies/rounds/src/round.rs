@@ -110,6 +110,16 @@ impl Round {
         self.id == id || self.names.contains(&id)
     }
 
+    /// Whether a decision for a gesture is held.
+    pub fn has_decided(&self) -> bool {
+        self.agreement.held().is_some_and(|held| held.class.is_some())
+    }
+
+    /// All its names that are remembered.
+    pub fn names(&self) -> impl Iterator<Item = RoundId> + '_ {
+        self.names.iter().copied().chain([self.id])
+    }
+
     /// Takes in another name: the smaller is its own.
     pub fn merge(&mut self, other: RoundId) {
         if self.names.len() < MAX_NAMES {

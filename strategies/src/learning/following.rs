@@ -1,5 +1,6 @@
 //! What learning is told of the rounds, and tells them.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
@@ -20,6 +21,10 @@ impl Follow for Learning {
         if self.recent.merge(round, other) {
             self.apply_to_round(round);
         }
+    }
+
+    fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
+        self.lessons.under(counter).collect()
     }
 
     fn settled(&mut self, decision: &Decision, clip: f64) {

@@ -125,8 +125,12 @@ impl Rounds {
         }
     }
 
-    /// Takes part in a round from now on; an older one that is still open is over.
+    /// Takes part in a round from now on; an older one that is still open is over. But what an instructor spoke of was shown before: whoever says
+    /// otherwise would have what is shown now learned as that.
     pub(super) fn join(&mut self, id: RoundId, effects: &mut Effects<'_>) {
+        if effects.follower.taught(id.counter).contains(&id) {
+            return self.enter(id, false, effects);
+        }
         self.enter(id, true, effects);
         (effects.carry_out)(Output::Opened(id));
         self.partners.hurry(self.now, self.config.repair_busy);
@@ -139,6 +143,13 @@ impl Rounds {
         self.stop_looking(effects);
         self.highest = self.highest.max(Some(id.counter));
         self.electorate.forget(self.now, self.config.lately, &self.alive);
+        match self.round.as_ref().filter(|before| before.id.counter == id.counter) {
+            Some(before) if before.has_decided() => self.past.extend(before.names()),
+            Some(_) => {}
+            None => self.past.clear(),
+        }
+        self.past.extend(effects.follower.taught(id.counter));
+        self.past.remove(&id);
         self.round = Some(Round::new(id, self.now, open));
         self.committee = None;
         self.draw(&BTreeSet::new());

@@ -1,5 +1,6 @@
 //! What goes along with the rounds of a robot without deciding any of them: its learning.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
@@ -17,6 +18,12 @@ pub trait Follow {
     /// A round that it knows of has another name: robots that open at once merge their rounds.
     fn merged(&mut self, round: RoundId, other: RoundId) {
         let _ = (round, other);
+    }
+
+    /// The names under that count of which an instructor spoke: their gestures were shown before.
+    fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
+        let _ = counter;
+        BTreeSet::new()
     }
 
     /// Whether it wants to see more of a round that is decided. The robot then goes on looking until the round's deadline

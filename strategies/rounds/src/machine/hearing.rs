@@ -23,6 +23,13 @@ const MAX_AHEAD: u64 = 1 << 24;
 /// and by so many more a second, which is as fast as gestures can be shown. So nobody uses them up.
 const AHEAD_PER_SECOND: u64 = 2;
 
+/// One robot alone takes another so far ahead at once. Bounds on how far depend on how long a robot lives: one word in between would part those that started
+/// at other times.
+const LEAP: u32 = 1024;
+
+/// Under one count so many rounds that are over are remembered: where there were more, none that follows takes in another name.
+const MAX_PAST: usize = 4096;
+
 /// Who lacks a decision that another holds asks for it after this long: most have the votes, and conclude it themselves.
 const ASK_AFTER: Duration = Duration::from_millis(100);
 
@@ -123,10 +130,14 @@ impl Rounds {
     }
 
     /// Whether that is a name of the newest round known: its own, or that of a round that was opened at the same time, as far as
-    /// can be told. Equal counters alone do not say so: where memories were lost or the swarm was cut, they belong to other showings.
+    /// can be told. Equal counters alone do not say so: where memories were lost or the swarm was cut, they belong to other showings. And whoever may
+    /// vote could call it by the name of one that is over: two gestures would have one name.
     pub(super) fn is_this_round(&self, id: RoundId) -> bool {
         let opened_at_once = |round: &Round| {
-            round.id.counter == id.counter && self.now <= round.since.saturating_add(self.config.deadline)
+            round.id.counter == id.counter
+                && self.now <= round.since.saturating_add(self.config.deadline)
+                && !self.past.contains(&id)
+                && self.past.len() < MAX_PAST
         };
         self.round.as_ref().is_some_and(|round| round.is_named(id) || opened_at_once(round))
     }
@@ -155,6 +166,11 @@ impl Rounds {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
         }
+        let known = self.highest.unwrap_or(first);
+        if id.counter > known.saturating_add(LEAP) && !self.is_vouched(known, (id, decided), by) {
+            self.refusals.add(Refusal::FarAhead);
+            return Err(Refusal::FarAhead);
+        }
         if !this && self.is_too_soon(id, by, effects) {
             self.refusals.add(Refusal::TooSoon);
             return Err(Refusal::TooSoon);
@@ -170,6 +186,25 @@ impl Rounds {
             round.merge(id);
         }
         Ok(order)
+    }
+
+    /// Whether more robots than may lie say that the swarm is so far beyond what is `known` here, where there are that many: by a decision, which is the word of
+    /// many, or by their votes, which they repeat.
+    fn is_vouched(
+        &mut self,
+        known: u32,
+        (id, decided): (RoundId, Option<bool>),
+        by: Option<RobotId>,
+    ) -> bool {
+        let Some(by) = by else { return decided == Some(true) };
+        if self.electorate.count() <= 2 {
+            return true;
+        }
+        if self.known(by).is_some() {
+            self.far_ahead.insert(by, id.counter);
+        }
+        let beyond = |counter: &&u32| **counter > known.saturating_add(LEAP);
+        self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
     }
 
     /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
@@ -188,7 +223,9 @@ impl Rounds {
         let mut names =
             votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
         self.round.as_ref().is_some_and(|round| {
-            round.id.counter == decision.round.counter && names.any(|name| round.is_named(name))
+            round.id.counter == decision.round.counter
+                && !self.past.contains(&decision.round)
+                && names.any(|name| round.is_named(name))
         })
     }
 
@@ -338,7 +375,7 @@ impl Rounds {
     }
 
     /// Whether this robot would decide so itself on the votes that the decision rests on. `this`: where it is of the newest
-    /// round, votes held here must be in it as their robots said them.
+    /// round, votes held here must be in it as their robots said them, and none of a round that is over.
     fn judge(&self, decision: &Decision, this: bool) -> Result<(), Refusal> {
         if decision.class.is_none() {
             // It decides nothing, but may be the first word of a round: somebody must have been in that.
@@ -355,7 +392,8 @@ impl Rounds {
         let true_words = said.all(|(robot, stamp, vote)| {
             let known = ballot.and_then(|ballot| ballot.confirms(robot, stamp, vote));
             let never_said = robot == self.me && stamp > self.stamp;
-            known != Some(false) && !never_said
+            let is_past = ballot.is_some() && self.past.contains(&vote.round);
+            known != Some(false) && !never_said && !is_past
         });
         match true_words && follows(decision, &*self.fusion, &self.config, self.electorate.count()) {
             true => Ok(()),

@@ -115,8 +115,12 @@ pub struct Rounds {
     pub(super) now: Duration,
     /// The newest round known.
     pub(super) round: Option<Round>,
+    /// The names of earlier rounds under its count, that this robot was in or that an instructor spoke of: names of this one they never become.
+    pub(super) past: BTreeSet<RoundId>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
     pub(super) highest: Option<u32>,
+    /// What robots said last of rounds far beyond it. Of those alone who are there.
+    pub(super) far_ahead: BTreeMap<RobotId, u32>,
     /// The counter that this life began with, and when it began.
     pub(super) began: (u32, Option<Duration>),
     pub(super) electorate: Electorate,
@@ -175,6 +179,8 @@ impl Rounds {
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
             round: None,
+            past: BTreeSet::new(),
+            far_ahead: BTreeMap::new(),
             highest: None,
             began: (0, None),
             electorate: Electorate::new(config.all_vote_up_to()),
@@ -349,6 +355,7 @@ impl Rounds {
         for allowance in [&mut self.haves, &mut self.given, &mut self.announced, &mut self.preempted] {
             allowance.forget(now, known);
         }
+        self.far_ahead.retain(|robot, _| known(*robot));
         self.forget_waiting();
     }
 

@@ -25,6 +25,41 @@ fn a_correction_reaches_all_also_who_was_away() {
     swarm.check();
 }
 
+/// All are switched off and on, the opener's disk is gone, so its first round has the count of yesterday's; and somebody calls it by that one's name.
+#[test]
+fn what_was_said_yesterday_labels_nothing_of_today() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 31);
+    let yesterday = swarm.show(1);
+    swarm.was(yesterday, 1);
+    swarm.disks[0].clear();
+    swarm.restart_all();
+    swarm.input(0, Input::Open);
+    let vote = Vote {
+        round: yesterday,
+        vocabulary: VocabularyId::NONE,
+        evidence: vec![],
+        looks: 0.0,
+        unknown: None,
+        named: vec![],
+    };
+    for i in 0..3 {
+        let stamp = Stamp { boot: 1, sequence: 1 };
+        let message = Message::Vote(vote.clone());
+        let said = Envelope { author: RobotId(9), stamp, message, signature: None };
+        swarm.input(i, Input::Received(said));
+    }
+    let today = swarm.show(2);
+    assert_eq!(today.counter, yesterday.counter, "or this test is of no use");
+    assert_ne!(today, yesterday);
+    swarm.was(today, 2);
+    swarm.pass(Duration::from_secs(10));
+    for mind in &swarm.minds {
+        let of = |class| mind.training_set().unwrap().class_count(ClassId(class));
+        assert_eq!((of(1), of(2)), (9, 9), "robot {}", mind.me());
+    }
+    swarm.check();
+}
+
 #[test]
 fn what_is_taken_back_is_forgotten_and_what_is_said_then_counts() {
     let mut swarm = Swarm::new(3, config(3, 1.0), 7);

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use gestalt_protocol::{
     ClassId, Envelope, FeatureSpaceId, Gesture, HeldBatch, Instruction, Lesson, Message, Outcome, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, Word,
+    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote, Word,
 };
 use gestalt_rounds::{Classify, ClassifyError, Life, Observation, Refusal, RoundsConfig, Vocabulary};
 use gestalt_svm::{Components, FeatureSpace, ScalingMethod};

@@ -111,6 +111,33 @@ fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
 }
 
 #[test]
+fn one_robot_takes_nobody_far_ahead_and_two_do() {
+    for liars in [0, 1] {
+        let mut mind = mind_with(7, RoundsConfig { liars, ..adding_up() });
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 5, 66]))));
+        for sequence in 1..20 {
+            mind.handle(ms(u64::from(sequence)), votes(66, sequence, null(5000 + sequence)));
+        }
+        for robot in 1000..1100 {
+            mind.handle(ms(30), votes(robot, 1, null(5000)));
+        }
+        assert_eq!((mind.round(), mind.far_ahead.len()), (None, 1), "whoever it makes up");
+        assert_eq!(mind.refusals().count(Refusal::FarAhead), 119);
+        mind.handle(ms(40), votes(3, 1, null(900)));
+        assert_eq!(mind.round().unwrap().counter, 900, "a little way is no leap");
+        mind.handle(ms(1000), gives(66, decision(50_000, None, 0, 66)));
+        assert_eq!(mind.round().unwrap().counter, 900, "that nothing was decided is nobody's word");
+        // Who lost what it knew, among others that did not.
+        mind.handle(ms(3000), votes(4, 1, null(50_000)));
+        assert_eq!(mind.round().unwrap().counter, 50_000);
+    }
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3]))));
+    mind.handle(ms(0), votes(3, 1, null(50_000)));
+    assert_eq!(mind.round().unwrap().counter, 50_000, "there is nobody else to go by");
+}
+
+#[test]
 fn when_the_counters_are_used_up_no_round_opens_and_it_is_counted() {
     let mut mind = mind(7).counting_from(Some(u32::MAX));
     mind.handle(ms(900), Input::Open);
@@ -239,6 +266,77 @@ fn equal_counters_of_rounds_opened_at_other_times_are_two_rounds() {
     mind.handle(ms(9100), votes(9, 1, Vote { round: round(1, 9), ..vote(1, 1, LEANING) }));
     assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "the greater one is joined");
     assert!(mind.held().is_none(), "what was decided of the other is not decided of this");
+}
+
+/// Whoever may vote opens another one under its count, and then calls that by its name.
+#[test]
+fn the_name_of_a_round_that_is_over_is_that_of_no_other() {
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..adding_up() });
+    mind.handle(ms(0), Input::Open);
+    mind.handle(ms(5), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, LEANING) }));
+    mind.handle(ms(10), gives(9, decision(1, Some(0), 2, 9)));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 1)), false));
+    mind.handle(ms(9000), votes(3, 1, Vote { round: round(1, 99), ..null(1) }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 99)), true));
+    for (sequence, over) in [(2, 1), (3, 5), (4, 7)] {
+        mind.handle(ms(9100), votes(3, sequence, Vote { round: round(1, over), ..vote(1, 1, SURE) }));
+        assert_eq!((mind.round(), mind.held()), (Some(round(1, 99)), None), "that was {over}");
+    }
+    mind.handle(ms(9200), gives(9, decision(1, Some(0), 2, 9)));
+    assert_eq!(
+        (mind.round(), mind.held()),
+        (Some(round(1, 99)), None),
+        "nor is its decision that of this one"
+    );
+    // Not with a vote of this one beside it, nor under the name of this one.
+    let over = decision(1, Some(0), 2, 9);
+    let mut certificate = over.certificate.clone();
+    let of_this = Vote { round: round(1, 99), ..null(1) };
+    let stamp = Stamp { boot: 1, sequence: 9 };
+    certificate.others.push(HeldVote { robot: RobotId(3), stamp, vote: of_this, signature: None });
+    let undecided = Decision { certificate: certificate.clone(), ..decision(1, None, 0, 9) };
+    let undecided = Decision {
+        certificate: gestalt_protocol::Certificate { votes: vec![], ..undecided.certificate },
+        ..undecided
+    };
+    let with_it = Decision { certificate, ..over.clone() };
+    for also in [with_it, undecided, Decision { round: round(1, 99), ..over }] {
+        mind.handle(ms(9250), gives(9, also));
+        assert_eq!((mind.round(), mind.held()), (Some(round(1, 99)), None));
+    }
+    // Of one that nobody here was in it is another name.
+    mind.handle(ms(9300), votes(3, 5, Vote { round: round(1, 50), ..vote(1, 1, LEANING) }));
+    assert_eq!(mind.round(), Some(round(1, 50)));
+}
+
+/// Knows what an instructor spoke of.
+#[derive(Default)]
+struct Taught(BTreeSet<RoundId>);
+
+impl crate::machine::Follow for Taught {
+    fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
+        self.0.iter().copied().filter(|round| round.counter == counter).collect()
+    }
+}
+
+/// After a restart of all, in which some lost what they knew, counts come again.
+#[test]
+fn a_round_that_an_instructor_spoke_of_is_over() {
+    let mut follower = Taught([round(8, 1)].into());
+    let joined = |out: &[Output]| out.iter().any(|out| matches!(out, Output::Opened(_)));
+    let mut mind = mind(7);
+    let out = mind.handle_with(ms(0), votes(3, 1, null(8)), &mut follower);
+    assert_eq!((mind.round(), mind.is_open(), joined(&out)), (Some(round(8, 1)), false, false));
+    let mut mind = mind_with(7, adding_up());
+    let anew = Vote { round: round(8, 4), ..null(8) };
+    let out = mind.handle_with(ms(0), votes(4, 1, anew), &mut follower);
+    assert!(mind.is_open() && joined(&out));
+    mind.handle_with(ms(10), votes(3, 1, null(8)), &mut follower);
+    assert_eq!(mind.round(), Some(round(8, 4)), "what is shown now has a name of its own");
+    // What is said of the one that is shown changes nothing of how it goes on.
+    follower.0.insert(round(8, 2));
+    mind.handle_with(ms(20), votes(2, 1, Vote { round: round(8, 2), ..null(8) }), &mut follower);
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(8, 2)), true));
 }
 
 #[test]
