@@ -102,12 +102,8 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T2,
         setting: Setting::Sealed,
         expected: "no vote of a robot that is off is counted",
-        counted: Counted::None(
-            "rounds of one counter merge while they are open, and the votes of an earlier life with them",
-        ),
-        gap: Some(
-            "who kept its memory takes part in rounds under old counts, too: others may have lost theirs",
-        ),
+        counted: Counted::None(NO_REFUSAL),
+        gap: None,
         play: |seed| old_votes_again(seed, &[1, 2, 4, 5]),
     },
     Attack {

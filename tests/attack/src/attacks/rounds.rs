@@ -1,8 +1,10 @@
 //! When a round begins and ends, and who is waited for.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Have, Message, Outcome, RobotId, RoundId, Stamp, Topic};
+use gestalt_strategies::Mind;
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, decided_in_time, unmoved};
@@ -56,6 +58,16 @@ pub const ALL: &[Attack] = &[
         counted: Counted::Some(&["refused_round_too_soon"]),
         gap: None,
         play: |seed| beside(&Plan::sealed().liars(1), seed, one_after_the_other, within_a_second),
+    },
+    Attack {
+        number: "A7 · 7",
+        what: "an enrolled robot begins another round under the count of one that was taught, and calls it by that one's name",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "no name stands for two gestures, and samples have the class that was said of what they show",
+        counted: Counted::None("who says the name of a round that is over may be behind: it is not heard"),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, one_name_again, names_apart),
     },
     Attack {
         number: "A8",
@@ -188,6 +200,38 @@ fn one_after_the_other(swarm: &mut Swarm) {
         }
         swarm.end(began);
         swarm.pass(6000 * MS);
+    }
+}
+
+fn one_name_again(swarm: &mut Swarm) {
+    let liar = swarm.liar();
+    let first = swarm.show(1);
+    swarm.teach(first, 1);
+    swarm.pass(6000 * MS);
+    let began = swarm.now();
+    say(swarm, liar, true, 1, RoundId { opener: RobotId(u32::MAX), ..first });
+    swarm.begin(2);
+    swarm.pass(50 * MS);
+    say(swarm, liar, true, 2, first);
+    let second = swarm.end(began);
+    swarm.teach(second, 2);
+}
+
+fn names_apart(peace: &Swarm, war: &Swarm) -> Result<(), String> {
+    let mut gestures: BTreeMap<RoundId, BTreeSet<ClassId>> = BTreeMap::new();
+    for (.., decision) in war.announced() {
+        gestures.entry(decision.round).or_default().extend(decision.class);
+    }
+    if let Some((round, classes)) = gestures.iter().find(|(_, classes)| classes.len() > 1) {
+        return Err(format!("{round:?} stands for {classes:?}"));
+    }
+    let samples = |swarm: &Swarm| -> Vec<[usize; 2]> {
+        let of = |mind: &Mind, class| mind.training_set().map_or(0, |set| set.class_count(ClassId(class)));
+        swarm.minds().map(|mind| [of(mind, 1), of(mind, 2)]).collect()
+    };
+    match (samples(war), samples(peace)) {
+        (found, usual) if found == usual => Ok(()),
+        (found, usual) => Err(format!("samples {found:?}, in peace {usual:?}")),
     }
 }
 
