@@ -402,7 +402,11 @@ mod tests {
         });
         for times in &times {
             assert!(times.len() >= 8, "{times:?}");
-            assert!(times.windows(2).all(|pair| pair[1] + MS >= pair[0] + 40 * MS), "{times:?}");
+            // Whoever asks may be held up after it has looked when to ask; what it lost is made up for at once.
+            let late = 20 * MS;
+            assert!(times.windows(2).all(|pair| pair[1] + late >= pair[0] + 40 * MS), "{times:?}");
+            let turns = times.len() as u32 - 1;
+            assert!(times[times.len() - 1] + late >= times[0] + turns * 40 * MS, "{times:?}");
         }
     }
 

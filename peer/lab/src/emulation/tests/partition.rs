@@ -31,13 +31,10 @@ fn five_seconds_after_a_cut_of_a_minute_all_hold_one_decision_and_know_the_same(
 #[test]
 fn no_part_of_a_swarm_that_rested_decides_alone() {
     for cut in [280, 299] {
-        let faults = [(2, 3), (3, 4)].map(|(a, b)| Fault {
-            at: Duration::from_secs(cut),
-            event: Event::Cut(RobotId(a), RobotId(b)),
-        });
+        let faults = [(2, 3), (3, 4)]
+            .map(|(a, b)| Fault { at: Duration::from_secs(cut), event: Event::Cut(RobotId(a), RobotId(b)) });
         let interval = Duration::from_secs(150);
-        let scenario =
-            Scenario { faults: faults.into(), interval, ..calm(5, 0, NetworkShape::Line, 2) };
+        let scenario = Scenario { faults: faults.into(), interval, ..calm(5, 0, NetworkShape::Line, 2) };
         assert!(interval > scenario.mind.lately);
         for seed in 0..10 {
             let report = run(&scenario, seed).unwrap();
