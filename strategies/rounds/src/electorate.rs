@@ -102,8 +102,11 @@ impl Electorate {
     }
 
     /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
-    /// without a robot.
+    /// without a robot. But whoever heard nobody at all may be deaf, and would be a majority of its own.
     pub fn round_over(&mut self, since: Duration) {
+        if self.heard.values().all(|at| *at < since) {
+            return;
+        }
         let silent: Vec<RobotId> = self
             .unheard
             .iter()
@@ -224,8 +227,23 @@ mod tests {
         assert_eq!(electorate.count(), 9);
         electorate.forget(at(62), LATELY, &robots(1..=3));
         assert_eq!(electorate.count(), 4, "three are there yet");
+        electorate.hear(RobotId(9), at(63));
         electorate.round_over(at(62));
-        assert_eq!(electorate.count(), 1, "and said nothing");
+        assert_eq!(electorate.count(), 2, "and said nothing, where another one did");
+    }
+
+    /// It has just started, and what others say does not reach it.
+    #[test]
+    fn who_hears_nobody_is_no_majority() {
+        let mut electorate = Electorate::default();
+        electorate.alive(&robots(1..=4), at(0));
+        for round in 1..5 {
+            electorate.round_over(at(5 * round));
+            assert_eq!(electorate.count(), 5);
+        }
+        electorate.hear(RobotId(2), at(31));
+        electorate.round_over(at(30));
+        assert_eq!(electorate.count(), 2, "the others are names");
     }
 
     /// Nothing was shown for long, and then the swarm was cut: before, or after, a hand is seen.

@@ -269,12 +269,16 @@ impl Rounds {
         let this = self.is_this_round(vote.round);
         let order = match self.place((vote.round, None), this, Some(robot), effects) {
             Err(refusal) => {
+                self.hear_of(robot);
                 if refusal == Refusal::TooSoon {
                     self.keep_waiting(held);
                 }
                 return false;
             }
             Ok(Ordering::Less) => {
+                if self.round.as_ref().is_some_and(|round| round.id.counter == vote.round.counter) {
+                    self.hear_of(robot);
+                }
                 self.answer_displaced(&held, effects);
                 return false;
             }
@@ -303,6 +307,14 @@ impl Rounds {
             self.hear_waiting(effects);
         }
         is_news
+    }
+
+    /// A robot that is there votes, if not in the round that this one is in: it says something, and counts as one that does. Whoever took it for a name
+    /// without a robot would come to be a majority of its own.
+    fn hear_of(&mut self, robot: RobotId) {
+        if self.alive.contains(robot) {
+            self.electorate.hear(robot, self.now);
+        }
     }
 
     /// Whether a decision is to be looked into, which takes work: that of the votes it rests on. It comes from that robot, `given` or announced.
