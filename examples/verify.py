@@ -328,10 +328,10 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
     require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
     aside = [held for held in others if votes and held["vote"]["vocabulary"] == certificate["vocabulary"]]
     require(not any(len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) == listed for held in aside), "a vote laid aside")
-    # What a robot said before it saw anything proves nothing where liars are expected.
 
     def suffice(all_of: int) -> tuple:
         """How many of so many robots are to take part, whether they do, and whether enough of them gave evidence."""
+        # What a robot said before it saw anything proves nothing where liars are expected.
         counting, gave, needed = votes if given.liars else votes + others, votes, (all_of + given.liars) // 2 + 1
         committee = given.committee + 4 * given.liars
         if given.committee and all_of > committee + committee // 2:
@@ -361,9 +361,9 @@ def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
             require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")
         return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
     require(majority, "no majority took part")
+    require(enough, "too few votes for so many liars")
     # How many robots there were is its author's word.
     require(suffice(max(certificate["robots"], given.robots))[1:] == (True, True), f"too few of {given.robots} robots took part")
-    require(enough, "too few votes for so many liars")
     probabilities, sure = judge(rule, evidence, given, pool)
     places = list(range(listed)) + named
     require(decision["class"] in places, "a gesture that no vote is about")

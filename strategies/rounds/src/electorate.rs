@@ -45,7 +45,7 @@ impl Electorate {
         Self { most_asked, ..Self::default() }
     }
 
-    /// A robot voted.
+    /// A robot voted, or was there until now and voted before.
     pub fn hear(&mut self, robot: RobotId, now: Duration) {
         self.unheard.remove(&robot);
         self.silent.remove(&robot);
@@ -63,13 +63,16 @@ impl Electorate {
 
     /// Those were alive, and these are now.
     pub fn change(&mut self, before: &Others, robots: &Others, now: Duration) {
-        for robot in before.since(robots).filter(|robot| !self.silent.contains(robot)) {
+        for robot in before.since(robots) {
+            if self.silent.contains(&robot) {
+                continue;
+            }
             if self.gone.len() < MAX_ROBOTS {
                 self.gone.insert(robot, now);
             }
             let voted = self.unheard.get(&robot).is_some_and(|unheard| unheard.voted);
-            if voted && self.heard.len() < MAX_ROBOTS || self.heard.contains_key(&robot) {
-                self.heard.insert(robot, now);
+            if voted || self.heard.contains_key(&robot) {
+                self.hear(robot, now);
             }
         }
         self.gone.retain(|robot, _| !robots.contains(*robot));

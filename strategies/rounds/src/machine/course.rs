@@ -125,19 +125,19 @@ impl Rounds {
         }
     }
 
-    /// Takes part in a round from now on; an older one that is still open is over. But what an instructor spoke of was shown before: whoever says
-    /// otherwise would have what is shown now learned as that.
+    /// Takes part in a round from now on, unless it was shown before; an older one that is still open is over.
     pub(super) fn join(&mut self, id: RoundId, effects: &mut Effects<'_>) {
-        if effects.follower.taught(id.counter).contains(&id) {
-            return self.enter(id, false, effects);
-        }
         self.enter(id, true, effects);
+        if !self.is_open() {
+            return;
+        }
         (effects.carry_out)(Output::Opened(id));
         self.partners.hurry(self.now, self.config.repair_busy);
         self.speak();
     }
 
-    /// Makes this the newest round known, with or without taking part in it.
+    /// Makes this the newest round known, with or without taking part in it. What an instructor spoke of was shown before, and is over: whoever says
+    /// otherwise would have what is shown now learned as that.
     pub(super) fn enter(&mut self, id: RoundId, open: bool, effects: &mut Effects<'_>) {
         self.close(effects);
         self.stop_looking(effects);
@@ -148,7 +148,9 @@ impl Rounds {
             Some(_) => {}
             None => self.past.clear(),
         }
-        self.past.extend(effects.follower.taught(id.counter));
+        let taught = effects.follower.taught(id.counter);
+        let open = open && !taught.contains(&id);
+        self.past.extend(taught);
         self.past.remove(&id);
         self.round = Some(Round::new(id, self.now, open));
         self.committee = None;
