@@ -1,14 +1,14 @@
 //! The batches that the samples held were shared in, as their authors said them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use gestalt_protocol::{HeldBatch, SampleId};
 
-/// Batches by the name of their first sample. They are kept as they came, since an author signs a batch as a whole, and for as
-/// long as one sample of them is held; so there are no more of them than shared samples.
+/// Batches in the order of the names of their first samples. They are kept as they came, since an author signs a batch as a whole, and for
+/// as long as one sample of them is held; so there are no more of them than shared samples. None is empty.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Batches(BTreeMap<SampleId, Arc<HeldBatch>>);
+pub(crate) struct Batches(Vec<Arc<HeldBatch>>);
 
 impl Batches {
     /// Keeps a batch, unless its numbers reach into those of another; says by which name. Honest authors number their samples one
@@ -16,25 +16,44 @@ impl Batches {
     pub fn keep(&mut self, batch: impl Into<Arc<HeldBatch>>) -> Option<SampleId> {
         let batch = batch.into();
         let (first, last) = (batch.samples.first()?, batch.samples.samples.last()?.id);
-        let before = self.0.range(..=first).next_back().and_then(|(_, before)| before.samples.samples.last());
-        let overlaps =
-            before.is_some_and(|before| before.id >= first) || self.0.range(first..=last).next().is_some();
-        if overlaps {
+        let place = self.after(first);
+        let before = self.0[..place].last().and_then(|before| before.samples.samples.last());
+        let behind = self.0.get(place).and_then(|behind| behind.samples.first());
+        if before.is_some_and(|before| before.id >= first) || behind.is_some_and(|behind| behind <= last) {
             return None;
         }
-        self.0.insert(first, batch);
+        if self.0.len() == self.0.capacity() {
+            self.0.reserve_exact(1 + self.0.len() / 8);
+        }
+        self.0.insert(place, batch);
         Some(first)
+    }
+
+    /// How many begin with that sample or before it.
+    fn after(&self, id: SampleId) -> usize {
+        self.0.partition_point(|batch| batch.samples.first() <= Some(id))
+    }
+
+    /// The last batch that begins with that sample or before it, and where it is.
+    fn until(&self, id: SampleId) -> Option<(usize, &HeldBatch)> {
+        let place = self.after(id).checked_sub(1)?;
+        Some((place, &self.0[place]))
+    }
+
+    /// The batch of that name, and where it is.
+    fn find(&self, first: SampleId) -> Option<(usize, &HeldBatch)> {
+        self.until(first).filter(|(_, batch)| batch.samples.first() == Some(first))
     }
 
     /// The batch of that name.
     pub fn get(&self, first: SampleId) -> Option<&HeldBatch> {
-        self.0.get(&first).map(|batch| &**batch)
+        self.find(first).map(|(_, batch)| batch)
     }
 
     /// The name of the batch that a sample was shared in, if it is kept.
     pub fn of(&self, id: SampleId) -> Option<SampleId> {
-        let (first, batch) = self.0.range(..=id).next_back()?;
-        batch.samples.samples.iter().any(|sample| sample.id == id).then_some(*first)
+        let (_, batch) = self.until(id)?;
+        if batch.samples.samples.iter().any(|sample| sample.id == id) { batch.samples.first() } else { None }
     }
 
     /// Lets go of those of these batches of which nothing is held; says of which.
@@ -43,21 +62,21 @@ impl Batches {
         firsts: BTreeSet<SampleId>,
         is_held: impl Fn(SampleId) -> bool,
     ) -> Vec<SampleId> {
-        let idle = |first: &SampleId| {
-            self.get(*first)
-                .is_some_and(|batch| !batch.samples.samples.iter().any(|sample| is_held(sample.id)))
-        };
-        let idle: Vec<SampleId> = firsts.into_iter().filter(idle).collect();
-        idle.iter().for_each(|first| {
-            self.0.remove(first);
-        });
-        idle
+        let mut gone = Vec::new();
+        for first in firsts {
+            let Some((place, batch)) = self.find(first) else { continue };
+            if !batch.samples.samples.iter().any(|sample| is_held(sample.id)) {
+                self.0.remove(place);
+                gone.push(first);
+            }
+        }
+        gone
     }
 
     /// All of them.
     #[cfg(test)]
     pub fn iter(&self) -> impl Iterator<Item = &HeldBatch> {
-        self.0.values().map(|batch| &**batch)
+        self.0.iter().map(|batch| &**batch)
     }
 }
 

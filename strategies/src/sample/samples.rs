@@ -13,7 +13,8 @@ use super::in_order::InOrder;
 #[derive(Debug, Default)]
 pub struct HeldSamples {
     held: InOrder,
-    ids: BTreeMap<SampleId, u64>,
+    /// The keys of those that have a name in the swarm, in the order of the names: a third of what a map from name to key takes.
+    named: Vec<u64>,
     classes: BTreeMap<ClassId, ClassKeys>,
     /// How many external ones there are, by author. Of most authors there are few, so there are many authors: a tree of them would be twice as large.
     authors: Vec<(RobotId, u32)>,
@@ -39,7 +40,12 @@ impl HeldSamples {
     /// The sample with that name.
     #[must_use]
     pub fn find(&self, id: SampleId) -> Option<&HeldSample> {
-        self.ids.get(&id).and_then(|key| self.get(*key))
+        self.get(self.named[self.place_of(id).ok()?])
+    }
+
+    /// Where that name is among the names; where it would be, if it is not.
+    fn place_of(&self, id: SampleId) -> Result<usize, usize> {
+        self.named.binary_search_by(|key| self.get(*key).and_then(|sample| sample.id).cmp(&Some(id)))
     }
 
     /// All samples, by key.
@@ -161,26 +167,29 @@ impl HeldSamples {
     pub(crate) fn insert(&mut self, sample: HeldSample) {
         self.arrivals = self.arrivals.max(sample.key);
         if let Some(id) = sample.id {
-            self.ids.insert(id, sample.key);
+            match self.place_of(id) {
+                Ok(place) => self.named[place] = sample.key,
+                Err(place) => insert(&mut self.named, place, sample.key),
+            }
             if sample.part == SetPart::External {
                 self.count_author(id.author, true);
             }
         }
         let keys = self.classes.entry(sample.class).or_default();
         for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
-            list.insert(list.partition_point(|key| *key < sample.key), sample.key);
+            insert(list, list.partition_point(|key| *key < sample.key), sample.key);
         }
         self.held.insert(sample);
     }
 
     /// Takes a sample out.
     pub(crate) fn remove(&mut self, key: u64) -> Option<HeldSample> {
+        if let Some(Ok(place)) = self.get(key)?.id.map(|id| self.place_of(id)) {
+            self.named.remove(place);
+        }
         let sample = self.held.remove(key)?;
-        if let Some(id) = sample.id {
-            self.ids.remove(&id);
-            if sample.part == SetPart::External {
-                self.count_author(id.author, false);
-            }
+        if let (Some(id), SetPart::External) = (sample.id, sample.part) {
+            self.count_author(id.author, false);
         }
         if let Some(keys) = self.classes.get_mut(&sample.class) {
             for list in [&mut keys.all, &mut keys.parts[sample.part as usize]] {
@@ -199,6 +208,14 @@ impl HeldSamples {
     pub(crate) fn set_arrivals(&mut self, arrivals: u64) {
         self.arrivals = arrivals;
     }
+}
+
+/// Puts a key into its place. A thousand robots that each hold as many keys would otherwise hold room for as many again.
+fn insert(keys: &mut Vec<u64>, place: usize, key: u64) {
+    if keys.len() == keys.capacity() {
+        keys.reserve_exact(1 + keys.len() / 8);
+    }
+    keys.insert(place, key);
 }
 
 /// One of the items at random, each as likely as the others.

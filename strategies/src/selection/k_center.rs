@@ -8,7 +8,7 @@ use crate::geometry::{ExactSum, Neighbours, narrow};
 use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// So many samples may come and go between two choices before the distances are dropped.
-const IDLE: usize = 1000;
+const IDLE: usize = 250;
 
 /// arg max over all personal x of min over all shared and external x' of ‖x − x'‖, whatever their classes: the point
 /// that the centres so far cover worst becomes the next. With no common knowledge at all the one nearest to the
@@ -17,7 +17,7 @@ const IDLE: usize = 1000;
 /// The greedy k-center algorithm (Gonzalez 1985), within a factor of 2 of the best cover, as used to choose core sets
 /// (Sener & Savarese, ICLR 2018), which do not look at classes. Within a class it would be
 /// [`Novelty`](super::Novelty), and it is kept up to date in the same way, at the same cost, over all classes; but only from the first choice on, and not
-/// where a thousand samples came and went since the last: in a large swarm a robot seldom has anything to share.
+/// where hundreds of samples came and went since the last: in a large swarm a robot seldom has anything to share.
 #[derive(Clone, Debug, Default)]
 pub struct KCenter(Option<Kept>);
 
