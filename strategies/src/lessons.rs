@@ -11,8 +11,8 @@ use siphasher::sip::SipHasher24;
 use crate::believe::Standing;
 use crate::candidates::Candidates;
 
-/// The most instructors of one round: beyond, those of the higher standing, and of these who were heard of first, on whatever round, are kept. Names made
-/// up later lock nobody out.
+/// The most instructors of one round: beyond, those of the higher standing are kept; of these the first by name, so that all robots keep the same. In an open
+/// swarm it is who was heard of first, on whatever round: names made up later lock nobody out.
 pub(crate) const MAX_INSTRUCTORS: usize = 16;
 
 /// The most instructors of whom it is known who was heard of first.
@@ -47,6 +47,11 @@ impl Said {
 
     fn is_proven(&self) -> bool {
         self.standing > Standing::Unproven
+    }
+
+    /// Whether an instructor with a key said it.
+    fn is_signed(&self) -> bool {
+        self.standing > Standing::Vouched
     }
 
     fn of(&self, round: RoundId, instructor: &InstructorId) -> Lesson {
@@ -105,8 +110,8 @@ impl LessonBook {
         self.hear_among(lesson, None, |_| false).0
     }
 
-    /// The same for a robot that lived through some rounds: words on those are taken in before words on others, so that
-    /// made-up rounds keep nobody from teaching. Says also which round was forgotten for it. In a sealed swarm a word has a `standing`, and its count
+    /// The same for a robot that lived through some rounds: rounds of which somebody with a key spoke are kept before others, and of these those it lived through, so
+    /// that made-up rounds keep nobody from teaching. Says also which round was forgotten for it. In a sealed swarm a word has a `standing`, and its count
     /// was signed.
     pub fn hear_among(
         &mut self,
@@ -121,30 +126,48 @@ impl LessonBook {
         if standing.is_none() && lesson.count > highest {
             return (LessonReceipt::FarAhead, None);
         }
+        self.take_in(lesson, standing, lived)
+    }
+
+    /// Takes in what this robot knew before, whatever its count.
+    pub(crate) fn hear_again(&mut self, lesson: &Lesson) {
+        self.take_in(lesson, None, |_| false);
+    }
+
+    fn take_in(
+        &mut self,
+        lesson: &Lesson,
+        standing: Option<Standing>,
+        lived: impl Fn(RoundId) -> bool,
+    ) -> (LessonReceipt, Option<RoundId>) {
         let said = Said::new(lesson, standing.unwrap_or(Standing::Overrules));
         let (mut replaced, mut forgotten) = (None, None);
         match self.rounds.get(&lesson.round) {
             Some(words) => match words.get(&lesson.instructor) {
                 Some(known) if known.order() >= said.order() => return (LessonReceipt::Known, None),
                 None if words.len() >= MAX_INSTRUCTORS => {
-                    let place = |name, said: &Said| (Reverse(said.standing), self.familiarity(name));
-                    let last = words.iter().max_by_key(|(name, said)| place(name, said));
-                    if last.is_some_and(|(name, last)| place(name, last) <= place(&lesson.instructor, &said))
-                    {
-                        return (LessonReceipt::Full, None);
+                    let familiarity = |name| if standing.is_none() { self.familiarity(name) } else { 0 };
+                    let new = (&lesson.instructor, &said);
+                    let last = words
+                        .iter()
+                        .chain([new])
+                        .max_by_key(|(name, said)| (Reverse(said.standing), familiarity(name), *name));
+                    match last {
+                        Some((name, _)) if *name != lesson.instructor => replaced = Some(name.clone()),
+                        _ => return (LessonReceipt::Full, None),
                     }
-                    replaced = last.map(|(name, _)| name.clone());
                 }
                 _ => {}
             },
             None if self.rounds.len() >= MAX_LESSONS => {
-                let strange = self.rounds.keys().find(|round| !lived(**round)).copied();
-                let gives_way = match strange.or(self.oldest()) {
-                    Some(strange) if lived(lesson.round) || strange < lesson.round => strange,
+                let place = |round, signed: bool| (signed, lived(round), round);
+                let known = self.rounds.iter();
+                let known = known.map(|(round, words)| place(*round, words.values().any(Said::is_signed)));
+                match known.min() {
+                    Some(last) if last < place(lesson.round, said.is_signed()) => forgotten = Some(last.2),
                     _ => return (LessonReceipt::Full, None),
-                };
-                self.forget(gives_way);
-                forgotten = Some(gives_way);
+                }
+                forgotten.into_iter().for_each(|round| self.forget(round));
             }
             None => {}
         }

@@ -1,6 +1,7 @@
 //! Gestures that instructors named while the swarm works: one latest word on each, so that what is heard twice, late or in another order comes to the
 //! same.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 
@@ -19,7 +20,7 @@ pub enum NamingReceipt {
     New,
     /// It, or a later word on the same gesture, was known.
     Known,
-    /// There is no room: as many gestures of smaller numbers are kept as can be.
+    /// There is no room: as many gestures that go before it are kept as can be.
     Full,
     /// Its count lies too far ahead of all that is known.
     FarAhead,
@@ -27,7 +28,8 @@ pub enum NamingReceipt {
     Unproven,
 }
 
-/// All gestures that were named, with what became of each: at most [`MAX_NAMED`], those of the smallest numbers, so that all robots keep the same.
+/// All gestures that were named, with what became of each: at most [`MAX_NAMED`]. Those that somebody with a key spoke of go before others, and of these those of
+/// the smallest numbers: so all robots keep the same, and whoever may only vouch makes nobody else's give way.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NameBook {
     namings: BTreeMap<ClassId, Said>,
@@ -58,25 +60,35 @@ impl NameBook {
         if receipt == NamingReceipt::New {
             let standing = standing.unwrap_or(Standing::Overrules);
             self.namings.insert(naming.gesture(), Said { naming: naming.clone(), standing });
-            if self.namings.len() > MAX_NAMED {
-                self.namings.pop_last();
+            if self.namings.len() > MAX_NAMED
+                && let Some((_, last)) = self.last()
+            {
+                self.namings.remove(&last);
             }
         }
         receipt
+    }
+
+    /// The place of the gesture that is the first to give way.
+    fn last(&self) -> Option<Place> {
+        self.namings.iter().map(|(gesture, said)| place(said.standing, *gesture)).max()
     }
 
     /// What would come of it.
     pub(crate) fn would_hear(&self, naming: &Naming, standing: Option<Standing>) -> NamingReceipt {
         let gesture = naming.gesture();
         let known = self.namings.get(&gesture);
-        let greatest = self.namings.last_key_value().map(|(greatest, _)| *greatest);
+        let standing_here = standing.unwrap_or(Standing::Overrules);
         let highest = known.map_or(0, |known| known.naming.count).saturating_add(COUNT_LEAP);
-        let place = (right(standing.unwrap_or(Standing::Overrules)), order(naming));
-        if known.is_some_and(|known| (right(known.standing), order(&known.naming)) >= place) {
+        let rank = (right(standing_here), order(naming));
+        if known.is_some_and(|known| (right(known.standing), order(&known.naming)) >= rank) {
             NamingReceipt::Known
         } else if standing.is_none() && naming.count > highest {
             NamingReceipt::FarAhead
-        } else if known.is_none() && self.namings.len() >= MAX_NAMED && greatest <= Some(gesture) {
+        } else if known.is_none()
+            && self.namings.len() >= MAX_NAMED
+            && self.last() <= Some(place(standing_here, gesture))
+        {
             NamingReceipt::Full
         } else {
             NamingReceipt::New
@@ -128,10 +140,25 @@ impl NameBook {
         self.namings.is_empty()
     }
 
-    /// The gestures of their own, at most so many: those of the smallest numbers.
+    /// The gestures of their own, at most so many: those that go before the others.
     #[must_use]
     pub fn in_use(&self, room: usize) -> BTreeSet<ClassId> {
-        self.namings.keys().copied().filter(|gesture| self.is_in_use(*gesture)).take(room).collect()
+        let mut places: Vec<Place> = self.places_in_use().collect();
+        places.sort_unstable();
+        places.into_iter().take(room).map(|(_, gesture)| gesture).collect()
+    }
+
+    /// Whether a gesture named by that right is, or would be, one of so many in use.
+    pub(crate) fn has_room(&self, room: usize, standing: Option<Standing>, gesture: ClassId) -> bool {
+        let new = right(standing.unwrap_or(Standing::Overrules));
+        let others =
+            self.places_in_use().filter(|(Reverse(standing), other)| *other != gesture && *standing >= new);
+        others.count() < room
+    }
+
+    fn places_in_use(&self) -> impl Iterator<Item = Place> + '_ {
+        let in_use = self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture));
+        in_use.map(|(gesture, said)| place(said.standing, *gesture))
     }
 
     fn is_in_use(&self, gesture: ClassId) -> bool {
@@ -249,6 +276,13 @@ fn order(naming: &Naming) -> (u64, u64, &InstructorId, Fate, &InstructorId, &str
     (*count, *at, said_by, *fate, by, label)
 }
 
+/// Where a gesture stands among those that were named: the smaller first.
+type Place = (Reverse<Standing>, ClassId);
+
+fn place(standing: Standing, gesture: ClassId) -> Place {
+    (Reverse(right(standing)), gesture)
+}
+
 /// What was named may be merged, retired and restored by anybody who teaches; without a key, as long as nobody with one has spoken of it.
 fn right(standing: Standing) -> Standing {
     standing.min(Standing::Teaches)
@@ -360,5 +394,28 @@ mod tests {
         assert_eq!(forwards.iter().count(), MAX_NAMED);
         assert_eq!(forwards, backwards);
         assert_eq!(forwards.in_use(58).len(), 58);
+    }
+
+    #[test]
+    fn whoever_may_only_vouch_makes_nobody_elses_gesture_give_way() {
+        let circle = naming("ana", "circle", 1, Fate::InUse);
+        let vouched = (0_u32..).map(|n| naming("guest", &n.to_string(), 1, Fate::InUse));
+        let vouched: Vec<Naming> =
+            vouched.filter(|naming| naming.gesture() < circle.gesture()).take(2 * MAX_NAMED).collect();
+        let (mut before, mut after) = (NameBook::default(), NameBook::default());
+        before.hear_by(&circle, Some(Standing::Teaches));
+        vouched.iter().for_each(|naming| {
+            before.hear_by(naming, Some(Standing::Vouched));
+        });
+        assert!(after.has_room(58, Some(Standing::Vouched), circle.gesture()));
+        vouched.iter().rev().for_each(|naming| {
+            after.hear_by(naming, Some(Standing::Vouched));
+        });
+        assert!(!after.has_room(58, Some(Standing::Vouched), circle.gesture()));
+        assert!(after.has_room(58, Some(Standing::Teaches), circle.gesture()));
+        after.hear_by(&circle, Some(Standing::Teaches));
+        assert_eq!(before, after);
+        assert_eq!(before.iter().count(), MAX_NAMED);
+        assert!(before.in_use(58).contains(&circle.gesture()) && before.in_use(58).len() == 58);
     }
 }

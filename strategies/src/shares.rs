@@ -11,7 +11,7 @@ use crate::sample::{HeldSample, HeldSamples, SetPart};
 const LEAST: usize = 5;
 
 /// The shares of a set's room, once it is known who is there. In a swarm of n robots and a set of T samples each other
-/// robot has max(5, ⌈1.25 · T/n⌉); all robots together that were never alive in this life, max(5, ⌈T/4⌉): whoever makes up
+/// robot has max(5, ⌈1.25 · T/n⌉), whether it is there or not; all robots together that were never alive in this life, max(5, ⌈T/4⌉): whoever makes up
 /// names has that at most. Of a robot's own samples max(5, ⌈T/n⌉), but at most half of T, stay whatever others send. All
 /// that matters when the set is full, and not before.
 #[derive(Clone, Debug, Default)]
@@ -90,16 +90,19 @@ impl Shares {
             || samples.authors().filter(|(author, _)| !self.has_met(*author)).map(|(_, held)| held).sum();
         let of_strangers = self.strange.unwrap_or_else(count);
         self.strange = Some(of_strangers);
-        let most = samples.authors_of_most().find(|(author, _)| self.has_met(*author));
-        let (author, excess) = most.map_or((None, 0), |(a, held)| (Some(a), held.saturating_sub(each)));
+        // Who hides gets no more room than who is there, and takes none from robots that are off.
+        let (author, held) = samples.authors_of_most().next()?;
+        let excess = held.saturating_sub(each);
         let excess_of_strangers = of_strangers.saturating_sub(strangers);
         if excess == 0 && excess_of_strangers == 0 {
             return None;
         }
         if excess_of_strangers >= excess {
-            oldest_of_most(samples, |robot| !self.has_met(robot))
+            let of_strangers = samples.authors_of_most().filter(|(author, _)| !self.has_met(*author));
+            let most = of_strangers.map(|(author, _)| author).next();
+            oldest_of_most(samples, |robot| Some(robot) == most)
         } else {
-            oldest_of_most(samples, |robot| Some(robot) == author)
+            oldest_of_most(samples, |robot| robot == author)
         }
     }
 

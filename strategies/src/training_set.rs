@@ -194,22 +194,22 @@ impl TrainingSet {
         as_sent: &dyn Fn(&[f32]) -> Vec<f32>,
         rng: &mut dyn Rng,
     ) -> Vec<SetChange> {
-        let mut changes = self.make_room(self.series);
-        let room = changes.len();
-        while changes.len() < room + n {
+        let mut seen = self.make_room(self.series);
+        let mut changes = Vec::new();
+        while changes.len() < n {
             let Some(key) = self.selection.select(&self.samples, classifier, rng) else { break };
             let Some(sample) = self.samples.get(key).filter(|sample| sample.part == SetPart::Personal) else {
                 break;
             };
             let id = self.series.sample(self.next_number());
-            if self.seen.insert(id) != Ok(true) {
-                break;
-            }
+            let Ok(Some(others)) = self.seen.insert_and_tell(id) else { break };
+            seen.extend(others.into_iter().map(SetChange::Seen));
             let vector = Arc::from(as_sent(&sample.vector));
             self.replace(HeldSample { part: SetPart::Shared, id: Some(id), vector, ..sample.clone() });
             changes.push(SetChange::Shared(key, id));
         }
-        changes
+        seen.extend(changes);
+        seen
     }
 
     /// Takes a shared sample in, unless it was seen before. Then forgets while there are more than the capacity.
@@ -228,10 +228,10 @@ impl TrainingSet {
             return SampleReceipt::Refused(error);
         }
         let mut changes = self.make_room(id.series());
-        match self.seen.insert(id) {
+        match self.seen.insert_and_tell(id) {
             Err(error) => return SampleReceipt::Refused(error),
-            Ok(false) => return SampleReceipt::Known,
-            Ok(true) => {}
+            Ok(None) => return SampleReceipt::Known,
+            Ok(Some(others)) => changes.extend(others.into_iter().map(SetChange::Seen)),
         }
         changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
         SampleReceipt::New(changes)
@@ -269,7 +269,7 @@ impl TrainingSet {
         };
         self.seen.forget(least);
         let gone = keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed);
-        gone.chain([SetChange::Unseen(least)]).collect()
+        gone.chain([SetChange::Seen(least)]).collect()
     }
 
     fn may_receive(&self, id: SampleId) -> Result<(), SeenError> {

@@ -288,7 +288,7 @@ fn robots_that_are_there_are_heard_however_many_strangers_were() {
         else {
             panic!("robot {author} is not heard")
         };
-        let Some(SetChange::Unseen(gone)) = changes.first() else { panic!("{changes:?}") };
+        let Some(SetChange::Seen(gone)) = changes.first() else { panic!("{changes:?}") };
         assert!(robot.seen().intervals(*gone).is_empty() && gone.author < RobotId(70_000));
     }
     let refused = robot.receive(id(80_000, 1), ClassId(1), round(1), vec![1.0], &mut rng);
@@ -332,6 +332,23 @@ proptest! {
         let kept = robot.total(SetPart::Personal) + robot.total(SetPart::Shared);
         prop_assert!(kept >= own.min(5.max(capacity.div_ceil(5)).min(capacity / 2)), "{} own of {}", kept, own);
     }
+}
+
+#[test]
+fn who_hides_has_no_more_than_who_is_there_and_takes_nothing_from_who_is_off() {
+    let mut rng = generator(1);
+    let mut robot = set(100, SelectionRule::Random, ForgettingRule::Fifo);
+    robot.meet(Arc::new((0..10).map(RobotId).collect()));
+    // Two honest robots that are off, one that is there, and one that hides.
+    for (author, samples) in [(50, 8), (51, 8), (3, 100), (60, 200)] {
+        for number in 1..=samples {
+            robot.receive(id(author, number), ClassId(1), round(1), vec![number as f32], &mut rng);
+        }
+    }
+    let held = |author| robot.authors().find(|(a, _)| *a == RobotId(author)).map_or(0, |(_, held)| held);
+    assert_eq!(robot.len(), 100);
+    assert!(held(60) <= 13 && held(3) <= 100, "{} and {}", held(60), held(3));
+    assert!(held(50) > 0 && held(51) > 0, "{} and {}", held(50), held(51));
 }
 
 #[test]

@@ -19,8 +19,13 @@ impl Learning {
         let names = self.names.clone();
         let proof = Proof { believer: &*believer, vocabulary: &self.vocabulary, names: &names };
         let rounds = self.lessons.judge_again(|lesson| proof.of_lesson(lesson));
-        let gestures = self.names.judge_again(|naming| proof.of_naming(naming));
+        let mut judged = names.clone();
+        let gestures = judged.judge_again(|naming| proof.of_naming(naming));
         self.believer = Some(believer);
+        if !gestures.is_empty() {
+            // There may be room for others now.
+            self.rename(|names| *names = judged);
+        }
         self.dirty.extend(gestures.into_iter().map(Item::Naming));
         if !rounds.is_empty() {
             self.judged.doubt();
@@ -52,7 +57,7 @@ impl Learning {
     }
 
     /// The same of what was said of a gesture that was named.
-    pub(super) fn standing_of_naming(&self, naming: &Naming) -> Option<Standing> {
+    pub(crate) fn standing_of_naming(&self, naming: &Naming) -> Option<Standing> {
         Some(self.proof()?.of_naming(naming))
     }
 

@@ -303,8 +303,8 @@ impl RobotMemory {
                 }
             }
         }
-        memory.seen = SeenSamples::from_intervals(seen)
-            .map_err(|_| MemoryError::Damaged("impossible sample numbers"))?;
+        memory.seen =
+            SeenSamples::from_stored(seen).map_err(|_| MemoryError::Damaged("impossible sample numbers"))?;
         Ok(memory)
     }
 

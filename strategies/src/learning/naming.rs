@@ -37,13 +37,21 @@ impl Learning {
         if heard != NamingReceipt::New {
             return heard;
         }
+        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
+        self.rename(|names| {
+            names.hear_by(naming, standing);
+        });
+        let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
+        self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
+        heard
+    }
+
+    /// Changes what is known of names, and trains by it.
+    pub(super) fn rename(&mut self, change: impl FnOnce(&mut NameBook)) {
         let classes: BTreeSet<ClassId> = self.classes_of_samples().collect();
         let before: Vec<(ClassId, Option<ClassId>)> =
             classes.into_iter().map(|class| (class, self.trained_as(class))).collect();
-        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
-        self.names.hear_by(naming, standing);
-        let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
-        self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
+        change(&mut self.names);
         self.gestures = self.all_gestures();
         self.judged.doubt();
         self.doubt_samples();
@@ -54,7 +62,6 @@ impl Learning {
         }
         let rounds: Vec<_> = self.lessons.all_rounds().collect();
         rounds.into_iter().for_each(|round| self.apply_to_round(round));
-        heard
     }
 
     /// Puts a word into the memory that the rules would not let in.

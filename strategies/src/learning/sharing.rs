@@ -1,10 +1,10 @@
 //! Which samples are told to others, within the bounds of a round, and once they are remembered as shared.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{
-    Batches as BatchesTold, ClassId, Envelope, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message, RoundId,
-    SampleId, Samples, SharedSample, Stamp,
+    Batches as BatchesTold, ClassId, Envelope, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Stamp,
 };
 use gestalt_rounds::Classify;
 
@@ -115,7 +115,18 @@ impl Learning {
         let lacking = held.chain(aside).filter(|id| lacks(*id));
         let firsts: BTreeSet<SampleId> = lacking.filter_map(|id| self.batches.of(id)).collect();
         let may_tell = firsts.into_iter().filter(|first| self.may_tell(*first));
-        let mut batches = may_tell.filter_map(|first| self.batches.get(first)).peekable();
+        // In turns: what one author shared does not keep that of the others back.
+        let mut turns: BTreeMap<RobotId, usize> = BTreeMap::new();
+        let mut in_turns: Vec<(usize, SampleId)> = may_tell
+            .map(|first| {
+                let turn = turns.entry(first.author).or_default();
+                *turn += 1;
+                (*turn, first)
+            })
+            .collect();
+        in_turns.sort_unstable();
+        let batches = in_turns.into_iter().filter_map(|(_, first)| self.batches.get(first));
+        let mut batches = batches.peekable();
         std::iter::from_fn(move || {
             let (mut told, mut length) = (Vec::new(), 0);
             while let Some(batch) = batches.next_if(|batch| {

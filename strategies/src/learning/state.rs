@@ -32,14 +32,11 @@ use crate::scrutiny::{PoisonDefence, Scrutiny};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
-/// How far beyond the newest round known one may lie that is spoken of.
-const LEAP: u32 = 64;
-
 /// The most times that a robot shares before the disk has kept up.
 pub(super) const MAX_UNSENT: usize = 64;
 
 /// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
-const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
+const FURTHEST_OF_A_NEWBORN: u32 = 1_000_000;
 
 /// Why a received sample was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -146,7 +143,7 @@ impl Learning {
         set.restore(samples, seen, counters.next_key)?;
         let mut lessons = LessonBook::default();
         heard.iter().for_each(|lesson| {
-            lessons.hear(lesson);
+            lessons.hear_again(lesson);
         });
         let mut names = NameBook::default();
         namings.iter().for_each(|naming| {
@@ -266,7 +263,7 @@ impl Learning {
             self.doubt_samples();
             self.heard = true;
             // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
-            if self.newest.is_some() || standing.is_some() {
+            if self.newest.is_some() || standing > Some(Standing::Vouched) {
                 self.dirty.insert(Item::Lessons(lesson.round));
             }
             self.dirty.extend(forgotten.map(Item::Lessons));
@@ -275,9 +272,10 @@ impl Learning {
         heard
     }
 
-    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
+    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds. Whoever could speak of rounds to come could end
+    /// them before they begin, as their names can be guessed.
     fn furthest(&self) -> u32 {
-        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
+        self.newest.unwrap_or(FURTHEST_OF_A_NEWBORN)
     }
 
     /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.
@@ -341,7 +339,7 @@ impl Learning {
                     }
                     self.training.push(TrainingChange::Remove(sample.key));
                 }
-                SetChange::Unseen(series) => {
+                SetChange::Seen(series) => {
                     self.dirty.insert(Item::Seen(series));
                 }
                 SetChange::Relabelled(key) => {

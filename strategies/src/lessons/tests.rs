@@ -197,3 +197,41 @@ proptest! {
         prop_assert_eq!(forwards.verdict(round, &six()), turned.verdict(round, &six()));
     }
 }
+
+#[test]
+fn rounds_that_robots_vouch_for_push_out_none_that_somebody_with_a_key_spoke_of() {
+    let mut book = LessonBook::default();
+    let word = |counter, who| lesson(counter, who, 1, was(1));
+    assert_eq!(hear_by(&mut book, &word(5, "bob")), LessonReceipt::New);
+    for counter in 10..10 + MAX_LESSONS as u32 {
+        hear_by(&mut book, &word(counter, "guest"));
+    }
+    assert_eq!(book.len(), MAX_LESSONS);
+    assert!(book.contains(word(5, "bob").round) && !book.contains(word(10, "guest").round));
+    assert_eq!(hear_by(&mut book, &word(4, "ada")), LessonReceipt::New, "older, and by somebody with a key");
+    assert!(book.contains(word(5, "bob").round) && !book.contains(word(11, "guest").round));
+}
+
+proptest! {
+    #[test]
+    fn of_more_instructors_than_are_kept_all_robots_keep_the_same(
+        said in prop::collection::vec((0..40_usize, 0..5_u64, 0..3_u32), 0..80),
+        order in any::<prop::sample::Index>(),
+    ) {
+        let standing = |name: usize| [Standing::Overrules, Standing::Teaches][usize::from(name > 3)];
+        let standing = |name| if name > 8 { Standing::Vouched } else { standing(name) };
+        let said: Vec<(Lesson, Standing)> = said
+            .into_iter()
+            .map(|(name, count, class)| (lesson(1, &format!("i{name:02}"), count, was(class)), standing(name)))
+            .collect();
+        let (mut forwards, mut turned) = (LessonBook::default(), LessonBook::default());
+        let hear = |book: &mut LessonBook, (lesson, standing): &(Lesson, Standing)| {
+            book.hear_among(lesson, Some(*standing), |_| false);
+        };
+        said.iter().for_each(|said| hear(&mut forwards, said));
+        let middle = order.index(said.len() + 1);
+        let twice = said[middle..].iter().chain(&said[..middle]).rev().chain(&said);
+        twice.for_each(|said| hear(&mut turned, said));
+        prop_assert_eq!(forwards.rounds, turned.rounds);
+    }
+}

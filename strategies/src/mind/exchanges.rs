@@ -66,8 +66,7 @@ impl Exchanges {
 
     /// A sample that neighbour offered cannot be taken.
     pub fn decline(&mut self, robot: RobotId, sample: SampleId) {
-        // One that cannot be noted is offered again.
-        let _ = self.with(robot).declined.insert(sample);
+        self.with(robot).declined.note(sample);
     }
 
     /// These robots are alive now and were not before: there may be room for their samples.
@@ -88,7 +87,7 @@ impl Exchanges {
             if place == 0 {
                 declined.forget(lesson.round);
             }
-            declined.hear(lesson);
+            declined.hear_again(lesson);
         }
         while declined.len() > MAX_DECLINED_ROUNDS {
             declined.forget_oldest();

@@ -106,13 +106,20 @@ impl Learning {
         if let Some(listed) = self.vocabulary().class(label) {
             return (Outcome::Known, Some(listed));
         }
-        let gesture = ClassId::named(by, label);
-        let in_use = self.names().in_use(self.room_for_names());
-        let room = in_use.contains(&gesture) || in_use.len() < self.room_for_names();
-        if !(1..=MAX_LABEL).contains(&label.len()) || !room {
+        if !(1..=MAX_LABEL).contains(&label.len()) || !self.has_room_for(label, said) {
             return (Outcome::NoRoom, None);
         }
         self.say_of(by.clone(), label.to_owned(), said, Fate::InUse)
+    }
+
+    /// Whether what that word names would be one of the gestures in use.
+    fn has_room_for(&self, label: &str, word: &Instructed) -> bool {
+        let Instructed { by, at, said, .. } = word;
+        let (by, said_by, said) = (by.clone(), by.clone(), said.clone());
+        let naming =
+            Naming { by, label: label.to_owned(), count: *at, at: *at, said_by, fate: Fate::InUse, said };
+        let standing = self.standing_of_naming(&naming);
+        self.names().has_room(self.room_for_names(), standing, naming.gesture())
     }
 
     /// Says what became of a gesture that was named, whoever named it.

@@ -138,7 +138,11 @@ impl Mind {
             lacking_here |= theirs.iter().any(|(round, digest)| {
                 book.digest_of(*round, key) != *digest && declined.get(round) != Some(digest)
             });
-            let lacking = book.rounds(key).filter(|(round, digest)| theirs.get(round) != Some(digest));
+            // What lies before all of a full list was left out of it, or would be.
+            let first = theirs.keys().next().filter(|_| theirs.len() >= MAX_LESSONS);
+            let lacking = book.rounds(key).filter(|(round, digest)| {
+                first.is_none_or(|first| round >= first) && theirs.get(round) != Some(digest)
+            });
             // First the names: lessons may speak of them.
             let names = learning.names();
             if names.digest(key) != know.named {

@@ -77,30 +77,51 @@ impl SeenSamples {
     ) -> Result<Self, SeenError> {
         let mut seen = Self::default();
         for (series, intervals) in all {
-            let Some(&(first, _)) = intervals.first() else { continue };
-            let id = series.sample(first);
-            if first == 0 {
-                return Err(SeenError::Zero(id));
+            let in_all = seen.intervals.len() + intervals.len();
+            if let Some((first, _)) = intervals.first().filter(|_| in_all > MAX_INTERVALS_IN_ALL) {
+                return Err(SeenError::TooManyGaps(series.sample(*first)));
             }
-            if intervals.len() > MAX_GAPS || seen.intervals.len() + intervals.len() > MAX_INTERVALS_IN_ALL {
-                return Err(SeenError::TooManyGaps(id));
-            }
-            seen.has_room_for(id)?;
-            let forwards = intervals.iter().all(|(from, to)| from <= to);
-            // Apart: at least one number is missing between two neighbours.
-            let apart = intervals.windows(2).all(|pair| pair[1].0.saturating_sub(pair[0].1) > 1);
-            if !(forwards && apart) {
-                return Err(SeenError::Disorder(series));
-            }
-            let Range { start, end } = seen.places(series);
-            if start < end {
-                return Err(SeenError::Disorder(series));
-            }
-            seen.of.splice(start..start, intervals.iter().map(|_| series));
-            seen.intervals.splice(start..start, intervals);
-            seen.series += 1;
+            seen.take_up(series, intervals)?;
         }
         Ok(seen)
+    }
+
+    /// The same of what this robot stored. More intervals than are kept in all are no error there: the lowest gaps count as seen.
+    ///
+    /// # Errors
+    /// The others.
+    pub(crate) fn from_stored(
+        all: impl IntoIterator<Item = (SampleSeries, Vec<(u32, u32)>)>,
+    ) -> Result<Self, SeenError> {
+        let mut seen = Self::default();
+        for (series, intervals) in all {
+            seen.take_up(series, intervals)?;
+        }
+        while seen.close_gap_of_most().is_some() {}
+        Ok(seen)
+    }
+
+    fn take_up(&mut self, series: SampleSeries, intervals: Vec<(u32, u32)>) -> Result<(), SeenError> {
+        let Some(&(first, _)) = intervals.first() else { return Ok(()) };
+        let id = series.sample(first);
+        if first == 0 {
+            return Err(SeenError::Zero(id));
+        }
+        if intervals.len() > MAX_GAPS {
+            return Err(SeenError::TooManyGaps(id));
+        }
+        self.has_room_for(id)?;
+        let forwards = intervals.iter().all(|(from, to)| from <= to);
+        // Apart: at least one number is missing between two neighbours.
+        let apart = intervals.windows(2).all(|pair| pair[1].0.saturating_sub(pair[0].1) > 1);
+        let Range { start, end } = self.places(series);
+        if !forwards || !apart || start < end {
+            return Err(SeenError::Disorder(series));
+        }
+        self.of.splice(start..start, intervals.iter().map(|_| series));
+        self.intervals.splice(start..start, intervals);
+        self.series += 1;
+        Ok(())
     }
 
     /// Whether the sample was seen.
@@ -116,18 +137,31 @@ impl SeenSamples {
     /// # Errors
     /// See [`SeenSamples::would_accept`]. Nothing is remembered then.
     pub fn insert(&mut self, id: SampleId) -> Result<bool, SeenError> {
+        Ok(self.insert_and_tell(id)?.is_some())
+    }
+
+    /// The same; if it is new, gives the series besides its own of which what was seen is another now.
+    pub(crate) fn insert_and_tell(&mut self, id: SampleId) -> Result<Option<Vec<SampleSeries>>, SeenError> {
         if !self.would_accept(id)? {
-            return Ok(false);
+            return Ok(None);
         }
-        self.add(id.series(), (id.number, id.number));
-        Ok(true)
+        Ok(Some(self.add(id.series(), (id.number, id.number))))
+    }
+
+    /// Remembers a sample wherever there is room for its series, however far its number is ahead.
+    pub(crate) fn note(&mut self, id: SampleId) {
+        if id.number > 0 && (!self.places(id.series()).is_empty() || self.has_room_for(id).is_ok()) {
+            self.add(id.series(), (id.number, id.number));
+        }
     }
 
     /// Remembers all that another set has; of series that there is no room for, nothing.
     pub fn extend(&mut self, other: &Self) {
         for series in other.series() {
             if !self.places(series).is_empty() || self.has_room_for(series.sample(1)).is_ok() {
-                other.intervals(series).iter().for_each(|interval| self.add(series, *interval));
+                for interval in other.intervals(series) {
+                    self.add(series, *interval);
+                }
             }
         }
     }
@@ -157,8 +191,8 @@ impl SeenSamples {
         start..start + self.of[start..].partition_point(|other| *other == series)
     }
 
-    /// Adds an interval, and closes gaps until all is within the bounds.
-    fn add(&mut self, series: SampleSeries, (mut from, mut to): (u32, u32)) {
+    /// Adds an interval, and closes gaps until all is within the bounds; gives the other series of which one was.
+    fn add(&mut self, series: SampleSeries, (mut from, mut to): (u32, u32)) -> Vec<SampleSeries> {
         let places = self.places(series);
         let intervals = &self.intervals[places.clone()];
         // Those that it overlaps or touches become one with it.
@@ -178,11 +212,19 @@ impl SeenSamples {
         if places.len() > MAX_GAPS {
             self.close_lowest_gap(places.start);
         }
-        while self.intervals.len() > MAX_INTERVALS_IN_ALL {
-            // More than one each, as there are more intervals than series.
-            let Some(most) = self.runs().max_by_key(ExactSizeIterator::len) else { return };
-            self.close_lowest_gap(most.start);
+        let closed = std::iter::from_fn(|| self.close_gap_of_most());
+        closed.filter(|other| *other != series).collect()
+    }
+
+    /// Where there are too many intervals in all, closes the lowest gap of the series that has most; says of which.
+    fn close_gap_of_most(&mut self) -> Option<SampleSeries> {
+        if self.intervals.len() <= MAX_INTERVALS_IN_ALL {
+            return None;
         }
+        // More than one each, as there are more intervals than series.
+        let start = self.runs().max_by_key(ExactSizeIterator::len)?.start;
+        self.close_lowest_gap(start);
+        Some(self.of[start])
     }
 
     /// Takes what lies between the two lowest intervals of a series as seen: of the one whose intervals begin there, and that has two.

@@ -15,8 +15,8 @@ pub enum SetChange {
     Relabelled(u64),
     /// The sample with this key went from personal to shared under this name; its vector is now what travels.
     Shared(u64, SampleId),
-    /// Nothing is known any more of what was seen of this series: another took its place.
-    Unseen(SampleSeries),
+    /// What was seen of this series is another set now, without a sample that came: it was forgotten for another series, or gaps in it count as seen.
+    Seen(SampleSeries),
 }
 
 /// What became of a received sample.

@@ -90,7 +90,10 @@ impl Store {
                     self.note(sample.id);
                     self.samples.remove(&sample.key);
                 }
-                SetChange::Unseen(series) => self.seen.retain(|id| id.series() != *series),
+                SetChange::Seen(series) => {
+                    self.seen.retain(|id| id.series() != *series);
+                    self.seen.extend(set.seen().beyond(*series, &[]));
+                }
                 SetChange::Relabelled(key) => {
                     self.samples.insert(*key, set.get(*key).unwrap().clone());
                 }

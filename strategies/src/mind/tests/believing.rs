@@ -18,6 +18,10 @@ impl Believe for Roll {
     }
 }
 
+/// A robot may speak for the guest.
+const ALL: &[(&str, Standing)] =
+    &[("ada", Standing::Overrules), ("bob", Standing::Teaches), ("guest", Standing::Vouched)];
+
 const BOTH: &[(&str, Standing)] = &[("ada", Standing::Overrules), ("bob", Standing::Teaches)];
 
 fn signed(who: &str, count: u64, instruction: &Instruction) -> SignedWord {
@@ -209,4 +213,78 @@ fn a_name_is_believed_by_the_word_that_gave_it() {
     swarm.restart_empty(2);
     swarm.pass(Duration::from_secs(10));
     assert_eq!(swarm.minds.iter().map(named).collect::<Vec<_>>(), [1, 1, 1]);
+}
+
+#[test]
+fn a_word_is_kept_over_a_restart_whatever_its_instructor_counts() {
+    let mut swarm = Swarm::sealed(38);
+    let round = swarm.show(1);
+    swarm.hear(0, "bob", 700, &was(round, 3));
+    // Counts are times: this one is of the year 2038.
+    swarm.hear(0, "ada", (1 << 63) + 1, &was(round, 4));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+    swarm.restart_all();
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!((swarm.lessons(), swarm.of_class(4)), (vec![1, 1, 1], vec![9, 9, 9]));
+    swarm.check();
+}
+
+#[test]
+fn what_is_said_of_rounds_to_come_ends_none_of_them() {
+    let mut swarm = Swarm::sealed(39);
+    swarm.believe(ALL);
+    let first = swarm.show(1);
+    swarm.hear(0, "ada", 700, &was(first, 1));
+    let taken_back = |counter| {
+        let round = RoundId { counter, ..first };
+        let said = signed("guest", 1, &Instruction::Retract { round });
+        let instructor = "guest".parse().unwrap();
+        Lesson { round, instructor, count: 1, at: 1, word: Word::Retracted, said: Some(said) }
+    };
+    for i in 0..3 {
+        let lessons = (first.counter + 1..first.counter + 9).map(taken_back).collect();
+        let message = Message::Lessons(Lessons { lessons });
+        let stamp = Stamp { boot: u32::MAX, sequence: i };
+        let said = Envelope { author: RobotId(2), stamp, message, signature: None };
+        swarm.input(i as usize, Input::Received(said));
+    }
+    for class in [2, 3] {
+        let round = swarm.show(class);
+        swarm.hear(0, "ada", 800 + u64::from(class), &was(round, class));
+        swarm.pass(Duration::from_secs(10));
+        assert_eq!(swarm.of_class(class), [9, 9, 9]);
+    }
+    swarm.check_rest();
+}
+
+#[test]
+fn names_that_robots_vouch_for_push_out_none_of_an_instructor_with_a_key() {
+    let mut swarm = Swarm::sealed(40);
+    swarm.believe(ALL);
+    let round = swarm.show(1);
+    let circle = ClassId::named(&"bob".parse().unwrap(), "circle");
+    swarm.hear(0, "bob", 500, &Instruction::New { label: "circle".to_owned(), round: Some(round) });
+    let guest: InstructorId = "guest".parse().unwrap();
+    let smaller = (0_u32..).map(|n| format!("g{n}")).filter(|label| ClassId::named(&guest, label) < circle);
+    for label in smaller.take(2 * gestalt_protocol::MAX_NAMED) {
+        swarm.hear(1, "guest", 1, &Instruction::New { label, round: None });
+    }
+    swarm.pass(Duration::from_secs(10));
+    let is_named = |mind: &Mind| mind.learned().unwrap().named.iter().any(|named| named.class == circle);
+    assert!(swarm.minds.iter().all(is_named));
+    assert_eq!(swarm.of_class(circle.0), [9, 9, 9]);
+    swarm.check();
+    // There is room for one more of hers, and none of the guest's.
+    swarm.hear(0, "ada", 900, &Instruction::New { label: "square".to_owned(), round: None });
+    swarm.pass(Duration::from_secs(10));
+    let square = ClassId::named(&"ada".parse().unwrap(), "square");
+    let is_there = |mind: &Mind| mind.learned().unwrap().named.iter().any(|named| named.class == square);
+    assert!(swarm.minds.iter().all(|mind| is_there(mind) && is_named(mind)));
+    // The guest's count no more, once no robot may speak for anybody.
+    swarm.believe(BOTH);
+    swarm.restart_all();
+    swarm.pass(Duration::from_secs(10));
+    assert!(swarm.minds.iter().all(is_named));
+    swarm.check();
 }

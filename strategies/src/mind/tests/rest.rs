@@ -21,6 +21,20 @@ impl Swarm {
     }
 }
 
+/// One robot hears that author share samples under these numbers of a life.
+fn shares(swarm: &mut Swarm, i: usize, author: u32, life: u32, numbers: &[u32]) {
+    let sample = |number: &u32| SharedSample {
+        id: SampleId { author: RobotId(author), life, number: *number },
+        class: ClassId(number % 6),
+        round: RoundId { counter: 1, opener: RobotId(author), life: 0 },
+        vector: Vector::F32(vec![(number % 1000) as f32 * 1e-3, 0.5, 0.5, 0.5]),
+    };
+    let samples = numbers.iter().map(sample).collect();
+    let message = Message::Samples(Samples { space: space().id(), samples });
+    let stamp = Stamp { boot: life, sequence: numbers[0] };
+    swarm.input(i, Input::Received(Envelope { author: RobotId(author), stamp, message, signature: None }));
+}
+
 fn other_space() -> Arc<FeatureSpace> {
     let rows = [[0.0_f32; 8], [1.0; 8], [0.5, 0.0, 1.0, 0.2, 0.0, 1.0, 0.3, 0.1]];
     let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -82,17 +96,9 @@ fn a_newborn_that_meets_no_round_says_what_it_was_told() {
 #[test]
 fn what_is_left_in_scattered_places_is_all_given() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 22);
-    let sample = |number| SharedSample {
-        id: SampleId { author: RobotId(9), life: 5, number },
-        class: ClassId(number % 6),
-        round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
-        vector: Vector::F32(vec![number as f32 * 1e-3, 0.5, 0.5, 0.5]),
-    };
     for batch in 0..20 {
-        let samples = (0..30).map(|i| sample(1 + 3 * (30 * batch + i))).collect();
-        let message = Message::Samples(Samples { space: space().id(), samples });
-        let stamp = Stamp { boot: 1, sequence: batch };
-        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+        let numbers: Vec<u32> = (0..30).map(|i| 1 + 3 * (30 * batch + i)).collect();
+        shares(&mut swarm, 0, 9, 5, &numbers);
     }
     swarm.pass(Duration::from_secs(20));
     assert_eq!((swarm.sizes(0), swarm.sizes(1)), ([0, 0, 600], [0, 0, 600]));
@@ -113,6 +119,84 @@ fn instructors_beyond_those_kept_are_not_told_again_and_again() {
     swarm.pass(Duration::from_secs(10));
     assert!(swarm.minds[0].refusals().count(Refusal::LessonFull) > 0);
     swarm.check_rest();
+}
+
+#[test]
+fn numbers_full_of_gaps_keep_no_robot_from_starting_again() {
+    let mut swarm = Swarm::new(1, config(2, 1.0), 25);
+    let numbers: Vec<u32> = (0..256).map(|i| 1 + 2 * i).collect();
+    for life in 0..64 {
+        numbers.chunks(64).for_each(|numbers| shares(&mut swarm, 0, 9, life, numbers));
+    }
+    // Each of these closes a gap of that one's.
+    (10..20).for_each(|author| shares(&mut swarm, 0, author, 1, &[1]));
+    let intervals = |swarm: &Swarm| {
+        let seen = swarm.minds[0].training_set().unwrap().seen();
+        seen.series().map(|series| seen.intervals(series).len()).sum::<usize>()
+    };
+    assert_eq!(intervals(&swarm), 64 * 256);
+    swarm.check();
+    swarm.restart(0);
+    assert_eq!(intervals(&swarm), 64 * 256);
+    swarm.check();
+}
+
+#[test]
+fn numbers_that_no_newcomer_takes_let_repair_rest() {
+    let mut swarm = Swarm::new(3, config(2, 1.0), 26);
+    let last = crate::sample::LAST_NUMBER;
+    for i in 0..2 {
+        // The second overlaps the first and is not passed on; from then on those behind it are in reach.
+        for numbers in [&[1, last + 5][..], &[last], &[last + 10_000, last + 10_001], &[last + 20_000]] {
+            shares(&mut swarm, i, 9, 1, numbers);
+        }
+    }
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    swarm.restart_empty(2);
+    swarm.pass(Duration::from_secs(30));
+    assert!(swarm.minds[2].refusals().count(Refusal::SampleNumber) > 0);
+    swarm.check_rest();
+}
+
+#[test]
+fn who_shares_much_keeps_nobody_else_from_being_passed_on() {
+    let mut swarm = Swarm::new(2, LearningConfig { capacity: 5000, ..config(2, 1.0) }, 27);
+    for batch in 0..60 {
+        let numbers: Vec<u32> = (0..64).map(|i| 1 + 64 * batch + i).collect();
+        shares(&mut swarm, 0, 5, 1, &numbers);
+    }
+    shares(&mut swarm, 0, 9, 1, &[1]);
+    let learning = swarm.minds[0].learning.as_ref().unwrap();
+    let first = learning.lacking(|_| true, 16 * 1024).next().unwrap();
+    assert!(first.batches.iter().any(|batch| batch.robot == RobotId(9)), "each in turn");
+}
+
+#[test]
+fn what_a_full_list_leaves_out_is_not_given_again_and_again() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 28);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    let told = |first: u32| {
+        let name = |counter| RoundId { counter, opener: RobotId(2), life: 0 };
+        let lessons = (0..gestalt_protocol::MAX_LESSONS as u32).map(|i| (name(first + i), 1)).collect();
+        let digest = gestalt_protocol::Digest { key: 1, samples: 0, lessons: 3 };
+        let know = gestalt_protocol::Know {
+            samples: Vec::new(),
+            lessons,
+            named: 0,
+            digest,
+            answer: true,
+            nothing_for: None,
+        };
+        let stamp = Stamp { boot: u32::MAX, sequence: first };
+        Input::Received(Envelope { author: RobotId(2), stamp, message: Message::Know(know), signature: None })
+    };
+    swarm.told.clear();
+    swarm.input(0, told(round.counter + 1));
+    assert!(!swarm.told.contains_key("lessons"), "that round lies before all of its list");
+    swarm.input(0, told(round.counter - 1));
+    assert!(swarm.told.contains_key("lessons"), "that one is missing in it");
 }
 
 proptest! {

@@ -184,3 +184,18 @@ proptest! {
         prop_assert_eq!(found, model.into_iter().collect::<Vec<_>>());
     }
 }
+
+#[test]
+fn what_was_stored_with_too_many_gaps_is_read_and_what_is_said_so_is_not() {
+    let stored = || {
+        let series = (0..65).map(|life| SampleSeries { author: RobotId(life % 2), life });
+        series.map(|series| (series, (0..256).map(|i| (1 + 2 * i, 1 + 2 * i)).collect()))
+    };
+    let said = SeenSamples::from_intervals(stored());
+    assert!(matches!(said, Err(SeenError::TooManyGaps(_))), "{said:?}");
+    let seen = SeenSamples::from_stored(stored()).unwrap();
+    assert_eq!((seen.series_count(), seen.intervals.len()), (65, MAX_INTERVALS_IN_ALL));
+    for (series, intervals) in stored() {
+        assert!(intervals.iter().all(|(from, _): &(u32, u32)| seen.contains(series.sample(*from))));
+    }
+}
