@@ -177,6 +177,7 @@ impl Refusal {
             Self::Roster(RosterError::OtherSwarm) => "other_swarm",
             Self::Roster(RosterError::Contradiction { .. }) => "contradiction",
             Self::Roster(RosterError::Forged) => "forged",
+            Self::Roster(RosterError::TooFast) => "too_often",
             Self::Roster(_) => "malformed",
             Self::First => "unasked",
             Self::TooOften => "too_often",

@@ -123,8 +123,11 @@ impl Inbox {
 
     /// Who knows by the roster of today whose words count.
     pub(super) fn believer(&self) -> Option<Arc<dyn Believe>> {
-        let roster = self.judged(|judge, _| judge.roster().clone())?;
-        Some(Arc::new(Believer(roster)))
+        self.judged(|judge, _| -> Arc<dyn Believe> {
+            let roster = judge.roster().clone();
+            let robots = roster.members().robots.keys().copied();
+            Arc::new(Believer { convicted: robots.filter(|robot| judge.convicts(*robot)).collect(), roster })
+        })
     }
 
     pub(super) fn on_roster(&self, sample: &Sample) -> Result<(), Refusal> {
@@ -133,7 +136,7 @@ impl Inbox {
         if sealed.roll.is_held(&json) {
             return Ok(());
         }
-        if !sealed.roll.may_look() {
+        if !sealed.roll.may_read(json.len()) {
             return Err(Refusal::TooOften);
         }
         let taken_up = self.judged(|judge, _| sealed.roll.take_up(judge, &json));

@@ -12,9 +12,13 @@ use tokio::sync::Notify;
 use crate::account::Account;
 use crate::tls::Door;
 
-/// How many rosters are looked into in one such span; looking into one may cost milliseconds.
-const MAX_LOOKED_INTO: u32 = 16;
-const SPAN: Duration = Duration::from_secs(2);
+/// How much work rosters may be in each such span, in microseconds: a tenth of a core. Somebody may say so many that the authority's would find no time
+/// left, so each costs what it is worth: what is no roster, or none that follows, nearly nothing.
+const MAX_WORK: u64 = 10_000;
+const SPAN: Duration = Duration::from_millis(100);
+/// How much it takes to check a signature, and to read a kilobyte of JSON.
+const CHECK: u64 = 100;
+const READ: u64 = 10;
 
 /// The folder beside a roster's file with the evidence against robots on it.
 const CONVICTED: &str = "convicted";
@@ -27,7 +31,7 @@ pub(crate) struct Roll {
     account: Arc<Account>,
     file: Option<PathBuf>,
     held: Mutex<Held>,
-    looked_into: Mutex<(Instant, u32)>,
+    worked: Mutex<(Instant, u64)>,
     news: Notify,
 }
 
@@ -52,7 +56,7 @@ impl Roll {
     ) -> Self {
         account.set("roster_epoch", roster.members().epoch);
         let door = Arc::new(Door::new(roster.clone()));
-        let looked_into = Mutex::new((Instant::now(), 0));
+        let worked = Mutex::new((Instant::now(), 0));
         Self {
             me,
             key,
@@ -60,7 +64,7 @@ impl Roll {
             account,
             file,
             held: Mutex::new(Held::new(roster)),
-            looked_into,
+            worked,
             news: Notify::new(),
         }
     }
@@ -79,14 +83,19 @@ impl Roll {
         self.held().json.as_bytes() == json
     }
 
-    /// Whether one more may be looked into now.
-    pub fn may_look(&self) -> bool {
-        let mut looked = self.looked_into.lock().unwrap_or_else(PoisonError::into_inner);
-        if looked.0.elapsed() >= SPAN {
-            *looked = (Instant::now(), 0);
+    /// Whether one of that length may be read now.
+    pub fn may_read(&self, length: usize) -> bool {
+        self.may_work(1 + READ * length as u64 / 1024)
+    }
+
+    fn may_work(&self, work: u64) -> bool {
+        let mut worked = self.worked.lock().unwrap_or_else(PoisonError::into_inner);
+        if worked.0.elapsed() >= SPAN {
+            *worked = (Instant::now(), 0);
         }
-        looked.1 += 1;
-        looked.1 <= MAX_LOOKED_INTO
+        let may = worked.1 + work <= MAX_WORK;
+        worked.1 += if may { work } else { 0 };
+        may
     }
 
     /// Goes by a roster that came from anywhere, if it follows the one held; the robots that have no key on it any more, or another one.
@@ -94,7 +103,7 @@ impl Roll {
     /// # Errors
     /// [`RosterError`]; the one held stays.
     pub fn take_up(&self, judge: &mut Judge, json: &[u8]) -> Result<Option<BTreeSet<RobotId>>, RosterError> {
-        let Some(next) = judge.roster().successor(json)? else { return Ok(None) };
+        let Some(next) = judge.roster().successor_if(json, || self.may_work(CHECK))? else { return Ok(None) };
         let before = judge.roster().members().robots.clone();
         judge.adopt(next.clone())?;
         let members = next.members();

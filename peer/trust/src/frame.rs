@@ -75,8 +75,8 @@ fn challenge_bytes(swarm: &SwarmId, by: RobotId, robot: RobotId, challenge: u64)
     [CHALLENGE_DOMAIN.as_slice(), swarm.as_bytes(), &by, &robot, &challenge].concat()
 }
 
-/// How many challenges a sender checks: more than come as long as nobody makes some up.
-const OF_CHALLENGES: Budget = Budget::of(32, 8, 1);
+/// How many challenges a sender checks, in all names together: far more than come as long as nobody makes some up, and some hundredths of a core.
+const OF_CHALLENGES: Budget = Budget::of(512, 512, 1);
 
 /// Signs the frames of one robot's camera, in answer to those who look at it. Pure: time is an argument.
 #[derive(Clone, Debug)]

@@ -19,7 +19,7 @@ use crate::roster_error::RosterError;
 use crate::scheme::{Ed25519, Scheme};
 use crate::verify::Verifier;
 use crate::witness::Witness;
-use crate::word::{Attention, WordHeading};
+use crate::word::{Attention, Speaker, WordHeading};
 
 /// How many batches of samples of one author are checked: a late joiner is given all that a swarm knows.
 const OF_SAMPLES: Budget = Budget::of(512, 64, 1000);
@@ -90,7 +90,11 @@ impl<S: Scheme> Judge<S> {
         word: &[u8],
         attachment: Option<&[u8]>,
     ) -> Result<(WordHeading, Roles), Distrust> {
-        self.of_words.heed(now, self.verifier.roster(), by, word, attachment)
+        let heeded = self.of_words.heed(now, self.verifier.roster(), by, word, attachment)?;
+        match heeded.0.speaker {
+            Speaker::For(robot) if self.convicts(robot) => Err(Distrust::Convicted),
+            _ => Ok(heeded),
+        }
     }
 
     /// Whether that robot gave this answer to that instructor.
@@ -105,6 +109,9 @@ impl<S: Scheme> Judge<S> {
         answer: &[u8],
         attachment: Option<&[u8]>,
     ) -> Result<(), Distrust> {
+        if self.convicts(robot) {
+            return Err(Distrust::Convicted);
+        }
         self.of_answers.check(now, self.verifier.roster(), robot, to, answer, attachment)
     }
 

@@ -89,10 +89,25 @@ impl<S: Scheme> Roster<S> {
     /// # Errors
     /// [`RosterError::OtherSwarm`], [`RosterError::Older`], [`RosterError::Contradiction`], and those of [`Roster::parse`].
     pub fn successor(&self, json: &[u8]) -> Result<Option<Self>, RosterError> {
+        self.successor_if(json, || true)
+    }
+
+    /// The same, where one that follows by its own words is checked only if it may be: that costs more than all before it.
+    ///
+    /// # Errors
+    /// As [`Roster::successor`]; [`RosterError::TooFast`] if it may not be.
+    pub fn successor_if(
+        &self,
+        json: &[u8],
+        may_check: impl FnOnce() -> bool,
+    ) -> Result<Option<Self>, RosterError> {
         let (members, authority, signature) = Self::unchecked(json)?;
         let swarm = SwarmId::new(&authority, &members.swarm);
         if !self.precedes(swarm, &members, None)? {
             return Ok(None);
+        }
+        if !may_check() {
+            return Err(RosterError::TooFast);
         }
         let offered = Self::checked(members, authority, signature)?;
         Ok(self.is_succeeded_by(&offered)?.then_some(offered))

@@ -54,6 +54,9 @@ pub enum RosterError {
         /// How many there may be.
         limit: usize,
     },
+    /// More rosters than are checked. It may well be true.
+    #[error("more rosters than are checked: it is looked at when it comes again")]
+    TooFast,
     /// Not signed by the authority that it names.
     #[error(
         "the signature is not its authority's: it was changed after signing; sign it again, or take the original"

@@ -122,20 +122,33 @@ impl<S: Scheme> Roster<S> {
     }
 }
 
-/// How many words of one speaker are checked: more than anybody says.
+/// How many words of one speaker are heeded: more than anybody says. As many are checked in one name where all together are used up.
 const OF_WORDS: Budget = Budget::of(32, 8, 1);
 
-/// What is kept so that no word counts twice, and nobody's words keep a robot busy: of each speaker that is on the roster, a budget and the
+/// How many words are checked in all names together: made-up ones in an instructor's name cost these, and not its own.
+const OF_ALL: Budget = Budget::of(1000, 1000, 1);
+
+/// What is kept so that no word counts twice, and nobody's words keep a robot busy: of each speaker that is on the roster, budgets and the
 /// highest count.
 #[derive(Clone, Debug)]
 pub struct Attention<S: Scheme = Ed25519> {
-    speakers: BTreeMap<Speaker, (Bucket, Option<u64>)>,
+    speakers: BTreeMap<Speaker, Heeded>,
+    left: Option<Bucket>,
     scheme: PhantomData<fn() -> S>,
+}
+
+#[derive(Clone, Debug)]
+struct Heeded {
+    /// What is left to be heeded.
+    words: Bucket,
+    /// What is left to be checked in this name, beyond what is in all.
+    checks: Bucket,
+    highest: Option<u64>,
 }
 
 impl<S: Scheme> Default for Attention<S> {
     fn default() -> Self {
-        Self { speakers: BTreeMap::new(), scheme: PhantomData }
+        Self { speakers: BTreeMap::new(), left: None, scheme: PhantomData }
     }
 }
 
@@ -161,20 +174,27 @@ impl<S: Scheme> Attention<S> {
             Speaker::Own(name) => roster.members().instructors.contains_key(name),
             Speaker::For(robot) => roster.members().robots.contains_key(robot),
         };
-        if known {
-            let new = || (Bucket::new(&OF_WORDS, now), None);
-            let (bucket, highest) = self.speakers.entry(claimed.speaker.clone()).or_insert_with(new);
-            if highest.is_some_and(|highest| highest >= claimed.count) {
-                return Err(Distrust::Repeated);
-            }
-            if !bucket.take(&OF_WORDS, now) {
-                return Err(Distrust::TooFast);
-            }
+        if !known {
+            // Of a stranger nothing is checked but the name.
+            return roster.check_word(by, word, attachment);
+        }
+        let new = || {
+            let full = Bucket::new(&OF_WORDS, now);
+            Heeded { words: full.clone(), checks: full, highest: None }
+        };
+        let heeded = self.speakers.entry(claimed.speaker).or_insert_with(new);
+        if heeded.highest.is_some_and(|highest| highest >= claimed.count) {
+            return Err(Distrust::Repeated);
+        }
+        let left = self.left.get_or_insert_with(|| Bucket::new(&OF_ALL, now));
+        if !left.take(&OF_ALL, now) && !heeded.checks.take(&OF_WORDS, now) {
+            return Err(Distrust::TooFast);
         }
         let (heading, roles) = roster.check_word(by, word, attachment)?;
-        if let Some((_, highest)) = self.speakers.get_mut(&heading.speaker) {
-            *highest = Some(heading.count);
+        if !heeded.words.take(&OF_WORDS, now) {
+            return Err(Distrust::TooFast);
         }
+        heeded.highest = Some(heading.count);
         Ok((heading, roles))
     }
 
@@ -277,6 +297,26 @@ mod tests {
         assert_eq!(answers.iter().filter(|it| it.is_ok()).count(), 32);
         assert_eq!(answers.last(), Some(&Err(Distrust::TooFast)));
         assert_eq!(heed("bob", 2, Speaker::For(RobotId(2)), 1), Ok(()));
+    }
+
+    #[test]
+    fn words_made_up_in_an_instructors_name_silence_nobody() {
+        let mut attention = Attention::default();
+        let mut heed = |now: Duration, key, count| {
+            let attachment = said("ada", key, Speaker::Own(name("ada")), count, b"open");
+            attention.heed(now, &roster(), &name("ada"), b"open", Some(&attachment)).map(drop)
+        };
+        for second in 1..=10 {
+            let at = |n: u64| Duration::from_millis(1000 * second + n);
+            for n in 0..900 {
+                let forged = heed(at(n), 91, u64::MAX - n);
+                assert_eq!(forged, Err(Distrust::Forged));
+            }
+            assert_eq!(heed(at(901), 90, second), Ok(()), "in second {second}");
+        }
+        // More than all that is checked of anybody.
+        let beyond = (0..5000).map(|n| heed(Duration::from_secs(20), 91, u64::MAX - n));
+        assert_eq!(beyond.filter(|it| *it == Err(Distrust::Forged)).count(), 1032);
     }
 
     #[test]

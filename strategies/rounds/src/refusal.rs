@@ -13,6 +13,8 @@ pub enum Refusal {
     Vocabulary,
     /// A decision that is none by this robot's own rule, quorum and alpha: all robots need the same.
     Unfounded,
+    /// A decision that is announced under another label than its gesture has here.
+    Label,
     /// A vote or decision with a value that no robot may say.
     Impossible,
     /// A vote of one robot more than a ballot can hold.
@@ -51,12 +53,13 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
         Self::Vocabulary,
         Self::Unfounded,
+        Self::Label,
         Self::Impossible,
         Self::BallotFull,
         Self::NoClassifier,
@@ -85,6 +88,7 @@ impl Refusal {
             Self::TooSoon => "refused_round_too_soon",
             Self::Vocabulary => "refused_other_vocabulary",
             Self::Unfounded => "refused_unfounded_decision",
+            Self::Label => "refused_decision_label",
             Self::Impossible => "refused_impossible_value",
             Self::BallotFull => "refused_ballot_full",
             Self::NoClassifier => "refused_no_classifier",

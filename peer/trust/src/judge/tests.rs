@@ -40,6 +40,23 @@ fn evidence_is_handed_out_once_to_be_kept_whoever_found_it() {
 }
 
 #[test]
+fn whoever_was_proven_to_lie_speaks_and_answers_for_nobody() {
+    let mut judge = Judge::new(roster(5), |_| false);
+    let (guest, swarm) = ("guest".parse().unwrap(), roster(5).swarm_id());
+    let both = |judge: &mut Judge, count| {
+        let heading = WordHeading { speaker: Speaker::For(RobotId(1)), count };
+        let attachment = crate::word::sign(&robot(1), &swarm, &guest, &heading, b"open");
+        let answer = crate::answer::sign(&robot(1), &swarm, RobotId(1), &guest, b"yes");
+        let word = judge.word(NOW, &guest, b"open", Some(&attachment)).map(drop);
+        (word, judge.answer(NOW, RobotId(1), &guest, b"yes", Some(answer.as_bytes())))
+    };
+    assert_eq!(both(&mut judge, 1), (Ok(()), Ok(())));
+    judge.envelope(NOW, &said(1, 1, 1.0)).unwrap();
+    assert_eq!(judge.envelope(NOW, &said(1, 1, -1.0)), Err(Distrust::Convicted));
+    assert_eq!(both(&mut judge, 2), (Err(Distrust::Convicted), Err(Distrust::Convicted)));
+}
+
+#[test]
 fn an_answer_is_its_robots() {
     let mut judge = Judge::new(roster(5), |_| false);
     let ada = "ada".parse().unwrap();

@@ -115,9 +115,13 @@ impl Rounds {
     }
 
     pub(super) fn on_announced(&mut self, announcement: Announcement, effects: &mut Effects<'_>) {
-        let Announcement { decision, announcer, .. } = announcement;
+        let Announcement { decision, announcer, label, .. } = announcement;
         if !self.may_hear(&decision, announcer, false) {
             return;
+        }
+        // Clients act on the word. What is said under a false one was not said: this robot says it itself.
+        if !self.may_be_called(&decision, label.as_deref()) {
+            return self.refusals.add(Refusal::Label);
         }
         let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
         // What nobody would decide, nobody announced.

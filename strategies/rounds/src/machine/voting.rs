@@ -159,6 +159,18 @@ impl Rounds {
         vocabulary.label(class).or_else(|| self.names.get(&class).map(String::as_str))
     }
 
+    /// Whether a decision may be announced under that label, as far as this robot knows what its gesture is called. Two robots may call one that was
+    /// named differently for a while, but for who named it.
+    pub(super) fn may_be_called(&self, decision: &Decision, label: Option<&str>) -> bool {
+        let Some(label) = label else { return true };
+        let bare = |title: &str| title.rsplit_once(" (").map_or(title.len(), |(label, _)| label.len());
+        match (decision.class, self.label_of(decision)) {
+            (None, _) => false,
+            (Some(class), Some(known)) if class.is_named() => label[..bare(label)] == known[..bare(known)],
+            (Some(_), known) => known.is_none_or(|known| known == label),
+        }
+    }
+
     /// A decision in this robot's own words.
     fn aloud(&self, decision: Decision) -> Message {
         let label = self.label_of(&decision).map(str::to_owned);

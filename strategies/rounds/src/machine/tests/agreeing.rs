@@ -46,6 +46,36 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
 }
 
 #[test]
+fn a_decision_under_a_false_label_was_not_announced() {
+    let announces_at = |label: Option<&str>| {
+        let mut mind = mind(9);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([5, 9]))));
+        mind.handle(ms(0), Input::Open);
+        let held = decision(1, Some(0), 3, 5);
+        mind.handle(ms(0), gives(5, held.clone()));
+        mind.handle(ms(0), says_it_holds(5, &held));
+        let Input::Announced(said) = announced(5, Decision { is_final: true, ..held }) else {
+            unreachable!()
+        };
+        let label = label.map(str::to_owned);
+        mind.handle(ms(100), Input::Announced(Announcement { label, ..said }));
+        let refused = mind.refusals().count(Refusal::Label);
+        let all = live(&mut mind, ms(20_000));
+        let said = all.iter().find_map(|(_, output)| match output {
+            Output::Announce(said) => Some(said.label.clone()),
+            _ => None,
+        });
+        (refused, said)
+    };
+    assert_eq!(announces_at(Some("one")), (0, None));
+    assert_eq!(announces_at(None), (0, None));
+    let own = Some(Some("one".to_owned()));
+    for false_label in ["two", "stop", "", "one (ana)"] {
+        assert_eq!(announces_at(Some(false_label)), (1, own.clone()), "{false_label}");
+    }
+}
+
+#[test]
 fn who_has_guests_speaks_for_them_too() {
     let mut host = mind(8);
     host.handle(ms(0), Input::Guests(robots([2, 3])));
