@@ -80,6 +80,7 @@ impl Host {
             self.handle(Input::Blind(blind));
         }
         self.effector.voice.publish_hold(&mut self.mind);
+        self.inbox.note_contradictions(self.mind.take_contradictions());
         self.report_learning();
         for (refusal, count) in self.mind.refusals().iter() {
             if count > 0 {

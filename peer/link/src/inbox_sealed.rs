@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, PoisonError};
 
 use gestalt_protocol::{
-    Answer, Envelope, FrameChallenge, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON, MAX_WORD, RobotId,
-    Signature, SignedWord, decode_json,
+    Answer, Envelope, FrameChallenge, HeldBatch, Instruction, InstructorId, MAX_ATTACHMENT, MAX_JSON,
+    MAX_WORD, RobotId, Signature, SignedWord, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
 use gestalt_trust::{Distrust, MAX_ROSTER, Tag};
@@ -144,6 +144,18 @@ impl Inbox {
             self.expel(gone);
         }
         Ok(())
+    }
+
+    /// What the mind has found that convicts an author of samples.
+    pub(super) fn note_contradictions(&self, found: Vec<(HeldBatch, HeldBatch)>) {
+        if found.is_empty() {
+            return;
+        }
+        for (one, other) in found {
+            self.judged(|judge, _| judge.two_samples(one, other));
+        }
+        self.expel_fallen();
+        self.ready.notify_one();
     }
 
     /// Whoever was convicted meanwhile counts no more.

@@ -1,9 +1,10 @@
-//! Proof that somebody lies: two different statements under one stamp, or a decision that does not follow from its votes.
+//! Proof that somebody lies: two different statements under one stamp, two samples under one number, or a decision that does not follow from its votes.
 
 use std::fmt;
 
 use gestalt_protocol::{
-    Announced, Decision, DecodeError, Give, MAX_MESSAGE, Message, RobotId, Signature, Stamp,
+    Announced, Decision, DecodeError, Envelope, Give, HeldBatch, MAX_MESSAGE, Message, RobotId, Samples,
+    SharedSample, Signature, Stamp,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -13,6 +14,9 @@ use crate::roster::Roster;
 use crate::scheme::Scheme;
 use crate::signed::{MAX_EVIDENT, MAX_SIGNED, Signed};
 use crate::statement::{self, Heading};
+
+/// The longest statement that can be one of two batches, in bytes: robots share half a kilobyte to sixteen at once.
+const MAX_BATCH: usize = 2 * MAX_EVIDENT;
 
 /// The version byte in front of encoded evidence.
 const VERSION: u8 = 2;
@@ -34,6 +38,9 @@ pub enum EvidenceError {
     /// By two authors, or under two stamps.
     #[error("two statements of different authors or stamps, which may well differ")]
     Unrelated,
+    /// Two batches of samples that may stand side by side: no number is in both, or the same sample is.
+    #[error("two statements in which no two samples have one number")]
+    Compatible,
     /// A single statement that gives no decision.
     #[error("one statement, and no decision in it")]
     Undecided,
@@ -57,6 +64,8 @@ pub enum EvidenceError {
 pub enum Lie {
     /// One thing here and another there.
     TwoThings,
+    /// One sample here and another there, as one.
+    TwoSamples,
     /// A decision that the votes it brings do not make.
     Unfounded,
 }
@@ -65,6 +74,7 @@ impl fmt::Display for Lie {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::TwoThings => "said two things under one stamp: it lies, or its key is in two hands",
+            Self::TwoSamples => "shared two samples under one number: it lies, or its key is in two hands",
             Self::Unfounded => {
                 "gave a decision that does not follow from its votes: it lies, or runs a program that is not Gestalt's"
             }
@@ -75,6 +85,9 @@ impl fmt::Display for Lie {
 /// Two different statements of one author under one stamp, each with its signature: the author said one thing here and another
 /// there. Stamps count over all that a robot says, of whatever kind, so an honest robot never does that; nor can anybody else make
 /// it look so. A robot whose memory was copied to a second one does: then its key is in two hands.
+///
+/// Or two batches of one author in which one number is that of different samples: robots number what they share in a life whose number was drawn at random,
+/// so that two lives do not meet.
 ///
 /// Or a decision that its author gave or announced, and signed, which contradicts the votes that it brings: whoever concluded it, robots pass on what they have
 /// looked into. Whether those votes were cast does not matter.
@@ -89,19 +102,20 @@ pub struct Evidence(Proof);
 enum Proof {
     TwoThings { first: Signed, second: Signed },
     Unfounded(Signed),
+    TwoSamples { first: Signed, second: Signed },
 }
 
 impl TryFrom<Proof> for Evidence {
     type Error = DecodeError;
 
     fn try_from(proof: Proof) -> Result<Self, DecodeError> {
-        if let Proof::TwoThings { first, second } = &proof {
-            let length = first.statement.len().max(second.statement.len());
-            if length > MAX_EVIDENT {
-                return Err(DecodeError::TooLong { length, limit: MAX_EVIDENT });
-            }
-        }
-        Ok(Self(proof))
+        let (first, second, limit) = match &proof {
+            Proof::TwoThings { first, second } => (first, second, MAX_EVIDENT),
+            Proof::TwoSamples { first, second } => (first, second, MAX_BATCH),
+            Proof::Unfounded(_) => return Ok(Self(proof)),
+        };
+        let length = first.statement.len().max(second.statement.len());
+        if length > limit { Err(DecodeError::TooLong { length, limit }) } else { Ok(Self(proof)) }
     }
 }
 
@@ -124,8 +138,19 @@ impl Evidence {
 
     /// The evidence of these two, in whichever order they were met.
     pub(crate) fn of_two(one: Signed, other: Signed) -> Self {
-        let (first, second) = if one <= other { (one, other) } else { (other, one) };
+        let (first, second) = in_order(one, other);
         Self(Proof::TwoThings { first, second })
+    }
+
+    /// That of two batches of one author, which share two samples under one number; `None` if one is not signed, or too long to be passed on.
+    #[must_use]
+    pub fn of_batches(one: HeldBatch, other: HeldBatch) -> Option<Self> {
+        let said = |batch: HeldBatch| {
+            let said = Envelope::from(batch);
+            Some(Signed { statement: said.statement(), signature: said.signature? })
+        };
+        let (first, second) = in_order(said(one)?, said(other)?);
+        Self::try_from(Proof::TwoSamples { first, second }).ok()
     }
 
     /// That of a statement that gives or announces a decision, with its author's signature.
@@ -139,6 +164,7 @@ impl Evidence {
     pub fn lie(&self) -> Lie {
         match self.0 {
             Proof::TwoThings { .. } => Lie::TwoThings,
+            Proof::TwoSamples { .. } => Lie::TwoSamples,
             Proof::Unfounded(_) => Lie::Unfounded,
         }
     }
@@ -146,7 +172,9 @@ impl Evidence {
     /// How many bytes its statements have.
     pub(crate) fn length(&self) -> usize {
         match &self.0 {
-            Proof::TwoThings { first, second } => first.statement.len() + second.statement.len(),
+            Proof::TwoThings { first, second } | Proof::TwoSamples { first, second } => {
+                first.statement.len() + second.statement.len()
+            }
             Proof::Unfounded(said) => said.statement.len(),
         }
     }
@@ -191,6 +219,13 @@ impl Evidence {
                 }
                 Ok(heading)
             }
+            Proof::TwoSamples { first, second } => {
+                let heading = statement::heading(&first.statement)?;
+                if statement::heading(&second.statement)?.author != heading.author {
+                    return Err(EvidenceError::Unrelated);
+                }
+                Ok(heading)
+            }
             Proof::Unfounded(said) if said.statement.len() > MAX_SIGNED => {
                 Err(DecodeError::TooLong { length: said.statement.len(), limit: MAX_SIGNED }.into())
             }
@@ -211,7 +246,9 @@ impl Evidence {
         let key = *roster.members().robots.get(&robot).ok_or(EvidenceError::Stranger(robot))?;
         let is_signed = |said: &Signed| roster.check(&said.statement, &said.signature).is_ok();
         let signed = match &self.0 {
-            Proof::TwoThings { first, second } => is_signed(first) && is_signed(second),
+            Proof::TwoThings { first, second } | Proof::TwoSamples { first, second } => {
+                is_signed(first) && is_signed(second)
+            }
             Proof::Unfounded(said) => is_signed(said),
         };
         if !signed {
@@ -222,8 +259,31 @@ impl Evidence {
         {
             return Err(EvidenceError::Founded);
         }
+        if let Proof::TwoSamples { first, second } = &self.0
+            && !contradict(&samples_in(&first.statement)?, &samples_in(&second.statement)?)
+        {
+            return Err(EvidenceError::Compatible);
+        }
         Ok(Conviction { robot, key, stamp, lie: self.lie() })
     }
+}
+
+fn in_order(one: Signed, other: Signed) -> (Signed, Signed) {
+    if one <= other { (one, other) } else { (other, one) }
+}
+
+fn samples_in(statement: &[u8]) -> Result<Samples, EvidenceError> {
+    match statement::read(statement)?.message {
+        Message::Samples(samples) => Ok(samples),
+        _ => Err(EvidenceError::Compatible),
+    }
+}
+
+/// Whether a sample of the one batch and another one of the other have one name.
+fn contradict(one: &Samples, other: &Samples) -> bool {
+    let differs = |sample: &SharedSample| one.space != other.space || !other.samples.contains(sample);
+    let in_both = |sample: &SharedSample| other.samples.iter().any(|theirs| theirs.id == sample.id);
+    one.samples.iter().any(|sample| in_both(sample) && differs(sample))
 }
 
 /// The decision that a statement gives or announces.
@@ -251,9 +311,10 @@ mod tests {
 
     #[test]
     fn whoever_reads_of_a_lie_reads_which_it_is() {
-        let told = [Lie::TwoThings, Lie::Unfounded].map(|lie| lie.to_string());
+        let told = [Lie::TwoThings, Lie::Unfounded, Lie::TwoSamples].map(|lie| lie.to_string());
         assert!(told[0].contains("two things under one stamp"), "{told:?}");
         assert!(told[1].contains("does not follow from its votes"), "{told:?}");
+        assert!(told[2].contains("two samples under one number"), "{told:?}");
     }
 
     #[test]
@@ -339,6 +400,52 @@ mod tests {
         assert!(matches!(check(longer, 2), Err(EvidenceError::Malformed(_))));
     }
 
+    /// A batch of that robot's under a stamp, with these samples: a number and a coordinate each.
+    fn batch(author: u32, sequence: u32, samples: &[(u32, i8)]) -> HeldBatch {
+        let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
+        let sample = |(number, at): &(u32, i8)| SharedSample {
+            id: gestalt_protocol::SampleId { author: RobotId(author), life: 9, number: *number },
+            class: gestalt_protocol::ClassId(0),
+            round,
+            vector: gestalt_protocol::Vector::I8(vec![*at]),
+        };
+        let space = gestalt_protocol::FeatureSpaceId(4);
+        let samples = Samples { space, samples: samples.iter().map(sample).collect() };
+        let stamp = Stamp { boot: 1, sequence };
+        let unsigned = HeldBatch { robot: RobotId(author), stamp, samples, signature: None };
+        let signature = signed(Envelope::from(unsigned.clone()).statement(), author).signature;
+        HeldBatch { signature: Some(signature), ..unsigned }
+    }
+
+    #[test]
+    fn two_samples_under_one_number_convict_who_shared_them_and_nobody_else() {
+        let check = |one: HeldBatch, other: HeldBatch| {
+            let evidence = Evidence::of_batches(one.clone(), other.clone()).unwrap();
+            assert_eq!(Evidence::of_batches(other, one), Some(evidence.clone()), "in whichever order");
+            assert_eq!(Evidence::decode(&evidence.encode()), Ok(evidence.clone()));
+            let json = serde_json::to_string(&evidence).unwrap();
+            assert_eq!(serde_json::from_str::<Evidence>(&json).unwrap(), evidence);
+            assert_eq!(evidence.lie(), Lie::TwoSamples);
+            evidence.check(&roster(1), |_| true).map(|proven| (proven.robot, proven.lie))
+        };
+        let held = batch(2, 5, &[(1, 10), (2, 20)]);
+        let proven = Ok((RobotId(2), Lie::TwoSamples));
+        assert_eq!(check(held.clone(), batch(2, 6, &[(2, 21)])), proven);
+        let mut elsewhere = batch(2, 6, &[(2, 20)]);
+        elsewhere.samples.space = gestalt_protocol::FeatureSpaceId(5);
+        let said = Envelope::from(HeldBatch { signature: None, ..elsewhere.clone() }).statement();
+        elsewhere.signature = Some(signed(said, 2).signature);
+        assert_eq!(check(held.clone(), elsewhere), proven, "in another feature space it is another sample");
+        // The same again, by itself or among others, and others beside it.
+        for honest in [batch(2, 6, &[(2, 20)]), held.clone(), batch(2, 6, &[(3, 30)])] {
+            assert_eq!(check(held.clone(), honest), Err(EvidenceError::Compatible));
+        }
+        assert_eq!(check(held.clone(), batch(3, 6, &[(2, 21)])), Err(EvidenceError::Unrelated));
+        let framed = HeldBatch { signature: batch(3, 6, &[(2, 21)]).signature, ..batch(2, 6, &[(2, 21)]) };
+        assert_eq!(check(held.clone(), framed), Err(EvidenceError::Forged(RobotId(2))));
+        assert_eq!(Evidence::of_batches(held.clone(), HeldBatch { signature: None, ..held }), None);
+    }
+
     #[test]
     fn it_travels_in_bytes_and_in_text() {
         let bytes = lie().encode();
@@ -378,7 +485,7 @@ mod tests {
         let mut long = vec![VERSION; Evidence::MAX_LENGTH + 1];
         assert!(matches!(Evidence::decode(&long), Err(DecodeError::TooLong { .. })));
         long.pop();
-        assert!(matches!(Evidence::decode(&long), Err(DecodeError::Malformed(_))));
+        assert!(matches!(Evidence::decode(&long), Err(DecodeError::Trailing(_))));
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Batches, CountedVote, Decision, Envelope, Give, Instruction, InstructorId, Message,
-    RobotId, Signature,
+    Announcement, Batches, CountedVote, Decision, Envelope, Give, HeldBatch, Instruction, InstructorId,
+    Message, RobotId, Signature,
 };
 
 use crate::answer::Answers;
@@ -177,6 +177,11 @@ impl<S: Scheme> Judge<S> {
         self.of_samples.believe_no_more(conviction.robot);
         self.docket.enter(conviction, evidence, true);
         true
+    }
+
+    /// Takes in two batches of one author that give different samples one number, as they were met; whether it is proven that it did.
+    pub fn two_samples(&mut self, one: HeldBatch, other: HeldBatch) -> bool {
+        Evidence::of_batches(one, other).is_some_and(|evidence| self.found(evidence))
     }
 
     /// Whether that member stands by a decision that it gave or announced, which is looked into before the votes that it rests on: their signatures are

@@ -306,16 +306,16 @@ mod tests {
             let attachment = said("ada", key, Speaker::Own(name("ada")), count, b"open");
             attention.heed(now, &roster(), &name("ada"), b"open", Some(&attachment)).map(drop)
         };
-        for second in 1..=10 {
+        for second in 1..=3 {
             let at = |n: u64| Duration::from_millis(1000 * second + n);
-            for n in 0..900 {
+            for n in 0..400 {
                 let forged = heed(at(n), 91, u64::MAX - n);
                 assert_eq!(forged, Err(Distrust::Forged));
             }
-            assert_eq!(heed(at(901), 90, second), Ok(()), "in second {second}");
+            assert_eq!(heed(at(401), 90, second), Ok(()), "in second {second}");
         }
         // More than all that is checked of anybody.
-        let beyond = (0..5000).map(|n| heed(Duration::from_secs(20), 91, u64::MAX - n));
+        let beyond = (0..1100).map(|n| heed(Duration::from_secs(20), 91, u64::MAX - n));
         assert_eq!(beyond.filter(|it| *it == Err(Distrust::Forged)).count(), 1032);
     }
 

@@ -139,6 +139,17 @@ impl Learning {
         })
     }
 
+    /// The batch kept here that gives another sample the number of one in that batch, if both are signed.
+    pub fn contradicted(&self, batch: &HeldBatch) -> Option<&HeldBatch> {
+        batch.signature?;
+        let mut held = batch.samples.samples.iter().filter_map(|sample| {
+            let held = self.batches.get(self.batches.of(sample.id)?)?;
+            let same = held.samples.space == batch.samples.space && held.samples.samples.contains(sample);
+            (!same && held.signature.is_some()).then_some(held)
+        });
+        held.next()
+    }
+
     /// Keeps a batch some of whose samples were news, while one of them is held.
     pub fn keep_batch(&mut self, batch: HeldBatch) {
         let Some(first) = batch.samples.first() else { return };

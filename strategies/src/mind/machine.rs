@@ -64,6 +64,8 @@ pub struct Mind {
     pub(super) asks: Asks,
     /// Of this life, in the names of its rounds and samples.
     nonce: u32,
+    /// Batches of one author each that give different samples one number.
+    pub(super) contradictions: Vec<(HeldBatch, HeldBatch)>,
 }
 
 impl Mind {
@@ -80,6 +82,7 @@ impl Mind {
             exchanges: Exchanges::default(),
             asks: Asks::default(),
             nonce: life.nonce,
+            contradictions: Vec::new(),
         })
     }
 
@@ -130,6 +133,11 @@ impl Mind {
             learning.shelf = shelf;
         }
         self
+    }
+
+    /// Signed batches of one author that give different samples one number, as they were met since this was last asked: they convict it. At most eight.
+    pub fn take_contradictions(&mut self) -> Vec<(HeldBatch, HeldBatch)> {
+        std::mem::take(&mut self.contradictions)
     }
 
     /// Takes in one input at the time `now` and says what is to be done.

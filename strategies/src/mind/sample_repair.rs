@@ -29,6 +29,9 @@ const MAX_TOLD: usize = 256;
 /// How many words of one message may turn out to be nobody's: what stands behind them is not looked at. Checking a signature is work.
 pub(super) const MAX_UNPROVEN: usize = 16;
 
+/// How many contradictions wait to be looked at: one convicts its author.
+const MAX_CONTRADICTIONS: usize = 8;
+
 // What is kept of samples and lessons can be told, all of it in one message: an interval takes 10 bytes at most, a series 11
 // beside its intervals, a round of lessons 25, all else 64.
 const _: () = assert!(MAX_GAPS <= MAX_INTERVALS && MAX_SERIES <= MAX_ROBOTS);
@@ -173,6 +176,11 @@ impl Mind {
         let is_neighbour = self.compares_with(from);
         let author = batch.robot;
         let Some(learning) = &mut self.learning else { return };
+        if self.contradictions.len() < MAX_CONTRADICTIONS
+            && let Some(held) = learning.contradicted(&batch)
+        {
+            self.contradictions.push((held.clone(), batch.clone()));
+        }
         let mut news = false;
         for sample in &batch.samples.samples {
             match learning.receive(batch.samples.space, sample) {

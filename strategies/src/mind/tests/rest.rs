@@ -160,6 +160,32 @@ fn numbers_that_no_newcomer_takes_let_repair_rest() {
 }
 
 #[test]
+fn two_samples_under_one_number_are_found_where_both_come_by() {
+    let mut swarm = Swarm::new(1, config(2, 1.0), 29);
+    let share = |swarm: &mut Swarm, sequence: u32, at: f32, signed: bool| {
+        let sample = SharedSample {
+            id: SampleId { author: RobotId(9), life: 1, number: 1 },
+            class: ClassId(1),
+            round: RoundId { counter: 1, opener: RobotId(9), life: 0 },
+            vector: Vector::F32(vec![at, 0.5, 0.5, 0.5]),
+        };
+        let samples = Samples { space: space().id(), samples: vec![sample] };
+        let signature = signed.then(|| gestalt_protocol::Signature::from_bytes([sequence as u8; 64]));
+        let (stamp, message) = (Stamp { boot: 1, sequence }, Message::Samples(samples));
+        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature }));
+        let found = swarm.minds[0].take_contradictions();
+        found.into_iter().map(|(one, other)| [one.stamp.sequence, other.stamp.sequence]).collect::<Vec<_>>()
+    };
+    assert!(share(&mut swarm, 1, 0.25, true).is_empty());
+    assert!(share(&mut swarm, 2, 0.25, true).is_empty(), "the same again");
+    assert!(share(&mut swarm, 3, 0.5, false).is_empty(), "whoever signs nothing can be nobody");
+    assert_eq!(share(&mut swarm, 4, 0.5, true), [[1, 4]]);
+    for _ in 0..3 {
+        assert_eq!(share(&mut swarm, 5, 0.5, true), [[1, 5]], "once each time");
+    }
+}
+
+#[test]
 fn who_shares_much_keeps_nobody_else_from_being_passed_on() {
     let mut swarm = Swarm::new(2, LearningConfig { capacity: 5000, ..config(2, 1.0) }, 27);
     for batch in 0..60 {

@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use gestalt_protocol::{Envelope, RobotId, Stamp, Topic};
+use gestalt_protocol::{Envelope, Message, RobotId, SampleId, Samples, Stamp, Topic};
 use gestalt_strategies::is_refuted;
 
 use super::decisions::liar_is_out;
 use crate::attack::{Attack, Counted, Played, Setting, Tier};
 use crate::beside::{beside, decided_alike};
 use crate::forged;
-use crate::swarm::world::{key, roster};
+use crate::swarm::world::{key, roster, space};
 use crate::swarm::{Plan, Swarm};
 use crate::trust::{Budget, Conviction, Distrust, Verifier, Witness, statement};
 
@@ -53,7 +53,39 @@ pub const ALL: &[Attack] = &[
         gap: None,
         play: |seed| beside(&Plan::sealed().liars(1).withstanding(1), seed, goes_on, liar_is_out),
     },
+    Attack {
+        number: "9",
+        what: "an enrolled robot shares two samples under one number, the second a while after the first",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "all honest robots convict it",
+        counted: Counted::Some(&["refused_vote_convicted"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1).withstanding(1), seed, two_samples, liar_is_out),
+    },
 ];
+
+fn two_samples(swarm: &mut Swarm) {
+    let began = swarm.now();
+    swarm.begin(1);
+    let round = swarm.end(began);
+    let (id, key) = (SampleId { author: RobotId(6), life: 5, number: 1 }, key(6));
+    for (sequence, at) in [(1, 0.5), (2, -0.5)] {
+        let samples = Samples { space: space().id(), samples: vec![forged::sample(id, 1, round, &[at])] };
+        let stamp = Stamp { boot: 1, sequence };
+        let message = Message::Samples(samples);
+        let said = Envelope { author: RobotId(6), stamp, message, signature: None };
+        swarm.put(&Topic::Sample(RobotId(6)), &forged::signed(said, &key, &swarm.id()).encode());
+        swarm.pass(1000 * MS);
+    }
+    swarm.pass(8000 * MS);
+    let began = swarm.now();
+    swarm.begin(2);
+    swarm.pass(50 * MS);
+    let [vote, _] = two_votes(swarm, 3, [5, 5]);
+    swarm.put_vote(&vote);
+    swarm.end(began);
+}
 
 fn two_votes(swarm: &Swarm, sequence: u32, classes: [u32; 2]) -> [Envelope; 2] {
     let (round, id) = (swarm.round(), swarm.id());

@@ -1,8 +1,11 @@
 //! Lessons that no instructor gave.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Gesture, Instruction, Lesson, Outcome, RobotId, RoundId, Word};
+use gestalt_protocol::{
+    ClassId, Envelope, Gesture, Instruction, Lesson, Message, Outcome, RobotId, RoundId, Word,
+};
 
 use crate::attack::{Attack, Counted, Setting, Tier};
 use crate::beside::{beside, learned_alike, unmoved};
@@ -22,7 +25,7 @@ pub const ALL: &[Attack] = &[
     },
     Attack {
         number: "A9",
-        what: "an enrolled robot tells 4,096 lessons on made-up rounds as far ahead as may be",
+        what: "an enrolled robot tells 4,096 lessons on made-up rounds of the newest count",
         tier: Tier::T4,
         setting: Setting::Sealed,
         expected: "nothing",
@@ -39,6 +42,16 @@ pub const ALL: &[Attack] = &[
         counted: Counted::None("a round that nobody lived through gives way to one that somebody did"),
         gap: None,
         play: |seed| beside(&Plan::sealed().liars(1), seed, vouched_rounds, next_word_counts),
+    },
+    Attack {
+        number: "A9",
+        what: "an enrolled robot vouches for somebody who takes back what every robot's next 64 rounds showed",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "the next gestures are seen, decided and learned by all",
+        counted: Counted::All(&["refused_lesson_far_ahead"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, rounds_to_come, next_word_counts),
     },
     Attack {
         number: "A9",
@@ -107,7 +120,7 @@ fn last_rounds(swarm: &mut Swarm, from: u32) {
 fn near_rounds(swarm: &mut Swarm, from: u32) {
     let first = show_and_teach(swarm, 1);
     let of = |n: u32| {
-        let round = RoundId { counter: first.counter + n % 64, opener: RobotId(u32::MAX), life: n };
+        let round = RoundId { counter: first.counter, opener: RobotId(u32::MAX), life: n };
         forged::lesson(round, "eve", 1, Word::Was(ClassId(4)))
     };
     tell(swarm, from, (0..4096).map(of).collect());
@@ -119,7 +132,7 @@ fn vouched_rounds(swarm: &mut Swarm) {
     let first = show_and_teach(swarm, 1);
     if swarm.at_war() {
         let of = |n: u32| {
-            let round = RoundId { counter: first.counter + n % 64, opener: RobotId(u32::MAX), life: n };
+            let round = RoundId { counter: first.counter, opener: RobotId(u32::MAX), life: n };
             let was = Instruction::Was { round, class: Gesture::Class(ClassId(4)) };
             let said = forged::vouched(6, &swarm.id(), "guest", n.into(), &was);
             forged::lesson_of(said, round, "guest", n.into(), Word::Was(ClassId(4)))
@@ -130,6 +143,38 @@ fn vouched_rounds(swarm: &mut Swarm) {
     }
     swarm.pass(Duration::from_secs(5));
     show_and_teach(swarm, 2);
+}
+
+fn rounds_to_come(swarm: &mut Swarm) {
+    let first = show_and_teach(swarm, 1);
+    swarm.pass(Duration::from_secs(5));
+    let own = swarm.air().iter().filter_map(|parcel| Envelope::decode(&parcel.bytes).ok());
+    let shared = own.filter_map(|envelope| match envelope.message {
+        Message::Samples(samples) => samples.first(),
+        _ => None,
+    });
+    // A robot opens its rounds, and shares its samples, in the same life.
+    let lives: BTreeSet<(RobotId, u32)> = shared.map(|id| (id.author, id.life)).collect();
+    assert!(lives.len() > 1, "robots share what they saw");
+    if swarm.at_war() {
+        let (id, mut count) = (swarm.id(), 0);
+        let mut of = |(opener, life), n: u32| {
+            let round = RoundId { counter: first.counter + n, opener, life };
+            count += 1;
+            let said = forged::vouched(6, &id, "guest", count, &Instruction::Retract { round });
+            forged::lesson_of(said, round, "guest", count, Word::Retracted)
+        };
+        let mut lessons = Vec::new();
+        for life in lives {
+            lessons.extend((1..=64).map(|n| of(life, n)));
+        }
+        for part in lessons.chunks(256) {
+            swarm.whisper(6, &forged::lessons(part.to_vec()));
+        }
+    }
+    swarm.pass(Duration::from_secs(5));
+    show_and_teach(swarm, 2);
+    show_and_teach(swarm, 3);
 }
 
 /// The last word of all was learned: what was seen in the last round is labelled by it everywhere.

@@ -15,7 +15,7 @@ use crate::swarm::{Plan, Swarm};
 pub const ALL: &[Attack] = &[
     Attack {
         number: "A13",
-        what: "gives robot 3 20,000 samples of 80 made-up authors with a gap after each",
+        what: "gives robot 3, which starts again after it, 20,000 samples of 80 made-up authors with a gap after each",
         tier: Tier::T0,
         setting: Setting::Open,
         expected: "a robot that lost its memory is given all true samples within 30 s",
@@ -120,6 +120,8 @@ fn gaps(swarm: &mut Swarm) {
     for part in all.chunks(10_000) {
         swarm.whisper_to(3, 50, &forged::samples(part.to_vec()));
     }
+    swarm.pass(Duration::from_secs(1));
+    swarm.restart(3, false);
     swarm.restart(4, true);
     swarm.pass(Duration::from_secs(30));
 }

@@ -150,16 +150,24 @@ impl Swarm {
     pub(super) fn arrive(&mut self, i: usize, parcel: &Parcel) {
         let now = self.now;
         let heard = self.robots[i].port.take(now, parcel);
-        for input in heard.into_iter().chain(self.robots[i].port.fallen()) {
-            let is_new_roster = matches!(input, Input::Expelled(_));
-            self.tell(i, input);
-            let believer = self.robots[i].port.believer().filter(|_| is_new_roster);
-            if let Some(believer) = believer {
-                self.tell(i, Input::Believe(believer));
-            }
-        }
+        let fallen = self.robots[i].port.fallen();
+        heard.into_iter().chain(fallen).for_each(|input| self.heed(i, input));
+        let robot = &mut self.robots[i];
+        robot.port.note_contradictions(robot.mind.take_contradictions());
+        let fallen = robot.port.fallen();
+        fallen.into_iter().for_each(|input| self.heed(i, input));
         for evidence in self.robots[i].port.untold(now) {
             self.broadcast(i, &Topic::Evidence, evidence);
+        }
+    }
+
+    /// Tells a mind what arrived; by a new roster it believes others.
+    fn heed(&mut self, i: usize, input: Input) {
+        let is_new_roster = matches!(input, Input::Expelled(_));
+        self.tell(i, input);
+        let believer = self.robots[i].port.believer().filter(|_| is_new_roster);
+        if let Some(believer) = believer {
+            self.tell(i, Input::Believe(believer));
         }
     }
 

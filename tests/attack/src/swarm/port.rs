@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, DecodeError, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE,
-    MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
+    Announcement, Answer, DecodeError, Envelope, HeldBatch, Instruction, InstructorId, Keys, MAX_JSON,
+    MAX_MESSAGE, MAX_WORD, Message, Question, RobotId, SignedWord, Topic, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
 
@@ -304,7 +304,12 @@ impl Port {
     /// In a sealed swarm: who knows by the roster of today whose words count.
     pub fn believer(&self) -> Option<Arc<dyn Believe>> {
         let judge = self.judge.as_ref()?;
-        Some(Arc::new(Believer(judge.roster().clone())))
+        let roster = judge.roster().clone();
+        let robots = roster.members().robots.keys().copied();
+        Some(Arc::new(Believer {
+            convicted: robots.filter(|robot| judge.convicts(*robot)).collect(),
+            roster,
+        }))
     }
 
     fn judge(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Refusal> {
@@ -321,6 +326,14 @@ impl Port {
         let fallen = self.judge.as_mut().map(Judge::fallen).unwrap_or_default();
         let fallen: BTreeSet<RobotId> = fallen.into_iter().map(|(robot, _)| robot).collect();
         (!fallen.is_empty()).then_some(Input::Expelled(fallen))
+    }
+
+    /// What the mind found that convicts an author of samples.
+    pub fn note_contradictions(&mut self, found: Vec<(HeldBatch, HeldBatch)>) {
+        let Some(judge) = &mut self.judge else { return };
+        for (one, other) in found {
+            judge.two_samples(one, other);
+        }
     }
 
     /// The evidence that was found here, as it is told to all.
