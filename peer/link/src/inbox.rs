@@ -240,6 +240,10 @@ impl Inbox {
         let _under_way = self.is_sealed().then(|| self.checks.begin(&self.ready));
         self.believe(&envelope)?;
         let mut state = self.lock();
+        // It may have been expelled while its vote was checked.
+        if self.is_stranger(id) {
+            return Err(Refusal::Distrust(Distrust::Expelled));
+        }
         if id == self.me {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
             let echo = state.own_votes.contains(&crc32fast::hash(&bytes));
