@@ -1,13 +1,14 @@
 //! Evidence on disk, so that whoever starts again knows who lied: one file for each robot that was convicted.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::Path;
 
 use gestalt_protocol::RobotId;
 
 use crate::docket::KEPT_BYTES;
 use crate::evidence::Evidence;
+use crate::whole_file;
 
 const EXTENSION: &str = "evidence";
 
@@ -23,12 +24,7 @@ impl Evidence {
     pub fn keep(&self, folder: &Path, against: RobotId) -> io::Result<()> {
         fs::create_dir_all(folder)?;
         let path = folder.join(format!("robot-{against}.{EXTENSION}"));
-        // Several robots of one computer may share the folder, and write the same at once.
-        let beside = folder.join(format!("robot-{against}.{}", std::process::id()));
-        let mut file = File::create(&beside)?;
-        file.write_all(&self.encode())?;
-        file.sync_all()?;
-        fs::rename(&beside, &path)
+        whole_file::write(&path, &self.encode())
     }
 
     /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What cannot be read as evidence is passed over, and what it
@@ -60,6 +56,7 @@ impl Evidence {
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
     use std::time::Duration;
 
     use super::*;
@@ -112,6 +109,21 @@ mod tests {
     }
 
     #[test]
+    fn robots_of_one_process_may_keep_the_same_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let (place, evidence) = (folder.path(), &evidence(1));
+        thread::scope(|scope| {
+            let writers =
+                (0..8).map(|_| scope.spawn(|| (0..10).try_for_each(|_| evidence.keep(place, RobotId(1)))));
+            for writer in writers.collect::<Vec<_>>() {
+                writer.join().unwrap().unwrap();
+            }
+        });
+        assert_eq!(Evidence::kept_in(place).unwrap(), [evidence.clone()]);
+        assert_eq!(fs::read_dir(place).unwrap().count(), 1, "nothing is left beside it");
+    }
+
+    #[test]
     fn what_is_no_evidence_is_passed_over_and_so_is_too_much() {
         let folder = tempfile::tempdir().unwrap();
         evidence(1).keep(folder.path(), RobotId(1)).unwrap();
@@ -119,7 +131,7 @@ mod tests {
         fs::write(folder.path().join("robot-0.evidence"), &whole[..whole.len() / 2]).unwrap();
         fs::write(folder.path().join("robot-2.evidence"), vec![2; Evidence::MAX_LENGTH + 9]).unwrap();
         // Left by a power cut.
-        fs::write(folder.path().join("robot-3.77"), &whole).unwrap();
+        fs::write(folder.path().join("robot-3.evidence.77-0.new"), &whole).unwrap();
         assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [evidence(1)]);
         for name in ["robot-0.evidence", "robot-2.evidence"] {
             fs::remove_file(folder.path().join(name)).unwrap();

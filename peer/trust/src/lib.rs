@@ -88,6 +88,7 @@ pub mod statement;
 #[cfg(test)]
 mod testing;
 mod verify;
+mod whole_file;
 mod witness;
 pub mod word;
 
