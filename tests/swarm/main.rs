@@ -112,6 +112,7 @@ fn main() -> std::process::ExitCode {
         [Waits] wall::a_stranger_in_any_mode_neither_reads_nor_changes_anything.await,
         [Waits] wall::clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more.await,
         [Waits] wall::who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_back_with_a_new_key.await,
+        [Waits] wall::who_opens_many_sessions_keeps_nobody_out.await,
         [Waits] wall::an_open_robot_and_a_sealed_one_do_not_link.await,
         [Waits] filmed::frames_are_their_robots_own_and_new_whatever_a_member_makes_of_them.await,
         [Waits] wall::junk_at_the_door_keeps_no_member_out.await,

@@ -12,6 +12,7 @@ use gestalt_trust::{Instructor, Membership, Role, Roles};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
+use zenoh::Wait;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
@@ -276,6 +277,62 @@ pub async fn who_is_expelled_counts_no_more_in_the_midst_of_a_round_and_comes_ba
     authority.close().await;
     late.stop().await;
     thief.stop().await;
+    for robot in robots {
+        robot.stop().await;
+    }
+}
+
+/// Far more than a robot has room for.
+const CROWD: usize = 80;
+
+/// Opens so many sessions at once, which come again when they are hung up; those that opened.
+async fn crowd(endpoint: &str, tls: Option<&Value>) -> Vec<zenoh::Session> {
+    let mut opening = tokio::task::JoinSet::new();
+    for _ in 0..CROWD {
+        // Opening blocks, also where it is awaited.
+        let config = stranger("client", endpoint, tls);
+        opening.spawn_blocking(move || zenoh::open(config).wait());
+    }
+    opening.join_all().await.into_iter().flatten().collect()
+}
+
+pub async fn who_opens_many_sessions_keeps_nobody_out() {
+    let swarm = unique("crowded");
+    let mut members = with_eve(&swarm, 3);
+    let ada = Instructor { key: key(90).public_key(), roles: Roles::up_to(Role::Teach) };
+    members.instructors.insert("ada".parse().unwrap(), ada);
+    let (mut robots, locators) = star(2, |id, connect| sealed(id, &members, connect)).await;
+    let (tls, here) = (by_tls(&locators), robots[0].robot.for_clients().unwrap().to_owned());
+    let eve = credentials(&members, Bearer::Client("eve".parse().unwrap()), key(666)).tls();
+    let (eves, locals) = tokio::join!(crowd(&tls[0], Some(&eve)), crowd(&here, None));
+    counted(&robots[0], "refused_link_too_many", CROWD as u64).await;
+
+    // A robot that starts, an instructor, and whoever may put eve out.
+    let began = Instant::now();
+    robots.push(start(sealed(2, &members, &locators), Some(ClassId(4))).await);
+    assert!(robots[2].sees_alive(2, LINKING).await, "{:?}", robots[0].robot.status());
+    let roster = members.clone().sign(&key(1000)).unwrap();
+    let of_authority = Credentials::of_authority(Arc::new(key(1000)), &roster).unwrap();
+    let ada = credentials(&members, Bearer::Client("ada".parse().unwrap()), key(90));
+    let (authority, ada) =
+        tokio::join!(client(&swarm, &tls, Some(of_authority)), client(&swarm, &tls, Some(ada)));
+    eprintln!(
+        "{} + {} sessions opened; the others are in after {:?}",
+        eves.len(),
+        locals.len(),
+        began.elapsed()
+    );
+    ada.instruct(&"ada".parse().unwrap(), &Instruction::Open).await.unwrap();
+    agreed(&mut robots, 1, PATIENCE).await;
+    members.epoch = 2;
+    members.instructors.remove(&"eve".parse().unwrap());
+    authority.tell_roster(&members.sign(&key(1000)).unwrap()).await.unwrap();
+    counted(&robots[0], "roster_epoch", 2).await;
+    for session in eves.into_iter().chain(locals) {
+        session.close().await.unwrap();
+    }
+    ada.close().await;
+    authority.close().await;
     for robot in robots {
         robot.stop().await;
     }

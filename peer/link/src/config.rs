@@ -74,7 +74,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// The largest `size`. A sealed robot has no more than 64 sessions with others, and some of them are relays and clients.
+    /// The largest `size`. A sealed robot has no more than 64 links of others, and some of them are relays.
     pub const MAX_SIZE: usize = 50;
 }
 

@@ -27,7 +27,7 @@ use crate::error::{LinkError, reason};
 use crate::failure::Part;
 use crate::identity::robot_of;
 use crate::supervisor::Supervisor;
-use crate::tls::{Door, Knocks, Visitor};
+use crate::tls::{Door, Knocks, Seat, Stranger, Visitor};
 
 /// The other end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -173,6 +173,15 @@ pub(crate) struct Guard {
     pub account: Arc<Account>,
 }
 
+impl Guard {
+    /// Says why somebody is hung up.
+    fn refuse(&self, stranger: &Stranger) -> TurnedAway {
+        self.account.count(&format!("refused_link_{}", stranger.name()));
+        self.account.error(&format!("hung up {stranger}"));
+        TurnedAway::Stranger
+    }
+}
+
 /// For how many robots that relay for nobody a relay has room.
 pub(crate) struct Room {
     /// The robot that runs it, for which there always is.
@@ -205,6 +214,16 @@ struct Link {
     relays: bool,
     /// Whether it is one that there must be room for.
     is_member: bool,
+    /// Whose it is, in a sealed swarm.
+    seat: Option<Seat>,
+}
+
+/// Why a link is not kept.
+enum TurnedAway {
+    /// It is none of the swarm's, or one too many.
+    Stranger,
+    /// The cell is full: there are others.
+    Full,
 }
 
 impl Links {
@@ -225,25 +244,37 @@ impl Links {
     }
 
     /// Lets in the one at the other end, unless there is no room for it; the number of the link.
-    fn let_in(&self, id: ZenohId, peer: &TransportPeer, transport: TransportUnicast) -> Option<usize> {
+    fn let_in(
+        &self,
+        id: ZenohId,
+        peer: &TransportPeer,
+        seat: Option<Seat>,
+        transport: TransportUnicast,
+    ) -> Result<usize, TurnedAway> {
         let relays = peer.whatami != WhatAmI::Client;
         let is_member = self
             .room
             .as_ref()
             .is_some_and(|room| !relays && robot_of(id, room.swarm).is_some_and(|robot| robot != room.of));
         let mut state = self.lock();
-        let others = state.iter().filter(|(other, link)| **other != id && link.is_member).count();
-        if let Some(room) = self.room.as_ref().filter(|room| is_member && others >= room.size) {
+        let others = || state.iter().filter(|(other, _)| **other != id).map(|(_, link)| link);
+        if let (Some(guard), Some(seat)) = (&self.guard, &seat)
+            && !seat.is_free(others().filter_map(|link| link.seat.as_ref()))
+        {
+            return Err(guard.refuse(&Stranger::TooMany(seat.clone())));
+        }
+        let members = others().filter(|link| link.is_member).count();
+        if let Some(room) = self.room.as_ref().filter(|room| is_member && members >= room.size) {
             room.account.count("cell_full");
-            return None;
+            return Err(TurnedAway::Full);
         }
         let number = self.made.fetch_add(1, Ordering::Relaxed);
-        if let Some(before) = state.insert(id, Link { transport, number, relays, is_member }) {
+        if let Some(before) = state.insert(id, Link { transport, number, relays, is_member, seat }) {
             (self.on_link)(Far { id, relays: before.relays }, false);
         }
         // Told while it is locked: who is told asks nothing of this session before it has returned.
         (self.on_link)(Far { id, relays }, true);
-        Some(number)
+        Ok(number)
     }
 
     /// That link has gone, if it has not been replaced.
@@ -258,9 +289,9 @@ impl Links {
         }
     }
 
-    /// Whether the one at the other end may stay.
-    fn is_welcome(&self, id: ZenohId, peer: &TransportPeer) -> bool {
-        let Some(guard) = &self.guard else { return true };
+    /// Whether the one at the other end may stay, and as whom.
+    fn look_at(&self, id: ZenohId, peer: &TransportPeer) -> Result<Option<Seat>, TurnedAway> {
+        let Some(guard) = &self.guard else { return Ok(None) };
         let link = peer.links.first();
         let tls = link.is_some_and(|link| link.src.protocol().as_str() == "tls");
         let visitor = Visitor {
@@ -269,12 +300,7 @@ impl Links {
             is_client: peer.whatami == WhatAmI::Client,
             is_local: !tls,
         };
-        let refused = guard.door.admit(&visitor).err();
-        if let Some(stranger) = &refused {
-            guard.account.count(&format!("refused_link_{}", stranger.name()));
-            guard.account.error(&format!("hung up {stranger}"));
-        }
-        refused.is_none()
+        guard.door.admit(&visitor).map(Some).map_err(|stranger| guard.refuse(&stranger))
     }
 
     /// Keeps whoever knocks again and again waiting. Zenoh begins to listen to a link only when it has told of it, so until then the one at
@@ -300,7 +326,7 @@ impl Links {
         let state = self.lock();
         // One that is gone already needs no look.
         let unwelcome = |id: &ZenohId, link: &Link| {
-            link.transport.get_peer().is_ok_and(|peer| !self.is_welcome(*id, &peer))
+            link.transport.get_peer().is_ok_and(|peer| self.look_at(*id, &peer).is_err())
         };
         let unwelcome = state.iter().filter(|(id, link)| unwelcome(id, link));
         unwelcome.map(|(_, link)| link.transport.clone()).collect()
@@ -324,15 +350,18 @@ impl TransportEventHandler for Handler {
         transport: TransportUnicast,
     ) -> zenoh::Result<Arc<dyn TransportPeerEventHandler>> {
         let (links, id) = (self.0.clone(), peer.zid.into());
-        let known = links.is_welcome(id, &peer);
-        if !known {
-            links.keep_waiting(&peer);
-        }
-        let number = if known { links.let_in(id, &peer, transport.clone()) } else { None };
-        let Some(number) = number else {
-            // Zenoh asks nobody whether it may link: it can only be ended again.
-            tokio::spawn(close(transport));
-            return Ok(Arc::new(DummyTransportPeerEventHandler));
+        let entered =
+            links.look_at(id, &peer).and_then(|seat| links.let_in(id, &peer, seat, transport.clone()));
+        let number = match entered {
+            Ok(number) => number,
+            Err(refusal) => {
+                if matches!(refusal, TurnedAway::Stranger) {
+                    links.keep_waiting(&peer);
+                }
+                // Zenoh asks nobody whether it may link: it can only be ended again.
+                tokio::spawn(close(transport));
+                return Ok(Arc::new(DummyTransportPeerEventHandler));
+            }
         };
         Ok(Arc::new(OfLink { links, id, number }))
     }

@@ -11,12 +11,21 @@ const MAX_MESSAGE: usize = MAX_FRAME + 64 * 1024;
 /// How long a TLS handshake may take: a stranger who does not go on holds a file of this process as long.
 const HANDSHAKE: &str = "#tls_handshake_timeout_ms=2000";
 
+/// How many links Zenoh makes before anything is known of who is at the other end, at the same time.
+const PENDING: usize = 32;
+
+/// Room for those that are being hung up again.
+pub(super) const IN_PASSING: usize = 2 * PENDING;
+
+/// The most sessions that a robot has: those that find a [`Seat`](super::Seat), and those in passing.
+pub(super) const MAX_SESSIONS: usize = 256;
+
 /// That of a robot.
 pub(crate) fn robot(credentials: &Credentials, keys: &Keys) -> Value {
     let mut config = links(credentials);
     let extra = json!({
-        "transport/unicast/accept_pending": 32,
-        "transport/unicast/max_sessions": 64,
+        "transport/unicast/accept_pending": PENDING,
+        "transport/unicast/max_sessions": MAX_SESSIONS,
         "access_control": planes(keys),
         "low_pass_filter": [{
             "id": "small",

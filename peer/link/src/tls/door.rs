@@ -7,6 +7,7 @@ use gestalt_trust::Roster;
 use thiserror::Error;
 
 use super::name::{Bearer, Name};
+use super::seat::Seat;
 
 /// Whoever is at the other end of a link, as the transport knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,6 +36,10 @@ pub(crate) enum Stranger {
     NotEnrolled(Bearer),
     #[error("a link of {0} that says it is another one: give each robot its own key, and an id of its own")]
     Pretender(Bearer),
+    #[error("a link of {0} that would relay for others: open Zenoh in client mode")]
+    NoClient(Bearer),
+    #[error("one link more of {0} than there may be: end some of its programs")]
+    TooMany(Seat),
 }
 
 impl Stranger {
@@ -45,6 +50,8 @@ impl Stranger {
             Self::OtherSwarm(_) => "other_swarm",
             Self::NotEnrolled(_) => "not_enrolled",
             Self::Pretender(_) => "pretender",
+            Self::NoClient(_) => "no_client",
+            Self::TooMany(_) => "too_many",
         }
     }
 }
@@ -63,10 +70,14 @@ impl Door {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = roster;
     }
 
-    /// Whether to let it in.
-    pub fn admit(&self, visitor: &Visitor) -> Result<(), Stranger> {
+    /// Whether to let it in, and as whom.
+    pub fn admit(&self, visitor: &Visitor) -> Result<Seat, Stranger> {
         let Some(text) = &visitor.name else {
-            return if visitor.is_local && visitor.is_client { Ok(()) } else { Err(Stranger::Plain) };
+            return if visitor.is_local && visitor.is_client {
+                Ok(Seat::Local)
+            } else {
+                Err(Stranger::Plain)
+            };
         };
         let roster = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let other = || Stranger::OtherSwarm(text.chars().take(80).collect());
@@ -83,13 +94,14 @@ impl Door {
         if !key.is_some_and(|key| name.has_key(&key)) {
             return Err(Stranger::NotEnrolled(name.holder));
         }
-        let is_it = match (&name.holder, visitor.robot) {
-            (Bearer::Robot(robot), Some(said)) => *robot == said,
-            // A robot's program that only listens or streams.
-            (Bearer::Robot(_), None) => visitor.is_client,
-            (Bearer::Client(_) | Bearer::Authority, said) => said.is_none(),
-        };
-        if is_it { Ok(()) } else { Err(Stranger::Pretender(name.holder)) }
+        match (name.holder, visitor.robot) {
+            (Bearer::Robot(robot), Some(said)) if robot == said => Ok(Seat::Robot(robot)),
+            (holder, Some(_)) => Err(Stranger::Pretender(holder)),
+            // Whatever else has a certificate listens, speaks or streams: a robot's program, an instructor's.
+            (holder, None) if !visitor.is_client => Err(Stranger::NoClient(holder)),
+            (Bearer::Authority, None) => Ok(Seat::Authority),
+            (holder, None) => Ok(Seat::Client(holder)),
+        }
     }
 }
 
@@ -122,11 +134,12 @@ mod tests {
         let door = Door::new(roster(1, &[(1, 1), (7, 7)]));
         let robot = |id| Bearer::Robot(RobotId(id));
         let desk = || Bearer::Client("desk".parse().unwrap());
-        assert_eq!(door.admit(&visitor(robot(7), 7, Some(7))), Ok(()));
-        assert_eq!(door.admit(&visitor(desk(), 90, None)), Ok(()));
-        assert_eq!(door.admit(&visitor(Bearer::Authority, 100, None)), Ok(()));
+        let client_of = |holder, number| Visitor { is_client: true, ..visitor(holder, number, None) };
+        assert_eq!(door.admit(&visitor(robot(7), 7, Some(7))), Ok(Seat::Robot(RobotId(7))));
+        assert_eq!(door.admit(&client_of(desk(), 90)), Ok(Seat::Client(desk())));
+        assert_eq!(door.admit(&client_of(Bearer::Authority, 100)), Ok(Seat::Authority));
         let client = |is_local| Visitor { name: None, robot: None, is_client: true, is_local };
-        assert_eq!(door.admit(&client(true)), Ok(()));
+        assert_eq!(door.admit(&client(true)), Ok(Seat::Local));
         assert_eq!(door.admit(&client(false)), Err(Stranger::Plain));
         assert_eq!(door.admit(&Visitor { is_client: false, ..client(true) }), Err(Stranger::Plain));
 
@@ -136,10 +149,13 @@ mod tests {
         assert_eq!(refused(visitor(Bearer::Authority, 7, None)), "not_enrolled");
         assert_eq!(refused(visitor(Bearer::Client("eve".parse().unwrap()), 90, None)), "not_enrolled");
         assert_eq!(refused(visitor(robot(7), 7, Some(1))), "pretender");
-        assert_eq!(refused(visitor(robot(7), 7, None)), "pretender");
         assert_eq!(refused(visitor(desk(), 90, Some(1))), "pretender");
-        let listens = Visitor { is_client: true, ..visitor(robot(7), 7, None) };
-        assert_eq!(door.admit(&listens), Ok(()));
+        // Nobody relays but robots in their own name.
+        assert_eq!(refused(visitor(robot(7), 7, None)), "no_client");
+        assert_eq!(refused(visitor(desk(), 90, None)), "no_client");
+        assert_eq!(refused(visitor(Bearer::Authority, 100, None)), "no_client");
+        let listens = client_of(robot(7), 7);
+        assert_eq!(door.admit(&listens), Ok(Seat::Client(robot(7))));
         let of_the_web = Visitor { name: Some("robot1.example.org".to_owned()), ..listens };
         assert_eq!(refused(of_the_web), "other_swarm");
         let other = roster(1, &[]).members().clone();
@@ -156,6 +172,6 @@ mod tests {
         assert_eq!(door.admit(&visitor(robot(), 7, Some(7))).unwrap_err(), Stranger::NotEnrolled(robot()));
         door.follow(roster(3, &[(1, 1), (7, 77)]));
         assert!(door.admit(&visitor(robot(), 7, Some(7))).is_err());
-        assert_eq!(door.admit(&visitor(robot(), 77, Some(7))), Ok(()));
+        assert_eq!(door.admit(&visitor(robot(), 77, Some(7))), Ok(Seat::Robot(RobotId(7))));
     }
 }

@@ -10,10 +10,12 @@ mod credentials;
 mod door;
 mod knocks;
 mod name;
+mod seat;
 
 pub use certificate::{Certificate, CertificateError};
 pub(crate) use config::{bounded, client, robot};
 pub use credentials::Credentials;
-pub(crate) use door::{Door, Visitor};
+pub(crate) use door::{Door, Stranger, Visitor};
 pub(crate) use knocks::Knocks;
 pub use name::Bearer;
+pub(crate) use seat::Seat;

@@ -1,0 +1,99 @@
+//! How many links there may be of whom, so that nobody leaves no room for others.
+
+use std::fmt;
+use std::mem::discriminant;
+
+use gestalt_protocol::RobotId;
+
+use super::name::Bearer;
+
+/// Whose a link is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Seat {
+    /// A robot's own session, or a relay that it runs.
+    Robot(RobotId),
+    /// A client with a certificate: an instructor, or a robot's program that only listens or streams.
+    Client(Bearer),
+    /// A client on this computer without one. Nothing tells them apart.
+    Local,
+    /// Whoever may change the roster, of whom robots must hear whatever others do.
+    Authority,
+}
+
+impl Seat {
+    /// The most links of one holder, and of all of that kind. No kind takes the room of another, and all together are fewer than Zenoh's own
+    /// bound, below which it refuses silently and without a look at who it is.
+    const fn bounds(&self) -> (usize, usize) {
+        match self {
+            // One, and in cells a relay beside it; before a link that broke silently is missed, the same once more.
+            Self::Robot(_) => (4, 64),
+            Self::Client(_) => (8, 64),
+            Self::Local => (32, 32),
+            Self::Authority => (4, 4),
+        }
+    }
+
+    /// Whether there is room beside those that are there.
+    pub fn is_free<'a>(&self, others: impl Iterator<Item = &'a Self>) -> bool {
+        let (mut holders, mut kinds) = (0, 0);
+        for other in others {
+            holders += usize::from(other == self);
+            kinds += usize::from(discriminant(other) == discriminant(self));
+        }
+        let (of_holder, of_kind) = self.bounds();
+        holders < of_holder && kinds < of_kind
+    }
+}
+
+impl fmt::Display for Seat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Robot(robot) => write!(f, "robot {robot}"),
+            Self::Client(Bearer::Robot(robot)) => write!(f, "a program of robot {robot}"),
+            Self::Client(holder) => holder.fmt(f),
+            Self::Local => f.write_str("a program on this computer without a certificate"),
+            Self::Authority => f.write_str("the authority"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How many of those that come find room, one after the other.
+    fn seated(coming: impl Iterator<Item = Seat>) -> Vec<Seat> {
+        let mut seated = Vec::new();
+        for seat in coming {
+            if seat.is_free(seated.iter()) {
+                seated.push(seat);
+            }
+        }
+        seated
+    }
+
+    #[test]
+    fn nobody_takes_the_room_of_others() {
+        let client = |name: &str| Seat::Client(Bearer::Client(name.parse().unwrap()));
+        let of_robot = |id| Seat::Client(Bearer::Robot(RobotId(id)));
+        let greedy = [client("eve"), Seat::Robot(RobotId(7)), of_robot(7), Seat::Local, Seat::Authority];
+        let mut taken = seated((0..1000).flat_map(|_| greedy.clone()));
+        let of = |seat: &Seat| taken.iter().filter(|taken| *taken == seat).count();
+        assert_eq!(greedy.each_ref().map(of), [8, 4, 8, 32, 4]);
+        for other in [client("ada"), Seat::Robot(RobotId(8)), of_robot(8)] {
+            assert!(other.is_free(taken.iter()), "{other}");
+        }
+        // However many get together.
+        taken.extend((100..200).map(of_robot));
+        assert!(!client("ada").is_free(taken.iter()) && Seat::Robot(RobotId(8)).is_free(taken.iter()));
+    }
+
+    #[test]
+    fn zenoh_has_room_for_all_of_them() {
+        let crowd = (0..100).flat_map(|id| {
+            let robot = RobotId(id);
+            [Seat::Robot(robot), Seat::Client(Bearer::Robot(robot)), Seat::Local, Seat::Authority]
+        });
+        assert!(seated(crowd).len() + super::super::config::IN_PASSING <= super::super::config::MAX_SESSIONS);
+    }
+}
