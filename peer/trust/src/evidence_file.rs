@@ -119,7 +119,7 @@ mod tests {
                 writer.join().unwrap().unwrap();
             }
         });
-        assert_eq!(Evidence::kept_in(place).unwrap(), [evidence.clone()]);
+        assert_eq!(Evidence::kept_in(place).unwrap(), std::slice::from_ref(evidence));
         assert_eq!(fs::read_dir(place).unwrap().count(), 1, "nothing is left beside it");
     }
 
