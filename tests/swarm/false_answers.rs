@@ -5,9 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use gestalt_link::{LinkConfig, RobotConfig, Scouting};
+use gestalt_link::{Bearer, Client, Credentials, LinkConfig, RobotConfig, Scouting};
 use gestalt_protocol::ClassId;
-use gestalt_tests::{sealed, start, unique, with_eve};
+use gestalt_tests::{by_tls, credentials, key, sealed, start, unique, with_eve};
+use gestalt_trust::{Instructor, Membership, Role, Roles};
+use serde_json::{Value, json};
 
 use crate::siege::REFRACTORY;
 use crate::trouble::counted;
@@ -96,4 +98,72 @@ pub async fn robots_that_find_each_other_do_so_though_their_calls_are_answered_b
     for robot in robots {
         robot.stop().await;
     }
+}
+
+/// A router of somebody's that answers every call, as all do, and asks nobody for anything.
+async fn router(protocol: &str, scouting: &Scouting, tls: Option<&Value>) -> (zenoh::Session, String) {
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let listen = format!("{protocol}/{free}");
+    let mut zenoh = zenoh::Config::default();
+    let mut set = |key: &str, value: Value| zenoh.insert_json5(key, &value.to_string()).unwrap();
+    set("mode", json!("router"));
+    set("listen/endpoints", json!([listen]));
+    set("scouting/multicast/address", json!(scouting.address));
+    set("scouting/multicast/interface", json!(scouting.interface));
+    // It hangs on nobody else's.
+    set("scouting/multicast/autoconnect", json!([]));
+    if let Some(tls) = tls {
+        set("transport/link/tls", tls.clone());
+    }
+    (zenoh::open(zenoh).await.unwrap(), listen)
+}
+
+async fn attached(members: &Membership, ada: &Credentials, link: LinkConfig) -> Result<Option<u32>, String> {
+    let link = LinkConfig { credentials: Some(ada.clone()), ..link };
+    let client = Client::open(&members.swarm, &link).await.map_err(|error| error.to_string())?;
+    let robot = client.attached().await.map(|robot| robot.0);
+    client.close().await;
+    Ok(robot)
+}
+
+pub async fn a_client_of_a_sealed_swarm_attaches_to_its_robots_and_to_no_one_else() {
+    let mut members = with_eve(&unique("attached"), 2);
+    let teaches = Instructor { key: key(90).public_key(), roles: Roles::up_to(Role::Teach) };
+    members.instructors.insert("ada".parse().unwrap(), teaches);
+    let ada = credentials(&members, Bearer::Client("ada".parse().unwrap()), key(90));
+    let eve = credentials(&members, Bearer::Client("eve".parse().unwrap()), key(666)).tls();
+    let port = 20_000 + (std::process::id() % 20_000) as u16;
+    let scouting = Scouting { address: format!("239.255.77.79:{port}"), interface: "lo".to_owned() };
+    let (open, at) = router("tcp", &scouting, None).await;
+    let (of_eve, at_eve) = router("tls", &scouting, Some(&eve)).await;
+    let looks = || LinkConfig { scouting: Some(scouting.clone()), ..LinkConfig::default() };
+    let names = |connect: &[String]| LinkConfig { connect: connect.to_vec(), ..LinkConfig::default() };
+
+    // They answer, and nobody else does.
+    let alone = attached(&members, &ada, looks()).await;
+    assert!(alone.as_ref().is_err_and(|error| error.contains("no robot of this swarm")), "{alone:?}");
+    let named = attached(&members, &ada, names(std::slice::from_ref(&at_eve))).await;
+    assert!(named.as_ref().is_err_and(|error| error.contains("relay for others")), "{named:?}");
+    let far = attached(&members, &ada, names(&["tcp/192.0.2.1:7447".to_owned()])).await;
+    assert!(far.as_ref().is_err_and(|error| error.contains("tls/ endpoint")), "{far:?}");
+
+    let robot = sealed(1, &members, &[]);
+    let link = LinkConfig { scouting: Some(scouting.clone()), ..robot.link };
+    let robot = start(RobotConfig { link, ..robot }, Some(ClassId(4))).await;
+    for _ in 0..3 {
+        assert_eq!(attached(&members, &ada, looks()).await, Ok(Some(1)));
+    }
+    assert_eq!(attached(&members, &ada, names(&by_tls(robot.robot.locators()))).await, Ok(Some(1)));
+    let here = robot.robot.for_clients().unwrap().to_owned();
+    assert_eq!(attached(&members, &ada, names(&[here])).await, Ok(Some(1)));
+    // Her roster is of a time when that robot had another key.
+    let mut before = members.clone();
+    before.robots.insert(gestalt_protocol::RobotId(1), key(11).public_key());
+    let ada = credentials(&before, Bearer::Client("ada".parse().unwrap()), key(90));
+    let other = attached(&before, &ada, names(&by_tls(robot.robot.locators()))).await;
+    assert!(other.as_ref().is_err_and(|error| error.contains("newest roster")), "{other:?}");
+    eprintln!("strangers at {at} and {at_eve}: {alone:?}, {named:?}, {far:?}, {other:?}");
+    open.close().await.unwrap();
+    of_eve.close().await.unwrap();
+    robot.stop().await;
 }

@@ -16,6 +16,7 @@ use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
 use zenoh::sample::Sample;
 
+use super::attach::Attached;
 use super::identity::{robot_of, swarm_checksum};
 use super::tls::{Bearer, Credentials};
 use super::words::next_count;
@@ -31,6 +32,8 @@ pub struct Client {
     pub(super) keys: Keys,
     /// Whoever speaks through it, in a sealed swarm, and the count of their last word.
     speaker: Option<(Credentials, Mutex<u64>)>,
+    /// What the session is one of, in a sealed swarm.
+    attached: Option<Attached>,
 }
 
 /// The swarm's decisions, as they are announced.
@@ -45,16 +48,24 @@ pub struct Answers {
 }
 
 impl Client {
-    /// Attaches to a robot at one of `link.connect`, or to one found by `link.scouting`.
+    /// Attaches to a robot at one of `link.connect`, or to one found by `link.scouting`. With `link.credentials` to no other than a robot
+    /// on their roster, with the key that it has there, by TLS; or to whoever is at an endpoint of this computer that is named.
     ///
     /// # Errors
-    /// [`LinkError::Config`] names what Zenoh cannot take, [`LinkError::Open`] says that no robot could be
-    /// reached.
+    /// [`LinkError::Config`] names what Zenoh cannot take, and an endpoint at which anybody could be; [`LinkError::Open`] says that no
+    /// robot could be reached.
     pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
         let keys = Keys::new(swarm)?;
-        let session = zenoh::open(link.client()?).await.map_err(|error| LinkError::open(&*error))?;
+        let attached = match &link.credentials {
+            Some(credentials) => Some(Attached::open(swarm, link, credentials).await?),
+            None => None,
+        };
+        let session = match attached.as_ref().and_then(Attached::session) {
+            Some(session) => session,
+            None => zenoh::open(link.client()?).await.map_err(|error| LinkError::open(&*error))?,
+        };
         let speaker = link.credentials.clone().map(|credentials| (credentials, Mutex::new(0)));
-        Ok(Self { session, keys, speaker })
+        Ok(Self { session, keys, speaker, attached })
     }
 
     /// Every decision from now on: one message each; where a spokesrobot died while speaking, its successor may
@@ -221,6 +232,9 @@ impl Client {
     pub async fn close(self) {
         if let Err(error) = self.session.close().await {
             tracing::debug!("closing the client's session: {error}");
+        }
+        if let Some(attached) = self.attached {
+            attached.close().await;
         }
     }
 }

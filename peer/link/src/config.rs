@@ -238,7 +238,7 @@ impl LinkConfig {
     /// Zenoh's configuration for a client: it attaches to one robot and gives up after a few seconds without.
     pub(super) fn client(&self) -> Result<zenoh::Config, LinkError> {
         let wall = self.credentials.as_ref().map(tls::client).unwrap_or_default();
-        self.with_defaults(
+        let config = self.with_defaults(
             wall,
             &serde_json::json!({
                 "mode": "client",
@@ -246,7 +246,11 @@ impl LinkConfig {
                 "timestamping/enabled": true,
                 "connect/timeout_ms": 5000,
             }),
-        )
+        )?;
+        if self.credentials.is_some() {
+            reach::check_client(&config)?;
+        }
+        Ok(config)
     }
 
     /// Zenoh's configuration for a session that stands for a whole swarm: clients attach to it as to a robot.

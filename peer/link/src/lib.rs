@@ -11,6 +11,7 @@
 
 mod account;
 mod apprentice;
+mod attach;
 mod believer;
 mod boot;
 mod cells;

@@ -91,6 +91,25 @@ pub(crate) fn check_sealed(config: &zenoh::Config) -> Result<(), LinkError> {
     Ok(())
 }
 
+/// Whether there is anybody to be dialled.
+pub(crate) fn names_any(config: &zenoh::Config) -> bool {
+    !endpoints(config, "connect/endpoints").is_empty()
+}
+
+/// Refuses to let a client of a sealed swarm dial where anybody could be: without TLS it goes to its own computer alone.
+pub(crate) fn check_client(config: &zenoh::Config) -> Result<(), LinkError> {
+    let mut dialled = endpoints(config, "connect/endpoints").into_iter();
+    match dialled.find(|it| !is_tls(it) && reach(it) != Reach::Here) {
+        Some(endpoint) => Err(LinkError::Config {
+            key: "zenoh.connect.endpoints".to_owned(),
+            cause: format!(
+                "whoever is at {endpoint} could be anybody: name a tls/ endpoint of a robot, or one of this computer"
+            ),
+        }),
+        None => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,6 +141,17 @@ mod tests {
             let refused = check_open(&config(&["tcp/127.0.0.1:0", far], &[]), false).unwrap_err().to_string();
             assert!(refused.contains(far) && refused.contains("trust.insecure"), "{refused}");
             assert!(check_open(&config(&[far], &[]), true).is_ok());
+        }
+    }
+
+    #[test]
+    fn a_client_of_a_sealed_swarm_dials_by_tls_but_on_its_own_computer() {
+        for near in ["tls/10.0.0.5:7447", "tcp/127.0.0.1:7447", "tcp/localhost:7447"] {
+            assert!(check_client(&config(&[], &[near])).is_ok(), "{near}");
+        }
+        for far in ["tcp/10.0.0.5:7447", "tcp/169.254.3.4:7447", "udp/10.0.0.5:7447"] {
+            let refused = check_client(&config(&[], &["tls/10.0.0.5:7447", far])).unwrap_err().to_string();
+            assert!(refused.contains(far) && refused.contains("tls/"), "{refused}");
         }
     }
 

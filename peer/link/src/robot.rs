@@ -183,7 +183,8 @@ impl Robot {
                 None => inbox.on_link(far, up),
             }
         };
-        let guard = door.map(|door| Guard { swarm: swarm_checksum(&swarm), door, account: account.clone() });
+        let guard =
+            door.map(|door| Guard { swarm: swarm_checksum(&swarm), door, account: Some(account.clone()) });
         let node = Node::open(zenoh, guard, None, on_link).await?;
         let locators = node.locators();
         account.lock().learning = apprentice.as_ref().and_then(|apprentice| apprentice.status(&mind));

@@ -60,7 +60,8 @@ impl Node {
         room: Option<Room>,
         on_link: impl Fn(Far, bool) + Send + Sync + 'static,
     ) -> Result<Self, LinkError> {
-        let listen = config.get_json("listen/endpoints").unwrap_or_default();
+        let of = |key: &str| config.get_json(key).unwrap_or_default();
+        let (listen, dials_nobody) = (of("listen/endpoints"), of("connect/endpoints") == "[]");
         let mut runtime = RuntimeBuilder::new(config).build().await.map_err(|e| LinkError::open(&*e))?;
         let links = Arc::new(Links::new(guard, room, Box::new(on_link)));
         DynamicRuntime::from(runtime.clone()).new_handler(Arc::new(Handler(links.clone())));
@@ -69,7 +70,8 @@ impl Node {
         let node = Self { session, runtime, links, relay: Arc::default() };
         if let Err(error) = started {
             // A client says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
-            if node.runtime.whatami() == WhatAmI::Client && !node.locators().is_empty() {
+            let listens = listen == "[]" || !node.locators().is_empty();
+            if node.runtime.whatami() == WhatAmI::Client && dials_nobody && listens {
                 return Ok(node);
             }
             node.close().await;
@@ -95,6 +97,16 @@ impl Node {
     pub(super) async fn dial(&self, id: ZenohId, locators: &[String]) -> bool {
         let locators: Vec<_> = locators.iter().filter_map(|locator| locator.parse().ok()).collect();
         self.runtime.connect_peer(&id.into(), &locators).await
+    }
+
+    /// Whether it is linked to anybody.
+    pub(super) fn is_linked(&self) -> bool {
+        !self.links.lock().is_empty()
+    }
+
+    /// Why a link was ended last.
+    pub(super) fn refused(&self) -> Option<Stranger> {
+        self.links.refused.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// How many robots are linked that relay for nobody, this one itself apart.
@@ -165,21 +177,13 @@ async fn close(link: TransportUnicast) {
     }
 }
 
-/// Who guards the door of a robot of a sealed swarm.
+/// Who guards the door of a robot of a sealed swarm, or looks at whom a client of one has dialled.
 pub(crate) struct Guard {
     /// The checksum of the swarm's name.
     pub swarm: u32,
     pub door: Arc<Door>,
-    pub account: Arc<Account>,
-}
-
-impl Guard {
-    /// Says why somebody is hung up.
-    fn refuse(&self, stranger: &Stranger) -> TurnedAway {
-        self.account.count(&format!("refused_link_{}", stranger.name()));
-        self.account.error(&format!("hung up {stranger}"));
-        TurnedAway::Stranger
-    }
+    /// That of the robot. A client, which speaks to robots alone, has none.
+    pub account: Option<Arc<Account>>,
 }
 
 /// For how many robots that relay for nobody a relay has room.
@@ -203,6 +207,7 @@ struct Links {
     on_link: Box<dyn Fn(Far, bool) + Send + Sync>,
     state: Mutex<BTreeMap<ZenohId, Link>>,
     made: AtomicUsize,
+    refused: Mutex<Option<Stranger>>,
     knocks: Mutex<Knocks>,
     waiting: AtomicUsize,
 }
@@ -234,6 +239,7 @@ impl Links {
             on_link,
             state: Mutex::default(),
             made: AtomicUsize::new(0),
+            refused: Mutex::default(),
             knocks: Mutex::default(),
             waiting: AtomicUsize::new(0),
         }
@@ -258,10 +264,10 @@ impl Links {
             .is_some_and(|room| !relays && robot_of(id, room.swarm).is_some_and(|robot| robot != room.of));
         let mut state = self.lock();
         let others = || state.iter().filter(|(other, _)| **other != id).map(|(_, link)| link);
-        if let (Some(guard), Some(seat)) = (&self.guard, &seat)
+        if let Some(seat) = &seat
             && !seat.is_free(others().filter_map(|link| link.seat.as_ref()))
         {
-            return Err(guard.refuse(&Stranger::TooMany(seat.clone())));
+            return Err(self.refuse(Stranger::TooMany(seat.clone())));
         }
         let members = others().filter(|link| link.is_member).count();
         if let Some(room) = self.room.as_ref().filter(|room| is_member && members >= room.size) {
@@ -300,23 +306,38 @@ impl Links {
             is_client: peer.whatami == WhatAmI::Client,
             is_local: !tls,
         };
-        guard.door.admit(&visitor).map(Some).map_err(|stranger| guard.refuse(&stranger))
+        let is_robot = guard.account.is_some();
+        let known = if is_robot { guard.door.admit(&visitor) } else { guard.door.recognise(&visitor) };
+        known.map(Some).map_err(|stranger| self.refuse(stranger))
+    }
+
+    /// Says why somebody is hung up.
+    fn refuse(&self, stranger: Stranger) -> TurnedAway {
+        match self.guard.as_ref().and_then(|guard| guard.account.as_ref()) {
+            Some(account) => {
+                account.count(&format!("refused_link_{}", stranger.name()));
+                account.error(&format!("hung up {stranger}"));
+            }
+            None => tracing::warn!("hung up {stranger}"),
+        }
+        *self.refused.lock().unwrap_or_else(PoisonError::into_inner) = Some(stranger);
+        TurnedAway::Stranger
     }
 
     /// Keeps whoever knocks again and again waiting. Zenoh begins to listen to a link only when it has told of it, so until then the one at
     /// the other end hears nothing and is not heard, and has no reason to knock once more.
     fn keep_waiting(&self, peer: &TransportPeer) {
-        let Some(guard) = &self.guard else { return };
+        let Some(account) = self.guard.as_ref().and_then(|guard| guard.account.as_ref()) else { return };
         let name = peer.links.first().and_then(|link| link.auth_identifier.get_cert_common_name());
-        let now = guard.account.started().elapsed();
+        let now = account.started().elapsed();
         let pause =
             self.knocks.lock().unwrap_or_else(PoisonError::into_inner).pause(name.unwrap_or("plain"), now);
         if pause.is_zero() {
             return;
         }
         if self.waiting.fetch_add(1, Ordering::Relaxed) < MAX_WAITING {
-            guard.account.count("links_kept_waiting");
-            guard.account.add("links_kept_waiting_ms", u64::try_from(pause.as_millis()).unwrap_or(u64::MAX));
+            account.count("links_kept_waiting");
+            account.add("links_kept_waiting_ms", u64::try_from(pause.as_millis()).unwrap_or(u64::MAX));
             tokio::task::block_in_place(|| std::thread::sleep(pause));
         }
         self.waiting.fetch_sub(1, Ordering::Relaxed);

@@ -52,7 +52,7 @@ impl Foundation {
         let config = link.relay(*me, swarm, *nonce, count)?;
         let checksum = swarm_checksum(swarm);
         let door = door.clone();
-        let guard = door.map(|door| Guard { swarm: checksum, door, account: account.clone() });
+        let guard = door.map(|door| Guard { swarm: checksum, door, account: Some(account.clone()) });
         let room = Room { of: *me, swarm: checksum, size: cells.size, account: account.clone() };
         let links = Arc::<Mutex<BTreeSet<Far>>>::default();
         let on_link = {

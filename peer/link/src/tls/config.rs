@@ -12,12 +12,9 @@ const MAX_MESSAGE: usize = MAX_FRAME + 64 * 1024;
 const HANDSHAKE: &str = "#tls_handshake_timeout_ms=2000";
 
 /// How many links Zenoh makes before anything is known of who is at the other end, at the same time.
-const PENDING: usize = 32;
+pub(super) const PENDING: usize = 32;
 
-/// Room for those that are being hung up again.
-pub(super) const IN_PASSING: usize = 2 * PENDING;
-
-/// The most sessions that a robot has: those that find a [`Seat`](super::Seat), and those in passing.
+/// The most sessions that a robot has: those that find a [`Seat`](super::Seat), and those that are being hung up again.
 pub(super) const MAX_SESSIONS: usize = 256;
 
 /// That of a robot.
@@ -39,9 +36,12 @@ pub(crate) fn robot(credentials: &Credentials, keys: &Keys) -> Value {
     config
 }
 
-/// That of a client.
+/// That of a client. Whom it dials is chosen by the rules of its swarm, and not by who is first to answer; nobody dials it.
 pub(crate) fn client(credentials: &Credentials) -> Value {
-    links(credentials)
+    let mut config = links(credentials);
+    let extra = json!({ "mode": "client", "listen/endpoints": [], "scouting/multicast/enabled": false });
+    merge(&mut config, extra);
+    config
 }
 
 fn links(credentials: &Credentials) -> Value {

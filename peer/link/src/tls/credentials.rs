@@ -18,6 +18,7 @@ pub struct Credentials {
     pub(crate) holder: Bearer,
     pub(crate) identity: Arc<Identity>,
     pub(crate) swarm: SwarmId,
+    roster: Arc<Roster>,
     certificate: Certificate,
 }
 
@@ -33,7 +34,7 @@ impl Credentials {
         certificate: Certificate,
     ) -> Result<Self, CertificateError> {
         certificate.check(roster, holder.clone(), &identity.public_key())?;
-        Ok(Self { holder, identity, swarm: roster.swarm_id(), certificate })
+        Ok(Self { holder, identity, swarm: roster.swarm_id(), roster: Arc::new(roster.clone()), certificate })
     }
 
     /// Those of the authority itself, which writes its own certificate: to tell a running swarm of its next roster.
@@ -44,6 +45,11 @@ impl Credentials {
         let (swarm, key) = (&roster.members().swarm, authority.public_key());
         let certificate = Certificate::issue(&authority, swarm, Bearer::Authority, &key)?;
         Self::new(roster, Bearer::Authority, authority, certificate)
+    }
+
+    /// Who else is a member.
+    pub(crate) fn roster(&self) -> &Roster {
+        &self.roster
     }
 
     /// The `transport/link/tls` of Zenoh's configuration. Zenoh never writes out what is handed to it in this form.

@@ -38,6 +38,8 @@ pub(crate) enum Stranger {
     Pretender(Bearer),
     #[error("a link of {0} that would relay for others: open Zenoh in client mode")]
     NoClient(Bearer),
+    #[error("a link of {0}, which is no robot: dial one that is")]
+    NoRobot(Seat),
     #[error("one link more of {0} than there may be: end some of its programs")]
     TooMany(Seat),
 }
@@ -51,6 +53,7 @@ impl Stranger {
             Self::NotEnrolled(_) => "not_enrolled",
             Self::Pretender(_) => "pretender",
             Self::NoClient(_) => "no_client",
+            Self::NoRobot(_) => "no_robot",
             Self::TooMany(_) => "too_many",
         }
     }
@@ -101,6 +104,19 @@ impl Door {
             (holder, None) if !visitor.is_client => Err(Stranger::NoClient(holder)),
             (Bearer::Authority, None) => Ok(Seat::Authority),
             (holder, None) => Ok(Seat::Client(holder)),
+        }
+    }
+}
+
+impl Door {
+    /// Whether a client may speak to the one that it has dialled: a robot, or whoever is at the endpoint of this computer that was named.
+    pub fn recognise(&self, dialled: &Visitor) -> Result<Seat, Stranger> {
+        if dialled.name.is_none() && dialled.is_local {
+            return Ok(Seat::Local);
+        }
+        match self.admit(dialled)? {
+            robot @ Seat::Robot(_) => Ok(robot),
+            other => Err(Stranger::NoRobot(other)),
         }
     }
 }
@@ -162,6 +178,23 @@ mod tests {
         let other = Membership { swarm: "other".to_owned(), ..other }.sign(&key(100)).unwrap().swarm_id();
         let name = Name::new(&other, robot(7), &key(7).public_key()).to_string();
         assert_eq!(refused(Visitor { name: Some(name), ..visitor(robot(7), 7, Some(7)) }), "other_swarm");
+    }
+
+    #[test]
+    fn a_client_speaks_to_robots_alone_or_to_whom_it_named_here() {
+        let door = Door::new(roster(1, &[(1, 1), (7, 7)]));
+        let robot = |id| Bearer::Robot(RobotId(id));
+        assert_eq!(door.recognise(&visitor(robot(7), 7, Some(7))), Ok(Seat::Robot(RobotId(7))));
+        let here = Visitor { name: None, robot: None, is_client: false, is_local: true };
+        assert_eq!(door.recognise(&here), Ok(Seat::Local));
+        let refused = |visitor: Visitor| door.recognise(&visitor).unwrap_err().name();
+        assert_eq!(refused(Visitor { is_local: false, ..here }), "plain");
+        assert_eq!(refused(visitor(robot(7), 8, Some(7))), "not_enrolled");
+        let desk = visitor(Bearer::Client("desk".parse().unwrap()), 90, None);
+        assert_eq!(refused(desk.clone()), "no_client");
+        assert_eq!(refused(Visitor { is_client: true, ..desk }), "no_robot");
+        let authority = visitor(Bearer::Authority, 100, None);
+        assert_eq!(refused(Visitor { is_client: true, ..authority }), "no_robot");
     }
 
     #[test]

@@ -59,6 +59,7 @@ impl fmt::Display for Seat {
 
 #[cfg(test)]
 mod tests {
+    use super::super::config::{MAX_SESSIONS, PENDING};
     use super::*;
 
     /// How many of those that come find room, one after the other.
@@ -94,6 +95,6 @@ mod tests {
             let robot = RobotId(id);
             [Seat::Robot(robot), Seat::Client(Bearer::Robot(robot)), Seat::Local, Seat::Authority]
         });
-        assert!(seated(crowd).len() + super::super::config::IN_PASSING <= super::super::config::MAX_SESSIONS);
+        assert!(seated(crowd).len() + 2 * PENDING <= MAX_SESSIONS);
     }
 }
