@@ -193,3 +193,55 @@ impl Roll {
         self.account.error(&format!("{done}, but that is not kept: {failed}"));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::Status;
+    use gestalt_trust::{Identity, Membership};
+
+    use super::*;
+
+    fn roster(epoch: u64, by: u8) -> Roster {
+        let key = |number| Identity::from_bytes(&[number; 32]);
+        let robots = [(RobotId(1), key(1).public_key())].into();
+        let members = Membership { swarm: "demo".to_owned(), epoch, robots, ..Membership::default() };
+        members.sign(&key(by)).unwrap()
+    }
+
+    fn roll() -> (Roll, Judge) {
+        let held = roster(1, 100);
+        let key = held.members().robots[&RobotId(1)];
+        let status = Status::new(RobotId(1), "demo".to_owned(), 1);
+        let account = Arc::new(Account::new(status, Instant::now()));
+        (Roll::new(RobotId(1), key, held.clone(), None, account), Judge::new(held, |_| false))
+    }
+
+    #[test]
+    fn what_is_no_roster_keeps_no_roster_from_being_taken_up() {
+        let ((roll, mut judge), next) = (roll(), roster(2, 100).to_json());
+        let mut forged = roster(2, 100).to_json();
+        let digit = forged.rfind(|digit: char| digit.is_ascii_digit()).unwrap();
+        forged.replace_range(digit..=digit, if &forged[digit..=digit] == "1" { "2" } else { "1" });
+        // In a tenth of a second: junk, rosters that follow none, and some that somebody made up.
+        for _ in 0..1000 {
+            assert!(roll.may_read(1) && roll.take_up(&mut judge, b"x").is_err());
+        }
+        let older = roster(1, 101).to_json();
+        for _ in 0..50 {
+            assert!(roll.may_read(older.len()) && roll.take_up(&mut judge, older.as_bytes()).is_err());
+            assert!(roll.may_read(forged.len()) && roll.take_up(&mut judge, forged.as_bytes()).is_err());
+        }
+        assert!(roll.may_read(next.len()));
+        assert!(roll.take_up(&mut judge, next.as_bytes()).unwrap().is_some());
+        assert_eq!(roll.newest().0, 2);
+    }
+
+    #[test]
+    fn no_more_is_looked_into_than_a_tenth_of_a_core_can() {
+        let (roll, _) = roll();
+        let began = Instant::now();
+        let read = (0..100_000).filter(|_| roll.may_read(100 * 1024)).count() as u64;
+        let spans = 1 + began.elapsed().as_millis() as u64 / 100;
+        assert!((1..=(1 + spans) * (MAX_WORK / (READ * 100))).contains(&read), "{read}");
+    }
+}
