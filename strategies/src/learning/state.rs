@@ -32,11 +32,14 @@ use crate::scrutiny::{PoisonDefence, Scrutiny};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
+/// How far beyond the newest round known one may lie that is spoken of.
+const LEAP: u32 = 64;
+
 /// The most times that a robot shares before the disk has kept up.
 pub(super) const MAX_UNSENT: usize = 64;
 
 /// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
-const FURTHEST_OF_A_NEWBORN: u32 = 1_000_000;
+const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
 /// Why a received sample was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,6 +80,8 @@ pub(crate) struct Learning {
     /// Unless all are believed: which samples of others are trained on.
     pub(super) scrutiny: Option<Scrutiny>,
     pub(super) lessons: LessonBook,
+    /// The rounds of which something was said before any of that count was known here: names of rounds to come can be guessed, and whoever speaks of one does not end it.
+    pub(super) ahead: BTreeSet<RoundId>,
     pub(super) names: NameBook,
     /// In a sealed swarm: who knows who may teach.
     pub(super) believer: Option<Arc<dyn Believe>>,
@@ -173,6 +178,7 @@ impl Learning {
             set,
             scrutiny,
             lessons,
+            ahead: BTreeSet::new(),
             names,
             believer: None,
             gestures,
@@ -262,6 +268,7 @@ impl Learning {
             self.judged.doubt();
             self.doubt_samples();
             self.heard = true;
+            self.note_ahead(lesson.round);
             // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
             if self.newest.is_some() || standing > Some(Standing::Vouched) {
                 self.dirty.insert(Item::Lessons(lesson.round));
@@ -272,10 +279,9 @@ impl Learning {
         heard
     }
 
-    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds. Whoever could speak of rounds to come could end
-    /// them before they begin, as their names can be guessed.
+    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
     fn furthest(&self) -> u32 {
-        self.newest.unwrap_or(FURTHEST_OF_A_NEWBORN)
+        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
     }
 
     /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.

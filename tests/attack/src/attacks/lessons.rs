@@ -49,7 +49,7 @@ pub const ALL: &[Attack] = &[
         tier: Tier::T4,
         setting: Setting::Sealed,
         expected: "the next gestures are seen, decided and learned by all",
-        counted: Counted::All(&["refused_lesson_far_ahead"]),
+        counted: Counted::None("a round that was spoken of before it was shown is not over for that"),
         gap: None,
         play: |seed| beside(&Plan::sealed().liars(1), seed, rounds_to_come, next_word_counts),
     },
