@@ -163,11 +163,10 @@ impl LessonBook {
                 let place = |round, signed: bool| (signed, lived(round), round);
                 let known = self.rounds.iter();
                 let known = known.map(|(round, words)| place(*round, words.values().any(Said::is_signed)));
-                match known.min() {
-                    Some(last) if last < place(lesson.round, said.is_signed()) => forgotten = Some(last.2),
-                    _ => return (LessonReceipt::Full, None),
-                }
-                forgotten.into_iter().for_each(|round| self.forget(round));
+                let last = known.min().filter(|last| *last < place(lesson.round, said.is_signed()));
+                let Some((_, _, last)) = last else { return (LessonReceipt::Full, None) };
+                self.forget(last);
+                forgotten = Some(last);
             }
             None => {}
         }

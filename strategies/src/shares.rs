@@ -98,11 +98,10 @@ impl Shares {
             return None;
         }
         if excess_of_strangers >= excess {
-            let of_strangers = samples.authors_of_most().filter(|(author, _)| !self.has_met(*author));
-            let most = of_strangers.map(|(author, _)| author).next();
-            oldest_of_most(samples, |robot| Some(robot) == most)
+            let mut authors = samples.authors_of_most().map(|(author, _)| author);
+            oldest_of_most(samples, authors.find(|author| !self.has_met(*author))?)
         } else {
-            oldest_of_most(samples, |robot| robot == author)
+            oldest_of_most(samples, author)
         }
     }
 
@@ -125,9 +124,9 @@ impl Shares {
     }
 }
 
-/// Of the samples of these authors, the oldest of the class that most of them are of.
-fn oldest_of_most(samples: &HeldSamples, of: impl Fn(RobotId) -> bool) -> Option<u64> {
-    let theirs = |key: &&u64| samples.get(**key).and_then(HeldSample::author).is_some_and(&of);
+/// Of the samples of that author, the oldest of the class that most of them are of.
+fn oldest_of_most(samples: &HeldSamples, of: RobotId) -> Option<u64> {
+    let theirs = |key: &&u64| samples.get(**key).and_then(HeldSample::author) == Some(of);
     let of_class = |class| samples.part_keys(SetPart::External, class).iter().filter(theirs);
     let most = samples.classes().max_by_key(|class| (of_class(*class).count(), std::cmp::Reverse(*class)))?;
     of_class(most).next().copied()

@@ -16,15 +16,14 @@ impl Learning {
     /// From now on that one knows who may teach; what is remembered is asked about anew. What can be shown to nobody any more counts here as long as
     /// nobody else says anything.
     pub fn believe(&mut self, believer: Arc<dyn Believe>) {
-        let names = self.names.clone();
-        let proof = Proof { believer: &*believer, vocabulary: &self.vocabulary, names: &names };
+        let mut names = self.names.clone();
+        let proof = Proof { believer: &*believer, vocabulary: &self.vocabulary, names: &self.names };
         let rounds = self.lessons.judge_again(|lesson| proof.of_lesson(lesson));
-        let mut judged = names.clone();
-        let gestures = judged.judge_again(|naming| proof.of_naming(naming));
+        let gestures = names.judge_again(|naming| proof.of_naming(naming));
         self.believer = Some(believer);
         if !gestures.is_empty() {
             // There may be room for others now.
-            self.rename(|names| *names = judged);
+            self.rename(|before| *before = names);
         }
         self.dirty.extend(gestures.into_iter().map(Item::Naming));
         if !rounds.is_empty() {

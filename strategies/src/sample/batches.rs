@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use gestalt_protocol::{HeldBatch, SampleId};
 
+use super::grow::insert;
+
 /// Batches in the order of the names of their first samples. They are kept as they came, since an author signs a batch as a whole, and for
 /// as long as one sample of them is held; so there are no more of them than shared samples. None is empty.
 #[derive(Clone, Debug, Default)]
@@ -22,10 +24,7 @@ impl Batches {
         if before.is_some_and(|before| before.id >= first) || behind.is_some_and(|behind| behind <= last) {
             return None;
         }
-        if self.0.len() == self.0.capacity() {
-            self.0.reserve_exact(1 + self.0.len() / 8);
-        }
-        self.0.insert(place, batch);
+        insert(&mut self.0, place, batch);
         Some(first)
     }
 

@@ -1,9 +1,7 @@
 //! Samples by key, side by side.
 
+use super::grow::{EMPTY, insert};
 use super::held::HeldSample;
-
-/// One place in so many is empty at most, and as much room is made for more.
-const EMPTY: usize = 8;
 
 /// Samples in the order of their keys, which mostly grow: a new one is put at the end, one that goes leaves its place empty until many are. In a tree
 /// of such samples every other place would be empty.
@@ -36,13 +34,8 @@ impl InOrder {
                 self.empty -= usize::from(before.is_none());
             }
             Err(place) => {
-                if self.keys.len() == self.keys.capacity() {
-                    let more = 1 + self.keys.len() / EMPTY;
-                    self.keys.reserve_exact(more);
-                    self.samples.reserve_exact(more);
-                }
-                self.keys.insert(place, sample.key);
-                self.samples.insert(place, Some(sample));
+                insert(&mut self.keys, place, sample.key);
+                insert(&mut self.samples, place, Some(sample));
             }
         }
     }

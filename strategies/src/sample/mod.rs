@@ -1,6 +1,7 @@
 //! A sample, the samples held, and those ever seen: what rules, training set and learning speak of.
 
 mod batches;
+mod grow;
 mod held;
 mod in_order;
 mod samples;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use gestalt_protocol::{ClassId, RobotId, SampleId};
 use rand::{Rng, RngExt};
 
+use super::grow::insert;
 use super::held::{HeldSample, SetPart};
 use super::in_order::InOrder;
 
@@ -208,14 +209,6 @@ impl HeldSamples {
     pub(crate) fn set_arrivals(&mut self, arrivals: u64) {
         self.arrivals = arrivals;
     }
-}
-
-/// Puts a key into its place. A thousand robots that each hold as many keys would otherwise hold room for as many again.
-fn insert(keys: &mut Vec<u64>, place: usize, key: u64) {
-    if keys.len() == keys.capacity() {
-        keys.reserve_exact(1 + keys.len() / 8);
-    }
-    keys.insert(place, key);
 }
 
 /// One of the items at random, each as likely as the others.

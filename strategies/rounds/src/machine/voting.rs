@@ -163,10 +163,9 @@ impl Rounds {
     /// named differently for a while, but for who named it.
     pub(super) fn may_be_called(&self, decision: &Decision, label: Option<&str>) -> bool {
         let Some(label) = label else { return true };
-        let bare = |title: &str| title.rsplit_once(" (").map_or(title.len(), |(label, _)| label.len());
         match (decision.class, self.label_of(decision)) {
             (None, _) => false,
-            (Some(class), Some(known)) if class.is_named() => label[..bare(label)] == known[..bare(known)],
+            (Some(class), Some(known)) if class.is_named() => bare(label) == bare(known),
             (Some(_), known) => known.is_none_or(|known| known == label),
         }
     }
@@ -186,4 +185,9 @@ impl Rounds {
         let vocabulary = self.classifier.as_ref()?.vocabulary();
         Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.labels().len() })
     }
+}
+
+/// What a gesture is called, without who named it.
+fn bare(title: &str) -> &str {
+    title.rsplit_once(" (").map_or(title, |(label, _)| label)
 }

@@ -78,13 +78,7 @@ fn two_samples(swarm: &mut Swarm) {
         swarm.put(&Topic::Sample(RobotId(6)), &forged::signed(said, &key, &swarm.id()).encode());
         swarm.pass(1000 * MS);
     }
-    swarm.pass(8000 * MS);
-    let began = swarm.now();
-    swarm.begin(2);
-    swarm.pass(50 * MS);
-    let [vote, _] = two_votes(swarm, 3, [5, 5]);
-    swarm.put_vote(&vote);
-    swarm.end(began);
+    votes_on(swarm, 3);
 }
 
 fn two_votes(swarm: &Swarm, sequence: u32, classes: [u32; 2]) -> [Envelope; 2] {
@@ -109,11 +103,16 @@ fn two_faced(swarm: &mut Swarm) {
 
 fn goes_on(swarm: &mut Swarm) {
     two_faced(swarm);
+    votes_on(swarm, 2);
+}
+
+/// Votes in another round, after those who were lied to have had time to tell each other.
+fn votes_on(swarm: &mut Swarm, sequence: u32) {
     swarm.pass(8000 * MS);
     let began = swarm.now();
     swarm.begin(2);
     swarm.pass(50 * MS);
-    let [vote, _] = two_votes(swarm, 2, [5, 5]);
+    let [vote, _] = two_votes(swarm, sequence, [5, 5]);
     swarm.put_vote(&vote);
     swarm.end(began);
 }
