@@ -8,6 +8,7 @@ mod center;
 mod churn;
 mod clients;
 mod cost;
+mod cut_off;
 mod doctor;
 mod eyes;
 mod false_answers;
@@ -67,6 +68,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Queues] partition::a_part_that_does_not_hear_the_majority_decides_nothing_and_says_why,
         [Waits, Queues] partition::parts_of_slow_neighbours_come_together_as_soon,
         [Waits, Namespaces] partition::the_parts_of_a_cut_swarm_decide_apart_and_agree_at_the_heal,
+        [Waits, Namespaces] cut_off::a_robot_whose_neighbours_and_strangers_lose_power_lets_clients_in,
         [Waits, Namespaces] pause::a_line_that_stood_still_agrees_again,
         [Waits] trouble::votes_cost_little_while_a_round_is_open_and_nothing_otherwise.await,
         [Waits] recording::a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise.await,

@@ -47,7 +47,7 @@ pub(crate) async fn mend_deafness(
             if patience.is_over(robot, now.duration_since(since), last.map(|last| now.duration_since(last))) {
                 tracing::info!("nothing is heard from robot {robot} over its link, which is made anew");
                 account.count("links_deaf");
-                node.hang_up(id).await;
+                node.hang_up(id);
             }
         }
     }

@@ -101,7 +101,7 @@ impl Keeper {
         for (id, robot) in links {
             if plan.drop.contains(&robot) {
                 self.account.count("links_dropped");
-                self.node.hang_up(id).await;
+                self.node.hang_up(id);
             }
         }
         if plan.scout {

@@ -36,8 +36,9 @@ pub(crate) async fn keep_roll(
     loop {
         let (epoch, json) = roll.newest();
         if epoch != kept {
-            node.look_through().await;
+            // First what must not be lost, whoever is at the other end of links.
             roll.keep().await;
+            node.look_through();
             kept = epoch;
         }
         let evidence = inbox.unkept();

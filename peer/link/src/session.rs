@@ -131,21 +131,21 @@ impl Node {
         [Some(self.links.clone()), relay.as_ref().map(|relay| relay.links.clone())].into_iter().flatten()
     }
 
-    /// Ends the link to one other session, if there is one.
-    pub(super) async fn hang_up(&self, id: ZenohId) {
+    /// Ends the link to one other session, if there is one. Does not wait for its end.
+    pub(super) fn hang_up(&self, id: ZenohId) {
         for links in self.all_links() {
             let link = links.lock().get(&id).map(|link| link.transport.clone());
             if let Some(link) = link {
-                close(link).await;
+                tokio::spawn(end(link));
             }
         }
     }
 
-    /// Ends the links to all who would not be let in any more: the roster has changed.
-    pub(super) async fn look_through(&self) {
+    /// Ends the links to all who would not be let in any more: the roster has changed. Does not wait for their end.
+    pub(super) fn look_through(&self) {
         for links in self.all_links() {
             for link in links.no_longer_welcome() {
-                close(link).await;
+                tokio::spawn(end(link));
             }
         }
     }
@@ -171,9 +171,13 @@ pub(crate) async fn watch_session(session: Session, supervisor: Arc<Supervisor>)
     }
 }
 
-async fn close(link: TransportUnicast) {
-    if let Err(error) = link.close().await {
-        tracing::debug!("closing a link: {error}");
+/// Ends a link without a word. To close it properly Zenoh would say so to the other end first, and wait without a limit, on a thread that others
+/// need, for room in the queue to one who does not read.
+async fn end(link: TransportUnicast) {
+    for way in link.get_links().unwrap_or_default() {
+        if let Err(error) = link.close_link(way).await {
+            tracing::debug!("ending a link: {error}");
+        }
     }
 }
 
@@ -325,9 +329,14 @@ impl Links {
     }
 
     /// Keeps whoever knocks again and again waiting. Zenoh begins to listen to a link only when it has told of it, so until then the one at
-    /// the other end hears nothing and is not heard, and has no reason to knock once more.
-    fn keep_waiting(&self, peer: &TransportPeer) {
-        let Some(account) = self.guard.as_ref().and_then(|guard| guard.account.as_ref()) else { return };
+    /// the other end hears nothing and is not heard, and has no reason to knock once more. So long no other link with its Zenoh id can be made: who
+    /// comes with that of a robot on the roster is not kept waiting.
+    fn keep_waiting(&self, id: ZenohId, peer: &TransportPeer) {
+        let Some(guard) = &self.guard else { return };
+        let Some(account) = &guard.account else { return };
+        if robot_of(id, guard.swarm).is_some_and(|robot| guard.door.knows(robot)) {
+            return;
+        }
         let name = peer.links.first().and_then(|link| link.auth_identifier.get_cert_common_name());
         let now = account.started().elapsed();
         let pause =
@@ -377,13 +386,17 @@ impl TransportEventHandler for Handler {
             Ok(number) => number,
             Err(refusal) => {
                 if matches!(refusal, TurnedAway::Stranger) {
-                    links.keep_waiting(&peer);
+                    links.keep_waiting(id, &peer);
                 }
                 // Zenoh asks nobody whether it may link: it can only be ended again.
-                tokio::spawn(close(transport));
+                tokio::spawn(end(transport));
                 return Ok(Arc::new(DummyTransportPeerEventHandler));
             }
         };
+        // Links are looked through after each change of the roster, and one that was looked at before may be let in after that.
+        if links.look_at(id, &peer).is_err() {
+            tokio::spawn(end(transport));
+        }
         Ok(Arc::new(OfLink { links, id, number }))
     }
 

@@ -1,10 +1,10 @@
 //! A neighbour that does not read holds up nobody.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
 
-use gestalt_protocol::Keys;
+use gestalt_protocol::{Keys, RobotId};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
@@ -12,7 +12,7 @@ use tokio::time::{sleep, timeout};
 use zenoh::Wait;
 use zenoh::qos::{CongestionControl, Priority};
 
-use super::{PATIENCE, config, swarm, unique};
+use super::{PATIENCE, config, start, swarm, unique};
 use crate::RobotConfig;
 
 /// Forwards between who connects and a robot, until it is told to forward nothing more from the robot. Gives where to
@@ -36,6 +36,73 @@ async fn proxy(robot: String, open: watch::Receiver<bool>) -> String {
     format!("tcp/{at}")
 }
 
+/// A router that dials there, and keeps its links without a sign of life for a minute.
+async fn neighbour(at: String, more: &[(&str, serde_json::Value)]) -> zenoh::Session {
+    let mut config = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", serde_json::json!("router")),
+        ("listen/endpoints", serde_json::json!([])),
+        ("connect/endpoints", serde_json::json!([at])),
+        ("scouting/multicast/enabled", serde_json::json!(false)),
+        ("transport/link/tx/lease", serde_json::json!(60_000)),
+    ]
+    .iter()
+    .chain(more)
+    {
+        config.insert_json5(key, &value.to_string()).unwrap();
+    }
+    zenoh::open(config).await.unwrap()
+}
+
+/// One that says it is a robot, asks for one queue for all, fills it, and never says a word, so that it is hung up: to say so to it, there is no room.
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn a_neighbour_that_does_not_read_is_hung_up_and_delays_nobody() {
+    let name = unique();
+    let mut first: RobotConfig = config(1, &name, &[]);
+    first.link.lease = Duration::from_secs(60);
+    let mut robots = swarm(&name, 2, first).await;
+    let (open, is_open) = watch::channel(true);
+    let at = robots[0].robot.locators()[0].trim_start_matches("tcp/").to_owned();
+    let id = crate::identity::zenoh_id(RobotId(9), &name, 1);
+    let more = [("id", serde_json::json!(id)), ("transport/unicast/qos/enabled", serde_json::json!(false))];
+    let deaf = neighbour(proxy(at, is_open).await, &more).await;
+    let filler = format!("gestalt/{name}/robot/9/filler");
+    let heard = deaf.declare_subscriber(&filler).await.unwrap();
+    let session = robots[0].robot.session.clone();
+    let (fill, full) = (filler.clone(), Arc::new(AtomicBool::new(false)));
+    while heard.try_recv().unwrap().is_none() {
+        session.put(&fill, vec![0_u8; 10]).await.unwrap();
+        sleep(Duration::from_millis(50)).await;
+    }
+    open.send_replace(false);
+    let ended = full.clone();
+    let filling = std::thread::spawn(move || {
+        // What does not fit is dropped.
+        while !ended.load(Ordering::Relaxed) {
+            let put = session.put(&fill, vec![0_u8; 30_000]).congestion_control(CongestionControl::Drop);
+            put.wait().unwrap();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    });
+    let deaf_one =
+        |status: &gestalt_protocol::Status| status.counters.get("links_deaf").is_some_and(|n| *n > 0);
+    robots[0].status("it is hung up", deaf_one).await;
+    let hub = robots[0].robot.locators().to_vec();
+    robots.push(start(config(3, &name, &hub)).await);
+    robots[2].status("who comes is met", |status| status.alive.len() == 3).await;
+    let mut counter = 0;
+    for _ in 0..4 {
+        counter = robots[1].decide(counter).await.round.counter;
+    }
+    full.store(true, Ordering::Relaxed);
+    filling.join().unwrap();
+    drop(heard);
+    timeout(PATIENCE, deaf.close()).await.expect("it closes").unwrap();
+    for robot in robots {
+        timeout(PATIENCE, robot.stop()).await.expect("it stops");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn a_neighbour_that_does_not_read_delays_no_decision() {
     let name = unique();
@@ -47,17 +114,7 @@ async fn a_neighbour_that_does_not_read_delays_no_decision() {
     let mut robots = swarm(&name, 2, first).await;
     let (open, is_open) = watch::channel(true);
     let at = robots[0].robot.locators()[0].trim_start_matches("tcp/").to_owned();
-    let mut deaf = zenoh::Config::default();
-    for (key, value) in [
-        ("mode", serde_json::json!("router")),
-        ("listen/endpoints", serde_json::json!([])),
-        ("connect/endpoints", serde_json::json!([proxy(at, is_open).await])),
-        ("scouting/multicast/enabled", serde_json::json!(false)),
-        ("transport/link/tx/lease", serde_json::json!(60_000)),
-    ] {
-        deaf.insert_json5(key, &value.to_string()).unwrap();
-    }
-    let deaf = zenoh::open(deaf).await.unwrap();
+    let deaf = neighbour(proxy(at, is_open).await, &[]).await;
     let keys = Keys::new(&name).unwrap();
     let all = keys.key(&gestalt_protocol::Topic::Decision);
     let all = format!("{}/**", all.rsplit_once('/').unwrap().0);

@@ -73,6 +73,12 @@ impl Door {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = roster;
     }
 
+    /// Whether that robot is on the roster.
+    pub fn knows(&self, robot: RobotId) -> bool {
+        let roster = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        roster.members().robots.contains_key(&robot)
+    }
+
     /// Whether to let it in, and as whom.
     pub fn admit(&self, visitor: &Visitor) -> Result<Seat, Stranger> {
         let Some(text) = &visitor.name else {

@@ -49,8 +49,11 @@ use zenoh_result::{zerror, ZResult};
 
 use crate::{
     utils::{get_tls_addr, get_tls_host, get_tls_server_name, TlsClientConfig, TlsServerConfig},
-    TLS_ACCEPT_THROTTLE_TIME, TLS_DEFAULT_MTU, TLS_LINGER_TIMEOUT, TLS_LOCATOR_PREFIX,
+    TLS_ACCEPT_THROTTLE_TIME, TLS_DEFAULT_MTU, TLS_LOCATOR_PREFIX,
 };
+
+/// How long a close waits for what is not sent yet.
+const TLS_CLOSE_TIMEOUT: Duration = Duration::from_millis(100);
 
 #[derive(Default, Debug, PartialEq, Eq, Hash)]
 pub struct TlsCommonName(String);
@@ -93,18 +96,8 @@ impl LinkUnicastTls {
             );
         }
 
-        // Set the TLS linger option
-        #[allow(deprecated)]
-        if let Err(err) = tcp_stream.set_linger(Some(Duration::from_secs(
-            (*TLS_LINGER_TIMEOUT).try_into().unwrap(),
-        ))) {
-            tracing::warn!(
-                "Unable to set LINGER option on TLS link {} => {}: {}",
-                src_addr,
-                dst_addr,
-                err
-            );
-        }
+        // Changed for Gestalt: no SO_LINGER. With it the close of a socket whose other end acknowledges nothing blocks the thread that drops it,
+        // the only one that accepts links among them; without it the system goes on sending by itself.
 
         // Compute the MTU
         // See IETF RFC6691: https://datatracker.ietf.org/doc/rfc6691/
@@ -171,7 +164,8 @@ impl LinkUnicastTls {
         tracing::trace!("Closing TLS link: {}", self);
         // Flush the TLS stream
         let _guard = zasynclock!(self.write_mtx);
-        let res = self.flush().await;
+        // Changed for Gestalt: who reads nothing keeps nobody from closing.
+        let res = tokio::time::timeout(TLS_CLOSE_TIMEOUT, self.flush()).await;
         tracing::trace!("TLS link flush {}: {:?}", self, res);
         // Close the underlying TCP stream
         let res = poll_fn(|cx| Pin::new(self.stream().get_mut().0).poll_shutdown(cx)).await;
