@@ -13,9 +13,10 @@ use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
 use crate::guard::Sight;
 use crate::guests::Guests;
+use crate::inbox::Inbox;
 use crate::presence::Presence;
 use crate::robot::Robot;
-use crate::seal::SealError;
+use crate::seal::{Seal, SealError};
 use crate::supervisor::{Supervisor, run_apart};
 use crate::wake::sleep_until;
 
@@ -31,12 +32,19 @@ pub struct GuestConfig {
 }
 
 impl Robot {
+    /// Whether the swarm's newest roster has this robot with its key: in an open swarm, always.
+    #[must_use]
+    pub fn is_enrolled(&self) -> bool {
+        let robot = self.account.lock().robot;
+        self.seal.as_deref().is_none_or(|seal| self.inbox.has_key(robot, &seal.key_of(robot)))
+    }
+
     /// Starts a robot that sees and votes through this one's session, while this one's mind decides for both. It has a
     /// liveliness token, a status and votes of its own. It leaves when it is stopped or dropped, or this robot is.
     ///
     /// # Errors
-    /// [`LinkError::Guest`] when this robot has a guest of that id, or that id itself; [`LinkError::Open`] when the
-    /// session is closed.
+    /// [`LinkError::Guest`] when this robot has a guest of that id, or that id itself; [`LinkError::Seal`] when the roster does not have
+    /// it with the key that is here; [`LinkError::Open`] when the session is closed.
     pub async fn guest(&self, config: GuestConfig) -> Result<Self, LinkError> {
         let GuestConfig { id, name, boot } = config;
         let host = self.account.lock().robot;
@@ -46,7 +54,11 @@ impl Robot {
         let departure = Departure { guest: id, guests: self.guests.clone(), host: self.commands.downgrade() };
         let mut voter = Voter::new(id, boot, self.rounds.clone())?;
         if let Some(seal) = self.seal.as_deref() {
-            let signer = seal.signer_of(id).ok_or(LinkError::Seal(SealError::NotEnrolled(id)))?;
+            let not_enrolled = || LinkError::Seal(SealError::NotEnrolled(id));
+            let signer = seal.signer_of(id).ok_or_else(not_enrolled)?;
+            if !self.inbox.has_key(id, &seal.key_of(id)) {
+                return Err(not_enrolled());
+            }
             voter = voter.signed_by(signer);
         }
         let Status { vocabulary, rounds, .. } = self.account.lock().clone();
@@ -77,6 +89,8 @@ impl Robot {
             classifier: Arc::clone(&classifier),
             departure,
             sight: Sight::new(supervisor.clone()),
+            seal: self.seal.clone(),
+            inbox: self.inbox.clone(),
         };
         let (host_events, host_ended) = (self.events.subscribe(), self.supervisor.ended());
         let task = tokio::spawn(serve(guest, host_events, host_ended, supervisor.clone()));
@@ -112,6 +126,8 @@ struct Guest {
     classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
     departure: Departure,
     sight: Sight,
+    seal: Option<Arc<Seal>>,
+    inbox: Arc<Inbox>,
 }
 
 /// Runs a guest's task, and what is kept beside it, to the end.
@@ -174,6 +190,11 @@ impl Guest {
                 },
                 () = sleep_until(wake) => {}
             }
+            // The host takes what it says as it comes.
+            if !self.is_enrolled() {
+                self.account.count("expelled");
+                break;
+            }
             // The classifier may just have failed.
             if let Some(blind) = self.sight.news() {
                 self.voter.blind(blind);
@@ -183,6 +204,11 @@ impl Guest {
                 self.tell_host(Input::Received(vote)).await;
             }
         }
+    }
+
+    fn is_enrolled(&self) -> bool {
+        let me = self.departure.guest;
+        self.seal.as_deref().is_none_or(|seal| self.inbox.has_key(me, &seal.key_of(me)))
     }
 
     /// Takes over where the host stands.

@@ -238,10 +238,11 @@ impl Inbox {
             return Err(Refusal::Kind);
         }
         let _under_way = self.is_sealed().then(|| self.checks.begin(&self.ready));
+        let epoch = self.epoch();
         self.believe(&envelope)?;
         let mut state = self.lock();
-        // It may have been expelled while its vote was checked.
-        if self.is_stranger(id) {
+        // It may have been expelled, or given another key, while its vote was checked. It repeats what it may still say.
+        if self.is_stranger(id) || self.epoch() != epoch {
             return Err(Refusal::Distrust(Distrust::Expelled));
         }
         if id == self.me {

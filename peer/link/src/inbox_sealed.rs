@@ -8,7 +8,7 @@ use gestalt_protocol::{
     MAX_WORD, RobotId, Signature, SignedWord, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
-use gestalt_trust::{Distrust, MAX_ROSTER, Tag};
+use gestalt_trust::{Distrust, MAX_ROSTER, PublicKey, Tag};
 use zenoh::sample::Sample;
 
 use crate::account::Refusal;
@@ -119,6 +119,18 @@ impl Inbox {
         let signed = SignedWord { word: word.into_owned(), attachment };
         let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
         self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) })
+    }
+
+    /// Whether that robot is a member that is believed, with that key.
+    pub(super) fn has_key(&self, robot: RobotId, key: &PublicKey) -> bool {
+        self.judged(|judge, _| {
+            judge.is_member(robot) && judge.roster().members().robots.get(&robot) == Some(key)
+        }) == Some(true)
+    }
+
+    /// The epoch of the roster that it goes by.
+    pub(super) fn epoch(&self) -> Option<u64> {
+        self.judged(|judge, _| judge.roster().members().epoch)
     }
 
     /// Who knows by the roster of today whose words count.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use gestalt_protocol::{RobotId, Signature};
 use gestalt_strategies::Sign;
-use gestalt_trust::{Identity, Roster, SwarmId, statement};
+use gestalt_trust::{Identity, PublicKey, Roster, SwarmId, statement};
 use thiserror::Error;
 
 use crate::tls::{Bearer, Certificate, CertificateError, Credentials};
@@ -97,6 +97,11 @@ impl Seal {
     /// Who signs for a robot that votes through this one, if its key is here.
     pub(crate) fn signer_of(&self, guest: RobotId) -> Option<Arc<dyn Sign>> {
         Some(self.signer_with(self.guests.get(&guest)?))
+    }
+
+    /// The key that this robot has, or one that votes through it.
+    pub(crate) fn key_of(&self, robot: RobotId) -> PublicKey {
+        self.guests.get(&robot).unwrap_or(&self.identity).public_key()
     }
 
     fn signer_with(&self, identity: &Arc<Identity>) -> Arc<dyn Sign> {

@@ -199,7 +199,9 @@ impl Door {
         let seats = self.queue.seats();
         self.robot.set("robots_served", seats.len() as u64);
         for (robot, seat) in seats {
-            if seat.report(now, self.queue.count(robot)) >= center.gone_after {
+            let silent = seat.report(now, self.queue.count(robot));
+            // Who was expelled or has another key comes again as what it is by then.
+            if silent >= center.gone_after || !seat.is_enrolled() {
                 self.robot.count("robots_gone");
                 drop(self.queue.dismiss(robot));
                 seat.leave().await;

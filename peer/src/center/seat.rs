@@ -67,6 +67,11 @@ impl Seat {
         self.pace.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Whether the swarm's newest roster has the robot with the key that it votes by.
+    pub fn is_enrolled(&self) -> bool {
+        self.robot.is_enrolled()
+    }
+
     /// Looks at a frame, and tells the robot what it showed.
     ///
     /// # Errors
