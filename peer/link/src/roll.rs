@@ -13,9 +13,12 @@ use crate::account::Account;
 use crate::tls::Door;
 
 /// How much work rosters may be in each such span, in microseconds: a tenth of a core. Somebody may say so many that the authority's would find no time
-/// left, so each costs what it is worth: what is no roster, or none that follows, nearly nothing.
+/// left, so each costs what it is worth: what is no roster, or none that follows, nearly nothing. What is much longer than the roster held has a
+/// budget of its own, as large: to say that it is none it has to be read.
 const MAX_WORK: u64 = 10_000;
 const SPAN: Duration = Duration::from_millis(100);
+/// The longest that counts as no longer than the roster held: so many of its lengths, and so many bytes.
+const USUAL: (usize, usize) = (2, 4096);
 /// How much it takes to check a signature, and to read a kilobyte of JSON.
 const CHECK: u64 = 100;
 const READ: u64 = 10;
@@ -31,8 +34,29 @@ pub(crate) struct Roll {
     account: Arc<Account>,
     file: Option<PathBuf>,
     held: Mutex<Held>,
-    worked: Mutex<(Instant, u64)>,
+    usual: Allowance,
+    long: Allowance,
     news: Notify,
+}
+
+/// The work done in one span.
+struct Allowance(Mutex<(Instant, u64)>);
+
+impl Allowance {
+    fn new() -> Self {
+        Self(Mutex::new((Instant::now(), 0)))
+    }
+
+    /// Whether there is so much left of it, which is then taken.
+    fn take(&self, work: u64) -> bool {
+        let mut worked = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if worked.0.elapsed() >= SPAN {
+            *worked = (Instant::now(), 0);
+        }
+        let may = worked.1 + work <= MAX_WORK;
+        worked.1 += if may { work } else { 0 };
+        may
+    }
 }
 
 struct Held {
@@ -56,7 +80,6 @@ impl Roll {
     ) -> Self {
         account.set("roster_epoch", roster.members().epoch);
         let door = Arc::new(Door::new(roster.clone()));
-        let worked = Mutex::new((Instant::now(), 0));
         Self {
             me,
             key,
@@ -64,7 +87,8 @@ impl Roll {
             account,
             file,
             held: Mutex::new(Held::new(roster)),
-            worked,
+            usual: Allowance::new(),
+            long: Allowance::new(),
             news: Notify::new(),
         }
     }
@@ -85,17 +109,13 @@ impl Roll {
 
     /// Whether one of that length may be read now.
     pub fn may_read(&self, length: usize) -> bool {
-        self.may_work(1 + READ * length as u64 / 1024)
+        self.allowance(length).take(1 + READ * length as u64 / 1024)
     }
 
-    fn may_work(&self, work: u64) -> bool {
-        let mut worked = self.worked.lock().unwrap_or_else(PoisonError::into_inner);
-        if worked.0.elapsed() >= SPAN {
-            *worked = (Instant::now(), 0);
-        }
-        let may = worked.1 + work <= MAX_WORK;
-        worked.1 += if may { work } else { 0 };
-        may
+    /// What rosters of that length are taken out of.
+    fn allowance(&self, length: usize) -> &Allowance {
+        let (times, more) = USUAL;
+        if length <= times * self.held().json.len() + more { &self.usual } else { &self.long }
     }
 
     /// Goes by a roster that came from anywhere, if it follows the one held; the robots that have no key on it any more, or another one.
@@ -103,7 +123,8 @@ impl Roll {
     /// # Errors
     /// [`RosterError`]; the one held stays.
     pub fn take_up(&self, judge: &mut Judge, json: &[u8]) -> Result<Option<BTreeSet<RobotId>>, RosterError> {
-        let Some(next) = judge.roster().successor_if(json, || self.may_work(CHECK))? else { return Ok(None) };
+        let may_check = || self.allowance(json.len()).take(CHECK);
+        let Some(next) = judge.roster().successor_if(json, may_check)? else { return Ok(None) };
         let before = judge.roster().members().robots.clone();
         judge.adopt(next.clone())?;
         let members = next.members();
@@ -226,6 +247,8 @@ mod tests {
         for _ in 0..1000 {
             assert!(roll.may_read(1) && roll.take_up(&mut judge, b"x").is_err());
         }
+        // As much of what is too long to be read as there may be.
+        while roll.may_read(500 * 1024) || roll.may_read(64 * 1024) {}
         let older = roster(1, 101).to_json();
         for _ in 0..50 {
             assert!(roll.may_read(older.len()) && roll.take_up(&mut judge, older.as_bytes()).is_err());
