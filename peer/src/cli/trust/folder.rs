@@ -1,6 +1,7 @@
 //! The folder of whoever has the authority's key: who is a member, and with which key.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,6 +20,8 @@ pub(crate) struct Authority {
     folder: PathBuf,
     identity: Arc<Identity>,
     members: Membership,
+    /// Files that take the place of others once the roster is written, which needs them.
+    new_files: Vec<(PathBuf, PathBuf)>,
 }
 
 impl Authority {
@@ -41,7 +44,7 @@ impl Authority {
         // Whoever works on a robot's own computer could as well show it gestures.
         let members =
             Membership { swarm: swarm.to_owned(), local: Roles::up_to(Role::Teach), ..Membership::default() };
-        let mut authority = Self { folder: folder.to_owned(), identity, members };
+        let mut authority = Self { folder: folder.to_owned(), identity, members, new_files: Vec::new() };
         authority.save()?;
         Ok(authority)
     }
@@ -64,7 +67,8 @@ impl Authority {
         if roster.authority() != identity.public_key() {
             return Err(format!("{} is of another authority: choose another folder", folder.display()).into());
         }
-        Ok(Self { folder: folder.to_owned(), identity, members: roster.members().clone() })
+        let members = roster.members().clone();
+        Ok(Self { folder: folder.to_owned(), identity, members, new_files: Vec::new() })
     }
 
     /// Opens the folder, or makes a swarm there.
@@ -140,15 +144,25 @@ impl Authority {
             old.ok_or_else(|| format!("robot {robot} was never a member: gestalt trust enrol makes it one"))?;
         self.members.robots.remove(&robot);
         self.members.expelled.insert(robot, old);
+        let who = Applicant::Robot(robot);
         let Some(key) = key else {
             let file = key_file(&self.folder, robot);
-            if file.exists() {
-                fs::remove_file(&file)
-                    .map_err(|error| format!("cannot remove {}: {error}", file.display()))?;
-            }
-            return self.enrol_here(robot);
+            let new = file.with_extension("new.key");
+            remove(&new)?;
+            let key = new_identity(&new)?.public_key();
+            self.enrol(&who, key, Roles::NONE)?;
+            self.certify(&who, &key)?.write(&certificate_file(&new))?;
+            self.new_files.push((certificate_file(&new), certificate_file(&file)));
+            self.new_files.push((new, file));
+            return Ok(());
         };
-        self.enrol(&Applicant::Robot(robot), key, Roles::NONE)
+        self.enrol(&who, key, Roles::NONE)
+    }
+
+    /// Whether a client is a member with that key.
+    #[must_use]
+    pub fn has_client(&self, name: &InstructorId, key: &PublicKey) -> bool {
+        self.members.instructors.get(name).is_some_and(|held| held.key == *key)
     }
 
     /// Takes a robot or a client off the roster.
@@ -182,7 +196,7 @@ impl Authority {
         Ok(Certificate::issue(&self.identity, &self.members.swarm, holder, key)?)
     }
 
-    /// Signs the next roster and writes it.
+    /// Signs the next roster and writes it; then new keys take the place of old ones.
     ///
     /// # Errors
     /// Members that exclude each other, and a file that cannot be written.
@@ -190,6 +204,15 @@ impl Authority {
         self.members.epoch += 1;
         let roster = self.members.clone().sign(&self.identity)?;
         roster.write(&self.folder.join(ROSTER_FILE))?;
+        for (new, file) in self.new_files.drain(..) {
+            fs::rename(&new, &file).map_err(|error| {
+                format!(
+                    "the roster is written, but not {}: {error}; rename {} to it",
+                    file.display(),
+                    new.display()
+                )
+            })?;
+        }
         Ok(roster)
     }
 }
@@ -201,8 +224,8 @@ impl Authority {
 pub(super) fn key_of(folder: &Path, who: &Applicant, anew: bool) -> Result<Identity, Failure> {
     make(folder)?;
     let file = key_path(folder, who);
-    if anew && file.exists() {
-        fs::remove_file(&file).map_err(|error| format!("cannot remove {}: {error}", file.display()))?;
+    if anew {
+        remove(&file)?;
     }
     if file.exists() { Ok(Identity::read(&file)?) } else { new_identity(&file) }
 }
@@ -230,6 +253,15 @@ pub(super) fn applicant(text: &str) -> Result<Applicant, String> {
     }
     let name: Result<InstructorId, _> = text.parse();
     name.map(Applicant::Client).map_err(|error| error.to_string())
+}
+
+fn remove(file: &Path) -> Result<(), Failure> {
+    match fs::remove_file(file) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(format!("cannot remove {}: {error}", file.display()).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 fn make(folder: &Path) -> Result<(), Failure> {
@@ -296,5 +328,30 @@ mod tests {
         authority.rekey(RobotId(7), None).unwrap();
         let after = authority.save().unwrap().members().clone();
         assert!(after.robots[&RobotId(7)] != before && after.expelled[&RobotId(7)] == before);
+    }
+
+    #[test]
+    fn the_old_key_is_there_until_the_roster_has_the_new_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut authority = Authority::create(folder.path(), "demo").unwrap();
+        authority.enrol_here(RobotId(7)).unwrap();
+        let before = authority.save().unwrap();
+        let key = || Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
+        let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
+        let starts = || trust.seal(RobotId(7)).unwrap().unwrap().credentials(RobotId(7)).is_ok();
+        // Interrupted before the roster is written, twice.
+        for _ in 0..2 {
+            Authority::open(folder.path()).unwrap().rekey(RobotId(7), None).unwrap();
+            assert!(key() == before.members().robots[&RobotId(7)] && starts());
+        }
+        let mut authority = Authority::open(folder.path()).unwrap();
+        authority.rekey(RobotId(7), None).unwrap();
+        let after = authority.save().unwrap();
+        assert!(
+            key() == after.members().robots[&RobotId(7)] && key() != before.members().robots[&RobotId(7)]
+        );
+        assert!(starts());
+        let left = fs::read_dir(folder.path()).unwrap().flatten();
+        assert!(left.into_iter().all(|file| !file.file_name().to_string_lossy().contains("new")));
     }
 }

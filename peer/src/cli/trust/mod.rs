@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use gestalt_protocol::{InstructorId, RobotId};
-use gestalt_trust::{Applicant, Request, Role, Roles, Roster};
+use gestalt_trust::{Applicant, PublicKey, Request, Role, Roles, Roster};
 use serde_json::json;
 
 use self::folder::{applicant, key_of, said};
@@ -173,6 +173,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Verb::Enrol(args) => enrol(args),
         Verb::Request(args) => {
             let identity = key_of(&args.folder, &args.who, args.anew)?;
+            show_key(&args.who, &identity.public_key(), "enrol");
             say(&Request::new(args.who.clone(), &identity).to_string())
         }
         Verb::Accept(args) => accept(args),
@@ -180,6 +181,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Verb::Expel(args) => expel(args),
         Verb::Rekey(args) => rekey(args),
     }
+}
+
+/// What two people compare to know that nobody has exchanged the line between them. Beside what may be piped on.
+fn show_key(who: &Applicant, key: &PublicKey, other: &str) {
+    let key = digits(&key.to_string());
+    eprintln!("the key of {} is {key}: compare that with what `gestalt trust {other}` shows", said(who));
 }
 
 fn say(words: &str) -> Result<(), Failure> {
@@ -212,7 +219,11 @@ fn enrol(args: &Enrol) -> Result<(), Failure> {
     let words = if let Some(name) = &args.client {
         let who = Applicant::Client(name.clone());
         let folder = args.folder.join(format!("client-{name}"));
-        let identity = key_of(&folder, &who, false)?;
+        // Whoever is no member any more gets another key: the old one may be in a thief's hands.
+        let mut identity = key_of(&folder, &who, false)?;
+        if !authority.has_client(name, &identity.public_key()) {
+            identity = key_of(&folder, &who, true)?;
+        }
         authority.enrol(&who, identity.public_key(), roles)?;
         let certificate = authority.certify(&who, &identity.public_key())?;
         let words =
@@ -222,6 +233,7 @@ fn enrol(args: &Enrol) -> Result<(), Failure> {
     } else if let Some(request) = &args.request {
         authority.enrol(&request.applicant, request.key, roles)?;
         print = Some((request.applicant.clone(), authority.certify(&request.applicant, &request.key)?));
+        show_key(&request.applicant, &request.key, "request");
         format!("{} is a member; where it is, `gestalt trust accept` takes this:", said(&request.applicant))
     } else if args.local {
         for robot in &args.robots {
@@ -328,7 +340,53 @@ fn in_words(folder: &Path, roster: &Roster) -> String {
 
 /// What two people compare to know that they speak of one swarm: the first 16 digits of its id.
 fn fingerprint(roster: &Roster) -> String {
-    let id = roster.swarm_id().to_string();
-    let parts: Vec<&str> = (0..4).filter_map(|part| id.get(4 * part..4 * part + 4)).collect();
+    digits(&roster.swarm_id().to_string())
+}
+
+/// The first 16 digits, for people.
+fn digits(hex: &str) -> String {
+    let parts: Vec<&str> = (0..4).filter_map(|part| hex.get(4 * part..4 * part + 4)).collect();
     format!("({})", parts.join("-"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn run(words: &[&str]) -> Result<(), Failure> {
+        super::run(&Line::parse_from([&["trust"], words].concat()).args)
+    }
+
+    #[test]
+    fn a_client_that_was_expelled_comes_back_with_a_new_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let keys = folder.path().join("keys").display().to_string();
+        let desk = "desk".parse().unwrap();
+        let key = || {
+            let roster: Roster = Roster::read(&Path::new(&keys).join(ROSTER_FILE)).unwrap();
+            roster.members().instructors.get(&desk).map(|held| held.key)
+        };
+        run(&["new", "--swarm", "demo", &keys]).unwrap();
+        run(&["enrol", "--client", "desk", "--role", "open", &keys]).unwrap();
+        let first = key().unwrap();
+        run(&["enrol", "--client", "desk", "--role", "teach", &keys]).unwrap();
+        assert_eq!(key(), Some(first), "another role takes no key away");
+        run(&["expel", "desk", "--offline", &keys]).unwrap();
+        assert_eq!(key(), None);
+        run(&["enrol", "--client", "desk", "--role", "teach", &keys]).unwrap();
+        assert!(key().is_some_and(|key| key != first));
+        let file = Path::new(&keys).join("client-desk");
+        assert_eq!(
+            key_of(&file, &Applicant::Client(desk.clone()), false).unwrap().public_key(),
+            key().unwrap()
+        );
+    }
 }
