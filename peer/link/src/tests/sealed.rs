@@ -9,7 +9,7 @@ use zenoh::Session;
 
 use super::*;
 use crate::tls::{Bearer, Certificate, Credentials};
-use crate::{LinkConfig, Seal};
+use crate::{GuestConfig, LinkConfig, Seal};
 
 fn key(number: u8) -> Identity {
     Identity::from_bytes(&[number; 32])
@@ -81,4 +81,64 @@ async fn what_a_robot_holds_it_signs_for_whoever_asks() {
     assert_eq!(judge.announcement(Duration::ZERO, &other), Err(Distrust::Forged));
     member.close().await.unwrap();
     robot.stop().await;
+}
+
+/// Robots 1 and 7, of which the second has that key, if it is a member.
+fn with_guest(swarm: &str, epoch: u64, guest: Option<u8>) -> Roster {
+    let of_guest = guest.map(|guest| (RobotId(7), key(guest).public_key()));
+    let robots = [(RobotId(0), key(1).public_key()), (RobotId(1), key(2).public_key())];
+    let robots = robots.into_iter().chain(of_guest).collect();
+    let members = Membership { swarm: swarm.to_owned(), epoch, robots, ..Membership::default() };
+    members.sign(&key(100)).unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn a_guest_that_is_expelled_or_has_another_key_counts_no_more() {
+    for after in [None, Some(9)] {
+        let swarm = unique();
+        let roster = with_guest(&swarm, 1, Some(8));
+        let mut seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(2))).unwrap();
+        seal.guests.insert(RobotId(7), Arc::new(key(8)));
+        let config = config(1, &swarm, &[]);
+        let link = LinkConfig { listen: vec!["tls/127.0.0.1:0".to_owned()], ..config.link };
+        let host = start(RobotConfig { link, seal: Some(seal), ..config }).await;
+        // The round waits for what the host sees.
+        host.looking.abort();
+        let as_guest = || GuestConfig { id: RobotId(7), name: "guest".to_owned(), boot: 1 };
+        let guest = host.robot.guest(as_guest()).await.unwrap();
+        guest.learned(Arc::new(Fixed::default()), "fixed");
+        host.status("it is there", |status| status.alive.contains(&RobotId(7))).await;
+        host.robot.open_round();
+        let end = Instant::now() + PATIENCE;
+        while guest.open().is_none() {
+            assert!(Instant::now() < end, "no round: {:#?}", guest.status());
+            sleep(Duration::from_millis(10)).await;
+        }
+        // It votes, and says so again every second.
+        guest.observe(look());
+        sleep(Duration::from_millis(500)).await;
+        assert!(guest.is_enrolled());
+        let authority = session(&swarm, &roster, &host.robot).await;
+        let next = with_guest(&swarm, 2, after).to_json();
+        authority.put(Keys::new(&swarm).unwrap().key(&Topic::Roster), next).await.unwrap();
+        host.status("it is there no more", |status| !status.alive.contains(&RobotId(7))).await;
+        assert!(!guest.is_enrolled());
+        assert!(host.robot.guest(as_guest()).await.is_err(), "it comes back");
+        sleep(Duration::from_millis(1500)).await;
+        let mut events = host.robot.events();
+        host.robot.observe(look());
+        let held = loop {
+            match timeout(PATIENCE, events.recv()).await.expect("it decides") {
+                Ok(Event::Held(held)) => break held,
+                _ => continue,
+            }
+        };
+        let certificate = &held.certificate;
+        let counted = certificate.votes.iter().map(|vote| vote.robot);
+        let counted: Vec<_> = counted.chain(certificate.others.iter().map(|vote| vote.robot)).collect();
+        assert_eq!(counted, [RobotId(1)]);
+        drop(guest);
+        authority.close().await.unwrap();
+        host.stop().await;
+    }
 }
