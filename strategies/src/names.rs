@@ -101,10 +101,12 @@ impl NameBook {
         self.namings.insert(naming.gesture(), said);
     }
 
-    /// Whether that word, or a later one on the same gesture, is known and can be shown to others.
+    /// Whether that word, or one that goes before it by whichever right it was said, is known and can be shown to others.
     pub(crate) fn is_known(&self, naming: &Naming) -> bool {
-        let known = self.namings.get(&naming.gesture());
-        known.is_some_and(|known| known.is_proven() && order(&known.naming) >= order(naming))
+        let Some(known) = self.namings.get(&naming.gesture()) else { return false };
+        // An earlier word goes before one that somebody without a key said.
+        let by_right = right(known.standing) == Standing::Teaches;
+        known.is_proven() && (known.naming == *naming || by_right && order(&known.naming) >= order(naming))
     }
 
     /// Asks anew by which right each word was said; gives the gestures on which a word has another standing now.

@@ -288,3 +288,32 @@ fn names_that_robots_vouch_for_push_out_none_of_an_instructor_with_a_key() {
     assert!(swarm.minds.iter().all(is_named));
     swarm.check();
 }
+
+#[test]
+fn on_a_name_the_word_of_somebody_with_a_key_goes_before_a_later_one_without_in_any_order() {
+    let circle = || Gesture::Label("circle (guest)".to_owned());
+    let merged = Instruction::Same { class: circle(), of: Gesture::Class(ClassId(3)) };
+    let retired = Instruction::Retire { class: circle() };
+    let id = ClassId::named(&"guest".parse().unwrap(), "circle");
+    for turned in [false, true] {
+        let mut swarm = Swarm::sealed(41);
+        swarm.believe(ALL);
+        swarm.hear(0, "guest", 500, &Instruction::New { label: "circle".to_owned(), round: None });
+        swarm.pass(Duration::from_secs(10));
+        if turned {
+            swarm.hear(2, "guest", 700, &merged);
+            swarm.pass(Duration::from_secs(10));
+        }
+        // Neither of the two has heard of the other's word.
+        swarm.hear(0, "bob", 600, &retired);
+        swarm.hear(1, "guest", 700, &merged);
+        swarm.pass(Duration::from_secs(10));
+        for mind in &swarm.minds {
+            let names = mind.learning.as_ref().unwrap().names();
+            assert_eq!(names.get(id).unwrap().said_by.to_string(), "bob", "robot {}", mind.me());
+        }
+        assert_eq!(swarm.outcome(600), Outcome::Learned);
+        swarm.check_rest();
+        swarm.check();
+    }
+}
