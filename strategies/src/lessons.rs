@@ -349,6 +349,11 @@ impl LessonBook {
         self.rounds.contains_key(&round)
     }
 
+    /// Whether an instructor with a key spoke of a round; in an open swarm everybody counts for one.
+    pub(crate) fn is_signed(&self, round: RoundId) -> bool {
+        self.rounds.get(&round).is_some_and(|words| words.values().any(Said::is_signed))
+    }
+
     /// The rounds under that count of which something is known.
     pub fn under(&self, counter: u32) -> impl Iterator<Item = RoundId> + '_ {
         let name = |most| RoundId { counter, opener: RobotId(most), life: most };

@@ -8,16 +8,6 @@ use gestalt_rounds::{Follow, Testimony};
 
 use super::state::Learning;
 
-impl Learning {
-    /// Something was said of that round. What is said of one before any of its count is known ends none.
-    pub(super) fn note_ahead(&mut self, round: RoundId) {
-        if self.newest.is_some_and(|newest| round.counter > newest) {
-            self.ahead.insert(round);
-            self.ahead.retain(|round| self.lessons.contains(*round));
-        }
-    }
-}
-
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
         self.note_counter(round.counter);

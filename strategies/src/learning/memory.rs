@@ -314,8 +314,8 @@ impl RobotMemory {
         self.owner.is_none()
     }
 
-    /// The highest count of a round that this robot saw something of itself, or heard spoken of. What others say they saw is
-    /// not looked at: of that nobody checks the count.
+    /// The highest count of a round that this robot saw something of itself, or heard spoken of: of rounds that anybody may have made up nothing is written.
+    /// What others say they saw is not looked at: of that nobody checks the count.
     pub(crate) fn newest_counter(&self) -> Option<u32> {
         let own = self.samples.iter().filter(|sample| sample.part == SetPart::Personal);
         let rounds = own.map(|sample| sample.round);

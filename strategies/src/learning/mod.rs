@@ -1,5 +1,6 @@
 //! Learning from what is shown and told: beside the rounds, which it follows.
 
+mod ahead;
 mod believing;
 mod budget;
 mod changes;

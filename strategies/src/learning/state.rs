@@ -32,14 +32,8 @@ use crate::scrutiny::{PoisonDefence, Scrutiny};
 use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
 use crate::vector_codec::{VectorError, decode_vector};
 
-/// How far beyond the newest round known one may lie that is spoken of.
-const LEAP: u32 = 64;
-
 /// The most times that a robot shares before the disk has kept up.
 pub(super) const MAX_UNSENT: usize = 64;
-
-/// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
-const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
 /// Why a received sample was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -80,7 +74,7 @@ pub(crate) struct Learning {
     /// Unless all are believed: which samples of others are trained on.
     pub(super) scrutiny: Option<Scrutiny>,
     pub(super) lessons: LessonBook,
-    /// The rounds of which something was said before any of that count was known here: names of rounds to come can be guessed, and whoever speaks of one does not end it.
+    /// The rounds of which something was said before any of that count was known here.
     pub(super) ahead: BTreeSet<RoundId>,
     pub(super) names: NameBook,
     /// In a sealed swarm: who knows who may teach.
@@ -269,34 +263,13 @@ impl Learning {
             self.doubt_samples();
             self.heard = true;
             self.note_ahead(lesson.round);
-            // From what is on its disk a robot counts on: what anybody may tell a newborn waits until it knows of a round.
-            if self.newest.is_some() || standing > Some(Standing::Vouched) {
+            if !self.is_to_come(lesson.round) {
                 self.dirty.insert(Item::Lessons(lesson.round));
             }
             self.dirty.extend(forgotten.map(Item::Lessons));
             self.apply_to_round(lesson.round);
         }
         heard
-    }
-
-    /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
-    fn furthest(&self) -> u32 {
-        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
-    }
-
-    /// That counter is one of a round. What was said of rounds that cannot be, if there are none beyond, is forgotten.
-    pub(super) fn note_counter(&mut self, counter: u32) {
-        if self.newest >= Some(counter) {
-            return;
-        }
-        let first = self.newest.is_none();
-        self.newest = Some(counter);
-        if first {
-            // Under this key stands what was known when it was drawn.
-            self.digest();
-            let forgotten = self.lessons.forget_beyond(self.furthest());
-            self.dirty.extend(forgotten.into_iter().chain(self.lessons.all_rounds()).map(Item::Lessons));
-        }
     }
 
     /// Takes in a sample that another robot shared. Says whether it was news.
@@ -399,6 +372,7 @@ impl Learning {
                 let intervals = self.set.seen().intervals(series);
                 (!intervals.is_empty()).then(|| memory::encode(&intervals.to_vec()))
             }
+            Item::Lessons(round) if self.is_to_come(round) => None,
             Item::Lessons(round) => {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))

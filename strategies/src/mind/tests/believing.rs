@@ -1,6 +1,7 @@
 //! Whose words are believed in a sealed swarm, and by whom.
 
 use gestalt_protocol::{InstructorId, Lessons, SignedWord, Word};
+use gestalt_rounds::Follow;
 
 use super::*;
 use crate::believe::{Believe, Standing};
@@ -256,6 +257,36 @@ fn what_is_said_of_rounds_to_come_ends_none_of_them() {
         assert_eq!(swarm.of_class(class), [9, 9, 9]);
     }
     swarm.check_rest();
+}
+
+#[test]
+fn a_newborn_knows_as_over_what_an_instructor_with_a_key_spoke_of_and_older_rounds_and_no_others() {
+    let mut swarm = Swarm::sealed(42);
+    swarm.believe(ALL);
+    let mut taught = |by: &str, counter| {
+        let round = RoundId { counter, opener: RobotId(9), life: 0 };
+        let said = Some(signed(by, 1, &was(round, 1)));
+        let instructor = by.parse().unwrap();
+        let lesson = Lesson { round, instructor, count: 1, at: 1, word: Word::Was(ClassId(1)), said };
+        let message = Message::Lessons(Lessons { lessons: vec![lesson] });
+        let stamp = Stamp { boot: u32::MAX, sequence: counter };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
+        round
+    };
+    let old = taught("guest", 1);
+    let proven = taught("bob", 8);
+    let to_come = taught("guest", 9);
+    let round = swarm.show(1);
+    assert_eq!(round.counter, 1);
+    swarm.pass(Duration::from_secs(10));
+    let is_over = |swarm: &Swarm, round: RoundId| {
+        swarm.minds[0].learning.as_ref().unwrap().taught(round.counter).contains(&round)
+    };
+    assert_eq!([old, proven, to_come].map(|round| is_over(&swarm, round)), [true, true, false]);
+    // What is proven is remembered, and counted on from.
+    swarm.restart_all();
+    assert_eq!([old, proven].map(|round| is_over(&swarm, round)), [true, true]);
+    assert_eq!(swarm.show(2).counter, 9);
 }
 
 #[test]
