@@ -62,7 +62,7 @@ pub(crate) enum Declined {
 /// | changes to be trained and remembered | those of one input: they are taken after each |
 ///
 /// Beside it, in the mind: what was settled with 64 neighbours (each within the bounds of what is seen, and 64 rounds),
-/// and 64 answers that wait.
+/// 64 answers that wait, and the 64 words that were answered and heard last.
 pub(crate) struct Learning {
     pub(super) config: LearningConfig,
     pub(super) me: RobotId,

@@ -1,11 +1,13 @@
-//! One answer for each word of an instructor, from the first robot that can give it.
+//! One answer for each word of an instructor, from the first robot that can give it; and which words were heard.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use gestalt_protocol::{Answer, InstructorId};
+use gestalt_protocol::{Answer, Instruction, InstructorId};
 
-/// The most answers that wait, and the most words known to be answered.
+use super::input::Instructed;
+
+/// The most answers that wait, and the most words known to be answered, or heard.
 const MAX_WAITING: usize = 64;
 
 /// An answer that waits for its turn, and until what it says is remembered.
@@ -18,14 +20,31 @@ pub(super) struct Waiting {
     pub answer: Answer,
 }
 
-/// The answers that wait, and the words answered last, by whomever.
+/// The answers that wait, the words answered last, by whomever, and those heard last.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Answers {
     waiting: Vec<Waiting>,
     answered: VecDeque<(InstructorId, u64)>,
+    heard: VecDeque<(InstructorId, u64, Instruction)>,
 }
 
 impl Answers {
+    /// Notes a word of an open swarm; says whether it is no copy of one that was heard lately: networks repeat what they carry.
+    pub fn is_news(&mut self, word: &Instructed) -> bool {
+        let Instructed { by, at, instruction, .. } = word;
+        let same = |heard: &(InstructorId, u64, Instruction)| {
+            heard.1 == *at && heard.0 == *by && heard.2 == *instruction
+        };
+        if self.heard.iter().any(same) {
+            return false;
+        }
+        self.heard.push_back((by.clone(), *at, instruction.clone()));
+        if self.heard.len() > MAX_WAITING {
+            self.heard.pop_front();
+        }
+        true
+    }
+
     /// Whether there is nothing to answer: the word is answered, or its answer waits, or too many do.
     pub fn needs_none(&self, by: &InstructorId, at: u64) -> bool {
         let known = self.waiting.iter().any(|w| w.by == *by && w.answer.at == at);

@@ -60,12 +60,25 @@ pub enum Input {
 pub struct Instructed {
     /// Who said it.
     pub by: InstructorId,
-    /// When, in the swarm's own time, or in a sealed swarm the count that was signed with it: the same at every robot.
+    /// When, as Zenoh counts it (in 2⁻³² s since 1970), by the clock of whose client says it; or in a sealed swarm the count that was signed with it. The same at
+    /// every robot.
     pub at: u64,
     /// What was said.
     pub instruction: Instruction,
     /// In a sealed swarm the word as it was signed, to be passed on.
     pub said: Option<SignedWord>,
+}
+
+/// How much later a word may arrive than one that was said after it. What is older still may be of a clock that was set back.
+const LATE: u64 = 60 << 32;
+
+impl Instructed {
+    /// Whether it comes late, in an open swarm: its instructor spoke of the same at that `later` time. Within two seconds nothing is said of the order: some
+    /// clients say no time, and then that is all their words tell.
+    pub(super) fn is_late(&self, later: u64) -> bool {
+        let span = |at: u64| at >> 33;
+        self.said.is_none() && span(self.at) < span(later) && later - self.at < LATE
+    }
 }
 
 /// What an input is about.

@@ -22,6 +22,10 @@ const KNOWS_NOTHING: Duration = Duration::from_secs(1);
 
 impl Mind {
     pub(super) fn on_instructed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
+        // In a sealed swarm whoever hands it over has seen to that.
+        if instructed.said.is_none() && !self.answers.is_news(&instructed) {
+            return AboutRounds::Tick;
+        }
         let (outcome, named) = match self.name(&instructed) {
             Some((outcome @ (Outcome::Learned | Outcome::Known), Some(gesture))) => {
                 (self.shown_as(&instructed, gesture).unwrap_or(outcome), Some(gesture))
@@ -80,6 +84,9 @@ impl Mind {
         let Some(word) = word else { return Outcome::UnknownGesture };
         let Instructed { by, at, said, .. } = instructed;
         let latest = learning.latest(round, by);
+        if latest.is_some_and(|(_, known, _)| instructed.is_late(known)) {
+            return Outcome::Known;
+        }
         let again = latest.is_some_and(|(.., latest)| latest == word);
         let count = match latest {
             _ if said.is_some() => *at,

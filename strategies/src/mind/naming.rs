@@ -136,6 +136,9 @@ impl Learning {
         let Instructed { by: said_by, at, said, .. } = word;
         let gesture = ClassId::named(&by, &label);
         let known = self.names().get(gesture);
+        if known.is_some_and(|known| known.said_by == *said_by && word.is_late(known.at)) {
+            return (Outcome::Known, Some(gesture));
+        }
         let again = known.is_some_and(|known| known.fate == fate);
         let is_later = known.is_none_or(|known| known.count < *at);
         let count = match known {

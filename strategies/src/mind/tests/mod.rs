@@ -6,6 +6,7 @@ mod feedback;
 mod knowledge;
 mod naming;
 mod refusing;
+mod repeating;
 mod rest;
 mod sharing;
 mod trusting;
