@@ -261,16 +261,16 @@ impl LessonBook {
             _ => None,
         };
         let mut candidates = classes.clone();
-        candidates.0.extend(named);
+        candidates.classes.extend(named);
         leading.iter().for_each(|(_, said)| candidates.restrict(said.word));
-        if candidates.0.is_empty() {
+        if candidates.classes.is_empty() {
             candidates = classes.clone();
-            candidates.0.extend(named);
+            candidates.classes.extend(named);
             candidates.restrict(latest.word);
         }
         match candidates.only() {
             Some(class) => Verdict::Class(class),
-            None if candidates.0.is_empty() => Verdict::Unsaid,
+            None if candidates.classes.is_empty() => Verdict::Unsaid,
             None => Verdict::Among(candidates),
         }
     }

@@ -189,6 +189,12 @@ impl NameBook {
         Some(at)
     }
 
+    /// The gestures that were found to be the same as another, each with what it is by now.
+    pub(crate) fn merged(&self) -> impl Iterator<Item = (ClassId, ClassId)> + '_ {
+        let now = self.namings.keys().filter_map(|gesture| Some((*gesture, self.stands_for(*gesture)?)));
+        now.filter(|(gesture, now)| gesture != now)
+    }
+
     /// The gesture that an instructor means by a label: `circle (ana)` is the one that ana named so, `circle` the instructor's own, or else the only one of
     /// that label that is in use.
     #[must_use]

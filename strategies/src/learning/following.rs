@@ -7,6 +7,7 @@ use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
 use gestalt_rounds::{Follow, Testimony};
 
 use super::state::Learning;
+use crate::lessons::Verdict;
 
 impl Follow for Learning {
     fn entered(&mut self, round: RoundId) {
@@ -36,7 +37,12 @@ impl Follow for Learning {
 
     fn pool(&mut self) -> Option<Pool> {
         let Self { judged, lessons, recent, gestures, shelf, .. } = self;
-        Some(judged.pool(shelf, |round| lessons.verdict_by_names(recent.names(round), gestures)))
+        let verdict = |round| match lessons.verdict_by_names(recent.names(round), gestures) {
+            Verdict::Class(class) => Verdict::Among(gestures.all_names_of(class)),
+            Verdict::Among(candidates) => Verdict::Among(candidates.by_all_names()),
+            verdict @ (Verdict::Unsaid | Verdict::Retracted) => verdict,
+        };
+        Some(judged.pool(shelf, verdict))
     }
 
     fn keep(&mut self, vote: HeldVote) -> Arc<HeldVote> {

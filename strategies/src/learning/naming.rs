@@ -80,10 +80,11 @@ impl Learning {
         }
     }
 
-    /// Those of the list, and those that were named and are in use.
+    /// Those of the list, and those that were named and are in use; what is the same as another counts as that.
     pub(super) fn all_gestures(&self) -> Candidates {
         let listed = self.vocabulary.all();
-        Candidates::of(listed.chain(self.names.in_use(self.room_for_names())))
+        let in_use = listed.chain(self.names.in_use(self.room_for_names()));
+        Candidates::of(in_use).with_merged(self.names.merged())
     }
 
     fn classes_of_samples(&self) -> impl Iterator<Item = ClassId> + '_ {

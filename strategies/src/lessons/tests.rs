@@ -49,6 +49,35 @@ fn words_add_up_and_the_latest_settles_a_contradiction() {
     assert_eq!(verdict(&four), class(4), "only one is left");
 }
 
+#[test]
+fn who_denies_a_gesture_denies_what_it_has_become() {
+    let ring = ClassId::named(&"ana".parse().unwrap(), "ring");
+    let merged = six().with_merged([(ring, ClassId(4))]);
+    let (was_ring, not_ring) = (Word::Was(ring), Word::Not(ring));
+    for (words, left) in [
+        (vec![not_ring], vec![0, 1, 2, 3, 5]),
+        (vec![not(4)], vec![0, 1, 2, 3, 5]),
+        // A contradiction: the later counts.
+        (vec![was(4), not_ring], vec![0, 1, 2, 3, 5]),
+        (vec![was_ring, not(4)], vec![0, 1, 2, 3, 5]),
+        (vec![not_ring, was(4)], vec![4]),
+    ] {
+        let mut book = LessonBook::default();
+        for (n, word) in words.iter().enumerate() {
+            book.hear(&lesson(1, &format!("i{n}"), n as u64 + 1, *word));
+        }
+        let found = match book.verdict(RoundId { counter: 1, opener: RobotId(1), life: 0 }, &merged) {
+            Verdict::Class(class) => vec![class.0],
+            Verdict::Among(candidates) => candidates.classes.iter().map(|class| class.0).collect(),
+            verdict => panic!("{verdict:?}"),
+        };
+        assert_eq!(found, left, "{words:?}");
+    }
+    let names: Vec<ClassId> = merged.all_names_of(ring).classes.into_iter().collect();
+    assert_eq!(names, [ClassId(4), ring]);
+    assert_eq!(merged.all_names_of(ClassId(3)).only(), Some(ClassId(3)));
+}
+
 proptest! {
     #[test]
     fn the_order_and_repetition_of_lessons_make_no_difference(

@@ -91,6 +91,40 @@ fn a_sample_of_a_gesture_that_nobody_named_here_waits_for_its_name() {
 }
 
 #[test]
+fn who_says_that_it_was_not_a_gesture_denies_what_that_was_merged_into_in_any_order() {
+    let ring = anas("ring");
+    // To the classifier what is aside is either 2 or 4.
+    let guesses = |swarm: &mut Swarm| {
+        (0..2).for_each(|i| swarm.input(i, Input::Learned(Arc::new(ByFirst))));
+        let of = |trained: &BTreeMap<u64, ClassId>| {
+            trained.range(training_key(0)..).map(|(_, class)| class.0).collect::<Vec<_>>()
+        };
+        swarm.trained.iter().map(of).collect::<Vec<_>>()
+    };
+    for merged_first in [false, true] {
+        let mut swarm = Swarm::new(2, config(2, 1.0), 65);
+        swarm.say("ana", new("ring"));
+        let round = swarm.show(2);
+        let same = Instruction::Same { class: called("ring"), of: called("4") };
+        if merged_first {
+            swarm.say("ana", same.clone());
+        }
+        swarm.say("bob", Instruction::Wrong { round, of: called("2") });
+        swarm.say("ana", Instruction::Wrong { round, of: Gesture::Class(ring) });
+        if !merged_first {
+            assert_eq!(guesses(&mut swarm), [[4, 4], [4, 4]], "it is another gesture still");
+            swarm.say("ana", same);
+        }
+        assert_eq!(guesses(&mut swarm), [[]; 2] as [[u32; 0]; 2]);
+        swarm.restart(1);
+        assert_eq!(guesses(&mut swarm), [[]; 2] as [[u32; 0]; 2]);
+        swarm.say("ana", Instruction::Restore { class: called("ring") });
+        assert_eq!(guesses(&mut swarm), [[4, 4], [4, 4]], "what was merged is restored");
+        swarm.check();
+    }
+}
+
+#[test]
 fn what_makes_no_gesture_is_answered_and_changes_nothing() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 63);
     let room = MAX_CLASSES - CLASSES as usize;
