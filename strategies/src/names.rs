@@ -150,12 +150,16 @@ impl NameBook {
         places.into_iter().take(room).map(|(_, gesture)| gesture).collect()
     }
 
-    /// Whether a gesture named by that right is, or would be, one of so many in use.
-    pub(crate) fn has_room(&self, room: usize, standing: Option<Standing>, gesture: ClassId) -> bool {
-        let new = right(standing.unwrap_or(Standing::Overrules));
-        let others =
-            self.places_in_use().filter(|(Reverse(standing), other)| *other != gesture && *standing >= new);
-        others.count() < room
+    /// Whether that word leaves no more gestures in use than so many, or than there were, of those that do not give way to what is said by that right.
+    pub(crate) fn has_room(&self, room: usize, naming: &Naming, standing: Option<Standing>) -> bool {
+        let standing = standing.unwrap_or(Standing::Overrules);
+        let mut after = self.clone();
+        after.namings.insert(naming.gesture(), Said { naming: naming.clone(), standing });
+        let beside = |book: &Self| {
+            let places = book.places_in_use();
+            places.filter(|(Reverse(other), _)| *other >= right(standing)).count()
+        };
+        beside(&after) <= room.max(beside(self))
     }
 
     fn places_in_use(&self) -> impl Iterator<Item = Place> + '_ {
@@ -415,12 +419,12 @@ mod tests {
         vouched.iter().for_each(|naming| {
             before.hear_by(naming, Some(Standing::Vouched));
         });
-        assert!(after.has_room(58, Some(Standing::Vouched), circle.gesture()));
+        assert!(after.has_room(58, &circle, Some(Standing::Vouched)));
         vouched.iter().rev().for_each(|naming| {
             after.hear_by(naming, Some(Standing::Vouched));
         });
-        assert!(!after.has_room(58, Some(Standing::Vouched), circle.gesture()));
-        assert!(after.has_room(58, Some(Standing::Teaches), circle.gesture()));
+        assert!(!after.has_room(58, &circle, Some(Standing::Vouched)));
+        assert!(after.has_room(58, &circle, Some(Standing::Teaches)));
         after.hear_by(&circle, Some(Standing::Teaches));
         assert_eq!(before, after);
         assert_eq!(before.iter().count(), MAX_NAMED);

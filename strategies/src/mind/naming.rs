@@ -8,6 +8,7 @@ use gestalt_rounds::Refusal;
 use super::input::Instructed;
 use super::machine::Mind;
 use super::sample_repair::MAX_UNPROVEN;
+use crate::believe::Standing;
 use crate::learning::Learning;
 use crate::names::NamingReceipt;
 
@@ -106,20 +107,18 @@ impl Learning {
         if let Some(listed) = self.vocabulary().class(label) {
             return (Outcome::Known, Some(listed));
         }
-        if !(1..=MAX_LABEL).contains(&label.len()) || !self.has_room_for(label, said) {
+        if !(1..=MAX_LABEL).contains(&label.len()) {
             return (Outcome::NoRoom, None);
         }
         self.say_of(by.clone(), label.to_owned(), said, Fate::InUse)
     }
 
-    /// Whether what that word names would be one of the gestures in use.
-    fn has_room_for(&self, label: &str, word: &Instructed) -> bool {
-        let Instructed { by, at, said, .. } = word;
-        let (by, said_by, said) = (by.clone(), by.clone(), said.clone());
-        let naming =
-            Naming { by, label: label.to_owned(), count: *at, at: *at, said_by, fate: Fate::InUse, said };
-        let standing = self.standing_of_naming(&naming);
-        self.names().has_room(self.room_for_names(), standing, naming.gesture())
+    /// Whether there is room for what that word leaves in use, if it changes anything.
+    fn has_room_for(&self, naming: &Naming) -> bool {
+        let (names, standing) = (self.names(), self.standing_of_naming(naming));
+        let counts =
+            standing != Some(Standing::Unproven) && names.would_hear(naming, standing) == NamingReceipt::New;
+        !counts || names.has_room(self.room_for_names(), naming, standing)
     }
 
     /// Says what became of a gesture that was named, whoever named it.
@@ -148,6 +147,10 @@ impl Learning {
             None => 1,
         };
         let naming = Naming { by, label, count, at: *at, said_by: said_by.clone(), fate, said: said.clone() };
+        // Some other that is in use would be told apart no more.
+        if !self.has_room_for(&naming) {
+            return (Outcome::NoRoom, None);
+        }
         match self.hear_naming(&naming) {
             NamingReceipt::New if !again => (Outcome::Learned, Some(gesture)),
             // Somebody with a key has spoken of it, and this one has none.

@@ -152,6 +152,39 @@ fn what_makes_no_gesture_is_answered_and_changes_nothing() {
     assert_eq!(swarm.outcome(named), Outcome::Learned);
 }
 
+#[test]
+fn what_would_leave_more_gestures_in_use_than_there_is_room_for_is_refused() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 66);
+    let gesture = |n: usize| called(&format!("gesture {n}"));
+    let room = MAX_CLASSES - CLASSES as usize;
+    let expect = |swarm: &mut Swarm, word: Instruction, outcome: Outcome| {
+        let before = swarm.names(0).clone();
+        let said = swarm.say("ana", word.clone());
+        assert_eq!(swarm.outcome(said), outcome, "{word:?}");
+        if outcome != Outcome::Learned {
+            assert_eq!(swarm.names(0), &before, "{word:?}");
+        }
+        assert!(swarm.names(0).in_use(MAX_CLASSES).len() <= room, "{word:?}");
+        swarm.check_names();
+    };
+    for n in 0..room {
+        expect(&mut swarm, new(&format!("gesture {n}")), Outcome::Learned);
+    }
+    expect(&mut swarm, Instruction::Retire { class: gesture(7) }, Outcome::Learned);
+    expect(&mut swarm, new("one more"), Outcome::Learned);
+    expect(&mut swarm, Instruction::Restore { class: gesture(7) }, Outcome::NoRoom);
+    // A merge taken back.
+    expect(&mut swarm, Instruction::Same { class: gesture(1), of: called("3") }, Outcome::Learned);
+    expect(&mut swarm, new("yet one"), Outcome::Learned);
+    expect(&mut swarm, Instruction::Restore { class: gesture(1) }, Outcome::NoRoom);
+    // What is the same in a circle is one gesture, where each was none.
+    expect(&mut swarm, Instruction::Same { class: gesture(1), of: gesture(7) }, Outcome::Learned);
+    expect(&mut swarm, Instruction::Same { class: gesture(7), of: gesture(1) }, Outcome::NoRoom);
+    expect(&mut swarm, Instruction::Restore { class: gesture(2) }, Outcome::Known);
+    expect(&mut swarm, Instruction::Retire { class: gesture(2) }, Outcome::Learned);
+    expect(&mut swarm, Instruction::Restore { class: gesture(7) }, Outcome::Learned);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
