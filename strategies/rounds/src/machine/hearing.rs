@@ -5,8 +5,7 @@ use std::cmp::Ordering;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, RoundId,
-    Stamp,
+    Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, RoundId, Stamp,
 };
 
 use super::members::expected;
@@ -111,25 +110,6 @@ impl Rounds {
             self.tell_have(wanted.holder, false, effects);
             let (due, asked) = (self.now + self.config.repair_busy, wanted.asked + 1);
             self.wanted = (asked < ASKED).then_some(Wanted { due, asked, ..wanted });
-        }
-    }
-
-    pub(super) fn on_announced(&mut self, announcement: Announcement, effects: &mut Effects<'_>) {
-        let Announcement { decision, announcer, label, .. } = announcement;
-        if !self.may_hear(&decision, announcer, false) {
-            return;
-        }
-        // Clients act on the word. What is said under a false one was not said: this robot says it itself.
-        if !self.may_be_called(&decision, label.as_deref()) {
-            return self.refusals.add(Refusal::Label);
-        }
-        let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
-        // What nobody would decide, nobody announced.
-        if self.hear_decision(decision, effects) != Heard::Refused
-            && self.is_this_round(id)
-            && let Some(round) = &mut self.round
-        {
-            round.agreement.note_announced(self.now, class, is_final);
         }
     }
 

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! Input ─► Rounds: course (open, look, close) ─► Output
-//!                  voting (speak, decide, announce)
+//!                  voting (speak, decide)
+//!                  announcing (the decision, aloud for the swarm)
 //!                  hearing (votes and decisions of others)
 //!                  repair (what a neighbour lacks)
 //! ```
 
 mod allowance;
+mod announcing;
 mod committee;
 mod course;
 mod expulsion;

@@ -1,15 +1,13 @@
-//! What a robot says itself: its vote, the decision it holds, and, when it is its turn, that of the swarm.
+//! What a robot says itself: its vote, and the decision it holds.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::time::Duration;
 
-use gestalt_protocol::{Announced, Announcement, Decision, Envelope, Holder, Message, RobotId};
+use gestalt_protocol::{Envelope, Holder, Message, RobotId};
 
 use super::members::expected;
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
-use crate::agreement::Agreement;
 use crate::ballot::Scale;
 use crate::others::Others;
 use crate::round::{Round, Speaker, View};
@@ -109,85 +107,8 @@ impl Rounds {
         (effects.carry_out)(Output::Broadcast(envelope));
     }
 
-    /// How long this robot leaves to those before it whatever one robot is to say for all: the live robot of the smallest
-    /// id speaks first, each next one waits a while longer for the one before.
-    #[must_use]
-    pub fn turn(&self) -> Duration {
-        self.config.takeover.saturating_mul(self.turns)
-    }
-
-    /// When this robot, as the spokesrobot or in its place, is to announce the decision it holds.
-    pub(super) fn announcement(&self) -> Option<Duration> {
-        let wait = self.config.settle.saturating_add(self.turn());
-        let agreement = &self.round.as_ref()?.agreement;
-        // Asked at every input: that many hold it is counted only while there is something to announce.
-        if agreement.held().is_none() || agreement.is_announced() {
-            return None;
-        }
-        agreement.announcement(wait, self.is_final(agreement), self.config.deadline)
-    }
-
-    pub(super) fn announce(&mut self, effects: &mut Effects<'_>) {
-        let is_final = self.round.as_ref().is_some_and(|round| self.is_final(&round.agreement));
-        let Some(agreement) = self.round.as_mut().map(|round| &mut round.agreement) else { return };
-        if let Some(decision) = agreement.held().cloned() {
-            agreement.note_announced(self.now, decision.class, is_final);
-            let said = self.aloud(Decision { is_final, ..decision });
-            let announcement = Announcement::of(self.stamped(said));
-            if let Some(announcement) = announcement {
-                (effects.carry_out)(Output::Announce(announcement));
-            }
-        }
-    }
-
-    /// The decision held as this robot says it to whoever asks; `None` while it holds none. It has its stamp and no signature yet: few ask, and a
-    /// signature takes longer than all else of it.
-    #[must_use]
-    pub fn held_aloud(&mut self) -> Option<Announcement> {
-        let agreement = &self.round.as_ref()?.agreement;
-        let (is_final, decision) = (self.is_final(agreement), agreement.held()?.clone());
-        let said = self.aloud(Decision { is_final, ..decision });
-        Announcement::of(self.unsigned(said))
-    }
-
-    /// What its gesture is called, if this robot has the vocabulary that it was decided by.
-    #[must_use]
-    pub fn label_of(&self, decision: &Decision) -> Option<&str> {
-        let known = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
-        let vocabulary = known.or(self.vocabulary.as_ref())?;
-        let class = decision.class.filter(|_| vocabulary.id() == decision.certificate.vocabulary)?;
-        vocabulary.label(class).or_else(|| self.names.get(&class).map(String::as_str))
-    }
-
-    /// Whether a decision may be announced under that label, as far as this robot knows what its gesture is called. Two robots may call one that was
-    /// named differently for a while, but for who named it.
-    pub(super) fn may_be_called(&self, decision: &Decision, label: Option<&str>) -> bool {
-        let Some(label) = label else { return true };
-        match (decision.class, self.label_of(decision)) {
-            (None, _) => false,
-            (Some(class), Some(known)) if class.is_named() => bare(label) == bare(known),
-            (Some(_), known) => known.is_none_or(|known| known == label),
-        }
-    }
-
-    /// A decision in this robot's own words.
-    fn aloud(&self, decision: Decision) -> Message {
-        let label = self.label_of(&decision).map(str::to_owned);
-        Message::Announced(Announced { decision, label })
-    }
-
-    pub(super) fn is_final(&self, agreement: &Agreement) -> bool {
-        let holders = self.config.holders(self.electorate.count());
-        agreement.is_final(holders, self.me, &self.guests, |robot| self.counts(robot))
-    }
-
     pub(super) fn own_scale(&self) -> Option<Scale> {
         let vocabulary = self.classifier.as_ref()?.vocabulary();
         Some(Scale { vocabulary: vocabulary.id(), classes: vocabulary.labels().len() })
     }
-}
-
-/// What a gesture is called, without who named it.
-fn bare(title: &str) -> &str {
-    title.rsplit_once(" (").map_or(title, |(label, _)| label)
 }

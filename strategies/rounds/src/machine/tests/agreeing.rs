@@ -46,9 +46,8 @@ fn the_next_robots_wait_for_the_spokesrobot_and_take_over_when_it_is_silent() {
 }
 
 #[test]
-fn a_decision_under_a_false_label_was_not_announced() {
-    let announces_at = |label: Option<&str>| {
-        let mut mind = mind(9);
+fn a_decision_under_a_false_label_or_without_its_own_was_not_announced() {
+    let announces_at = |mut mind: Rounds, label: Option<&str>| {
         mind.handle(ms(0), Input::Alive(Arc::new(robots([5, 9]))));
         mind.handle(ms(0), Input::Open);
         let held = decision(1, Some(0), 3, 5);
@@ -65,14 +64,18 @@ fn a_decision_under_a_false_label_was_not_announced() {
             Output::Announce(said) => Some(said.label.clone()),
             _ => None,
         });
+        // It is taken in all the same: what nobody lies about is held.
+        assert_eq!(mind.held().map(|held| held.class), Some(Some(ClassId(0))));
         (refused, said)
     };
-    assert_eq!(announces_at(Some("one")), (0, None));
-    assert_eq!(announces_at(None), (0, None));
+    assert_eq!(announces_at(mind(9), Some("one")), (0, None));
     let own = Some(Some("one".to_owned()));
     for false_label in ["two", "stop", "", "one (ana)"] {
-        assert_eq!(announces_at(Some(false_label)), (1, own.clone()), "{false_label}");
+        assert_eq!(announces_at(mind(9), Some(false_label)), (1, own.clone()), "{false_label}");
     }
+    // Whoever has no list of gestures is no liar; but who knows the label says it.
+    assert_eq!(announces_at(mind(9), None), (0, own));
+    assert_eq!(announces_at(blind(9), None), (0, None), "nor does this one know it");
 }
 
 #[test]

@@ -194,7 +194,8 @@ fn says_it_holds(robot: u32, decision: &Decision) -> Input {
 /// A robot announces a decision.
 fn announced(announcer: u32, decision: Decision) -> Input {
     let (announcer, stamp) = (RobotId(announcer), Stamp { boot: 1, sequence: 60 });
-    Input::Announced(Announcement { decision, label: None, announcer, stamp, signature: None })
+    let label = decision.class.and_then(|class| vocabulary().label(class).map(str::to_owned));
+    Input::Announced(Announcement { decision, label, announcer, stamp, signature: None })
 }
 
 fn broadcast(out: &[Output]) -> Vec<&Vote> {
