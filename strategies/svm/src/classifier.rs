@@ -53,18 +53,29 @@ pub struct Classifier {
 struct Panel {
     /// The gestures that any of them has met, and all of the list.
     vocabulary: Vocabulary,
+    /// Which of those any of them has met.
+    taught: Vec<bool>,
     members: Vec<Arc<Classifier>>,
 }
 
 impl Panel {
+    fn of(vocabulary: Vocabulary, members: Vec<Arc<Classifier>>) -> Self {
+        let mut taught = vec![false; vocabulary.classes()];
+        for class in members.iter().flat_map(|member| member.met_classes()) {
+            if let Some(place) = vocabulary.place(class) {
+                taught[place] = true;
+            }
+        }
+        Self { vocabulary, taught, members }
+    }
+
     fn asked(&self, coordinates: &[f32], no_hand: f64) -> Votes<'_> {
-        let mut votes = Votes::of(&self.vocabulary);
+        let mut votes = Votes::of(&self.vocabulary, &self.taught);
         for member in &self.members {
             let (probabilities, unknown) = member.judge_in_space(coordinates, no_hand);
-            // Who has met nothing says nothing.
-            let all = member.vocabulary.all().zip(probabilities).filter(|_| member.met().next().is_some());
-            let likeliest = all.reduce(|a, b| if b.1 > a.1 { b } else { a });
-            votes.add(likeliest.map(|(class, _)| class), unknown);
+            // What it has not met it takes for unknown, however it is called.
+            let met = member.met_classes().zip(member.met().map(|class| probabilities[class]));
+            votes.add(met.reduce(|a, b| if b.1 > a.1 { b } else { a }), unknown);
         }
         votes
     }
@@ -89,7 +100,7 @@ impl Classifier {
 
     /// One that answers as most of these say, in that vocabulary.
     pub(crate) fn of_panel(vocabulary: Vocabulary, first: &Self, members: Vec<Arc<Self>>) -> Self {
-        Self { panel: Some(Arc::new(Panel { vocabulary, members })), ..first.clone() }
+        Self { panel: Some(Arc::new(Panel::of(vocabulary, members))), ..first.clone() }
     }
 
     /// What most groups of authors say of coordinates in its space, and how certain that is; `None` of one that learned from all samples together, and for
@@ -159,6 +170,11 @@ impl Classifier {
     /// The classes it has met.
     pub(crate) fn met(&self) -> impl Iterator<Item = usize> {
         self.learned.iter().enumerate().filter(|(_, count)| **count > 0).map(|(class, _)| class)
+    }
+
+    /// The same by name.
+    fn met_classes(&self) -> impl Iterator<Item = ClassId> {
+        self.vocabulary.all().zip(&self.learned).filter(|(_, count)| **count > 0).map(|(class, _)| class)
     }
 
     /// The probability of each gesture that it has not met.

@@ -23,7 +23,11 @@ fn space() -> Arc<FeatureSpace> {
 }
 
 fn learner(groups: usize) -> Learner {
-    let vocabulary = Vocabulary::new((0..CLASSES).map(|class| class.to_string())).unwrap();
+    learner_of(CLASSES, groups)
+}
+
+fn learner_of(classes: u32, groups: usize) -> Learner {
+    let vocabulary = Vocabulary::new((0..classes).map(|class| class.to_string())).unwrap();
     Learner::new(space(), vocabulary, LearnerOptions { groups, ..Default::default() }).unwrap()
 }
 
@@ -141,6 +145,39 @@ fn groups_know_gestures_that_were_named_meanwhile() {
     assert_eq!(classifier.probabilities_in_space(&[1.0, 0.0]).unwrap().len(), CLASSES as usize + 1);
     learner.remove(2);
     assert!(learner.learn().unwrap().vocabulary().named().is_empty());
+}
+
+#[test]
+fn a_gesture_that_no_group_was_taught_is_exactly_as_likely_as_unknown_and_never_what_most_say() {
+    for taught in 0..=3 {
+        let mut learner = learner_of(6, 5);
+        for key in 0..60 * u64::from(taught) {
+            let class = (key / 5) as u32 % taught;
+            let angle = class as f32 * std::f32::consts::TAU / 3.0;
+            let vector = [angle.cos() + key as f32 * 1e-3, angle.sin()].into();
+            learner.insert_of(Some(key as usize % 5), key, ClassId(class), vector, key / 5).unwrap();
+        }
+        let classifier = learner.learn().unwrap();
+        for view in views().chain([[30.0, -40.0]]) {
+            let judged = classifier.judge(&view).unwrap();
+            let unknown = judged.unknown.unwrap_or(1.0 / 6.0);
+            for untaught in &judged.probabilities[taught as usize..] {
+                assert_eq!(untaught.to_bits(), unknown.to_bits(), "{taught} taught, at {view:?}: {judged:?}");
+            }
+            assert!((judged.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{judged:?}");
+            let coordinates = classifier.space().project(&view).unwrap();
+            let said = classifier.certified(&coordinates).unwrap();
+            assert!(said.class.0 < taught.max(1), "{taught} taught, at {view:?}: {said:?}");
+        }
+        // Far from all that was taught none of it is likelier than what was not.
+        if taught >= 2 {
+            let far = classifier.judge(&[30.0, -40.0]).unwrap();
+            let unknown = far.unknown.unwrap();
+            assert!(far.probabilities.iter().all(|p| *p <= unknown), "{taught} taught: {far:?}");
+            let near = classifier.probabilities_in_space(&[1.0, 0.0]).unwrap();
+            assert!(near[0] > 2.0 * near[5], "{taught} taught: {near:?}");
+        }
+    }
 }
 
 #[test]
