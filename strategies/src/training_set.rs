@@ -7,7 +7,9 @@
 //! ```
 
 mod changes;
+mod lives;
 mod restore_error;
+mod room;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
@@ -18,11 +20,12 @@ use gestalt_rounds::Classify;
 use rand::Rng;
 
 pub use changes::{SampleReceipt, SetChange};
+use lives::Lives;
 pub use restore_error::RestoreError;
 
 use crate::forgetting::Forgetting;
 use crate::groups::Groups;
-use crate::sample::{HeldSample, HeldSamples, MAX_LIVES, MAX_SERIES, SeenError, SeenSamples, SetPart};
+use crate::sample::{HeldSample, HeldSamples, SeenSamples, SetPart};
 use crate::selection::Selection;
 use crate::shares::Shares;
 
@@ -50,6 +53,7 @@ pub struct TrainingSet {
     forgetting: Box<dyn Forgetting>,
     samples: HeldSamples,
     seen: SeenSamples,
+    lives: Lives,
     shares: Shares,
     groups: Option<Groups>,
     next_key: u64,
@@ -79,6 +83,7 @@ impl TrainingSet {
             forgetting,
             samples: HeldSamples::default(),
             seen: SeenSamples::default(),
+            lives: Lives::default(),
             shares: Shares::default(),
             groups: None,
             next_key: 1,
@@ -166,6 +171,7 @@ impl TrainingSet {
         }
         self.samples = restored;
         self.shares.recount();
+        self.lives = Lives::of(&seen, &self.samples);
         self.seen = seen;
         self.next_key = next_key.max(1);
         Ok(())
@@ -203,6 +209,7 @@ impl TrainingSet {
             };
             let id = self.series.sample(self.next_number());
             let Ok(Some(others)) = self.seen.insert_and_tell(id) else { break };
+            self.lives.note(self.series, sample.round.counter, &self.seen, &self.samples);
             seen.extend(others.into_iter().map(SetChange::Seen));
             let vector = Arc::from(as_sent(&sample.vector));
             self.replace(HeldSample { part: SetPart::Shared, id: Some(id), vector, ..sample.clone() });
@@ -224,7 +231,7 @@ impl TrainingSet {
         vector: impl Into<Arc<[f32]>>,
         rng: &mut dyn Rng,
     ) -> SampleReceipt {
-        if let Err(error) = self.may_receive(id) {
+        if let Err(error) = self.may_receive(id, round) {
             return SampleReceipt::Refused(error);
         }
         let mut changes = self.make_room(id.series());
@@ -233,56 +240,9 @@ impl TrainingSet {
             Ok(None) => return SampleReceipt::Known,
             Ok(Some(others)) => changes.extend(others.into_iter().map(SetChange::Seen)),
         }
+        self.lives.note(id.series(), round.counter, &self.seen, &self.samples);
         changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
         SampleReceipt::New(changes)
-    }
-
-    /// Whether there is no room for that series, which is new. A place is kept for this robot's own.
-    fn is_full_for(&self, series: SampleSeries) -> bool {
-        let spoke = series == self.series || !self.seen.intervals(self.series).is_empty();
-        self.seen.series_count() >= MAX_SERIES - usize::from(!spoke)
-    }
-
-    /// Where a series is one too many, forgets the one of which the least is held, and what that is: of its author's other
-    /// lives, or, for a robot that is alive, of those that are not.
-    fn make_room(&mut self, series: SampleSeries) -> Vec<SetChange> {
-        if !self.seen.intervals(series).is_empty() {
-            return Vec::new();
-        }
-        let may_go: Vec<SampleSeries> = if self.seen.lives(series.author).count() >= MAX_LIVES {
-            self.seen.lives(series.author).filter(|life| *life != self.series).collect()
-        } else if self.is_full_for(series) {
-            let stays = |robot| robot == self.me() || self.shares.is_alive(robot);
-            self.seen.series().filter(|series| !stays(series.author)).collect()
-        } else {
-            return Vec::new();
-        };
-        let mut held: BTreeMap<SampleSeries, Vec<u64>> =
-            may_go.into_iter().map(|series| (series, Vec::new())).collect();
-        for sample in self.samples.iter() {
-            if let Some(keys) = sample.id.and_then(|id| held.get_mut(&id.series())) {
-                keys.push(sample.key);
-            }
-        }
-        let Some((least, keys)) = held.into_iter().min_by_key(|(_, keys)| keys.len()) else {
-            return Vec::new();
-        };
-        self.seen.forget(least);
-        let gone = keys.into_iter().filter_map(|key| self.remove(key)).map(SetChange::Removed);
-        gone.chain([SetChange::Seen(least)]).collect()
-    }
-
-    fn may_receive(&self, id: SampleId) -> Result<(), SeenError> {
-        // Whoever could speak under the name of this very life could keep this robot from sharing.
-        if id.series() == self.series && id.number >= self.next_number() {
-            return Err(SeenError::NeverShared(id));
-        }
-        // So could the names of strangers.
-        let stranger = self.seen.intervals(id.series()).is_empty();
-        if stranger && self.is_full_for(id.series()) && !self.shares.is_alive(id.author) {
-            return Err(SeenError::TooManyAuthors(id));
-        }
-        Ok(())
     }
 
     /// Takes a shared sample in again that was [retracted](Self::retract), under the class it turned out to have. One

@@ -17,6 +17,9 @@ const MAX_DECLINED_ROUNDS: usize = 64;
 /// How often a neighbour is given all names for one difference of what both know: a message may be lost, and what is refused stays refused.
 const NAMES_GIVEN: u32 = 8;
 
+/// The same of samples: of many lives of one robot two robots may keep others for good.
+const SAMPLES_GIVEN: u32 = 16;
+
 /// How many messages a neighbour is told at once at most, of 16 KiB at most. A question of 40 bytes in its name brings no
 /// more upon it.
 const REPLIES_AT_ONCE: f64 = 128.0;
@@ -35,10 +38,25 @@ struct Exchange {
     /// The lessons it offered, some of which this robot cannot take: at most [`MAX_DECLINED_ROUNDS`] rounds.
     declined_lessons: LessonBook,
     /// For which digests of names, this robot's and the neighbour's, it was given all of them, and how often.
-    names: Option<((u64, u64), u32)>,
+    names: Given,
+    /// The same of samples.
+    samples: Given,
     /// The messages it was told, less those that time has made up for, and when that was reckoned.
     told: f64,
     told_at: Duration,
+}
+
+/// For which digests, this robot's and a neighbour's, that was given something, and how often.
+#[derive(Clone, Copy, Debug, Default)]
+struct Given(Option<((u64, u64), u32)>);
+
+impl Given {
+    /// How often it was given something for these, before this time.
+    fn again(&mut self, digests: (u64, u64)) -> u32 {
+        let given = self.0.filter(|(of, _)| *of == digests).map_or(0, |(_, given)| given);
+        self.0 = Some((digests, given.saturating_add(1)));
+        given
+    }
 }
 
 /// What was settled with the neighbours: at most [`MAX_NEIGHBOURS`].
@@ -103,10 +121,12 @@ impl Exchanges {
 
     /// Whether that neighbour is to be given all names, where the digests of both are these.
     pub fn may_give_names(&mut self, robot: RobotId, digests: (u64, u64)) -> bool {
-        let exchange = self.with(robot);
-        let given = exchange.names.filter(|(of, _)| *of == digests).map_or(0, |(_, given)| given);
-        exchange.names = Some((digests, given.saturating_add(1)));
-        given < NAMES_GIVEN
+        self.with(robot).names.again(digests) < NAMES_GIVEN
+    }
+
+    /// Whether that neighbour is to be given the samples that it lacks, where the digests of both are these.
+    pub fn may_give_samples(&mut self, robot: RobotId, digests: (u64, u64)) -> bool {
+        self.with(robot).samples.again(digests) < SAMPLES_GIVEN
     }
 
     /// How many messages that neighbour may be told now.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use gestalt_protocol::{
     Digest, HeldBatch, Know, Known, Lesson, Lessons, MAX_INTERVALS, MAX_LESSONS, MAX_MESSAGE, MAX_ROBOTS,
-    Message, Naming, Namings, RobotId, RoundId,
+    Message, Naming, Namings, RobotId, RoundId, SharedSample,
 };
 use gestalt_rounds::Refusal;
 
@@ -132,6 +132,10 @@ impl Mind {
             lacking_here |= self.exchanges.told_to(from, learning.set().seen()).lacks(&theirs);
             let lacking = learning.lacking(|id| !theirs.contains(id), CHUNK);
             given.extend(lacking.take(chunks).map(Message::Batches));
+            let digests = (here.samples, know.digest.samples);
+            if !given.is_empty() && !self.exchanges.may_give_samples(from, digests) {
+                given.clear();
+            }
         }
         if here.lessons != know.digest.lessons || !know.lessons.is_empty() {
             let theirs: BTreeMap<RoundId, u64> = know.lessons.iter().copied().collect();
@@ -181,22 +185,31 @@ impl Mind {
         {
             self.contradictions.push((held.clone(), batch.clone()));
         }
-        let mut news = false;
+        let (mut news, mut refused) = (false, Vec::new());
+        let space = batch.samples.space;
         for sample in &batch.samples.samples {
-            match learning.receive(batch.samples.space, sample) {
+            match learning.receive(space, sample) {
                 Ok(new) => news |= new,
-                Err(declined) => {
-                    if is_neighbour {
-                        self.exchanges.decline(from, sample.id);
-                    }
-                    self.rounds.note_refusal(match declined {
-                        Declined::Vector(VectorError::Space { .. }) => Refusal::OtherSpace,
-                        Declined::Vector(_) => Refusal::BadVector,
-                        Declined::Class => Refusal::UnknownClass,
-                        Declined::Number => Refusal::SampleNumber,
-                    });
-                }
+                Err(declined) => refused.push((sample, declined)),
             }
+        }
+        // Of many lives of its author there may be room for this one since one of them was taken in.
+        let is_refused = |(sample, declined): &mut (&SharedSample, Declined)| {
+            *declined != Declined::Number || learning.receive(space, sample).is_err()
+        };
+        if news {
+            refused.retain_mut(is_refused);
+        }
+        for (sample, declined) in refused {
+            if is_neighbour {
+                self.exchanges.decline(from, sample.id);
+            }
+            self.rounds.note_refusal(match declined {
+                Declined::Vector(VectorError::Space { .. }) => Refusal::OtherSpace,
+                Declined::Vector(_) => Refusal::BadVector,
+                Declined::Class => Refusal::UnknownClass,
+                Declined::Number => Refusal::SampleNumber,
+            });
         }
         if news {
             learning.keep_batch(batch);

@@ -23,10 +23,22 @@ impl Swarm {
 
 /// One robot hears that author share samples under these numbers of a life.
 fn shares(swarm: &mut Swarm, i: usize, author: u32, life: u32, numbers: &[u32]) {
+    shares_of_rounds(swarm, i, author, life, numbers, |_| 1);
+}
+
+/// The same of rounds of such counts.
+fn shares_of_rounds(
+    swarm: &mut Swarm,
+    i: usize,
+    author: u32,
+    life: u32,
+    numbers: &[u32],
+    counter: impl Fn(u32) -> u32,
+) {
     let sample = |number: &u32| SharedSample {
         id: SampleId { author: RobotId(author), life, number: *number },
         class: ClassId(number % 6),
-        round: RoundId { counter: 1, opener: RobotId(author), life: 0 },
+        round: RoundId { counter: counter(*number), opener: RobotId(author), life: 0 },
         vector: Vector::F32(vec![(number % 1000) as f32 * 1e-3, 0.5, 0.5, 0.5]),
     };
     let samples = numbers.iter().map(sample).collect();
@@ -255,5 +267,45 @@ proptest! {
         swarm.pass(Duration::from_secs(60));
         swarm.check_rest();
         swarm.check();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn of_more_lives_than_are_kept_all_robots_keep_the_newest_and_repair_comes_to_rest(
+        seed in any::<u64>(), has_room in any::<bool>(),
+        counters in prop::collection::vec(1..60_u32, 75),
+        heard in prop::collection::vec(1..16_u8, 75),
+        order in Just((0..75_usize).collect::<Vec<_>>()).prop_shuffle(),
+        again in prop::option::of(0..4_usize),
+    ) {
+        // Where an author's share is full, most of what was seen of each life is forgotten.
+        let capacity = if has_room { 2000 } else { 200 };
+        let mut swarm = Swarm::new(4, LearningConfig { capacity, ..config(2, 1.0) }, seed);
+        let life = |nth: usize| 7 + (nth as u32).wrapping_mul(2_654_435_761);
+        for nth in order {
+            for i in (0..4).filter(|i| heard[nth] >> i & 1 == 1) {
+                let counter = |number| counters[nth] + 7 * (number % 3);
+                shares_of_rounds(&mut swarm, i, 9, life(nth), &[1, 2, 3], counter);
+            }
+        }
+        swarm.pass(Duration::from_secs(120));
+        swarm.check_rest();
+        if let Some(i) = again {
+            swarm.restart(i);
+            swarm.pass(Duration::from_secs(120));
+            swarm.check_rest();
+        }
+        swarm.check();
+        let mut newest: Vec<(u32, u32)> = (0..75).map(|nth| (counters[nth] + 14, life(nth))).collect();
+        newest.sort_unstable();
+        let newest: BTreeSet<u32> = newest.iter().rev().take(64).map(|(_, life)| *life).collect();
+        for mind in swarm.minds.iter().filter(|_| has_room) {
+            let seen = mind.training_set().unwrap().seen();
+            let lives: BTreeSet<u32> = seen.lives(RobotId(9)).map(|series| series.life).collect();
+            prop_assert_eq!(&lives, &newest);
+        }
     }
 }
