@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Envelope, HeldVote, Message, RobotId, RoundId, Stamp};
+use gestalt_protocol::{ClassId, Envelope, HeldVote, Message, Pool, RobotId, RoundId, Stamp};
 
 use super::allowance::Allowance;
 use super::follow::Follow;
@@ -102,6 +102,8 @@ pub struct Rounds {
     pub(super) nonce: u32,
     pub(super) config: RoundsConfig,
     pub(super) fusion: Arc<dyn Fuse>,
+    /// Of what others found of how alike robots are and this one holds decisions by: what rests on most rounds.
+    pub(super) heard_pool: Option<Pool>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
     /// What gestures are called while there is no classifier.
     pub(super) vocabulary: Option<Vocabulary>,
@@ -197,6 +199,7 @@ impl Rounds {
             preempted: Allowance::new(config.deadline, 1),
             waiting: BTreeMap::new(),
             fusion: Arc::new(config.rule),
+            heard_pool: None,
             config,
             refusals: Refusals::default(),
             duplicate: None,

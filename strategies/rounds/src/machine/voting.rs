@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use gestalt_protocol::{Envelope, Holder, Message, RobotId};
+use gestalt_protocol::{Envelope, Holder, Message, Pool, RobotId};
 
 use super::members::expected;
 use super::output::Output;
@@ -11,6 +11,9 @@ use super::rounds::{Effects, Rounds};
 use crate::ballot::Scale;
 use crate::others::Others;
 use crate::round::{Round, Speaker, View};
+
+/// However many rounds a pool is said to rest on, one that rests on so many is as good: the newest of them counts.
+const MOST_ROUNDS: u16 = 64;
 
 impl Rounds {
     pub(super) fn on_alive(&mut self, robots: Arc<BTreeSet<RobotId>>) {
@@ -63,6 +66,15 @@ impl Rounds {
         // While the votes may still suffice, the "no decision" of a robot that heard less ends nothing.
         let or_none = !round.open || self.now >= round.patience_and_deadline(&self.config).1;
         let Some(decision) = round.agreement.settle(self.now, or_none) else { return false };
+        // One for nothing need not convince by the pool that it states.
+        let is_anothers = decision.class.is_some() && decision.author != self.me;
+        let stated = decision.certificate.pool.filter(|pool| is_anothers && pool.rounds > 0);
+        let stated = stated.map(|pool| Pool { rounds: pool.rounds.min(MOST_ROUNDS), ..pool });
+        if let Some(stated) =
+            stated.filter(|stated| self.heard_pool.is_none_or(|heard| stated.rounds >= heard.rounds))
+        {
+            self.heard_pool = Some(stated);
+        }
         effects.follower.settled(decision, self.config.clip);
         (effects.carry_out)(Output::Hold(decision.clone()));
         true
@@ -80,7 +92,12 @@ impl Rounds {
         let view = View { me: self.me, expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
-        let learned = if self.config.liars == 0 { effects.follower.pool() } else { None };
+        let learns = self.config.liars == 0;
+        let found = learns.then(|| effects.follower.pool()).flatten();
+        // Who has lived through few rounds, or does not learn, would be surer than all others, and the surest decision is the one that all hold.
+        let heard = self.heard_pool.filter(|_| learns);
+        let heard = heard.filter(|heard| found.is_none_or(|found| found.rounds < heard.rounds));
+        let learned = heard.or(found);
         let fitted = learned.and_then(|pool| self.fusion.with(pool));
         let rule = fitted.as_deref().unwrap_or(&*self.fusion);
         round.conclude(self.now, &view, rule, &self.config);

@@ -1,6 +1,9 @@
 //! What a robot says, and whose votes it counts.
 
+use gestalt_protocol::Pool;
+
 use super::*;
+use crate::machine::Follow;
 
 #[test]
 fn votes_are_said_on_change_at_a_bounded_rate_and_repeated_while_open() {
@@ -123,4 +126,63 @@ fn a_second_robot_with_my_id_is_counted_and_reported_but_my_echo_is_not() {
     );
     assert_eq!(mind.refusals().count(Refusal::DuplicateId), 2, "a vote of an earlier life is merely old");
     assert_eq!(mind.held(), None, "none of it counts as this robot's evidence");
+}
+
+/// Learns how alike robots are, as far as it is told.
+struct Found(Option<Pool>);
+
+impl Follow for Found {
+    fn pool(&mut self) -> Option<Pool> {
+        self.0
+    }
+}
+
+/// What 64 rounds of robots that are wrong together say.
+const FOUND: Pool = Pool { likeness: 0.75, temperature: 1.56, rounds: 64 };
+
+/// What ten robots come to whose evidence says that by so much each, in a mind of that kind.
+fn comes_to(mind: &mut Rounds, found: &mut Found, (counter, at): (u32, u64), lead: f32) -> Decision {
+    for robot in 10..20 {
+        let said = Vote { evidence: vec![lead, 0.0, -2.0 * lead], ..vote(counter, 0, 0.0) };
+        mind.handle_with(ms(at), votes(robot, counter, said), found);
+    }
+    (1..=6).for_each(|second| drop(mind.handle_with(ms(at + 1000 * second), Input::Tick, found)));
+    mind.held().cloned().expect("the round is over")
+}
+
+#[test]
+fn who_found_less_than_others_of_how_alike_robots_are_goes_by_what_they_found() {
+    let start = |me: u32, liars: u32| {
+        let config = RoundsConfig { liars, ..RoundsConfig::default() };
+        let mut mind = mind_with(me, config);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots(10..20))));
+        mind
+    };
+    let (clear, faint) = (6.0, 2.0);
+    let mut fitted = start(1, 0);
+    let clearly = comes_to(&mut fitted, &mut Found(Some(FOUND)), (1, 0), clear);
+    assert_eq!((clearly.class, clearly.certificate.pool), (Some(ClassId(0)), Some(FOUND)));
+    assert_eq!(comes_to(&mut fitted, &mut Found(Some(FOUND)), (2, 10_000), faint).class, None);
+
+    // One that starts again, or does not learn, and knows nothing of it.
+    let alone = comes_to(&mut start(7, 0), &mut Found(None), (2, 10_000), faint);
+    assert_eq!((alone.class, alone.certificate.pool), (Some(ClassId(0)), Some(Pool::PRIOR)));
+    let told = |liars: u32, own: Option<Pool>, given: Decision| {
+        let mut mind = start(7, liars);
+        let config = mind.config().clone();
+        mind.handle_with(ms(9000), gives(1, by(&config, given)), &mut Found(own));
+        assert_eq!(mind.held().and_then(|held| held.class).is_some(), liars == 0);
+        let said = comes_to(&mut mind, &mut Found(own), (2, 10_000), faint);
+        (said.class, said.certificate.pool)
+    };
+    for own in [None, Some(Pool::PRIOR), Some(Pool { rounds: 5, ..Pool::PRIOR })] {
+        assert_eq!(told(0, own, clearly.clone()), (None, Some(FOUND)), "{own:?}");
+    }
+    // Of its own it has as much as they; and where some may lie it hears nobody.
+    let own = Pool { rounds: 64, ..Pool::PRIOR };
+    assert_eq!(told(0, Some(own), clearly.clone()), (Some(ClassId(0)), Some(own)));
+    assert_eq!(told(1, None, clearly.clone()).1, Some(Pool::PRIOR));
+    // What another believed beforehand is nothing that it found.
+    let unfounded = comes_to(&mut start(1, 0), &mut Found(None), (1, 0), clear);
+    assert_eq!(told(0, None, unfounded).1, Some(Pool::PRIOR));
 }
