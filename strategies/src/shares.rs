@@ -1,14 +1,18 @@
 //! Whose samples have how much room in a full training set: no author's push out those of the others.
 
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use gestalt_protocol::{MAX_ROBOTS, RobotId};
+use gestalt_protocol::{ClassId, MAX_ROBOTS, RobotId};
 
 use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// However small the share of an author is, so many samples are no flood.
 const LEAST: usize = 5;
+
+/// How many samples of a gesture that was named while the swarm works are not forgotten.
+const YOUNG: usize = 20;
 
 /// The shares of a set's room, once it is known who is there. In a swarm of n robots and a set of T samples each other
 /// robot has max(5, ⌈1.25 · T/n⌉), whether it is there or not; all robots together that were never alive in this life, max(5, ⌈T/4⌉): whoever makes up
@@ -81,7 +85,7 @@ impl Shares {
     }
 
     /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
-    /// above, the oldest of the class that it has most of.
+    /// above, the oldest of the class that it has most of; of a young one only where it has no others.
     pub fn above(&mut self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
         let n = self.robots()?;
         let each = LEAST.max((5 * capacity).div_ceil(4 * n));
@@ -108,14 +112,34 @@ impl Shares {
     /// The sample to go in place of that one, if it is an own one and no more of them may go: the oldest of another robot,
     /// of the same class if there is one.
     pub fn in_place_of(&self, victim: &HeldSample, samples: &HeldSamples, capacity: usize) -> Option<u64> {
-        let n = self.robots().filter(|_| victim.part != SetPart::External)?;
-        let reserve = LEAST.max(capacity.div_ceil(n)).min(capacity / 2);
-        if samples.total(SetPart::Personal) + samples.total(SetPart::Shared) > reserve {
+        if victim.part == SetPart::External || !self.own_stay(samples, capacity) {
             return None;
         }
         let external = |sample: &&HeldSample| sample.part == SetPart::External;
         let alike = samples.part_keys(SetPart::External, victim.class).first().copied();
         alike.or_else(|| samples.iter().find(external).map(|sample| sample.key))
+    }
+
+    /// Whether there are so few own samples that none goes for those of others.
+    fn own_stay(&self, samples: &HeldSamples, capacity: usize) -> bool {
+        let reserve = self.robots().map(|n| LEAST.max(capacity.div_ceil(n)).min(capacity / 2));
+        let own = samples.total(SetPart::Personal) + samples.total(SetPart::Shared);
+        reserve.is_some_and(|reserve| own <= reserve)
+    }
+
+    /// The sample to go in place of one of that class, if it is young: all others are of gestures that have been shown for longer. The oldest of the gesture of
+    /// which there are most, but for own ones while no more of them may go.
+    pub fn in_place_of_young(&self, class: ClassId, samples: &HeldSamples, capacity: usize) -> Option<u64> {
+        if !is_young(samples, class) {
+            return None;
+        }
+        let own_stay = self.own_stay(samples, capacity);
+        let may_go = |sample: &&HeldSample| sample.part == SetPart::External || !own_stay;
+        let oldest = |class: &ClassId| samples.with_keys(samples.class_keys(*class)).find(may_go);
+        let many = samples.classes().filter(|class| samples.class_count(*class) > YOUNG);
+        let most = many.filter(|class| oldest(class).is_some());
+        let most = most.max_by_key(|class| (samples.class_count(*class), *class))?;
+        oldest(&most).map(|sample| sample.key)
     }
 
     /// How many robots there are; `None` for one that knows of no other.
@@ -124,10 +148,75 @@ impl Shares {
     }
 }
 
-/// Of the samples of that author, the oldest of the class that most of them are of.
+/// Whether a gesture was named while the swarm works, and there are few samples of it as yet.
+fn is_young(samples: &HeldSamples, class: ClassId) -> bool {
+    class.is_named() && samples.class_count(class) <= YOUNG
+}
+
+/// Of the samples of that author, the oldest of the class that most of them are of; of a young one only where there is no other.
 fn oldest_of_most(samples: &HeldSamples, of: RobotId) -> Option<u64> {
     let theirs = |key: &&u64| samples.get(**key).and_then(HeldSample::author) == Some(of);
     let of_class = |class| samples.part_keys(SetPart::External, class).iter().filter(theirs);
-    let most = samples.classes().max_by_key(|class| (of_class(*class).count(), std::cmp::Reverse(*class)))?;
+    let order = |class: &ClassId| (!is_young(samples, *class), of_class(*class).count(), Reverse(*class));
+    let most = samples.classes().filter(|class| of_class(*class).next().is_some()).max_by_key(order)?;
     of_class(most).next().copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{RoundId, SampleId};
+
+    use super::*;
+
+    const ME: RobotId = RobotId(1);
+
+    fn circle() -> ClassId {
+        ClassId::named(&"ana".parse().unwrap(), "circle")
+    }
+
+    /// Robot 1's shares among three robots, and so many samples of each of these, the first the oldest.
+    fn held(coming: &[(u32, ClassId, usize)]) -> (Shares, HeldSamples) {
+        let (mut shares, mut samples) = (Shares::default(), HeldSamples::default());
+        shares.meet(ME, Arc::new((1..=3).map(RobotId).collect()));
+        let all = coming.iter().flat_map(|(author, class, n)| std::iter::repeat_n((*author, *class), *n));
+        for ((author, class), key) in all.zip(1..) {
+            let is_own = author == ME.0;
+            let part = if is_own { SetPart::Personal } else { SetPart::External };
+            let id = SampleId { author: RobotId(author), life: 1, number: key };
+            let round = RoundId { counter: 1, opener: ME, life: 0 };
+            let (id, key, vector) = ((!is_own).then_some(id), u64::from(key), [0.0].into());
+            samples.insert(HeldSample { key, part, id, class, round, vector });
+        }
+        (shares, samples)
+    }
+
+    #[test]
+    fn who_alone_saw_what_was_named_loses_its_samples_of_other_gestures_first() {
+        // Of 24 each other robot has ten.
+        let listed = ClassId(4);
+        let (mut shares, samples) =
+            held(&[(3, ClassId(0), 10), (2, circle(), 8), (2, listed, 3), (1, listed, 4)]);
+        let goes = shares.above(&samples, 24).and_then(|key| samples.get(key)).unwrap();
+        assert_eq!((goes.author(), goes.class), (Some(RobotId(2)), listed));
+        // There is nothing else of it, or there are many.
+        for coming in [vec![(2, circle(), 11)], vec![(3, circle(), 10), (2, circle(), 11), (2, listed, 3)]] {
+            let (mut shares, samples) = held(&coming);
+            let goes = shares.above(&samples, 24).and_then(|key| samples.get(key)).unwrap();
+            assert_eq!((goes.author(), goes.class), (Some(RobotId(2)), circle()));
+        }
+    }
+
+    #[test]
+    fn for_what_was_named_no_own_sample_goes_of_those_that_stay_whatever_others_send() {
+        let goes = |own: usize| {
+            // Of 60 twenty own ones stay.
+            let (shares, samples) = held(&[(1, ClassId(0), own), (2, ClassId(0), 11), (3, circle(), 15)]);
+            let key = shares.in_place_of_young(circle(), &samples, 60).unwrap();
+            samples.get(key).unwrap().part
+        };
+        assert_eq!(goes(20), SetPart::External);
+        assert_eq!(goes(21), SetPart::Personal);
+        let (shares, samples) = held(&[(1, ClassId(0), 20), (3, circle(), 15)]);
+        assert_eq!(shares.in_place_of_young(circle(), &samples, 60), None, "there are no others");
+    }
 }

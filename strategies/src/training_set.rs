@@ -11,7 +11,7 @@ mod lives;
 mod restore_error;
 mod room;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -28,9 +28,6 @@ use crate::groups::Groups;
 use crate::sample::{HeldSample, HeldSamples, SeenSamples, SetPart};
 use crate::selection::Selection;
 use crate::shares::Shares;
-
-/// How many samples of a gesture that was named while the swarm works are not forgotten.
-const YOUNG: usize = 20;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -302,25 +299,14 @@ impl TrainingSet {
                 let named = named.and_then(|key| self.samples.get(key));
                 let instead =
                     named.and_then(|named| self.shares.in_place_of(named, &self.samples, self.capacity));
-                let victim = instead.or(named.map(|named| named.key)).or(oldest);
-                victim.map(|victim| self.in_place_of_young(victim).unwrap_or(victim))
+                let victim = instead.or(named.map(|named| named.key)).or(oldest)?;
+                let class = self.samples.get(victim)?.class;
+                Some(self.shares.in_place_of_young(class, &self.samples, self.capacity).unwrap_or(victim))
             });
             let Some(victim) = victim.and_then(|key| self.remove(key)) else { break };
             changes.push(SetChange::Removed(victim));
         }
         changes
-    }
-
-    /// Of a gesture that was named while the swarm works, the first samples are not forgotten: there are few, and all others are of gestures that have been
-    /// shown for longer. The oldest of the gesture of which there are most goes in their place.
-    fn in_place_of_young(&self, victim: u64) -> Option<u64> {
-        let class = self.samples.get(victim).map(|sample| sample.class).filter(|class| class.is_named())?;
-        let mut counts: BTreeMap<ClassId, usize> = BTreeMap::new();
-        self.samples.iter().for_each(|sample| *counts.entry(sample.class).or_default() += 1);
-        let young = counts.get(&class).is_some_and(|count| *count <= YOUNG);
-        let (most, count) = counts.into_iter().filter(|_| young).max_by_key(|(class, n)| (*n, *class))?;
-        let oldest = self.samples.iter().find(|sample| sample.class == most)?;
-        (count > YOUNG).then_some(oldest.key)
     }
 
     /// The most samples that are held.
