@@ -27,17 +27,20 @@ impl Learning {
                 }
                 for (number, aside) in self.aside.take(|aside| names.contains(&aside.round)) {
                     self.note_not_aside(number, &aside);
-                    self.take_back(aside, class);
+                    let is_new = !self.aside.take_earned(number);
+                    self.take_back(aside, class, is_new);
                 }
                 for vector in self.recent.take_unlabelled(round) {
-                    self.keep(round, class, vector);
+                    self.keep(round, class, vector, true);
                 }
             }
             verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
                 for change in names.iter().flat_map(|name| self.set.retract(*name)).collect::<Vec<_>>() {
                     if let SetChange::Removed(sample) = &change {
                         let HeldSample { part, id: shared, round, vector, .. } = sample.clone();
-                        self.put_aside(UnresolvedSample { part, shared, round, vector, guess: None });
+                        let aside = UnresolvedSample { part, shared, round, vector, guess: None };
+                        let number = self.put_aside(aside);
+                        self.aside.note_earned(number);
                     }
                     self.absorb(vec![change]);
                 }
@@ -58,17 +61,17 @@ impl Learning {
         }
     }
 
-    /// A new sample of this robot's own.
-    fn keep(&mut self, round: RoundId, class: ClassId, vector: Vec<f32>) {
-        self.credit += self.config.share_fraction;
+    /// A sample of this robot's own. Of those that are new a part may be shared: what was taken back and is said again is none.
+    fn keep(&mut self, round: RoundId, class: ClassId, vector: Vec<f32>, is_new: bool) {
+        self.credit += if is_new { self.config.share_fraction } else { 0.0 };
         let changes = self.set.keep(class, round, vector, &mut *self.rng);
         self.absorb(changes);
     }
 
-    fn take_back(&mut self, aside: UnresolvedSample, class: ClassId) {
+    fn take_back(&mut self, aside: UnresolvedSample, class: ClassId, is_new: bool) {
         let UnresolvedSample { shared, round, vector, .. } = aside;
         match shared {
-            None => self.keep(round, class, vector.to_vec()),
+            None => self.keep(round, class, vector.to_vec(), is_new),
             Some(id) => {
                 let changes = self.set.take_back(id, class, round, vector, &mut *self.rng);
                 self.absorb(changes);
@@ -76,12 +79,14 @@ impl Learning {
         }
     }
 
-    fn put_aside(&mut self, aside: UnresolvedSample) {
+    /// Puts one aside; says under which number.
+    fn put_aside(&mut self, aside: UnresolvedSample) -> u64 {
         let (number, gone) = self.aside.put(aside);
         self.dirty.extend([Item::Counters, Item::Aside(number)]);
         for (number, aside) in gone {
             self.note_not_aside(number, &aside);
         }
+        number
     }
 
     /// Notes that a sample is aside no longer.

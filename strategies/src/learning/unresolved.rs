@@ -1,7 +1,7 @@
 //! Samples of which it is not known what they show: kept, not trained on, until an instructor says more or the
 //! classifier is sure.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use gestalt_protocol::{ClassId, RoundId, SampleId};
@@ -33,6 +33,8 @@ pub(crate) fn training_key(number: u64) -> u64 {
 #[derive(Clone, Debug)]
 pub(super) struct Unresolved {
     samples: BTreeMap<u64, UnresolvedSample>,
+    /// Those of this life that were in the training set before: for them a part may be shared already, and is not again when they come back.
+    earned: BTreeSet<u64>,
     next: u64,
     capacity: usize,
 }
@@ -41,7 +43,7 @@ impl Unresolved {
     pub fn new(samples: Vec<(u64, UnresolvedSample)>, next: u64, capacity: usize) -> Self {
         let samples: BTreeMap<_, _> = samples.into_iter().collect();
         let next = samples.keys().next_back().map_or(next, |last| next.max(last + 1));
-        Self { samples, next, capacity }
+        Self { samples, earned: BTreeSet::new(), next, capacity }
     }
 
     /// Puts one aside; those whose place was taken, which may be itself, come back.
@@ -53,7 +55,22 @@ impl Unresolved {
         while self.samples.len() > self.capacity {
             gone.extend(self.samples.pop_first());
         }
+        for (number, _) in &gone {
+            self.earned.remove(number);
+        }
         (number, gone)
+    }
+
+    /// That one was in the training set before.
+    pub fn note_earned(&mut self, number: u64) {
+        if self.samples.contains_key(&number) {
+            self.earned.insert(number);
+        }
+    }
+
+    /// Whether that one, which was taken out, was in the training set before.
+    pub fn take_earned(&mut self, number: u64) -> bool {
+        self.earned.remove(&number)
     }
 
     /// Takes out those for which `pick` says so, oldest first.

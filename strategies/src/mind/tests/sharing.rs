@@ -36,6 +36,30 @@ fn the_size_follows_the_formula() {
 }
 
 #[test]
+fn what_is_taken_back_and_said_again_is_not_newly_acquired() {
+    let mut swarm = Swarm::new(2, config(5, 0.2), 12);
+    let round = swarm.show(1);
+    // What was open until it was said is.
+    swarm.say("ada", Instruction::Wrong { round, of: Gesture::Class(ClassId(2)) });
+    swarm.pass(Duration::from_secs(1));
+    swarm.was(round, 1);
+    swarm.pass(Duration::from_secs(1));
+    for class in 0..10 {
+        assert_eq!(swarm.sizes(0), [4, 1, 1]);
+        swarm.say("ada", Instruction::Retract { round });
+        swarm.pass(Duration::from_secs(1));
+        assert_eq!(swarm.sizes(0), [0, 0, 0]);
+        swarm.was(round, class % CLASSES);
+        swarm.pass(Duration::from_secs(1));
+    }
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    swarm.pass(Duration::from_secs(1));
+    assert_eq!(swarm.sizes(0), [8, 2, 2], "nor is anything owed");
+    swarm.check();
+}
+
+#[test]
 fn bytes_bound_what_a_round_shares() {
     let mut swarm = Swarm::new(2, LearningConfig { share_bytes: Some(128), ..config(8, 1.0) }, 10);
     let round = swarm.show(1);
