@@ -304,7 +304,26 @@ def decides(rule: str, votes: list, given: argparse.Namespace, alpha: float, poo
         return False
 
 
+def single(value: float) -> float:
+    """The 32-bit float nearest to it: robots write its shortest digits, and compute with the float."""
+    return struct.unpack("<f", struct.pack("<f", value))[0]
+
+
+def as_computed(decision: dict) -> None:
+    """What robots hold as 32-bit floats becomes such, before anything is computed."""
+    certificate = decision["certificate"]
+    for held in certificate["votes"]:
+        held["weight"] = single(held["weight"])
+    for held in certificate["votes"] + certificate["others"]:
+        vote = held["vote"]
+        vote["evidence"] = [single(nats) for nats in vote["evidence"]]
+        vote["looks"] = single(vote["looks"])
+        if vote.get("unknown") is not None:
+            vote["unknown"] = single(vote["unknown"])
+
+
 def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
+    as_computed(decision)
     swarm, certificate = members(roster), decision["certificate"]
     votes, others = certificate["votes"], certificate["others"]
 
