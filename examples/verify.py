@@ -4,14 +4,16 @@
     pip install cryptography
     python3 examples/verify.py decision.json --roster keys/roster.json
 
-A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--alpha`,
-`--clip`, `--liars` and `--committee` are those of the swarm's `rounds`.
+A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--rule`, `--alpha`,
+`--clip`, `--quorum`, `--liars` and `--committee` are those of the swarm's `rounds`. It proves the same files as `gestalt verify`.
 """
 import argparse
 import collections
+import decimal
 import hashlib
 import json
 import math
+import re
 import struct
 import sys
 
@@ -26,7 +28,9 @@ RULES = ("majority", "mean_probability", "log_pool", "confidence_weighted", None
 PRIOR = {"likeness": 0.5, "temperature": 1.1, "rounds": 0}
 ALPHA = {rule: 0.05 for rule in POOLS}
 TOLERANCE = 1e-9
-GESTURES, WORD = 64, (1 << 64) - 1
+GESTURES, ROBOTS, INSTRUCTORS, WORD = 64, 4096, 256, (1 << 64) - 1
+LONGEST, LONGEST_ROSTER, LONGEST_STATEMENT = 2 << 20, 512 << 10, 512 << 10
+NAMED = range(1 << 27, 1 << 28)
 
 
 class Refused(Exception):
@@ -36,6 +40,132 @@ class Refused(Exception):
 def require(holds: bool, why: str) -> None:
     if not holds:
         raise Refused(why)
+
+
+# ---- Reading: as robots and `gestalt trust` write it and not otherwise, so that nobody reads another decision in a file that was proven
+
+
+class Whole(str):
+    """A number without point and exponent, as it is written."""
+
+
+class Real(str):
+    """Any other number, as it is written."""
+
+
+def document(text: bytes, longest: int) -> object:
+    def once(pairs: list) -> dict:
+        require(len(dict(pairs)) == len(pairs), "a field is there twice")
+        return dict(pairs)
+
+    def never(constant: str) -> None:
+        raise Refused(f"{constant} is no number")
+
+    require(len(text) <= longest, f"more than {longest} bytes")
+    return json.loads(text.decode(), object_pairs_hook=once, parse_int=Whole, parse_float=Real, parse_constant=never)
+
+
+def whole(bits: int):
+    def read(value: object) -> int:
+        require(type(value) is Whole and value.isdigit() and len(value) <= 20 and int(value) < 1 << bits, "no whole number within its bounds")
+        return int(value)
+
+    return read
+
+
+def real(value: object) -> float:
+    require(type(value) in (Whole, Real) and math.isfinite(float(value)), "no number")
+    return float(value)
+
+
+def rounded(value: float) -> float:
+    """The 32-bit float nearest to it."""
+    return struct.unpack("<f", struct.pack("<f", value))[0]
+
+
+def single(value: object) -> float:
+    """A 32-bit float: robots write its shortest digits and compute with the float. To round it to 64 bits first may be to round it otherwise, so these become
+    odd where digits are left over."""
+    double = real(value)
+    left_over = decimal.Decimal(value).copy_abs().compare(decimal.Decimal(abs(double))) if double else 0
+    bits, = struct.unpack("<Q", struct.pack("<d", double))
+    return rounded(struct.unpack("<d", struct.pack("<Q", bits - (left_over < 0) | (left_over != 0)))[0])
+
+
+def boolean(value: object) -> bool:
+    require(type(value) is bool, "neither true nor false")
+    return value
+
+
+def word(form: str):
+    def read(value: object) -> str:
+        require(type(value) is str and re.fullmatch(form, value, re.DOTALL) is not None, "no text of its form")
+        value.encode()
+        return value
+
+    return read
+
+
+def digits(length: int):
+    """So many bytes: their digits, in lower case."""
+    return word("[0-9a-f]{%d}" % (2 * length))
+
+
+def optional(read):
+    return lambda value: None if value is None else read(value)
+
+
+def list_of(read, most: int):
+    def read_all(values: object) -> list:
+        require(type(values) is list and len(values) <= most, "no list within its bounds")
+        return [read(value) for value in values]
+
+    return read_all
+
+
+def table(name, read, most: int):
+    def read_all(of: object) -> dict:
+        require(type(of) is dict and len(of) <= most, "no members within their bounds")
+        return {name(of_whom): read(value) for of_whom, value in of.items()}
+
+    return read_all
+
+
+def record(fields: dict, left_out: dict = {}):
+    """Each of the fields, but those that may be left out, and no other."""
+    def read(of: object) -> dict:
+        require(type(of) is dict and {**left_out, **of}.keys() == fields.keys(), "a field is lacking, or is there beside those there are")
+        return {**left_out, **{field: fields[field](value) for field, value in of.items()}}
+
+    return read
+
+
+U32 = whole(32)
+ROUND = record({"counter": U32, "opener": U32, "life": U32})
+STAMP = record({"boot": U32, "sequence": U32})
+CAST = record({"round": ROUND, "vocabulary": U32, "evidence": list_of(single, GESTURES), "looks": single, "unknown": optional(single),
+               "named": list_of(U32, GESTURES)})
+HELD = {"robot": U32, "stamp": STAMP, "vote": CAST, "signature": optional(digits(64))}
+CERTIFICATE = record({
+    "vocabulary": U32, "rule": word("|".join(filter(None, RULES))), "pool": optional(record({"likeness": real, "temperature": real, "rounds": whole(16)})),
+    "probabilities": list_of(real, GESTURES), "unknown": optional(real), "named": list_of(U32, GESTURES),
+    "votes": list_of(record({**HELD, "class": U32, "weight": single}), ROBOTS), "others": list_of(record(HELD), ROBOTS),
+    "robots": U32, "quorum": U32, "elapsed_ms": U32,
+    "terms": record({"clip": real, "alpha": real, "majority": boolean, "liars": U32, "committee": U32}),
+})
+DECISION = record({
+    "round": ROUND, "class": optional(U32), "confidence": real, "author": U32, "final": boolean, "certificate": CERTIFICATE,
+    "label": optional(word(".*")), "announcer": U32, "stamp": STAMP, "signature": optional(digits(64)),
+})
+NUMBER, NAME = word("0|[1-9][0-9]{0,9}"), word("[A-Za-z0-9_-]{1,32}")
+ROSTER = record({
+    "swarm": word("[A-Za-z0-9_-]{1,64}"), "authority": digits(32), "epoch": whole(64), "robots": table(NUMBER, digits(32), ROBOTS),
+    "instructors": table(NAME, record({"key": digits(32), "roles": list_of(word("|".join(ROLES)), len(ROLES))}), INSTRUCTORS),
+    "local": list_of(word("|".join(ROLES)), len(ROLES)), "expelled": table(NUMBER, digits(32), ROBOTS), "signature": digits(64),
+}, {"instructors": {}, "local": [], "expelled": {}})
+
+
+# ---- Signatures
 
 
 def varint(number: int) -> bytes:
@@ -52,12 +182,31 @@ def text(word: str) -> bytes:
     return varint(len(word.encode())) + word.encode()
 
 
+P = (1 << 255) - 19
+D = -121665 * pow(121666, -1, P) % P
+# The five heights of the eight points of small order, by which whoever signs could have two messages under one signature.
+EIGHTH = int.from_bytes(bytes.fromhex("26e8958fc2b227b045c3f489f2ef98f0d5dfac05d3c63339b13802886d53fc05"), "little")
+SMALL = (0, 1, P - 1, EIGHTH, P - EIGHTH)
+
+
+def height(point: str) -> int:
+    return int.from_bytes(bytes.fromhex(point), "little") & (1 << 255) - 1
+
+
+def is_key(key: str) -> bool:
+    """Whether that is a point in its one spelling, and not of small order."""
+    y = height(key)
+    return y < P and y not in SMALL and pow((y * y - 1) * pow(D * y * y + 1, -1, P), (P - 1) // 2, P) == 1
+
+
 def verify(key: str, message: bytes, signature: str) -> None:
+    """By the strict rule of Ed25519, which leaves whoever checks no choice."""
+    require(height(signature[:64]) not in SMALL, "a signature of small order")
     Ed25519PublicKey.from_public_bytes(bytes.fromhex(key)).verify(bytes.fromhex(signature), message)
 
 
 def members(roster: dict) -> bytes:
-    """Checks who signed the roster; gives the swarm's id."""
+    """Checks who signed the roster, and that its members go together; gives the swarm's id."""
     def entries(of: dict, write, order) -> bytes:
         written = [write(name, entry) for name, entry in sorted(of.items(), key=order)]
         return varint(len(written)) + b"".join(written)
@@ -66,6 +215,7 @@ def members(roster: dict) -> bytes:
         return varint(int(number)) + bytes.fromhex(key)
 
     def roles(words: list) -> bytes:
+        require(words == [role for role in ROLES if role in words], "roles that are not in their order")
         return bytes([sum(1 << ROLES.index(word) for word in words)])
 
     def instructor(name: str, entry: dict) -> bytes:
@@ -74,9 +224,13 @@ def members(roster: dict) -> bytes:
     by_number, by_name = (lambda item: int(item[0])), (lambda item: item[0])
     body = bytes.fromhex(roster["authority"]) + text(roster["swarm"]) + varint(roster["epoch"])
     body += entries(roster["robots"], robot, by_number)
-    body += entries(roster.get("instructors", {}), instructor, by_name)
-    body += roles(roster.get("local", []))
-    body += entries(roster.get("expelled", {}), robot, by_number)
+    body += entries(roster["instructors"], instructor, by_name)
+    body += roles(roster["local"])
+    body += entries(roster["expelled"], robot, by_number)
+    keys = [*roster["robots"].values(), *(entry["key"] for entry in roster["instructors"].values())]
+    require(all(map(is_key, [roster["authority"], *keys])), "a key that is none")
+    require(all(int(number) < 1 << 32 for number in [*roster["robots"], *roster["expelled"]]), "a robot that has no number")
+    require(len(set(keys)) == len(keys) and not set(keys) & set(roster["expelled"].values()), "a key of two members, or of one that was expelled")
     verify(roster["authority"], b"gestalt-roster-2\0" + body, roster["signature"])
     return hashlib.sha256(b"gestalt-swarm-1" + bytes.fromhex(roster["authority"]) + roster["swarm"].encode()).digest()
 
@@ -101,13 +255,12 @@ def maybe(value, write) -> bytes:
 
 def gestures(of: dict) -> bytes:
     """Those that were named since the list was made."""
-    named = of.get("named", [])
-    return varint(len(named)) + b"".join(map(varint, named))
+    return varint(len(of["named"])) + b"".join(map(varint, of["named"]))
 
 
 def the_vote(vote: dict) -> bytes:
     return name(vote["round"]) + varint(vote["vocabulary"]) + vector(vote["evidence"], "f") + struct.pack("<f", vote["looks"]) \
-        + maybe(vote.get("unknown"), lambda nats: struct.pack("<f", nats)) + gestures(vote)
+        + maybe(vote["unknown"], lambda nats: struct.pack("<f", nats)) + gestures(vote)
 
 
 def the_pool(pool: dict) -> bytes:
@@ -115,8 +268,7 @@ def the_pool(pool: dict) -> bytes:
 
 
 def the_terms(terms: dict) -> bytes:
-    return struct.pack("<2d", terms["clip"], terms["alpha"]) + bytes([terms["majority"] is True]) \
-        + varint(terms["liars"]) + varint(terms["committee"])
+    return struct.pack("<2d", terms["clip"], terms["alpha"]) + bytes([terms["majority"]]) + varint(terms["liars"]) + varint(terms["committee"])
 
 
 def statement(held: dict) -> bytes:
@@ -139,14 +291,64 @@ def aloud(said: dict) -> bytes:
     certificate = said["certificate"]
     votes, others = certificate["votes"], certificate["others"]
     body = name(said["round"]) + maybe(said["class"], varint) + struct.pack("<d", said["confidence"])
-    body += varint(said["author"]) + bytes([said["final"] is True]) + varint(certificate["vocabulary"])
-    body += varint(RULES.index(certificate["rule"])) + maybe(certificate.get("pool"), the_pool)
-    body += vector(certificate["probabilities"], "d") + maybe(certificate.get("unknown"), lambda p: struct.pack("<d", p)) + gestures(certificate)
+    body += varint(said["author"]) + bytes([said["final"]]) + varint(certificate["vocabulary"])
+    body += varint(RULES.index(certificate["rule"])) + maybe(certificate["pool"], the_pool)
+    body += vector(certificate["probabilities"], "d") + maybe(certificate["unknown"], lambda p: struct.pack("<d", p)) + gestures(certificate)
     body += varint(len(votes)) + b"".join(map(counted, votes)) + varint(len(others)) + b"".join(map(other, others))
     body += varint(certificate["robots"]) + varint(certificate["quorum"]) + varint(certificate["elapsed_ms"])
     body += the_terms(certificate["terms"])
     body += maybe(said["label"], text)
     return bytes([VERSION]) + varint(said["announcer"]) + number(said["stamp"]) + varint(ANNOUNCED) + body
+
+
+# ---- What no robot may say
+
+
+def ascending(values: list) -> bool:
+    return all(a < b for a, b in zip(values, values[1:]))
+
+
+def are_named(named: list, among: list) -> bool:
+    return len(named) <= len(among) and ascending(named) and all(gesture in NAMED for gesture in named)
+
+
+def listed(of: list, named: list) -> int:
+    """Of how many gestures of the list these values are, those that were named coming last."""
+    return len(of) - len(named)
+
+
+def sound(decision: dict) -> None:
+    certificate = decision["certificate"]
+    votes, others, named, probabilities = (certificate[field] for field in ("votes", "others", "named", "probabilities"))
+    said = [decision["confidence"], *probabilities, *([] if certificate["unknown"] is None else [certificate["unknown"]])]
+    require(are_named(named, probabilities), "gestures that were not named, twice, or out of order")
+    require(all(0 <= p <= 1 for p in said), "a probability outside 0 to 1")
+    terms, pool = certificate["terms"], certificate["pool"]
+    require(0 < terms["clip"] <= 1000 and 0 < terms["alpha"] <= 0.5, "terms that no robot can decide by")
+    if pool is not None:
+        likeness, temperature = pool["likeness"], pool["temperature"]
+        require(0 <= likeness <= 1 and 0.1 <= temperature <= 10, "an impossible pool")
+        require(round(likeness * 20) / 20 == likeness and round(temperature * 100) / 100 == temperature, "a pool between the steps")
+    known = [*range(listed(probabilities, named)), *named]
+    require(decision["class"] in (None, *known) and all(held["class"] in known for held in votes), "a gesture that no vote is about")
+    require(all(held["weight"] >= 0 for held in votes), "a negative weight")
+    robots = [[held["robot"] for held in of] for of in (votes, others)]
+    require(all(map(ascending, robots)) and not set(robots[0]) & set(robots[1]), "a robot is counted twice, or out of order")
+    for vote in (held["vote"] for held in votes + others):
+        require(are_named(vote["named"], vote["evidence"]), "gestures that were not named, twice, or out of order")
+        require(not vote["evidence"] or listed(vote["evidence"], vote["named"]) >= 2, "evidence over fewer than two gestures of the list")
+        require(vote["unknown"] is None or bool(vote["evidence"]), "evidence for unknown where nothing was seen")
+        require(vote["looks"] >= 0, "a negative number of looks")
+
+
+# ---- What follows from votes
+
+
+def exp(value: float) -> float:
+    try:
+        return math.exp(value)
+    except OverflowError:
+        return math.inf
 
 
 def softmax(row: list) -> list:
@@ -155,21 +357,33 @@ def softmax(row: list) -> list:
 
 
 def certainty(row: list) -> float:
-    return 1 + sum(p * math.log(p) for p in softmax(row) if p > 0) / math.log(len(row))
+    return min(max(1 + sum(p * math.log(p) for p in softmax(row) if p > 0) / math.log(len(row)), 0.0), 1.0)
+
+
+def clipped(row: list, clip: float) -> list:
+    return [min(max(value, -clip), clip) for value in row]
+
+
+def weight(rule: str, evidence: list, clip: float) -> float:
+    """What a vote weighs: its certainty where that is asked for, nothing where it abstains, else 1."""
+    row = clipped(evidence, clip)
+    if rule == "majority":
+        return float(row.count(max(row)) == 1)
+    return rounded(certainty(row)) if rule == "confidence_weighted" else 1.0
 
 
 def knows(vote: dict, gesture: int) -> bool:
     """Whether that robot was taught that gesture: to one that was not, it is exactly as likely as what is unknown."""
-    evidence, unknown = vote["evidence"], vote.get("unknown")
+    evidence, unknown = vote["evidence"], vote["unknown"]
     if gesture in vote["lacks"]:
         return False
-    return evidence[gesture] != unknown if unknown is not None else len(set(evidence)) > 1
+    return evidence[gesture] != unknown if unknown is not None else any(value != evidence[gesture] for value in vote["said"])
 
 
 def named_by(votes: list, listed: int) -> list:
     """The gestures beyond the list that any of these robots knows; of too many those that most know, then those of the smaller numbers."""
-    known_by = collections.Counter(gesture for vote in votes for gesture in vote.get("named", []))
-    return sorted(sorted(known_by, key=lambda gesture: (-known_by[gesture], gesture))[:GESTURES - listed])
+    known_by = collections.Counter(gesture for vote in votes for gesture in vote["named"])
+    return sorted(sorted(known_by, key=lambda gesture: (-known_by[gesture], gesture))[:max(GESTURES - listed, 0)])
 
 
 def lot(counter: int, robot: int) -> int:
@@ -185,13 +399,12 @@ def lot(counter: int, robot: int) -> int:
 
 def spread(vote: dict, named: list) -> dict:
     """The vote over those of the list and these: of one that its robot does not know, it says what it says of unknown."""
-    of_vote = vote.get("named", [])
-    listed = len(vote["evidence"]) - len(of_vote)
-    beyond = dict(zip(of_vote, vote["evidence"][listed:]))
-    unknown = vote.get("unknown")
-    evidence = vote["evidence"][:listed] + [beyond.get(gesture, 0.0 if unknown is None else unknown) for gesture in named]
-    lacks = {listed + place for place, gesture in enumerate(named) if gesture not in beyond}
-    return {"evidence": evidence, "unknown": unknown, "lacks": lacks}
+    of_list = listed(vote["evidence"], vote["named"])
+    beyond = dict(zip(vote["named"], vote["evidence"][of_list:]))
+    unknown = vote["unknown"]
+    evidence = vote["evidence"][:of_list] + [beyond.get(gesture, 0.0 if unknown is None else unknown) for gesture in named]
+    lacks = {of_list + place for place, gesture in enumerate(named) if gesture not in beyond}
+    return {"evidence": evidence, "unknown": unknown, "lacks": lacks, "said": vote["evidence"]}
 
 
 def sharpness(pool: dict, voices: float) -> float:
@@ -207,15 +420,16 @@ def voices(rows: list) -> float:
 
 
 def fuse(rule: str, votes: list, clip: float, pool: dict) -> tuple:
-    """The probability of each class, and what each vote adds to its total."""
-    rows = [[min(max(value, -clip), clip) for value in vote] for vote in votes]
+    """The probability of each class, and what each vote adds to its total; none where all abstain."""
+    rows = [clipped(vote, clip) for vote in votes]
     if rule == "majority":
         # Who finds two classes equally likely abstains.
         parts = [[float(value == max(row)) for value in row] for row in rows if row.count(max(row)) == 1]
-        require(bool(parts), "all abstain")
     else:
         parts = {"mean_probability": [softmax(row) for row in rows], "log_pool": rows, "correlated_pool": rows,
                  "confidence_weighted": [[certainty(row) * value for value in row] for row in rows]}[rule]
+    if not parts:
+        return None, parts
     totals = [sum(column) for column in zip(*parts)]
     if rule == "correlated_pool":
         totals = [sharpness(pool, voices(rows)) * total for total in totals]
@@ -235,19 +449,19 @@ def least(rule: str, parts: list, top: int, liars: int, probability: float) -> f
             return probability
         leads = [sharpness(PRIOR, len(parts) - liars) * lead for lead in leads]
     if rule in POOLS:
-        return 1 / (1 + sum(math.exp(-lead) for lead in leads))
+        return 1 / (1 + sum(exp(-lead) for lead in leads))
     return left(part[top] for part in parts) / (len(parts) - liars)
 
 
 def judge(rule: str, votes: list, given: argparse.Namespace, pool: dict) -> tuple:
     """The probability of each gesture, and of unknown where any robot tells; and of the likeliest what is left of it if so many of the robots lied.
 
-    First whether it is a gesture that any robot was taught, of which all are one witness; then, by the rule, which of these."""
+    First whether it is a gesture that any robot was taught, of which all are one witness; then, by the rule, which of these. None where all abstain."""
     clip, gestures = given.clip, range(len(votes[0]["evidence"]))
-    tell = [vote for vote in votes if vote.get("unknown") is not None]
+    tell = [vote for vote in votes if vote["unknown"] is not None]
     known_by = [sum(knows(vote, k) for vote in votes) for k in gestures]
 
-    def clipped(value: float) -> float:
+    def bounded(value: float) -> float:
         return min(max(value, -clip), clip)
 
     def more_than(robots: int) -> list:
@@ -259,20 +473,24 @@ def judge(rule: str, votes: list, given: argparse.Namespace, pool: dict) -> tupl
 
     def which_at_least(of: list, top: int, liars: int) -> float:
         probabilities, parts = which(of)
-        if top not in of or probabilities[of.index(top)] < max(probabilities):
+        if probabilities is None or top not in of or probabilities[of.index(top)] < max(probabilities):
             return 0.0
         return least(rule, parts, of.index(top), liars, probabilities[of.index(top)]) if len(of) > 1 else 1.0
 
     def taught(of: list, liars: int) -> tuple:
         """How likely it is one of these, and each other one."""
-        odds = sorted(math.log(sum(math.exp(clipped(vote["evidence"][k]) - clipped(vote["unknown"])) for k in of)) if of else -math.inf
-                      for vote in tell)[:len(tell) - liars]
-        odds = math.exp(sum(odds) / len(odds)) if odds else 0.0
-        others = len(gestures) - len(of) + 1
-        return odds / (odds + others), 1 / (odds + others)
+        each = [sum(exp(bounded(vote["evidence"][k]) - bounded(vote["unknown"])) for k in of) for vote in tell]
+        odds = sorted(math.log(one) if one > 0 else -math.inf for one in each)[:max(len(tell) - liars, 0)]
+        odds = sum(odds) / len(odds) if odds else -math.inf
+        # The form that cannot overflow.
+        known, other = (1.0, exp(-odds)) if odds > 0 else (exp(odds), 1.0)
+        total = known + (len(gestures) - len(of) + 1) * other
+        return known / total, other / total
 
     of, liars = more_than(0), given.liars
     chosen, _ = which(of)
+    if chosen is None:
+        return None, 0.0
     probabilities = chosen
     if tell:
         known, each = taught(of, 0)
@@ -296,127 +514,127 @@ def judge(rule: str, votes: list, given: argparse.Namespace, pool: dict) -> tupl
     return probabilities, sure
 
 
-def decides(rule: str, votes: list, given: argparse.Namespace, alpha: float, pool: dict) -> bool:
-    """Whether votes that are enough make a gesture likely enough."""
-    try:
-        return judge(rule, votes, given, pool)[1] - TOLERANCE >= 1 - alpha
-    except Refused:
-        return False
-
-
-def single(value: float) -> float:
-    """The 32-bit float nearest to it: robots write its shortest digits, and compute with the float."""
-    return struct.unpack("<f", struct.pack("<f", value))[0]
-
-
-def as_computed(decision: dict) -> None:
-    """What robots hold as 32-bit floats becomes such, before anything is computed."""
+def follows(decision: dict, given: argparse.Namespace) -> str:
+    """Whether robots of these rounds decide so on these votes."""
     certificate = decision["certificate"]
-    for held in certificate["votes"]:
-        held["weight"] = single(held["weight"])
-    for held in certificate["votes"] + certificate["others"]:
+    votes, others, rule, pool = (certificate[field] for field in ("votes", "others", "rule", "pool"))
+    named, counter = certificate["named"], decision["round"]["counter"]
+    of_list, voted = listed(certificate["probabilities"], named), [held["vote"] for held in votes]
+
+    def is_counted(vote: dict) -> bool:
+        return listed(vote["evidence"], vote["named"]) == of_list and vote["vocabulary"] == certificate["vocabulary"]
+
+    require(all(held["vote"]["round"]["counter"] == counter for held in votes + others), "a vote of another round")
+    require(all(map(is_counted, voted)), "a vote over other gestures")
+    require(not (votes and any(is_counted(held["vote"]) for held in others)), "a vote laid aside")
+    require(named == named_by(voted, of_list), "gestures that no vote names")
+
+    require(rule == given.rule, f"fused by {rule}, and not by {given.rule}")
+    alpha = ALPHA.get(rule, 0.5) if given.alpha is None else given.alpha
+    terms = {"clip": given.clip, "alpha": alpha, "majority": given.quorum is None, "liars": given.liars, "committee": given.committee}
+    require(certificate["terms"] == terms, f"decided by other terms than {terms}")
+    require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
+    require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
+    size = max(given.committee, 2 * (given.quorum or 0)) + 4 * given.liars
+
+    def draws(robots: int) -> bool:
+        """Whether of so many robots a committee votes."""
+        return given.committee > 0 and robots > size + size // 2
+
+    def needs(robots: int) -> int:
+        if given.quorum is not None:
+            return given.quorum
+        return size // 2 + 1 + given.liars if draws(robots) else min(robots + given.liars, (1 << 32) - 1) // 2 + 1
+
+    def suffice(robots: int, counts=lambda robot: True) -> bool:
+        """Whether so many of so many robots take part, and enough of them gave evidence."""
+        reached, gave = (sum(counts(held["robot"]) for held in of) for of in (votes + others, votes))
+        # What a robot said before it saw anything proves nothing where liars are expected.
+        counting = reached if given.quorum is None and given.liars == 0 else gave
+        return counting >= needs(robots) and (given.liars == 0 or gave > 2 * given.liars)
+
+    def suffice_of(robots: int) -> bool:
+        """The same of those who were drawn, or may have been by robots that know of half as many."""
+        if not draws(robots):
+            return suffice(robots)
+        return suffice(robots, lambda robot: lot(counter, robot) < min((size << 65) // robots, WORD))
+
+    robots = certificate["robots"]
+    require(certificate["quorum"] == needs(robots), "another quorum than that of so many robots")
+    # How many robots there were is its author's word.
+    stated, truly = suffice(robots), suffice_of(max(robots, given.robots))
+    gesture, part = decision["class"], f"{len(votes + others)} of {robots} robots"
+    require(gesture is None or (stated and truly), f"too few of {max(robots, given.robots)} robots took part")
+    probabilities, sure = judge(rule, [spread(vote, named) for vote in voted], given, pool) if votes else (None, 0.0)
+    said = certificate["probabilities"] + ([] if certificate["unknown"] is None else [certificate["unknown"]])
+    if probabilities is None:
+        require(gesture is None and not votes and not said and decision["confidence"] == 0, "votes that say nothing, for something")
+        return f"nothing was decided, and {part} took part"
+
+    def close(a: float, b: float) -> bool:
+        return abs(a - b) <= TOLERANCE
+
+    places = [*range(of_list), *named]
+    for held in votes:
         vote = held["vote"]
-        vote["evidence"] = [single(nats) for nats in vote["evidence"]]
-        vote["looks"] = single(vote["looks"])
-        if vote.get("unknown") is not None:
-            vote["unknown"] = single(vote["unknown"])
+        knows_of = dict(zip([*range(of_list), *vote["named"]], vote["evidence"]))
+        known = [place for place in places if place in knows_of]
+        require(held["class"] == max(known, key=knows_of.get), "a vote for another gesture")
+        require(close(held["weight"], weight(rule, vote["evidence"], given.clip)), "a vote of another weight")
+    require(len(said) == len(probabilities), "unknown where no vote tells it, or none where one does")
+    require(all(map(close, probabilities, said)), "other probabilities")
+    require(close(max(probabilities), decision["confidence"]), "another confidence")
+    if gesture is None:
+        enough = truly or (stated and not draws(robots))
+        require(not (enough and sure - TOLERANCE >= 1 - alpha), "the votes suffice for a gesture")
+        return f"nothing was decided, and {part} took part"
+    of_class = probabilities[places.index(gesture)]
+    require(close(of_class, max(probabilities)), "another class is likelier")
+    require(min(of_class, sure) + TOLERANCE >= 1 - alpha, "the votes do not suffice")
+    return f"class {gesture}, p = {of_class:.3f}, by {part}"
 
 
-def check(decision: dict, roster: dict, given: argparse.Namespace) -> str:
-    as_computed(decision)
+def prove(decision: bytes, roster: bytes, given: argparse.Namespace) -> str:
+    """What is proven by the decision that is written there; raises why none is."""
+    decision, roster = DECISION(document(decision, LONGEST)), ROSTER(document(roster, LONGEST_ROSTER))
     swarm, certificate = members(roster), decision["certificate"]
-    votes, others = certificate["votes"], certificate["others"]
 
     def signed(by: int, said: bytes, signature: str, what: str) -> None:
         require(str(by) in roster["robots"], f"robot {by} is no member")
-        require(bool(signature), f"{what} of robot {by} is not signed")
+        require(signature is not None, f"{what} of robot {by} is not signed")
+        require(len(said) <= LONGEST_STATEMENT, f"{what} of robot {by} is longer than any")
         verify(roster["robots"][str(by)], b"gestalt-statement-1\0" + swarm + said, signature)
 
-    require(decision["final"] in (True, False), "neither final nor not")
     signed(decision["announcer"], aloud(decision), decision["signature"], "the announcement")
-    robots = [held["robot"] for held in votes + others]
-    require(len(set(robots)) == len(robots), "a robot is counted twice")
-    for held in votes + others:
-        require(held["vote"]["round"]["counter"] == decision["round"]["counter"], "a vote of another round")
+    sound(decision)
+    for held in certificate["votes"] + certificate["others"]:
         signed(held["robot"], statement(held), held["signature"], "the vote")
-    named = certificate.get("named", [])
-    listed = len(certificate["probabilities"]) - len(named)
-    over = [len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) for held in votes]
-    require(all(gestures == listed for gestures in over), "a vote over other gestures")
-    require(named == (named_by([held["vote"] for held in votes], listed) if certificate["probabilities"] else []), "gestures that no vote names")
-    require(all(held["vote"]["vocabulary"] == certificate["vocabulary"] for held in votes), "a vote over other gestures")
-    aside = [held for held in others if votes and held["vote"]["vocabulary"] == certificate["vocabulary"]]
-    require(not any(len(held["vote"]["evidence"]) - len(held["vote"].get("named", [])) == listed for held in aside), "a vote laid aside")
-
-    def suffice(all_of: int) -> tuple:
-        """How many of so many robots are to take part, whether they do, and whether enough of them gave evidence."""
-        # What a robot said before it saw anything proves nothing where liars are expected.
-        counting, gave, needed = votes if given.liars else votes + others, votes, (all_of + given.liars) // 2 + 1
-        committee = given.committee + 4 * given.liars
-        if given.committee and all_of > committee + committee // 2:
-            # Only those count who were drawn, or may have been by robots that know of half as many.
-            drawn = {held["robot"] for held in votes + others
-                     if lot(decision["round"]["counter"], held["robot"]) < min((committee << 65) // all_of, WORD)}
-            counting, gave = ([held for held in of if held["robot"] in drawn] for of in (counting, gave))
-            needed = committee // 2 + 1 + given.liars
-        return needed, len(counting) >= needed, given.liars == 0 or len(gave) > 2 * given.liars
-
-    needed, majority, enough = suffice(certificate["robots"])
-    rule = certificate["rule"]
-    alpha = given.alpha or ALPHA.get(rule, 0.5)
-    terms = {"clip": given.clip, "alpha": alpha, "majority": True, "liars": given.liars, "committee": given.committee}
-    require(certificate["terms"] == terms, f"decided by other terms than {terms}")
-    require(certificate["quorum"] == needed, "another quorum than that of so many robots")
-    pool, unknown = certificate.get("pool"), certificate.get("unknown")
-    require((pool is not None) == (rule == "correlated_pool"), "a pool that is none, or none where there must be one")
-    require(given.liars == 0 or pool in (None, PRIOR), "a pool that a liar may have chosen")
-    if pool is not None:
-        likeness, temperature = pool["likeness"], pool["temperature"]
-        require(0 <= likeness <= 1 and 0.1 <= temperature <= 10, "an impossible pool")
-        require(round(likeness * 20) / 20 == likeness and round(temperature * 100) / 100 == temperature, "a pool between the steps")
-    evidence = [spread(held["vote"], named) for held in votes]
-    if decision["class"] is None:
-        if majority and enough and votes:
-            require(not decides(rule, evidence, given, alpha, pool), "the votes suffice for a gesture")
-        return f"nothing was decided, and {len(robots)} of {certificate['robots']} robots took part"
-    require(majority, "no majority took part")
-    require(enough, "too few votes for so many liars")
-    # How many robots there were is its author's word.
-    require(suffice(max(certificate["robots"], given.robots))[1:] == (True, True), f"too few of {given.robots} robots took part")
-    probabilities, sure = judge(rule, evidence, given, pool)
-    places = list(range(listed)) + named
-    require(decision["class"] in places, "a gesture that no vote is about")
-    of_class = probabilities[places.index(decision["class"])]
-    said = certificate["probabilities"] + ([] if unknown is None else [unknown])
-    require(len(said) == len(probabilities), "unknown where no vote tells it, or none where one does")
-    require(all(abs(a - b) <= TOLERANCE for a, b in zip(probabilities, said)), "other probabilities")
-    require(abs(of_class - decision["confidence"]) <= TOLERANCE, "another confidence")
-    require(abs(of_class - max(probabilities)) <= TOLERANCE, "another class is likelier")
-    require(sure + TOLERANCE >= 1 - alpha, "the votes do not suffice")
-    return f"class {decision['class']}, p = {of_class:.3f}, by {len(robots)} of {certificate['robots']} robots"
+    return f"round {decision['round']['counter']}, {follows(decision, given)}"
 
 
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON; - for standard input")
     arguments.add_argument("--roster", required=True, help="the swarm's roster.json")
+    arguments.add_argument("--rule", default="correlated_pool", choices=list(filter(None, RULES)))
     arguments.add_argument("--alpha", type=float, help="by default that of the rule: 0.05 for the pools, 0.5 for the others")
     arguments.add_argument("--clip", type=float, default=6.0)
+    arguments.add_argument("--quorum", type=int, help="so many robots that gave evidence; by default a majority of all")
     arguments.add_argument("--liars", type=int, default=0)
     arguments.add_argument("--committee", type=int, default=72, help="of more robots than half as many again, so many vote; 0: always all")
     arguments.add_argument("--robots", type=int, default=1, help="how many robots there were at least, if that is known: of how many it was is its author's word")
     given = arguments.parse_args()
-    with sys.stdin if given.decision == "-" else open(given.decision, encoding="utf-8") as file:
-        decision = json.load(file)
-    with open(given.roster, encoding="utf-8") as file:
-        roster = json.load(file)
     try:
-        print(f"proven: round {decision['round']['counter']}, {check(decision, roster, given)}")
+        with sys.stdin.buffer if given.decision == "-" else open(given.decision, "rb") as file:
+            decision = file.read(LONGEST + 1)
+        with open(given.roster, "rb") as file:
+            roster = file.read(LONGEST_ROSTER + 1)
+        print(f"proven: {prove(decision, roster, given)}")
     except Refused as error:
         sys.exit(f"refused: {error}")
     except InvalidSignature:
         sys.exit("refused: a signature is not its author's")
-    except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:
+    except (OSError, ValueError, OverflowError, RecursionError) as error:
         sys.exit(f"refused: no decision, or no roster: {error!r}")
 
 

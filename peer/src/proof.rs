@@ -1,14 +1,25 @@
 //! Whether a decision was really made: checked offline, by whoever has the roster.
 
-use gestalt_protocol::{Announcement, CountedVote, Decision, Envelope, FusionRule, HeldVote, RobotId};
+use gestalt_protocol::{
+    Announcement, CountedVote, Decision, DecodeError, Envelope, FusionRule, HeldVote, RobotId, decode_json,
+};
 use gestalt_strategies::{MindConfig, follows};
-use gestalt_trust::{Distrust, Roster};
+use gestalt_trust::{Distrust, Roster, RosterError};
 use rayon::prelude::*;
+use serde_json::Value;
 use thiserror::Error;
 
 /// What keeps a decision from being one.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Unproven {
+    /// No decision at all.
+    #[error("no decision: {0}")]
+    Decision(#[from] DecodeError),
+    /// One that robots write otherwise.
+    #[error(
+        "a field is lacking, or is there beside those there are, or is written otherwise than robots write it"
+    )]
+    Spelling,
     /// No member of the roster announced it, or not so.
     #[error("it is not what robot {robot} announced: {cause}")]
     Announcement {
@@ -36,6 +47,51 @@ pub enum Unproven {
     /// The votes are true, and do not make this decision.
     #[error("it does not follow from its votes: robots of this configuration would not decide so")]
     Follows,
+}
+
+/// Reads a decision that is to be proven: each of its fields, once, and nothing beside them. A robot passes over what it does not know, for a later release
+/// may say more; but whoever is shown a file that was proven, and reads it by other means, is to find nothing in it that nobody proved.
+///
+/// # Errors
+/// [`Unproven::Decision`] and [`Unproven::Spelling`].
+pub fn read(json: &[u8]) -> Result<Announcement, Unproven> {
+    let announcement: Announcement = decode_json(json)?;
+    let written = serde_json::to_value(&announcement).ok().zip(serde_json::from_slice(json).ok());
+    written
+        .is_some_and(|(meant, found)| is_spelt(&found, &meant))
+        .then_some(announcement)
+        .ok_or(Unproven::Spelling)
+}
+
+/// The same of the roster, of which members that there are none of may be left out.
+///
+/// # Errors
+/// [`RosterError`].
+pub fn read_roster(json: &[u8]) -> Result<Roster, RosterError> {
+    let roster = Roster::parse(json)?;
+    let written =
+        serde_json::from_str::<Value>(&roster.to_json()).ok().zip(serde_json::from_slice(json).ok());
+    let same = written.is_some_and(|(meant, found): (_, Value)| {
+        found
+            .as_object()
+            .is_some_and(|found| found.iter().all(|(field, value)| meant.get(field) == Some(value)))
+    });
+    same.then_some(roster)
+        .ok_or_else(|| RosterError::Malformed("written otherwise than 'gestalt trust' writes it".to_owned()))
+}
+
+/// Whether that has the form of what it was taken for. Numbers have many spellings, and are none the less the same.
+fn is_spelt(found: &Value, meant: &Value) -> bool {
+    match (found, meant) {
+        (Value::Object(found), Value::Object(meant)) => {
+            let is_field = |(field, value)| meant.get(field).is_some_and(|meant| is_spelt(value, meant));
+            found.len() == meant.len() && found.iter().all(is_field)
+        }
+        (Value::Array(found), Value::Array(meant)) => {
+            found.len() == meant.len() && found.iter().zip(meant).all(|(found, meant)| is_spelt(found, meant))
+        }
+        (found, meant) => std::mem::discriminant(found) == std::mem::discriminant(meant),
+    }
 }
 
 /// Whether a member of the swarm announced that, to the last word; every vote that it rests on was signed by a member, and it follows from

@@ -7,7 +7,6 @@ import argparse
 import importlib.util
 import json
 import pathlib
-import struct
 import sys
 
 HERE = pathlib.Path(__file__).resolve()
@@ -15,28 +14,29 @@ spec = importlib.util.spec_from_file_location("verify", HERE.parents[2] / "examp
 verify = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(verify)
 
-RULES = argparse.Namespace(alpha=0.05, clip=6.0, liars=0, committee=72, robots=1)
-NO_DECISION = (verify.Refused, verify.InvalidSignature, KeyError, IndexError, TypeError, ValueError, struct.error,
-               AttributeError, OverflowError)
+RULES = argparse.Namespace(rule="correlated_pool", alpha=None, clip=6.0, quorum=None, liars=0, committee=72, robots=1)
+NO_DECISION = (verify.Refused, verify.InvalidSignature, ValueError, OverflowError)
+
+
+def read(decision: bytes) -> dict:
+    return verify.DECISION(verify.document(decision, verify.LONGEST))
 
 
 def main() -> None:
     shown = json.load(sys.stdin)
-    roster, truly = json.loads(shown["roster"]), shown["decision"]
-    print(verify.check(truly, roster, RULES))
-    text, refused = json.dumps(truly).encode(), 0
+    roster, text, refused = shown["roster"].encode(), json.dumps(shown["decision"]).encode(), 0
+    print(verify.prove(text, roster, RULES))
     for place in range(len(text)):
         flipped = bytearray(text)
         flipped[place] ^= 1
         try:
-            decision = json.loads(flipped)
-            verify.check(decision, roster, RULES)
+            verify.prove(bytes(flipped), roster, RULES)
         except NO_DECISION:
             refused += 1
             continue
         # Digits beyond those of a 32-bit float are not there for anybody.
-        if verify.aloud(decision) != verify.aloud(truly):
-            sys.exit(f"byte {place} makes another decision, which is proven: {decision}")
+        if verify.aloud(read(bytes(flipped))) != verify.aloud(read(text)):
+            sys.exit(f"byte {place} makes another decision, which is proven: {flipped.decode()}")
     print(f"{refused} of {len(text)} refused")
 
 

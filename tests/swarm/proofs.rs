@@ -7,14 +7,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_peer::proof;
-use gestalt_protocol::{Announcement, ClassId, FusionRule, RobotId, Signature, decode_json};
+use gestalt_protocol::{Announcement, ClassId, Envelope, FusionRule, Pool, RobotId, Signature, Stamp};
 use gestalt_strategies::{
-    Classify, ClassifyError, Input, Life, Mind, MindConfig, Observation, Output, Sign, Vocabulary,
+    Classify, ClassifyError, Input, Life, Mind, MindConfig, Observation, Output, Quorum, Sign, Vocabulary,
 };
 use gestalt_trust::{Identity, Membership, Roster, SwarmId, statement};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// How many gestures are on the list.
 const LISTED: usize = 4;
@@ -80,16 +80,24 @@ impl File {
 
     /// What verify.py is told of the rounds.
     fn words(&self) -> Vec<String> {
-        let MindConfig { liars, clip, .. } = self.rounds;
-        let mut words =
-            vec![format!("--liars={liars}"), format!("--clip={clip}"), format!("--robots={}", self.robots)];
+        let MindConfig { rule, liars, clip, committee, quorum, .. } = self.rounds;
+        let mut words = vec![
+            format!("--rule={rule}"),
+            format!("--liars={liars}"),
+            format!("--clip={clip}"),
+            format!("--committee={committee}"),
+            format!("--robots={}", self.robots),
+        ];
+        if let Quorum::Evidence(quorum) = quorum {
+            words.push(format!("--quorum={quorum}"));
+        }
         words.extend(self.rounds.alpha.map(|alpha| format!("--alpha={alpha}")));
         words
     }
 
     fn by_gestalt(&self) -> Result<(), String> {
-        let roster = Roster::parse(&self.roster).map_err(|error| error.to_string())?;
-        let announced = decode_json(&self.decision).map_err(|error| error.to_string())?;
+        let roster = proof::read_roster(&self.roster).map_err(|error| error.to_string())?;
+        let announced = proof::read(&self.decision).map_err(|error| error.to_string())?;
         proof::check(&announced, &roster, &self.rounds, self.robots).map_err(|error| error.to_string())
     }
 }
@@ -225,5 +233,294 @@ pub fn what_robots_decide_both_programs_prove_as_it_was_published() {
     assert!(near >= 10 && undecided >= 10, "{near} {undecided}");
     for (file, (proven, why)) in files.iter().zip(alike(&files)) {
         assert!(proven, "{}: {why}: {}", file.what, String::from_utf8_lossy(&file.decision));
+    }
+}
+
+/// The same announcement, as member 2 signs it after it was changed.
+fn signed_anew(announced: &Announcement, change: impl Fn(&mut Announcement)) -> Announcement {
+    let mut changed = announced.clone();
+    (changed.announcer, changed.stamp) = (RobotId(2), Stamp { boot: 9, sequence: 9 });
+    change(&mut changed);
+    let said = Envelope::from(changed.clone()).statement();
+    let signature = Some(statement::sign(&key(2), &roster().swarm_id(), &said));
+    Announcement { signature, ..changed }
+}
+
+/// What a member can make of a decision, with its own key.
+const OWN: [(&str, fn(&mut Announcement)); 37] = [
+    ("nothing", |_| {}),
+    ("a final one", |d| d.decision.is_final = true),
+    ("of another author", |d| d.decision.author = RobotId(9)),
+    ("a round of another opener", |d| d.decision.round.opener = RobotId(9)),
+    ("another round", |d| d.decision.round.counter += 1),
+    ("no class", |d| d.decision.class = None),
+    ("class 0", |d| d.decision.class = Some(ClassId(0))),
+    ("a class beyond the list", |d| d.decision.class = Some(ClassId(64))),
+    ("surer", |d| d.decision.confidence = 0.99),
+    ("a little surer", |d| d.decision.confidence = (d.decision.confidence + 1e-6).min(1.0)),
+    ("surer in a digit that platforms differ in", |d| {
+        d.decision.confidence = (d.decision.confidence - 1e-12).max(0.0);
+    }),
+    ("impossibly sure", |d| d.decision.confidence = 1.5),
+    ("other probabilities", |d| {
+        if let Some(p) = d.decision.certificate.probabilities.first_mut() {
+            *p = 1.0 - *p;
+        }
+    }),
+    ("a probability less", |d| drop(d.decision.certificate.probabilities.pop())),
+    ("another probability of unknown", |d| d.decision.certificate.unknown = Some(0.25)),
+    ("none of unknown", |d| d.decision.certificate.unknown = None),
+    ("a vote for another class", |d| {
+        if let Some(counted) = d.decision.certificate.votes.first_mut() {
+            counted.class = ClassId((counted.class.0 + 1) % 4);
+        }
+    }),
+    ("a vote of another weight", |d| {
+        if let Some(counted) = d.decision.certificate.votes.first_mut() {
+            counted.weight += 0.5;
+        }
+    }),
+    ("a vote of a negative weight", |d| {
+        if let Some(counted) = d.decision.certificate.votes.first_mut() {
+            counted.weight = -1.0;
+        }
+    }),
+    ("votes out of order", |d| d.decision.certificate.votes.reverse()),
+    ("a vote less", |d| drop(d.decision.certificate.votes.pop())),
+    ("no votes", |d| d.decision.certificate.votes.clear()),
+    ("a vote twice", |d| {
+        let twice = d.decision.certificate.votes.first().cloned();
+        d.decision.certificate.votes.extend(twice);
+    }),
+    ("a vote aside", |d| {
+        let aside = d.decision.certificate.votes.pop();
+        d.decision.certificate.others.extend(aside.map(|counted| counted.held()));
+        d.decision.certificate.others.sort_by_key(|held| held.robot);
+    }),
+    ("a vote unsigned", |d| {
+        if let Some(counted) = d.decision.certificate.votes.last_mut() {
+            counted.signature = None;
+        }
+    }),
+    ("gestures that nobody named", |d| d.decision.certificate.named.push(ClassId(1 << 27))),
+    ("no named gestures", |d| d.decision.certificate.named.clear()),
+    ("of one robot", |d| (d.decision.certificate.robots, d.decision.certificate.quorum) = (1, 1)),
+    ("of twenty robots", |d| (d.decision.certificate.robots, d.decision.certificate.quorum) = (20, 11)),
+    ("another quorum", |d| d.decision.certificate.quorum += 1),
+    ("another list", |d| d.decision.certificate.vocabulary.0 ^= 1),
+    ("another rule", |d| {
+        d.decision.certificate.rule = FusionRule::MeanProbability;
+        d.decision.certificate.pool = None;
+    }),
+    ("a pool", |d| d.decision.certificate.pool = Some(Pool { rounds: 64, ..Pool::PRIOR })),
+    ("another pool", |d| {
+        d.decision.certificate.pool = Some(Pool { likeness: 0.05, temperature: 0.5, rounds: 64 });
+    }),
+    ("a pool between the steps", |d| {
+        d.decision.certificate.pool = Some(Pool { likeness: 0.512, ..Pool::PRIOR });
+    }),
+    ("other terms", |d| d.decision.certificate.terms.alpha = 0.4),
+    ("another label", |d| d.label = Some("stop \u{0}\u{2028}\u{1F44B}".to_owned())),
+];
+
+pub fn what_a_member_makes_of_a_decision_both_programs_judge_alike() {
+    let (mut files, mut sure, mut unsure) = (Vec::new(), [0; 5], [0; 5]);
+    for seed in 1000.. {
+        let rounds = rounds(seed);
+        let announced = decided(seed, &rounds);
+        // Two decisions of each rule, and two without one.
+        let rule = seed as usize % 5;
+        let so_far = if announced.decision.class.is_some() { &mut sure } else { &mut unsure };
+        so_far[rule] += 1;
+        if so_far[rule] <= 2 {
+            for (what, change) in OWN {
+                let file = File::new(&signed_anew(&announced, change), &rounds);
+                files.push(File { what: format!("{what}: {}", file.what), robots: seed as u32 % 4, ..file });
+            }
+        }
+        if sure.iter().all(|n| *n >= 2) && unsure.iter().skip(2).all(|n| *n >= 2) || seed > 1400 {
+            break;
+        }
+    }
+    assert!(sure.iter().chain(&unsure[2..]).all(|n| *n >= 2), "{sure:?} {unsure:?}");
+    let verdicts = alike(&files);
+    let proven = files.iter().zip(&verdicts).filter(|(_, (proven, _))| *proven);
+    let proven: Vec<&str> = proven.map(|(file, _)| file.what.as_str()).collect();
+    println!("{} of {} are proven", proven.len(), files.len());
+    for lie in [
+        "surer:",
+        "a vote for another class:",
+        "a vote of another weight:",
+        "votes out of order:",
+        "another rule: c",
+    ] {
+        assert!(!proven.iter().any(|what| what.starts_with(lie)), "{proven:?}");
+    }
+    assert!(proven.iter().any(|what| what.starts_with("of another author")), "{proven:?}");
+}
+
+/// The part of a text from `from` to the first `to` after it, replaced.
+fn between(text: &str, from: &str, to: &str, other: &str) -> String {
+    let start = text.find(from).unwrap_or_else(|| panic!("{from} in {text}"));
+    let end = start + text[start..].find(to).unwrap() + to.len();
+    format!("{}{other}{}", &text[..start], &text[end..])
+}
+
+/// The same decision in other words, and in words that other readers would take for another one.
+fn respelt(text: &str) -> Vec<(&'static str, Vec<u8>)> {
+    let read: Value = serde_json::from_str(text).unwrap();
+    let (class, counter) = (&read["class"], &read["round"]["counter"]);
+    let nats = text.split_once("\"evidence\":[").unwrap().1.split_once(',').unwrap().0;
+    let exact = format!("{:.60}", f64::from(nats.parse::<f32>().unwrap()));
+    let beside = |more: &str| text.replacen('{', &format!("{{{more},"), 1);
+    let evidence = |digits: &str| text.replacen(&format!("[{nats}"), &format!("[{digits}"), 1);
+    let counted =
+        |other: &str| text.replace(&format!("\"counter\":{counter},"), &format!("\"counter\":{other},"));
+    let label = |other: &str| between(text, "\"label\":", ",", &format!("\"label\":{other},"));
+    let signature = text.rsplit_once("\"signature\":\"").unwrap().1.trim_end_matches("\"}");
+    let round = &read["round"];
+    let texts = vec![
+        ("itself", text.to_owned()),
+        ("with more space", text.replace(',', " ,\n\t")),
+        ("two million spaces", text.to_owned() + &" ".repeat(2 << 20)),
+        ("a class before it", beside("\"class\":5")),
+        ("its class twice", beside(&format!("\"class\":{class}"))),
+        ("a field more", beside("\"more\":1")),
+        ("a field more, twice", beside("\"more\":1,\"more\":2")),
+        ("no number beside it", beside("\"more\":NaN")),
+        ("no end beside it", beside("\"more\":-Infinity")),
+        ("half a letter beside it", beside("\"more\":\"\\ud800\"")),
+        ("a number without bounds beside it", beside("\"more\":1e999999")),
+        ("depths beside it", beside(&format!("\"more\":{}{}", "[".repeat(5000), "]".repeat(5000)))),
+        ("a field more in a vote", text.replacen("\"looks\"", "\"more\":null,\"looks\"", 1)),
+        ("its names written otherwise", text.replace("\"final\"", "\"\\u0066inal\"")),
+        ("digits in upper case", text.replace(signature, &signature.to_uppercase())),
+        ("digits apart", text.replace(signature, &format!("{} {}", &signature[..64], &signature[64..]))),
+        ("a digit less", text.replace(signature, &signature[1..])),
+        (
+            "1 for true",
+            text.replace("\"final\":true", "\"final\":1").replace("\"final\":false", "\"final\":0"),
+        ),
+        ("true for 1", text.replace("\"opener\":1", "\"opener\":true")),
+        ("a point", counted(&format!("{counter}.0"))),
+        ("an exponent", counted(&format!("{counter}e0"))),
+        ("a zero before it", counted(&format!("0{counter}"))),
+        ("a sign", counted(&format!("+{counter}"))),
+        ("less than nothing", counted("-0")),
+        ("beyond its bounds", counted("4294967297")),
+        ("far beyond its bounds", counted(&"9".repeat(5000))),
+        ("a text", counted(&format!("\"{counter}\""))),
+        ("all digits", evidence(&exact)),
+        ("digits that are nobody's", evidence(&format!("{exact}0000000000000000000000000001"))),
+        ("a little more than it", evidence(&format!("{}4", &exact[..exact.len() - 30]))),
+        ("another float", evidence(&format!("1{nats}"))),
+        ("beyond all floats", evidence("1e39")),
+        ("nothing that is negative", evidence("-0")),
+        ("more digits than there are", evidence(&format!("{exact}{}", "0".repeat(5000)))),
+        ("no terms", between(text, "\"terms\":", "}", "\"x\":0").replace(",\"x\":0", "")),
+        ("no named", text.replacen("\"named\":[],", "", 1)),
+        ("no unknown", text.replacen("\"unknown\":null,", "", 1)),
+        ("no pool", text.replacen("\"pool\":null,", "", 1)),
+        ("no label", between(text, "\"label\":", ",", "")),
+        ("another label", label("\"x\"")),
+        ("half a letter", label("\"\\ud800\"")),
+        ("a letter in two halves", label("\"\\ud83d\\udc4b\"")),
+        ("a number for a label", label("7")),
+        (
+            "a round as a list",
+            text.replacen(
+                &round.to_string(),
+                &json!([round["counter"], round["opener"], round["life"]]).to_string(),
+                1,
+            ),
+        ),
+        (
+            "a rule as an object",
+            text.replacen("\"rule\":\"", "\"rule\":{\"", 1).replacen("\",\"pool\"", "\":null},\"pool\"", 1),
+        ),
+        (
+            "a rule of somebody's own",
+            between(text, "\"rule\":\"", "\"", "\"rule\":{\"other\":\"mine\"}").replacen(
+                "}correlated_pool\"",
+                "}",
+                1,
+            ),
+        ),
+        ("one more", text.to_owned() + "{}"),
+        ("half of it", text[..text.len() / 2].to_owned()),
+        ("nothing", String::new()),
+        ("a list", format!("[{text}]")),
+        ("nobody", "null".to_owned()),
+        ("a mark before it", format!("\u{feff}{text}")),
+    ];
+    let mut texts: Vec<(&str, Vec<u8>)> =
+        texts.into_iter().map(|(what, text)| (what, text.into_bytes())).collect();
+    let label = text.find("\"label\":").unwrap();
+    texts.push((
+        "no letter",
+        [
+            &text.as_bytes()[..label + 9],
+            b"\"\xff\",\"announcer\":",
+            text[label..].split_once("\"announcer\":").unwrap().1.as_bytes(),
+        ]
+        .concat(),
+    ));
+    texts.push(("sixteen bits a letter", text.encode_utf16().flat_map(u16::to_le_bytes).collect()));
+    texts
+}
+
+pub fn a_file_in_other_words_both_programs_judge_alike() {
+    let (mut files, mut rosters) = (Vec::new(), 0);
+    for seed in [1, 2, 3, 4, 9] {
+        let rounds = rounds(seed);
+        let file = File::new(&decided(seed, &rounds), &rounds);
+        let text = String::from_utf8(file.decision.clone()).unwrap();
+        for (what, decision) in respelt(&text) {
+            files.push(File { what: format!("{what}: {}", file.what), decision, ..file.clone() });
+        }
+        let roster = String::from_utf8(file.roster.clone()).unwrap();
+        let one = roster.split_once("\"1\": \"").unwrap().1.split_once('"').unwrap().0.to_owned();
+        let changed = [
+            roster.replacen('{', "{\"more\": 1,", 1),
+            roster.replacen("\"epoch\": 1", "\"epoch\": 1, \"epoch\": 1", 1),
+            roster.replacen("\"epoch\": 1", "\"epoch\": 1.0", 1),
+            roster.replacen("\"instructors\": {},", "", 1),
+            roster.replacen("\"local\": [],", "", 1),
+            roster.replacen("\"1\": \"", "\"01\": \"", 1),
+            roster.replacen("\"1\": \"", "\"8\": \"", 1),
+            roster.replacen(&one, &one.to_uppercase(), 1),
+            roster.replacen("\"demo\"", "\"demo2\"", 1),
+            roster.clone() + &" ".repeat(512 << 10),
+            String::new(),
+        ];
+        for (n, roster) in changed.into_iter().enumerate() {
+            rosters += 1;
+            files.push(File { what: format!("roster {n}"), roster: roster.into_bytes(), ..file.clone() });
+        }
+    }
+    let verdicts = alike(&files);
+    let proven: Vec<&str> = files
+        .iter()
+        .zip(&verdicts)
+        .filter(|(_, (proven, _))| *proven)
+        .map(|(file, _)| file.what.as_str())
+        .collect();
+    println!("{} of {} files are proven, {rosters} by other rosters", proven.len(), files.len());
+    let is_proven = |what: &str| proven.iter().any(|proven| proven.starts_with(what));
+    for same in
+        ["itself", "with more space", "its names written otherwise", "all digits", "digits that are nobody's"]
+    {
+        assert!(is_proven(same), "{same} in {proven:?}");
+    }
+    for other in [
+        "a class before it",
+        "its class twice",
+        "a field more",
+        "no terms",
+        "digits in upper case",
+        "1 for true",
+        "two million",
+    ] {
+        assert!(!is_proven(other), "{other} in {proven:?}");
     }
 }

@@ -3,8 +3,8 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use gestalt_protocol::{Announcement, MAX_JSON, decode_json};
-use gestalt_trust::Roster;
+use gestalt_protocol::MAX_JSON;
+use gestalt_trust::MAX_ROSTER;
 use serde_json::json;
 
 use super::Failure;
@@ -39,8 +39,8 @@ pub struct Args {
 /// # Errors
 /// What keeps the decision from being one.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let announcement: Announcement = decode_json(&read(&args.decision)?)?;
-    let roster: Roster = Roster::read(&args.roster)?;
+    let announcement = proof::read(&read(&args.decision, MAX_JSON)?)?;
+    let roster = proof::read_roster(&read(&args.roster, MAX_ROSTER)?)?;
     let config = args.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
     proof::check(&announcement, &roster, &config.rounds, args.robots)?;
     let decision = announcement.decision;
@@ -60,8 +60,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     line(args.json, &object, &words)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
-    let at_most = MAX_JSON as u64 + 1;
+/// So many bytes, and one more by which it is too long.
+fn read(path: &Path, longest: usize) -> Result<Vec<u8>, Failure> {
+    let at_most = longest as u64 + 1;
     let mut bytes = Vec::new();
     if path == Path::new("-") {
         std::io::stdin().take(at_most).read_to_end(&mut bytes)?;
