@@ -43,6 +43,8 @@ pub enum Refusal {
     Stranger,
     /// A question about what this robot knows, of a neighbour that was told much just now.
     TooOften,
+    /// What another robot asks whoever instructs the swarm, of a round that is not the newest, not over or was spoken of, or sooner than the swarm may ask.
+    Untimely,
     /// A decision beyond the rate at which one robot may give them, or all together announce them.
     DecisionTooOften,
     /// A comparison of what is known of a round, beyond the rate at which one robot may ask for it.
@@ -53,7 +55,7 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -74,6 +76,7 @@ impl Refusal {
         Self::NamingUnproven,
         Self::Stranger,
         Self::TooOften,
+        Self::Untimely,
         Self::DecisionTooOften,
         Self::HaveTooOften,
         Self::CountersUsedUp,
@@ -103,6 +106,7 @@ impl Refusal {
             Self::NamingUnproven => "refused_naming_unproven",
             Self::Stranger => "refused_question_of_stranger",
             Self::TooOften => "refused_question_too_often",
+            Self::Untimely => "refused_question_untimely",
             Self::DecisionTooOften => "refused_decision_too_often",
             Self::HaveTooOften => "refused_have_too_often",
             Self::CountersUsedUp => "refused_counters_used_up",

@@ -4,11 +4,16 @@ use std::time::Duration;
 
 use super::config::QuestionsConfig;
 
+/// By how much the ways of two questions through the swarm may differ: one that was asked in time may be heard that much too soon.
+const UNDER_WAY: Duration = Duration::from_secs(2);
+
 /// Counts rounds and time since the last question, whoever asked it.
 ///
 /// It begins as if one had just been asked: a robot that starts anew does not know of what was asked before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QuestionBudget {
+    /// Whether it knows when the last one was asked.
+    knows: bool,
     /// Rounds that began since.
     rounds: u32,
     last: Option<Duration>,
@@ -23,14 +28,23 @@ impl QuestionBudget {
 
     /// A question was asked, by this robot or another.
     pub fn spend(&mut self, now: Duration) {
-        *self = Self { rounds: 0, last: Some(now) };
+        *self = Self { knows: true, rounds: 0, last: Some(now) };
+    }
+
+    /// Whether another robot may ask one now, about the latest round. Of the first that it hears a robot that has just started cannot tell.
+    #[must_use]
+    pub fn allows_another(&self, now: Duration, config: &QuestionsConfig) -> bool {
+        !self.knows || self.is_due(now.saturating_add(UNDER_WAY), config)
+    }
+
+    fn is_due(&self, now: Duration, config: &QuestionsConfig) -> bool {
+        self.last.is_some_and(|last| now >= last.saturating_add(config.apart)) && self.rounds >= config.rounds
     }
 
     /// Whether one may be asked now, about the latest round.
     #[must_use]
     pub fn allows(&self, now: Duration, config: &QuestionsConfig) -> bool {
-        let apart = self.last.is_some_and(|last| now >= last.saturating_add(config.apart));
-        config.ask && apart && self.rounds >= config.rounds
+        config.ask && self.is_due(now, config)
     }
 
     /// Since how many rounds no question was asked, in units of those that must lie between two.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::{Ask, Asked, ClassId, Message, Question, Reason};
-use gestalt_rounds::{Doubt, Input as AboutRounds, outcome};
+use gestalt_rounds::{Doubt, Input as AboutRounds, Refusal, outcome};
 
 use super::asks::Passed;
 use super::machine::Mind;
@@ -19,10 +19,20 @@ impl Mind {
         self.asks.open.as_ref().map(|(question, _)| question)
     }
 
-    /// Another robot asked.
+    /// Another robot asked. What no honest robot would have asked now is refused: else one member, or whoever says again what one asked long ago, could keep all
+    /// others from asking, and have an instructor speak of a round of its choice.
     pub(super) fn on_asked(&mut self, now: Duration, question: Question) -> AboutRounds {
-        if let Some(learning) = self.learning.as_ref().filter(|_| question.robot != self.rounds.me()) {
-            self.asks.note(now, question, &learning.config().questions);
+        let Some(learning) = self.learning.as_ref().filter(|_| question.robot != self.rounds.me()) else {
+            return AboutRounds::Tick;
+        };
+        let config = &learning.config().questions;
+        let is_over = !self.rounds.is_open() && self.rounds.looking().is_none();
+        let is_of_newest = self.rounds.round() == Some(question.round);
+        let is_unsaid = learning.verdict(question.round) == Verdict::Unsaid;
+        if is_over && is_of_newest && is_unsaid && self.asks.budget.allows_another(now, config) {
+            self.asks.note(now, question, config);
+        } else {
+            self.rounds.note_refusal(Refusal::Untimely);
         }
         AboutRounds::Tick
     }

@@ -24,7 +24,7 @@ use gestalt_strategies::Vocabulary;
 use serde::Serialize;
 
 pub use decision::{DecisionView, Share, VoteView};
-pub use question::{QuestionView, SHOWN};
+pub use question::{APART, QuestionView, SHOWN};
 pub use robot::{LearningView, RobotView};
 pub use round::{CurvePoint, MAX_ROUNDS, RoundView, Verdict};
 pub use said::{MAX_SAID, SaidView};
@@ -296,7 +296,10 @@ impl View {
     }
 
     fn on_question(&mut self, now: Duration, question: Question) -> Option<Event> {
-        if !self.asked.ask(now, question.clone()) {
+        // Robots ask about their newest round alone.
+        let is_old =
+            self.latest.as_ref().is_some_and(|latest| question.round.counter < latest.decision.round.counter);
+        if is_old || !self.asked.ask(now, question.clone()) {
             return None;
         }
         self.tally.count_question(&question.ask);

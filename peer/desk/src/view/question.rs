@@ -10,6 +10,10 @@ use super::text::{clipped, finite};
 /// How long it is shown: as long as robots wait for its answer, unless they are told otherwise.
 pub const SHOWN: Duration = Duration::from_secs(15);
 
+/// How long after one another is shown at the earliest: robots ask 10 s apart, unless they are told otherwise, and what they say is under way for a while. Whoever
+/// asks more is no robot in good order.
+pub const APART: Duration = Duration::from_secs(8);
+
 /// A question as a reader of the page is shown it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuestionView {
@@ -31,27 +35,32 @@ pub struct QuestionView {
 
 /// The latest question, until it is answered or nobody did in time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Asked(Option<(Question, Duration)>);
+pub(super) struct Asked {
+    open: Option<(Question, Duration)>,
+    /// When the last one was heard, answered or not.
+    last: Option<Duration>,
+}
 
 impl Asked {
     /// Takes in a question. Says whether it is new: where a robot dies while it asks, the next may ask the same.
     pub fn ask(&mut self, now: Duration, question: Question) -> bool {
-        if self.at(now).is_some_and(|known| known.round == question.round) {
+        let is_known = self.at(now).is_some_and(|known| known.round == question.round);
+        if is_known || self.last.is_some_and(|last| now < last.saturating_add(APART)) {
             return false;
         }
-        self.0 = Some((question, now));
+        (self.open, self.last) = (Some((question, now)), Some(now));
         true
     }
 
     /// A word on that round was answered: where it was heeded, the question is settled.
     pub fn answer(&mut self, round: RoundId, outcome: Outcome) {
         let heeded = matches!(outcome, Outcome::Learned | Outcome::Known | Outcome::NothingSeen);
-        self.0.take_if(|(question, _)| heeded && question.round == round);
+        self.open.take_if(|(question, _)| heeded && question.round == round);
     }
 
     /// The one that waits for its answer.
     pub fn at(&self, now: Duration) -> Option<&Question> {
-        let (question, heard) = self.0.as_ref()?;
+        let (question, heard) = self.open.as_ref()?;
         (now < heard.saturating_add(SHOWN)).then_some(question)
     }
 }
@@ -103,5 +112,12 @@ mod tests {
         assert!(asked.ask(second(20), question(8)));
         asked.answer(question(8).round, Outcome::Learned);
         assert_eq!(asked.at(second(20)), None);
+    }
+
+    #[test]
+    fn who_asks_without_end_is_shown_no_more_than_a_swarm_asks() {
+        let mut asked = Asked::default();
+        let shown = (0..1000).filter(|n| asked.ask(Duration::from_millis(100 * n), question(*n as u32)));
+        assert_eq!(shown.count(), 13, "in 100 s, one in 8");
     }
 }

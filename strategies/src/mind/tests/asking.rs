@@ -1,6 +1,6 @@
 //! What the swarm asks, and what comes of it.
 
-use gestalt_protocol::{Ask, Question};
+use gestalt_protocol::{Ask, Question, Stamp};
 
 use super::*;
 use crate::asking::QuestionsConfig;
@@ -86,6 +86,63 @@ fn robots_that_disagree_ask_between_two_once_and_not_again_for_three_rounds() {
     assert_eq!(rounds, [3, 6, 9], "{:?}", swarm.asked);
     let apart = swarm.asked.windows(2).all(|pair| pair[1].0 - pair[0].0 >= Duration::from_secs(10));
     assert!(apart, "{:?}", swarm.asked);
+}
+
+/// Asks all robots, in the name of the third.
+fn ask(swarm: &mut Swarm, round: RoundId) {
+    let question = Question {
+        round,
+        ask: Ask::Name { nearest: None },
+        labels: vec![],
+        entropy: 1.0,
+        disagreement: 1.0,
+        robot: RobotId(9),
+        stamp: Stamp { boot: 9, sequence: 9 },
+        signature: None,
+    };
+    for i in 0..swarm.minds.len() {
+        swarm.input(i, Input::Asked(question.clone()));
+    }
+}
+
+#[test]
+fn what_no_robot_would_ask_now_is_refused_and_keeps_nobody_from_asking() {
+    let mut swarm = swarm(3, QuestionsConfig::default());
+    let (mut asked, mut rounds): (Vec<(RoundId, Question)>, Vec<RoundId>) = (Vec::new(), Vec::new());
+    for n in 0..9 {
+        let round = show(&mut swarm, 2, if n < 2 { &SURE } else { &SPLIT });
+        if swarm.asked.len() > asked.len() {
+            asked.push((round, last(&swarm).clone()));
+            // One that was asked already, by whoever; and one that was answered.
+            ask(&mut swarm, round);
+        }
+        let unknown = RoundId { counter: round.counter + 5, ..round };
+        for old in rounds.iter().chain([&unknown]).copied() {
+            (0..20).for_each(|_| ask(&mut swarm, old));
+        }
+        // What honest robots asked long ago, said again.
+        for (_, question) in &asked[..asked.len().saturating_sub(1)] {
+            for i in 1..3 {
+                swarm.input(i, Input::Asked(question.clone()));
+            }
+        }
+        if let Some((_, open)) = asked.last() {
+            assert!(swarm.minds.iter().all(|mind| mind.question().is_none_or(|it| it == open)));
+        }
+        swarm.input(0, Input::Open);
+        assert!(swarm.minds[0].is_open());
+        let open = swarm.minds[0].round().unwrap();
+        ask(&mut swarm, open);
+        swarm.pass(Duration::from_secs(8));
+        swarm.was(open, 1);
+        ask(&mut swarm, open);
+        swarm.pass(Duration::from_secs(1));
+        rounds.extend([round, open]);
+    }
+    let apart: Vec<u32> = asked.windows(2).map(|pair| pair[1].0.counter - pair[0].0.counter).collect();
+    assert!(asked.len() >= 3 && apart.iter().all(|apart| (3..=6).contains(apart)), "{asked:?}");
+    let refused = swarm.minds[1].refusals().count(Refusal::Untimely);
+    assert!(refused > 1000, "{refused}");
 }
 
 #[test]
