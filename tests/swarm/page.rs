@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use gestalt_desk::{Address, Desk, Door};
 use gestalt_link::{Client, Heard, LinkConfig, RobotConfig};
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Instruction, RobotId};
 use gestalt_tests::{Browser, Process, Watched, config, learning, short_rounds, start_learning, unique};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -196,6 +196,22 @@ pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
     let took = see("document.querySelector('#answer').textContent.includes('learned')");
     println!("learned {took:?} after the button");
     see("document.querySelector('#curve-words').textContent.includes('the swarm in')");
+    // Undo takes back what was said last, and not what was decided since.
+    let first = announced.decision.round.counter;
+    client.instruct(&"ada".parse().unwrap(), &Instruction::Open).await.unwrap();
+    let next = loop {
+        let next =
+            timeout(PATIENCE, decisions.next()).await.unwrap().unwrap().unwrap().decision.round.counter;
+        if next > first {
+            break next;
+        }
+    };
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
+    see(&format!("document.querySelector('#facts').textContent.includes('round {next},')"));
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    block_in_place(|| browser.press("#undo"));
+    let mut see = |expression: &str| block_in_place(|| browser.wait(expression, PATIENCE));
+    see(&format!("document.querySelector('#answer').textContent.startsWith('Round {first}: ')"));
     let markup =
         block_in_place(|| browser.evaluate("document.querySelectorAll('img, script:not([src])').length"));
     assert_eq!(markup, 0, "a name became a part of the page");

@@ -9,6 +9,8 @@ const token = decodeURIComponent(location.hash.slice(1));
 const authority = token ? { Authorization: `Bearer ${token}` } : {};
 
 const state = { swarm: null, decision: null, rounds: null, question: null };
+// The round of which something was said last, here: what "Undo" takes back, whatever was decided since.
+let said = null;
 // Without a word for this long, the page is not live. The server says one each second.
 const SILENCE = 2500;
 // A round that has just appeared is not yet what the person meant to speak of.
@@ -323,7 +325,7 @@ function buttons() {
   const can = live && settled && !waiting;
   $("look").disabled = !live || waiting;
   for (const id of ["right", "wrong"]) $(id).disabled = !can || !it || it.class === null;
-  $("undo").disabled = !can || !it;
+  $("undo").disabled = !can || !(said || it);
   $("name-it").disabled = !live || waiting;
   $("was").classList.toggle("off", !can || !it);
   for (const button of $("gestures").children) button.disabled = !can || !it;
@@ -377,17 +379,19 @@ function chooseOther(it, others) {
 
 async function say(word) {
   waiting = true;
+  // Also what nobody answers may have arrived.
+  said = word.round ?? said;
   buttons();
   reply(word.say === "open" ? "Asking all robots to look…" : "Telling the swarm…", false);
   try {
     const response = await fetch("say", {
       method: "POST", headers: { ...authority, "Content-Type": "application/json" }, body: JSON.stringify(word),
     });
-    const said = await response.json();
-    if (!response.ok) throw new Error(said.error);
-    const samples = said.answer ? `; robot ${said.answer.robot} learns from ${counted(said.answer.samples, "sample")} of it` : "";
+    const told = await response.json();
+    if (!response.ok) throw new Error(told.error);
+    const samples = told.answer ? `; robot ${told.answer.robot} learns from ${counted(told.answer.samples, "sample")} of it` : "";
     const round = word.round ? `Round ${word.round.counter}: ` : "";
-    const words = round + said.words + (said.answer && said.answer.samples ? samples : "");
+    const words = round + told.words + (told.answer && told.answer.samples ? samples : "");
     reply(`${words[0].toUpperCase()}${words.slice(1)}.`, false);
   } catch (error) {
     reply(`That did not arrive: ${error.message}`, true);
@@ -521,7 +525,7 @@ $("new").addEventListener("submit", (event) => {
   const it = state.decision;
   say(it && settled ? { say: "new", label, round: it.round } : { say: "new", label });
 });
-$("undo").addEventListener("click", () => say({ say: "retract", round: state.decision.round }));
+$("undo").addEventListener("click", () => say({ say: "retract", round: said ?? state.decision.round }));
 $("certificate").addEventListener("click", save);
 addEventListener("hashchange", () => location.reload());
 follow();
