@@ -1,17 +1,20 @@
 //! `gestalt teach`: a person at a keyboard teaches a running swarm.
 
+mod about;
+
 use std::io::BufRead;
 use std::pin::pin;
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, Ask, ClassId, Gesture, Instruction, InstructorId, Question, RoundId};
+use gestalt_protocol::{Answer, Ask, Gesture, Instruction, InstructorId, Question, RoundId};
 use serde_json::json;
 use tokio::sync::mpsc;
 
+use self::about::{About, Typed};
 use super::config_args::ConfigArgs;
 use super::show::{self, Names, line};
 use super::{Failure, interrupted};
-use gestalt_desk::{SHOWN, Word};
+use gestalt_desk::Word;
 use gestalt_link::{Client, Heard, News};
 use gestalt_vision::vocabulary::GestureBook;
 
@@ -80,13 +83,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let client = Client::open(&swarm, &link).await?;
         let news = client.news().await?;
-        let last =
-            client.last_decision(super::ANSWER).await?.map(|last| (last.decision.round, last.decision.class));
-        let last = match args.round {
-            Some(round) => Some((round, last.filter(|last| last.0 == round).and_then(|last| last.1))),
-            None => last,
-        };
-        let mut lesson = Lesson { args, client, news, last, asked: None, names: Names::default() };
+        let last = client.last_decision(super::ANSWER).await?;
+        let about = About::new(args.round, last.as_ref().map(|last| &last.decision));
+        let mut lesson = Lesson { args, client, news, about, names: Names::default() };
         let said = match (word, book) {
             (_, Some(book)) => lesson.name_all(book).await,
             (Some(Word::New(label)), _) => lesson.name(label).await,
@@ -102,10 +101,7 @@ struct Lesson<'a> {
     args: &'a Args,
     client: Client,
     news: News,
-    /// The round that words are about, and what was decided of it.
-    last: Option<(RoundId, Option<ClassId>)>,
-    /// What the swarm asked last, and when.
-    asked: Option<(Question, Instant)>,
+    about: About,
     names: Names,
 }
 
@@ -124,10 +120,16 @@ impl Lesson<'_> {
         let mut interrupted = pin!(interrupted());
         loop {
             let typed = tokio::select! {
+                // What was heard before a line was typed is what the line is about.
+                biased;
                 () = &mut interrupted => return Ok(()),
                 heard = self.news.next() => match heard {
                     Some(Heard::Asked(question)) => {
                         self.hear_question(question)?;
+                        continue;
+                    }
+                    Some(Heard::Decided(decided)) => {
+                        self.about.hear(&decided.decision);
                         continue;
                     }
                     Some(_) => continue,
@@ -142,13 +144,16 @@ impl Lesson<'_> {
             if words.is_empty() {
                 continue;
             }
-            let said = match Word::read(&words) {
-                Ok(Word::Quit) => return Ok(()),
-                Ok(word) => self.say(word).await,
-                Err(error) => match self.question() {
-                    Some(question) => self.reply(&question, &words.join(" ")).await,
-                    None => Err(error.into()),
-                },
+            let said = match self.about.read(Instant::now(), &words) {
+                Ok(Typed::Word(Word::Quit)) => return Ok(()),
+                Ok(Typed::Word(word)) => self.say(word).await,
+                Ok(Typed::Answer(question, label)) => {
+                    self.say_of(question.round, None, Word::Was(Gesture::Label(label))).await
+                }
+                Ok(Typed::Neither) => {
+                    line(self.args.json, &json!({"event": "neither"}), "which one, then? Or nothing.")
+                }
+                Err(error) => Err(error.into()),
             };
             if let Err(error) = said {
                 eprintln!("{}", show::clean(&error.to_string()));
@@ -181,8 +186,7 @@ impl Lesson<'_> {
                     self.args.shows
                 );
             }
-            self.open().await?;
-            let Some((round, _)) = self.last else { continue };
+            let round = self.open().await?;
             self.tell(&Instruction::Was { round, class: Gesture::Class(class) }).await?;
             tokio::time::sleep(BETWEEN_SHOWS).await;
         }
@@ -190,42 +194,23 @@ impl Lesson<'_> {
     }
 
     fn hear_question(&mut self, question: Question) -> Result<(), Failure> {
-        // Where a robot dies while it asks, the next may ask the same.
-        if self.question().is_some_and(|known| known.round == question.round) {
+        if !self.about.ask(Instant::now(), &question) {
             return Ok(());
         }
         let words = format!("{}\n{}", show::question(&question), how_to_answer(&question.ask));
-        let shown = line(self.args.json, &json!({"event": "question", "question": question}), &words);
-        self.asked = Some((question, Instant::now()));
-        shown
-    }
-
-    /// The question that waits for its answer.
-    fn question(&self) -> Option<Question> {
-        let (question, asked) = self.asked.as_ref()?;
-        (asked.elapsed() < SHOWN).then(|| question.clone())
-    }
-
-    /// Answers a question with what was typed: a gesture's name, or `neither`, which leaves it to the next line to say which.
-    async fn reply(&mut self, question: &Question, typed: &str) -> Result<(), Failure> {
-        if typed == "neither" {
-            self.asked = Some((question.clone(), Instant::now()));
-            return line(self.args.json, &json!({"event": "neither"}), "which one, then? Or nothing.");
-        }
-        self.asked = None;
-        let word = Word::Was(Gesture::Label(typed.to_owned()));
-        self.say_of(question.round, None, word).await
+        line(self.args.json, &json!({"event": "question", "question": question}), &words)
     }
 
     async fn say(&mut self, word: Word) -> Result<(), Failure> {
         if word == Word::Open {
-            return self.open().await;
+            return self.open().await.map(|_| ());
         }
         if let Some(instruction) = word.of_names(self.args.round) {
             return self.tell(&instruction).await.map(|_| ());
         }
         let (round, decided) = self
-            .last
+            .about
+            .of(&word)
             .ok_or("no round has been decided yet: open one with 'open', or name one with --round")?;
         self.say_of(round, decided, word).await
     }
@@ -238,6 +223,8 @@ impl Lesson<'_> {
     /// Says it to the swarm, and prints the answer.
     async fn tell(&mut self, instruction: &Instruction) -> Result<Answer, Failure> {
         let timeout = self.args.timeout;
+        // Also what nobody answers may have arrived.
+        self.about.say(instruction);
         let answer = self.client.teach(&self.args.instructor, instruction, timeout).await?;
         let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
         if answer.looks_like.is_some() && !self.args.json {
@@ -248,14 +235,15 @@ impl Lesson<'_> {
         Ok(answer)
     }
 
-    async fn open(&mut self) -> Result<(), Failure> {
-        let before = self.news.newest().max(self.last.map(|(round, _)| round.counter));
+    /// Has a round opened, and shows what is decided; says which it was.
+    async fn open(&mut self) -> Result<RoundId, Failure> {
+        let before = self.news.newest().max(self.about.last().map(|(round, _)| round.counter));
         let (instructor, timeout) = (&self.args.instructor, self.args.timeout);
         let decided = super::open_round(&self.client, &mut self.news, instructor, before, timeout).await?;
         let decided = decided.ok_or_else(|| {
             format!("no decision within {timeout:?}: is a robot running? (gestalt watch --status)")
         })?;
-        self.last = Some((decided.decision.round, decided.decision.class));
+        self.about.hear(&decided.decision);
         if !self.args.json && !self.names.cover(&decided.decision) {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }
@@ -263,7 +251,8 @@ impl Lesson<'_> {
             self.args.json,
             &json!({"event": "decision", "decision": decided}),
             &show::announced(&decided, &self.names),
-        )
+        )?;
+        Ok(decided.decision.round)
     }
 }
 
