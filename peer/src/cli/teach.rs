@@ -6,7 +6,7 @@ use std::io::BufRead;
 use std::pin::pin;
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, Ask, Gesture, Instruction, InstructorId, Question, RoundId};
+use gestalt_protocol::{Answer, Ask, ClassId, Gesture, Instruction, InstructorId, Question, RoundId};
 use serde_json::json;
 use tokio::sync::mpsc;
 
