@@ -267,7 +267,7 @@ const OWN: [(&str, fn(&mut Announcement)); 37] = [
             *p = 1.0 - *p;
         }
     }),
-    ("a probability less", |d| drop(d.decision.certificate.probabilities.pop())),
+    ("a probability less", |d| _ = d.decision.certificate.probabilities.pop()),
     ("another probability of unknown", |d| d.decision.certificate.unknown = Some(0.25)),
     ("none of unknown", |d| d.decision.certificate.unknown = None),
     ("a vote for another class", |d| {
