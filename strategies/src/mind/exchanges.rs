@@ -20,6 +20,9 @@ const NAMES_GIVEN: u32 = 8;
 /// The same of samples: of many lives of one robot two robots may keep others for good.
 const SAMPLES_GIVEN: u32 = 16;
 
+/// And again after so many more questions: links may lose many messages in a row, and come to themselves.
+const GIVEN_AGAIN: u32 = 256;
+
 /// How many messages a neighbour is told at once at most, of 16 KiB at most. A question of 40 bytes in its name brings no
 /// more upon it.
 const REPLIES_AT_ONCE: f64 = 128.0;
@@ -37,25 +40,25 @@ struct Exchange {
     declined: SeenSamples,
     /// The lessons it offered, some of which this robot cannot take: at most [`MAX_DECLINED_ROUNDS`] rounds.
     declined_lessons: LessonBook,
-    /// For which digests of names, this robot's and the neighbour's, it was given all of them, and how often.
+    /// How often it asked for all names.
     names: Given,
-    /// The same of samples.
+    /// The same of the samples that it lacks.
     samples: Given,
     /// The messages it was told, less those that time has made up for, and when that was reckoned.
     told: f64,
     told_at: Duration,
 }
 
-/// For which digests, this robot's and a neighbour's, that was given something, and how often.
+/// For which digests, this robot's and a neighbour's, that asked for something, and how often.
 #[derive(Clone, Copy, Debug, Default)]
 struct Given(Option<((u64, u64), u32)>);
 
 impl Given {
-    /// How often it was given something for these, before this time.
-    fn again(&mut self, digests: (u64, u64)) -> u32 {
-        let given = self.0.filter(|(of, _)| *of == digests).map_or(0, |(_, given)| given);
-        self.0 = Some((digests, given.saturating_add(1)));
-        given
+    /// Whether it is to be given something for these, which it may be so often.
+    fn may(&mut self, digests: (u64, u64), so_often: u32) -> bool {
+        let asked = self.0.filter(|(of, _)| *of == digests).map_or(0, |(_, asked)| asked);
+        self.0 = Some((digests, asked.saturating_add(1)));
+        asked < so_often || asked.is_multiple_of(GIVEN_AGAIN)
     }
 }
 
@@ -121,12 +124,12 @@ impl Exchanges {
 
     /// Whether that neighbour is to be given all names, where the digests of both are these.
     pub fn may_give_names(&mut self, robot: RobotId, digests: (u64, u64)) -> bool {
-        self.with(robot).names.again(digests) < NAMES_GIVEN
+        self.with(robot).names.may(digests, NAMES_GIVEN)
     }
 
     /// Whether that neighbour is to be given the samples that it lacks, where the digests of both are these.
     pub fn may_give_samples(&mut self, robot: RobotId, digests: (u64, u64)) -> bool {
-        self.with(robot).samples.again(digests) < SAMPLES_GIVEN
+        self.with(robot).samples.may(digests, SAMPLES_GIVEN)
     }
 
     /// How many messages that neighbour may be told now.
@@ -181,6 +184,19 @@ mod tests {
         assert!(!exchanges.is_at_rest(neighbour, digest, digest));
         let told = exchanges.told_to(neighbour, &SeenSamples::default());
         assert!(!told.contains(id(5)) && told.contains(id(6)));
+    }
+
+    #[test]
+    fn who_asks_for_the_same_again_and_again_is_given_it_a_few_times_and_then_rarely() {
+        let mut exchanges = Exchanges::default();
+        let mut given = |digests| {
+            let asked = (0..10_000).map(|_| exchanges.may_give_samples(RobotId(1), digests));
+            asked.enumerate().filter(|(_, may)| *may).map(|(nth, _)| nth as u32).collect::<Vec<_>>()
+        };
+        let first = given((1, 2));
+        assert!((0..SAMPLES_GIVEN).eq(first.iter().copied().take(SAMPLES_GIVEN as usize)));
+        assert_eq!(first.len(), SAMPLES_GIVEN as usize + 39, "links that lost all of it come to themselves");
+        assert_eq!(given((1, 3)), first, "what is known has changed");
     }
 
     #[test]
