@@ -363,7 +363,8 @@ fn a_robot_that_was_started_ever_so_often_still_shares_and_is_heard() {
             TrainingSet::new(RobotId(5), 100, SelectionRule::Random.build(), ForgettingRule::Fifo.build());
         robot = robot.in_life(life * 7919 % 1009);
         robot.restore(stored, seen, next_key).unwrap();
-        robot.keep(ClassId(0), round(1), vec![life as f32], &mut rng);
+        // Of many lives those of the newest rounds are known.
+        robot.keep(ClassId(0), round(life), vec![life as f32], &mut rng);
         let changes = robot.share(1, None, &as_is, &mut rng);
         let [.., SetChange::Shared(key, id)] = &changes[..] else { panic!("{changes:?}") };
         let sample = robot.get(*key).unwrap();

@@ -1,6 +1,7 @@
 //! Whole swarms on real Zenoh, one subject a file. Each line of the table says what a scenario does most of its time, and
 //! what it needs of the machine; what waits runs side by side. The long ones come first.
 
+mod announced;
 mod asking;
 mod cameras;
 mod cells;

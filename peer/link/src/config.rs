@@ -295,8 +295,6 @@ impl LinkConfig {
             "transport/unicast/max_links": 1,
             "transport/link/tx/lease": lease,
             "transport/link/tx/keep_alive": keep_alives,
-            // What may not be dropped waits for room in the queue to one neighbour, and all that this session receives waits with it.
-            "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
         });
         for (path, value) in [first, &rest].into_iter().filter_map(Value::as_object).flatten() {
             config
