@@ -125,8 +125,11 @@ fn signed_anew(announced: &Announcement, change: impl Fn(&mut Announcement)) -> 
     Announcement { signature, ..changed }
 }
 
+/// What somebody makes of an announcement.
+type Change = fn(&mut Announcement);
+
 /// What a member can make of a decision, with its own key.
-const OWN: [(&str, fn(&mut Announcement)); 37] = [
+const OWN: [(&str, Change); 37] = [
     ("nothing", |_| {}),
     ("a final one", |d| d.decision.is_final = true),
     ("of another author", |d| d.decision.author = RobotId(9)),
