@@ -36,7 +36,7 @@ impl Robot {
     #[must_use]
     pub fn is_enrolled(&self) -> bool {
         let robot = self.account.lock().robot;
-        self.seal.as_deref().is_none_or(|seal| self.inbox.has_key(robot, &seal.key_of(robot)))
+        self.inbox.enrols(robot, self.seal.as_deref())
     }
 
     /// Starts a robot that sees and votes through this one's session, while this one's mind decides for both. It has a
@@ -56,7 +56,7 @@ impl Robot {
         if let Some(seal) = self.seal.as_deref() {
             let not_enrolled = || LinkError::Seal(SealError::NotEnrolled(id));
             let signer = seal.signer_of(id).ok_or_else(not_enrolled)?;
-            if !self.inbox.has_key(id, &seal.key_of(id)) {
+            if !self.inbox.enrols(id, Some(seal)) {
                 return Err(not_enrolled());
             }
             voter = voter.signed_by(signer);
@@ -191,7 +191,7 @@ impl Guest {
                 () = sleep_until(wake) => {}
             }
             // The host takes what it says as it comes.
-            if !self.is_enrolled() {
+            if !self.inbox.enrols(self.departure.guest, self.seal.as_deref()) {
                 self.account.count("expelled");
                 break;
             }
@@ -204,11 +204,6 @@ impl Guest {
                 self.tell_host(Input::Received(vote)).await;
             }
         }
-    }
-
-    fn is_enrolled(&self) -> bool {
-        let me = self.departure.guest;
-        self.seal.as_deref().is_none_or(|seal| self.inbox.has_key(me, &seal.key_of(me)))
     }
 
     /// Takes over where the host stands.

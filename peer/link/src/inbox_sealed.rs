@@ -8,12 +8,13 @@ use gestalt_protocol::{
     MAX_WORD, RobotId, Signature, SignedWord, decode_json,
 };
 use gestalt_strategies::{Believe, Input, Instructed};
-use gestalt_trust::{Distrust, MAX_ROSTER, PublicKey, Tag};
+use gestalt_trust::{Distrust, Judge, MAX_ROSTER, Tag};
 use zenoh::sample::Sample;
 
 use crate::account::Refusal;
 use crate::believer::Believer;
 use crate::inbox::{Inbox, MAX_QUEUE, payload};
+use crate::seal::Seal;
 use crate::words::Vouched;
 
 /// The most words of those on this computer that wait to be passed on.
@@ -121,11 +122,14 @@ impl Inbox {
         self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) })
     }
 
-    /// Whether that robot is a member that is believed, with that key.
-    pub(super) fn has_key(&self, robot: RobotId, key: &PublicKey) -> bool {
-        self.judged(|judge, _| {
-            judge.is_member(robot) && judge.roster().members().robots.get(&robot) == Some(key)
-        }) == Some(true)
+    /// Whether that robot is a member that is believed, with the key that it has here; in an open swarm, where there is no seal, always.
+    pub(super) fn enrols(&self, robot: RobotId, seal: Option<&Seal>) -> bool {
+        let Some(seal) = seal else { return true };
+        let has_key = |judge: &mut Judge, _| {
+            let held = judge.roster().members().robots.get(&robot);
+            held == Some(&seal.key_of(robot)) && judge.is_member(robot)
+        };
+        self.judged(has_key) == Some(true)
     }
 
     /// The epoch of the roster that it goes by.

@@ -68,12 +68,10 @@ impl Rounds {
         let Some(decision) = round.agreement.settle(self.now, or_none) else { return false };
         // One for nothing need not convince by the pool that it states.
         let is_anothers = decision.class.is_some() && decision.author != self.me;
-        let stated = decision.certificate.pool.filter(|pool| is_anothers && pool.rounds > 0);
-        let stated = stated.map(|pool| Pool { rounds: pool.rounds.min(MOST_ROUNDS), ..pool });
-        if let Some(stated) =
-            stated.filter(|stated| self.heard_pool.is_none_or(|heard| stated.rounds >= heard.rounds))
-        {
-            self.heard_pool = Some(stated);
+        if let Some(pool) = decision.certificate.pool.filter(|pool| is_anothers && pool.rounds > 0) {
+            let stated = Pool { rounds: pool.rounds.min(MOST_ROUNDS), ..pool };
+            self.heard_pool.take_if(|heard| heard.rounds <= stated.rounds);
+            self.heard_pool.get_or_insert(stated);
         }
         effects.follower.settled(decision, self.config.clip);
         (effects.carry_out)(Output::Hold(decision.clone()));
@@ -92,10 +90,11 @@ impl Rounds {
         let view = View { me: self.me, expected, robots, committee, scale };
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
-        let learns = self.config.liars == 0;
-        let found = learns.then(|| effects.follower.pool()).flatten();
+        let (found, heard) = match self.config.liars {
+            0 => (effects.follower.pool(), self.heard_pool),
+            _ => (None, None),
+        };
         // Who has lived through few rounds, or does not learn, would be surer than all others, and the surest decision is the one that all hold.
-        let heard = self.heard_pool.filter(|_| learns);
         let heard = heard.filter(|heard| found.is_none_or(|found| found.rounds < heard.rounds));
         let learned = heard.or(found);
         let fitted = learned.and_then(|pool| self.fusion.with(pool));
