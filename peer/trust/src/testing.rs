@@ -1,13 +1,14 @@
 //! A small swarm for tests.
 
 use gestalt_protocol::{
-    Certificate, Decision, Envelope, FusionRule, Have, Message, RobotId, RoundId, Stamp, Terms, VocabularyId,
-    Vote,
+    Certificate, ClassId, Decision, Envelope, FeatureSpaceId, FusionRule, Have, HeldBatch, Message, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Stamp, Terms, Vector, VocabularyId, Vote,
 };
 
 use crate::identity::Identity;
 use crate::membership::Membership;
 use crate::roster::Roster;
+use crate::statement;
 
 /// Who enrols the robots.
 pub(crate) fn authority() -> Identity {
@@ -55,6 +56,23 @@ pub(crate) fn have(author: u32, sequence: u32) -> Vec<u8> {
     let have =
         Have { round: None, decision: None, holders: 0, votes: Vec::new(), knowledge: None, answer: false };
     said(author, sequence, Message::Have(have))
+}
+
+/// A batch of that robot under a stamp, with these samples: a number and a coordinate each.
+pub(crate) fn batch(author: u32, sequence: u32, samples: &[(u32, i8)]) -> HeldBatch {
+    let round = RoundId { counter: 1, opener: RobotId(0), life: 7 };
+    let sample = |(number, at): &(u32, i8)| SharedSample {
+        id: SampleId { author: RobotId(author), life: 9, number: *number },
+        class: ClassId(0),
+        round,
+        vector: Vector::I8(vec![*at]),
+    };
+    let samples = Samples { space: FeatureSpaceId(4), samples: samples.iter().map(sample).collect() };
+    let stamp = Stamp { boot: 1, sequence };
+    let unsigned = HeldBatch { robot: RobotId(author), stamp, samples, signature: None };
+    let statement = Envelope::from(unsigned.clone()).statement();
+    let signature = statement::sign(&robot(author), &roster(1).swarm_id(), &statement);
+    HeldBatch { signature: Some(signature), ..unsigned }
 }
 
 /// That nothing was decided, of no vote, in so many milliseconds.

@@ -1,7 +1,7 @@
 //! What evidence proves, against whom, and what it does not.
 
 use super::*;
-use crate::testing::{authority, decision, have, members, robot, roster, vote};
+use crate::testing::{authority, batch, decision, have, members, robot, roster, vote};
 
 fn signed(statement: Vec<u8>, by: u32) -> Signed {
     let signature = statement::sign(&robot(by), &roster(1).swarm_id(), &statement);
@@ -100,23 +100,6 @@ fn what_does_not_follow_convicts_who_gave_it_and_nobody_else() {
     assert!(matches!(check(longer, 2), Err(EvidenceError::Malformed(_))));
 }
 
-/// A batch of that robot's under a stamp, with these samples: a number and a coordinate each.
-fn batch(author: u32, sequence: u32, samples: &[(u32, i8)]) -> HeldBatch {
-    let round = gestalt_protocol::RoundId { counter: 1, opener: RobotId(0), life: 7 };
-    let sample = |(number, at): &(u32, i8)| SharedSample {
-        id: gestalt_protocol::SampleId { author: RobotId(author), life: 9, number: *number },
-        class: gestalt_protocol::ClassId(0),
-        round,
-        vector: gestalt_protocol::Vector::I8(vec![*at]),
-    };
-    let space = gestalt_protocol::FeatureSpaceId(4);
-    let samples = Samples { space, samples: samples.iter().map(sample).collect() };
-    let stamp = Stamp { boot: 1, sequence };
-    let unsigned = HeldBatch { robot: RobotId(author), stamp, samples, signature: None };
-    let signature = signed(Envelope::from(unsigned.clone()).statement(), author).signature;
-    HeldBatch { signature: Some(signature), ..unsigned }
-}
-
 #[test]
 fn two_samples_under_one_number_convict_who_shared_them_and_nobody_else() {
     let check = |one: HeldBatch, other: HeldBatch| {
@@ -170,6 +153,13 @@ fn it_is_bounded() {
     statement.push(0);
     assert!(Evidence::decode(&two(&statement).encode()).is_err());
     assert!(serde_json::from_str::<Evidence>(&serde_json::to_string(&two(&statement)).unwrap()).is_err());
+    // Two batches may be twice as long.
+    let other = signed(vec![0], 2);
+    for (length, is_taken) in [(64 * 1024, true), (64 * 1024 + 1, false)] {
+        let first = signed(vec![1; length], 2);
+        let proof = Proof::TwoSamples { first, second: other.clone() };
+        assert_eq!(Evidence::decode(&Evidence(proof).encode()).is_ok(), is_taken, "{length}");
+    }
     // A decision may be almost as long as a message.
     let one = |statement: &[u8]| {
         Evidence::of_decision(statement.to_vec(), Signature::from_bytes([7; Signature::LENGTH]))

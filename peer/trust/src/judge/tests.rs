@@ -1,6 +1,6 @@
 use super::*;
 use crate::statement;
-use crate::testing::{decision, robot, roster, vote};
+use crate::testing::{batch, decision, robot, roster, vote};
 
 const NOW: Duration = Duration::from_secs(1000);
 
@@ -37,6 +37,18 @@ fn evidence_is_handed_out_once_to_be_kept_whoever_found_it() {
     assert_eq!((kept.len(), here.unkept()), (1, vec![]));
     assert_eq!(there.evidence(NOW, kept[0].1.clone()), Ok(()));
     assert_eq!((there.unkept(), there.convicts(RobotId(1))), (kept, true));
+}
+
+#[test]
+fn who_shares_two_samples_under_one_number_is_out_and_who_shares_one_twice_is_not() {
+    let mut judge = Judge::new(roster(5), |_| false);
+    let again = |number| batch(2, 6, &[(number, 20)]);
+    assert!(!judge.two_samples(batch(2, 5, &[(1, 20)]), again(1)));
+    assert!(!judge.two_samples(batch(2, 5, &[(1, 10)]), HeldBatch { signature: None, ..again(1) }));
+    assert!(judge.is_member(RobotId(2)) && judge.fallen().is_empty());
+    assert!(judge.two_samples(batch(2, 5, &[(1, 10)]), again(1)));
+    assert_eq!(judge.fallen(), [(RobotId(2), Lie::TwoSamples)]);
+    assert!(judge.convicts(RobotId(2)) && judge.untold(NOW).len() == 1);
 }
 
 #[test]
