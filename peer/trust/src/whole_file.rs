@@ -76,6 +76,12 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_named_alone_lies_where_one_is() {
+        assert_eq!(folder_of(Path::new("roster")), Path::new("."));
+        assert_eq!(folder_of(Path::new("keys/roster")), Path::new("keys"));
+    }
+
+    #[test]
     fn who_keeps_the_lock_keeps_nobody_from_writing_for_long() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
