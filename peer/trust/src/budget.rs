@@ -137,6 +137,14 @@ mod tests {
     }
 
     #[test]
+    fn what_is_spared_is_a_second_of_all_and_less_of_one_that_passes_on() {
+        let rates = |budget: Budget| (budget.burst.get(), budget.per_second.get());
+        assert_eq!(rates(Budget::of(16, 8, 1000).of_all()), (1000, 1000));
+        assert_eq!(rates(Budget::of(16, 8, 1000).of_one_that_passes_on()), (250, 62));
+        assert_eq!(rates(Budget::of(16, 8, 3).of_one_that_passes_on()), (1, 1), "nobody is spared nothing");
+    }
+
+    #[test]
     fn a_clock_that_stands_still_gives_one_burst() {
         for now in [Duration::ZERO, Duration::from_secs(1_700_000_000), Duration::MAX] {
             let mut bucket = Bucket::new(&Budget::default(), now);

@@ -76,6 +76,19 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_is_taken_is_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        for count in 0..300 {
+            fs::write(format!("{}.{}-{count}.new", path.display(), process::id()), b"of somebody else")
+                .unwrap();
+        }
+        write(&path, b"whole").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 301);
+    }
+
+    #[test]
     fn a_file_that_is_named_alone_lies_where_one_is() {
         assert_eq!(folder_of(Path::new("roster")), Path::new("."));
         assert_eq!(folder_of(Path::new("keys/roster")), Path::new("keys"));
