@@ -175,7 +175,8 @@ async fn main() {
 async fn session(listen: &[String], connect: &[String], tls: Option<Value>) -> Session {
     let mut config = zenoh::Config::default();
     for (key, value) in [
-        ("mode", serde_json::json!("router")),
+        // Who listens to nobody is a client: robots hang up one that would relay for others.
+        ("mode", serde_json::json!(if listen.is_empty() { "client" } else { "router" })),
         ("listen/endpoints", serde_json::json!(listen)),
         ("connect/endpoints", serde_json::json!(connect)),
         ("scouting/multicast/enabled", serde_json::json!(false)),
