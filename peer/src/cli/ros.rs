@@ -5,7 +5,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_desk::Word;
 use gestalt_link::{Client, Heard};
-use gestalt_protocol::{Announcement, CameraState, Instruction, InstructorId, MAX_ROBOTS, RobotId, Status};
+use gestalt_protocol::{
+    Announcement, CameraState, Instruction, InstructorId, MAX_ROBOTS, RobotId, RoundId, Status,
+};
 use gestalt_ros::message::{Diagnostic, Diagnostics, Header, Level, Text};
 use gestalt_ros::{Node, NodeConfig, NodeName, Publisher, Qos, Received, RosError, Subscription};
 use tokio::sync::mpsc;
@@ -176,9 +178,10 @@ impl Bridge {
             Err::<(), Failure>("the swarm's Zenoh session was closed".into())
         };
         let taught = async {
+            let mut spoken = None;
             while let Some(word) = words.recv().await {
                 let last = last.borrow().clone();
-                let words = match said(client, instructor, &word, last).await {
+                let words = match said(client, instructor, &word, last, &mut spoken).await {
                     Ok(words) => words,
                     Err(error) => error.to_string(),
                 };
@@ -206,12 +209,13 @@ async fn diagnose(
     }
 }
 
-/// Says a word to the swarm, and what became of it.
+/// Says a word to the swarm, and what became of it. What is withdrawn is what was said last, of `spoken`.
 async fn said(
     client: &Client,
     instructor: &InstructorId,
     word: &str,
     last: Option<Announcement>,
+    spoken: &mut Option<RoundId>,
 ) -> Result<String, Failure> {
     let words: Vec<&str> = word.split_whitespace().collect();
     let word = Word::read(&words)?;
@@ -222,12 +226,15 @@ async fn said(
     let instruction = match word.of_names(None) {
         Some(instruction) => instruction,
         None => {
-            let last = last.ok_or("no round has been decided yet: say 'open'")?.decision;
-            word.about(last.round, last.class)?.ok_or(
+            let last = last.map(|last| (last.decision.round, last.decision.class));
+            let spoken = spoken.filter(|_| word == Word::Undo).map(|round| (round, None));
+            let (round, decided) = spoken.or(last).ok_or("no round has been decided yet: say 'open'")?;
+            word.about(round, decided)?.ok_or(
                 "this is a word for a keyboard: use open, was GESTURE, class NUMBER, right, wrong, undo or new LABEL",
             )?
         }
     };
+    *spoken = instruction.round().or(*spoken);
     let answer = client.teach(instructor, &instruction, ANSWERED_WITHIN).await?;
     let answer =
         answer.ok_or_else(|| format!("no answer within {ANSWERED_WITHIN:?}: is a robot running?"))?;

@@ -39,11 +39,15 @@ enum Round {
     Text(String),
 }
 
-/// What is to be said to the swarm, by the JSON of a call.
+/// What is to be said to the swarm, by the JSON of a call. What is withdrawn is what was said last, of whichever round that was.
 ///
 /// # Errors
 /// What there is to say instead.
-pub(super) fn instruction(payload: &[u8], last: Option<Last>) -> Result<Instruction, String> {
+pub(super) fn instruction(
+    payload: &[u8],
+    last: Option<Last>,
+    said_last: Option<RoundId>,
+) -> Result<Instruction, String> {
     let said: Said = serde_json::from_slice(payload)
         .map_err(|error| format!("{error}: write {{\"say\": \"was three\"}}, as gestalt teach takes it"))?;
     let round = match said.round {
@@ -76,6 +80,7 @@ pub(super) fn instruction(payload: &[u8], last: Option<Last>) -> Result<Instruct
     if let Some(instruction) = word.of_names(round) {
         return Ok(instruction);
     }
+    let round = round.or(said_last.filter(|_| word == Word::Undo));
     let (round, decided) = about(round, last)?;
     word.about(round, decided)?
         .ok_or_else(|| "there is nothing to leave here: close the connection".to_owned())
@@ -103,7 +108,7 @@ fn request() -> Value {
         "required": ["say"],
         "properties": {
             "say": {"type": "string", "description": about},
-            "round": {"type": "string", "description": "Which round it is about, such as 5@2-3f9a01c7; absent: the one decided last."},
+            "round": {"type": "string", "description": "Which round it is about, such as 5@2-3f9a01c7; absent: the one decided last; of undo the one last spoken of here."},
             "class": gesture("Beside was, same, retire or restore alone: the gesture, by label; a number is its class."),
             "of": gesture("Beside right or wrong: the gesture decided; beside same: what the other is."),
             "label": {"type": "string", "description": "Beside new: what the gesture is called."},
@@ -154,8 +159,9 @@ mod tests {
     fn words_are_taken_as_people_type_them_and_as_programs_put_them() {
         let (last, other): (RoundId, RoundId) =
             ("5@2-3f9a01c7".parse().unwrap(), "4@1-3f9a01c7".parse().unwrap());
-        let said =
-            |json: Value| instruction(json.to_string().as_bytes(), Some((last, Some(ClassId(3))))).unwrap();
+        let said = |json: Value| {
+            instruction(json.to_string().as_bytes(), Some((last, Some(ClassId(3)))), None).unwrap()
+        };
         let label = |label: &str| Gesture::Label(label.to_owned());
         let three = Gesture::Class(ClassId(3));
         for open in ["open", "look", " look "] {
@@ -186,6 +192,19 @@ mod tests {
     }
 
     #[test]
+    fn undo_withdraws_what_was_said_last_whatever_round_that_was_of() {
+        let round = |text: &str| text.parse::<RoundId>().unwrap();
+        let (decided, spoken) = (round("6@2-3f9a01c7"), round("4@1-3f9a01c7"));
+        let said = |json: &str| {
+            instruction(json.as_bytes(), Some((decided, Some(ClassId(3)))), Some(spoken)).unwrap()
+        };
+        assert_eq!(said(r#"{"say":"undo"}"#), Instruction::Retract { round: spoken });
+        let named = Instruction::Retract { round: round("5@1-3f9a01c7") };
+        assert_eq!(said(r#"{"say":"undo","round":"5@1-3f9a01c7"}"#), named);
+        assert_eq!(said(r#"{"say":"was 2"}"#).round(), Some(decided));
+    }
+
+    #[test]
     fn every_instruction_of_a_zenoh_client_is_taken_as_it_is() {
         let round: RoundId = "5@2-3f9a01c7".parse().unwrap();
         let (class, of) = (Gesture::Class(ClassId(3)), Gesture::Label("three".to_owned()));
@@ -200,7 +219,7 @@ mod tests {
             Instruction::Retire { class: of.clone() },
             Instruction::Restore { class: of },
         ] {
-            assert_eq!(instruction(&serde_json::to_vec(&all).unwrap(), None), Ok(all));
+            assert_eq!(instruction(&serde_json::to_vec(&all).unwrap(), None, None), Ok(all));
         }
     }
 
@@ -216,7 +235,7 @@ mod tests {
             (r#"{"say":"open","sudo":true}"#, "sudo"),
             (r#"{"say":"quit","round":"5@2-3f9a01c7"}"#, "nothing to leave"),
         ] {
-            let refused = instruction(json.as_bytes(), None).unwrap_err();
+            let refused = instruction(json.as_bytes(), None, None).unwrap_err();
             assert!(refused.contains(hint), "{json}: {refused}");
         }
     }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{SinkExt, StreamExt};
+use gestalt_protocol::RoundId;
 use serde_json::json;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
@@ -105,7 +106,7 @@ impl Host {
         let (mut to, from) = socket.split();
         let Some((seat, dismissed)) = self.hub.join() else { return };
         let (id, (answers, answered)) = (seat.id, mpsc::channel(MAX_ANSWERS));
-        let listener = Listener { host: &self, id, answers, calls: JoinSet::new() };
+        let listener = Listener { host: &self, id, answers, calls: JoinSet::new(), said: None };
         let end = tokio::select! {
             // An error says that the hub is gone.
             why = dismissed => End::Dismissed(why.unwrap_or(Dismissal::Closing)),
@@ -216,6 +217,8 @@ struct Listener<'h> {
     id: u64,
     answers: mpsc::Sender<Answer>,
     calls: JoinSet<()>,
+    /// The round of which the client said something last.
+    said: Option<RoundId>,
 }
 
 impl Listener<'_> {
@@ -299,7 +302,7 @@ impl Listener<'_> {
                 .host
                 .known
                 .with(|view, _| view.latest().map(|latest| (latest.decision.round, latest.decision.class)));
-            say::instruction(&call.payload, last)
+            say::instruction(&call.payload, last, self.said)
         };
         let instruction = match told {
             Ok(instruction) => instruction,
@@ -308,6 +311,7 @@ impl Listener<'_> {
                 return self.answers.send(Answer::Send(call.failure(&why))).await.is_ok();
             }
         };
+        self.said = instruction.round().or(self.said);
         let (asks, answers) = (self.host.asks.clone(), self.answers.clone());
         self.calls.spawn(async move {
             let message = match asks.say(instruction).await {

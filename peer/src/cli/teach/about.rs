@@ -74,14 +74,7 @@ impl About {
 
     /// That is said to the swarm.
     pub fn say(&mut self, instruction: &Instruction) {
-        self.said = match instruction {
-            Instruction::Was { round, .. }
-            | Instruction::Right { round, .. }
-            | Instruction::Wrong { round, .. }
-            | Instruction::Retract { round }
-            | Instruction::New { round: Some(round), .. } => Some(*round),
-            _ => return,
-        };
+        self.said = instruction.round().or(self.said);
     }
 
     /// The swarm asks; whether that is to be shown. Where a robot dies while it asks, the next may ask the same; and who asks of earlier rounds, of one that was

@@ -36,7 +36,7 @@ fn the_layout_names_topics_and_fields_that_there_are() {
     for panel in panels.values().filter(|panel| panel["serviceName"].is_string()) {
         let payload = panel["requestPayload"].as_str().unwrap();
         let last = ("5@2-3f9a01c7".parse().unwrap(), Some(gestalt_protocol::ClassId(3)));
-        assert!(say::instruction(payload.as_bytes(), Some(last)).is_ok(), "{payload}");
+        assert!(say::instruction(payload.as_bytes(), Some(last), None).is_ok(), "{payload}");
     }
 }
 
