@@ -5,8 +5,10 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 
-use gestalt_protocol::{ClassId, Fate, InstructorId, MAX_NAMED, Naming};
+use gestalt_protocol::{ClassId, Fate, Instruction, InstructorId, MAX_NAMED, Naming};
 use siphasher::sip::SipHasher24;
+
+use gestalt_rounds::Called;
 
 use crate::believe::Standing;
 
@@ -40,6 +42,8 @@ pub struct NameBook {
 struct Said {
     naming: Naming,
     standing: Standing,
+    /// The signed word by which it was named, if the latest is another: without it, whoever was away believes none that came later.
+    first: Option<Box<Naming>>,
 }
 
 impl Said {
@@ -58,8 +62,7 @@ impl NameBook {
     pub(crate) fn hear_by(&mut self, naming: &Naming, standing: Option<Standing>) -> NamingReceipt {
         let receipt = self.would_hear(naming, standing);
         if receipt == NamingReceipt::New {
-            let standing = standing.unwrap_or(Standing::Overrules);
-            self.namings.insert(naming.gesture(), Said { naming: naming.clone(), standing });
+            self.put(naming, standing.unwrap_or(Standing::Overrules));
             if self.namings.len() > MAX_NAMED
                 && let Some((_, last)) = self.last()
             {
@@ -67,6 +70,41 @@ impl NameBook {
             }
         }
         receipt
+    }
+
+    fn put(&mut self, naming: &Naming, standing: Standing) {
+        let before =
+            self.namings.remove(&naming.gesture()).filter(|before| is_of_one(&before.naming, naming));
+        let first = before.and_then(|Said { naming, first, .. }| {
+            first.or_else(|| is_named_by(&naming).then(|| Box::new(naming)))
+        });
+        let said = Said { naming: naming.clone(), standing, first: first.filter(|_| !is_named_by(naming)) };
+        self.namings.insert(naming.gesture(), said);
+    }
+
+    /// Whether a word names a gesture that is known by later ones alone.
+    pub(crate) fn lacks_first(&self, naming: &Naming) -> bool {
+        let known = self.namings.get(&naming.gesture()).filter(|known| is_of_one(&known.naming, naming));
+        known.is_some_and(|known| known.first.is_none() && !is_named_by(&known.naming)) && is_named_by(naming)
+    }
+
+    /// Keeps the word by which a gesture was named that is known by later ones alone.
+    pub(crate) fn keep_first(&mut self, naming: &Naming) {
+        if self.lacks_first(naming)
+            && let Some(known) = self.namings.get_mut(&naming.gesture())
+        {
+            known.first = Some(Box::new(naming.clone()));
+        }
+    }
+
+    /// The signed word by which a gesture was named, where the latest on it is another.
+    pub(crate) fn first(&self, gesture: ClassId) -> Option<&Naming> {
+        self.namings.get(&gesture)?.first.as_deref()
+    }
+
+    /// Whether a gesture is known that the same instructor named so.
+    pub(crate) fn is_named(&self, naming: &Naming) -> bool {
+        self.get(naming.gesture()).is_some_and(|known| is_of_one(known, naming))
     }
 
     /// The place of the gesture that is the first to give way.
@@ -97,8 +135,7 @@ impl NameBook {
 
     /// Takes in what this robot knew before, whatever its count.
     pub(crate) fn hear_again(&mut self, naming: &Naming) {
-        let said = Said { naming: naming.clone(), standing: Standing::Overrules };
-        self.namings.insert(naming.gesture(), said);
+        self.put(naming, Standing::Overrules);
     }
 
     /// Whether that word, or one that goes before it by whichever right it was said, is known and can be shown to others.
@@ -131,6 +168,11 @@ impl NameBook {
         self.namings.values().map(|said| &said.naming)
     }
 
+    /// The words that others are to hear first, of those that can be shown to them.
+    pub(crate) fn told_first(&self) -> impl Iterator<Item = &Naming> {
+        self.namings.values().filter(|said| said.is_proven()).filter_map(|said| said.first.as_deref())
+    }
+
     /// What of it can be shown to others.
     pub(crate) fn told(&self) -> impl Iterator<Item = &Naming> {
         self.namings.values().filter(|said| said.is_proven()).map(|said| &said.naming)
@@ -154,7 +196,7 @@ impl NameBook {
     pub(crate) fn has_room(&self, room: usize, naming: &Naming, standing: Option<Standing>) -> bool {
         let standing = standing.unwrap_or(Standing::Overrules);
         let mut after = self.clone();
-        after.namings.insert(naming.gesture(), Said { naming: naming.clone(), standing });
+        after.put(naming, standing);
         let beside = |book: &Self| {
             let places = book.places_in_use();
             places.filter(|(Reverse(other), _)| *other >= right(standing)).count()
@@ -222,15 +264,16 @@ impl NameBook {
         only.filter(|_| of_label.next().is_none())
     }
 
-    /// Whether an instructor can have meant that gesture by a label that is not of the list: whichever of those that bear it.
+    /// Whether an instructor can have meant that gesture by a label that is not of the list: whichever of those that bear it. One that nobody named was meant
+    /// by nobody.
     pub(crate) fn can_mean(&self, label: &str, by: &InstructorId, gesture: ClassId) -> bool {
         let theirs = |label: &str| {
             let (label, whose) = label.strip_suffix(')')?.rsplit_once(" (")?;
             Some(ClassId::named(&whose.parse().ok()?, label))
         };
-        ClassId::named(by, label) == gesture
-            || theirs(label) == Some(gesture)
-            || self.get(gesture).is_some_and(|naming| naming.label == label)
+        self.get(gesture).is_some_and(|naming| {
+            ClassId::named(by, label) == gesture || theirs(label) == Some(gesture) || naming.label == label
+        })
     }
 
     /// What each gesture is called: by its label, and where another in use, or of the list, has the same, by who named it too. One that is the
@@ -252,6 +295,18 @@ impl NameBook {
         let all = self.namings.keys();
         all.filter_map(|gesture| Some((*gesture, called(self.stands_for(*gesture).unwrap_or(*gesture))?)))
             .collect()
+    }
+
+    /// The same, with what robots that know of more or of fewer names call each.
+    #[must_use]
+    pub fn called(&self, listed: &[String]) -> BTreeMap<ClassId, Called> {
+        let also = |gesture: ClassId| {
+            let namings = [Some(gesture), self.stands_for(gesture)].into_iter().flatten();
+            let namings = namings.filter_map(|gesture| self.get(gesture));
+            namings.flat_map(|Naming { label, by, .. }| [label.clone(), format!("{label} ({by})")]).collect()
+        };
+        let titles = self.titles(listed).into_iter();
+        titles.map(|(gesture, title)| (gesture, Called { title, also: also(gesture) })).collect()
     }
 
     /// A digest of everything that can be shown to others under a key: the same words, heard in whatever order, give the same; 0 for nothing.
@@ -280,6 +335,18 @@ impl NameBook {
         }
         sip.finish()
     }
+}
+
+/// Whether two words are of a gesture that one instructor named so: of two of one number one was not.
+fn is_of_one(one: &Naming, other: &Naming) -> bool {
+    one.by == other.by && one.label == other.label
+}
+
+/// Whether that word names the gesture, and is signed.
+fn is_named_by(naming: &Naming) -> bool {
+    let said = naming.said.as_ref().and_then(|said| said.instruction().ok());
+    let names = |instruction| matches!(instruction, Instruction::New { label, .. } if label == naming.label);
+    naming.by == naming.said_by && said.is_some_and(names)
 }
 
 /// The later word is the greater. Of two names that make one number, which chance gives once in many thousand swarms, the greater is kept.

@@ -94,9 +94,13 @@ impl Proof<'_> {
 
     fn of_naming(&self, naming: &Naming) -> Standing {
         let Naming { by, label, count, at, said_by, fate, said } = naming;
-        let is_it = |gesture: &Gesture| match gesture {
-            Gesture::Class(class) => *class == naming.gesture(),
-            Gesture::Label(said) => said == label || *said == format!("{label} ({by})"),
+        // What becomes of a gesture can be said of one that was named: whom a label leaves open, whoever passes the word on does not find.
+        let is_it = |gesture: &Gesture| {
+            self.names.is_named(naming)
+                && match gesture {
+                    Gesture::Class(class) => *class == naming.gesture(),
+                    Gesture::Label(said) => said == label || *said == format!("{label} ({by})"),
+                }
         };
         self.of_word(said_by, (*count, *at), said.as_ref(), |instruction| match (instruction, fate) {
             (Instruction::New { label: said, .. }, Fate::InUse) => said == label && by == said_by,

@@ -25,7 +25,9 @@ impl Follow for Learning {
     }
 
     fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
-        self.lessons.under(counter).filter(|round| !self.ahead.contains(round)).collect()
+        // As after a restart, what an instructor with a key spoke of was shown, whenever that was heard.
+        let is_signed = |round| self.believer.is_some() && self.lessons.is_signed(round);
+        self.lessons.under(counter).filter(|round| !self.ahead.contains(round) || is_signed(*round)).collect()
     }
 
     fn settled(&mut self, decision: &Decision, clip: f64) {

@@ -9,7 +9,7 @@ use gestalt_protocol::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use super::unresolved::UnresolvedSample;
+use super::unresolved::{LAST_NUMBER, UnresolvedSample};
 use crate::sample::{HeldSample, SeenSamples, SetPart};
 
 /// One change of a robot's memory.
@@ -226,16 +226,25 @@ fn decode_lessons(round: RoundId, bytes: &[u8]) -> Result<impl Iterator<Item = L
     }))
 }
 
-/// The same of what was named.
-pub(super) fn encode_naming(naming: &Naming) -> Vec<u8> {
+/// The same of what was named; and behind it the word by which it was, if that is another.
+pub(super) fn encode_naming(naming: &Naming, first: Option<&Naming>) -> Vec<u8> {
     let Naming { by, label, count, at, said_by, fate, said } = naming;
-    encode(&((by, label, count, at, said_by, fate), said))
+    let mut bytes = encode(&((by, label, count, at, said_by, fate), said));
+    bytes.extend(first.map(|Naming { count, at, said, .. }| encode(&(count, at, said))).unwrap_or_default());
+    bytes
 }
 
-fn decode_naming(bytes: &[u8]) -> Result<Naming, MemoryError> {
+/// The word by which it was named before the latest.
+fn decode_naming(bytes: &[u8]) -> Result<[Option<Naming>; 2], MemoryError> {
     let ((by, label, count, at, said_by, fate), rest): (StoredNaming, _) = decode_first(bytes)?;
-    let said = if rest.is_empty() { None } else { decode(rest)? };
-    Ok(Naming { by, label, count, at, said_by, fate, said })
+    let (said, rest) = if rest.is_empty() { (None, rest) } else { decode_first(rest)? };
+    let first: Option<(u64, u64, Option<SignedWord>)> =
+        if rest.is_empty() { None } else { Some(decode(rest)?) };
+    let first = first.map(|(count, at, said)| {
+        let (by, label) = (by.clone(), label.clone());
+        Naming { said_by: by.clone(), by, label, count, at, fate: Fate::InUse, said }
+    });
+    Ok([first, Some(Naming { by, label, count, at, said_by, fate, said })])
 }
 
 fn part_number(part: SetPart) -> u8 {
@@ -291,7 +300,7 @@ impl RobotMemory {
                 Item::Lessons(round) => {
                     memory.lessons.extend(decode_lessons(round, value)?);
                 }
-                Item::Naming(_) => memory.namings.push(decode_naming(value)?),
+                Item::Naming(_) => memory.namings.extend(decode_naming(value)?.into_iter().flatten()),
                 Item::Batch(first) => memory.batches.push(decode_batch(first, value)?),
                 Item::Aside(number) => {
                     let StoredAside { part, shared, round, vector, guess } = decode(value)?;
@@ -347,6 +356,11 @@ impl RobotMemory {
         let mut labels = labels.chain(self.aside.iter().filter_map(|(_, aside)| aside.guess));
         if !labels.all(|class| class.is_named() || class.index() < classes) {
             return Err(MemoryError::Damaged("a sample of an unknown class"));
+        }
+        // Nobody puts so many aside, and those to come would have no numbers.
+        let mut numbers = self.aside.iter().map(|(number, _)| *number).chain([self.counters.next_aside]);
+        if numbers.any(|number| number > LAST_NUMBER) {
+            return Err(MemoryError::Damaged("a sample put aside under a number that none can have"));
         }
         Ok(())
     }

@@ -26,12 +26,17 @@ impl Learning {
     /// Takes in what was said of a gesture that was named, and trains by it.
     pub fn hear_naming(&mut self, naming: &Naming) -> NamingReceipt {
         // Neighbours say all they know: mostly there is nothing to be done.
-        if self.names.is_known(naming) {
+        let lacks_first = self.names.lacks_first(naming);
+        if self.names.is_known(naming) && !lacks_first {
             return NamingReceipt::Known;
         }
         let standing = self.standing_of_naming(naming);
         if standing == Some(Standing::Unproven) {
             return NamingReceipt::Unproven;
+        }
+        if lacks_first {
+            self.names.keep_first(naming);
+            self.dirty.insert(Item::Naming(naming.gesture()));
         }
         let heard = self.names.would_hear(naming, standing);
         if heard != NamingReceipt::New {

@@ -377,7 +377,10 @@ impl Learning {
                 let mut lessons = self.lessons.of(round).peekable();
                 lessons.peek().is_some().then(|| memory::encode_lessons(lessons))
             }
-            Item::Naming(gesture) => self.names.get(gesture).map(memory::encode_naming),
+            Item::Naming(gesture) => {
+                let first = self.names.first(gesture);
+                self.names.get(gesture).map(|naming| memory::encode_naming(naming, first))
+            }
             Item::Aside(number) => self.aside.get(number).map(memory::encode_aside),
             Item::Batch(first) => self.batches.get(first).map(memory::encode_batch),
         }

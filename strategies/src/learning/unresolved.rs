@@ -24,6 +24,9 @@ pub(super) struct UnresolvedSample {
 /// The keys of such samples in training begin here, far beyond those of the training set.
 const FIRST_KEY: u64 = 1 << 63;
 
+/// The largest number that one of an earlier life can have.
+pub(super) const LAST_NUMBER: u64 = FIRST_KEY / 2;
+
 /// The key that a sample of that number has in training.
 pub(crate) fn training_key(number: u64) -> u64 {
     FIRST_KEY | number

@@ -78,7 +78,7 @@ impl Mind {
     /// What this robot's gestures are called from now on where it announces them.
     pub(super) fn call_by_names(&mut self) {
         if let Some(learning) = &self.learning {
-            self.rounds.call(learning.names().titles(learning.vocabulary().labels()));
+            self.rounds.call(learning.names().called(learning.vocabulary().labels()));
         }
     }
 

@@ -37,10 +37,11 @@ const MAX_CONTRADICTIONS: usize = 8;
 const _: () = assert!(MAX_GAPS <= MAX_INTERVALS && MAX_SERIES <= MAX_ROBOTS);
 const _: () = assert!(10 * MAX_INTERVALS_IN_ALL + 11 * MAX_SERIES + 25 * MAX_LESSONS + 64 < MAX_MESSAGE);
 
-/// All that was named, if anything was: it is little, and seldom differs.
-fn names_to_give(names: &NameBook) -> Option<Message> {
-    let namings: Vec<Naming> = names.told().cloned().collect();
-    (!namings.is_empty()).then_some(Message::Namings(Namings { namings }))
+/// All that was named, if anything was: it is little, and seldom differs. First by which words, then what became of it.
+fn names_to_give(names: &NameBook) -> impl Iterator<Item = Message> {
+    let parts: [Vec<Naming>; 2] = [names.told_first().cloned().collect(), names.told().cloned().collect()];
+    let given = parts.into_iter().filter(|namings| !namings.is_empty());
+    given.map(|namings| Message::Namings(Namings { namings }))
 }
 
 /// These lessons, round by round, in messages: all of a round in one, so that it is known to be all.

@@ -1,6 +1,6 @@
 //! Whose words are believed in a sealed swarm, and by whom.
 
-use gestalt_protocol::{InstructorId, Lessons, SignedWord, Word};
+use gestalt_protocol::{Fate, InstructorId, Lessons, Naming, SignedWord, Word};
 use gestalt_rounds::Follow;
 
 use super::*;
@@ -283,6 +283,18 @@ fn a_newborn_knows_as_over_what_an_instructor_with_a_key_spoke_of_and_older_roun
         swarm.minds[0].learning.as_ref().unwrap().taught(round.counter).contains(&round)
     };
     assert_eq!([old, proven, to_come].map(|round| is_over(&swarm, round)), [true, true, false]);
+    // So it is for one that knows of earlier rounds.
+    let taught = |swarm: &mut Swarm, by: &str| {
+        let round = RoundId { counter: 3, opener: RobotId(9), life: by.len() as u32 };
+        let said = Some(signed(by, 1, &was(round, 1)));
+        let instructor = by.parse().unwrap();
+        let lesson = Lesson { round, instructor, count: 1, at: 1, word: Word::Was(ClassId(1)), said };
+        let message = Message::Lessons(Lessons { lessons: vec![lesson] });
+        let stamp = Stamp { boot: u32::MAX, sequence: 100 + by.len() as u32 };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
+        is_over(swarm, round)
+    };
+    assert_eq!(["bob", "guest"].map(|by| taught(&mut swarm, by)), [true, false]);
     // What is proven is remembered, and counted on from.
     swarm.restart_all();
     assert_eq!([old, proven].map(|round| is_over(&swarm, round)), [true, true]);
@@ -347,4 +359,82 @@ fn on_a_name_the_word_of_somebody_with_a_key_goes_before_a_later_one_without_in_
         swarm.check_rest();
         swarm.check();
     }
+}
+
+/// A liar with a signed word on one gesture says it of others, of whichever names it likes.
+#[test]
+fn what_is_said_of_a_name_is_said_of_none_that_nobody_gave() {
+    let mut swarm = Swarm::sealed(44);
+    swarm.hear(0, "bob", 500, &Instruction::New { label: "circle".to_owned(), round: None });
+    swarm.pass(Duration::from_secs(10));
+    let label = Gesture::Label("circle".to_owned());
+    let bobs = ClassId::named(&"bob".parse().unwrap(), "circle");
+    let ada: InstructorId = "ada".parse().unwrap();
+    let words = [
+        (700, Instruction::Retire { class: label }, Fate::Retired),
+        (800, Instruction::Restore { class: Gesture::Label("circle (bob)".to_owned()) }, Fate::InUse),
+        (900, Instruction::Restore { class: Gesture::Class(bobs) }, Fate::InUse),
+    ];
+    let mut sequence = 0;
+    for (count, word, fate) in words {
+        swarm.hear(0, "ada", count, &word);
+        swarm.pass(Duration::from_secs(10));
+        let names = |swarm: &Swarm| swarm.minds[0].learning.as_ref().unwrap().names().clone();
+        let before = names(&swarm);
+        assert_eq!(before.get(bobs).unwrap().count, count);
+        let made_up = (0..40).map(|n| Naming {
+            by: format!("nobody{n}").parse().unwrap(),
+            label: "circle".to_owned(),
+            count,
+            at: count,
+            said_by: ada.clone(),
+            fate,
+            said: Some(signed("ada", count, &word)),
+        });
+        let message = Message::Namings(gestalt_protocol::Namings { namings: made_up.collect() });
+        sequence += 1;
+        let stamp = Stamp { boot: u32::MAX, sequence };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
+        assert_eq!(names(&swarm), before);
+    }
+    // Whoever comes new, or lost all, is told by which word it was named, and believes what came of it, also after all have started again.
+    for again in [false, true] {
+        if again {
+            swarm.restart_all();
+        }
+        swarm.restart_empty(1);
+        swarm.pass(Duration::from_secs(20));
+        let known = swarm.minds[1].learning.as_ref().unwrap().names().get(bobs).map(|naming| naming.count);
+        assert_eq!(known, Some(900));
+    }
+    swarm.check_rest();
+    swarm.check();
+}
+
+/// Nor is a label the name of what nobody named: only one bears it.
+#[test]
+fn nobody_means_a_gesture_that_nobody_named() {
+    let mut swarm = Swarm::sealed(45);
+    let round = swarm.show(1);
+    swarm.hear(0, "bob", 500, &Instruction::New { label: "circle".to_owned(), round: None });
+    let was = Instruction::Was { round, class: Gesture::Label("circle".to_owned()) };
+    swarm.hear(0, "ada", 700, &was);
+    swarm.pass(Duration::from_secs(10));
+    let [adas, bobs] = ["ada", "bob"].map(|by| ClassId::named(&by.parse().unwrap(), "circle"));
+    let labels = swarm.of_class(bobs.0);
+    assert!(labels.iter().all(|count| *count > 0));
+    let said = Some(signed("ada", 700, &was));
+    let lesson = Lesson {
+        round,
+        instructor: "ada".parse().unwrap(),
+        count: 700,
+        at: 700,
+        word: Word::Was(adas),
+        said,
+    };
+    let message = Message::Lessons(Lessons { lessons: vec![lesson] });
+    let stamp = Stamp { boot: u32::MAX, sequence: 1 };
+    swarm.input(1, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!((swarm.of_class(bobs.0), swarm.of_class(adas.0)), (labels, vec![0, 0, 0]));
 }
