@@ -14,6 +14,7 @@
 mod agreement;
 mod alike;
 mod ballot;
+mod called;
 mod classify;
 mod columns;
 mod committee;
@@ -43,6 +44,7 @@ mod voter;
 mod withstand;
 
 pub use ballot::{Ballot, Cast, Scale};
+pub use called::Called;
 pub use classify::{Classify, ClassifyError, Judgement};
 pub use columns::Columns;
 pub use config::{RoundsConfig, RoundsConfigError};

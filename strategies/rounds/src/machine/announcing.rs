@@ -80,18 +80,16 @@ impl Rounds {
         let known = self.classifier.as_ref().map(|classifier| classifier.vocabulary());
         let vocabulary = known.or(self.vocabulary.as_ref())?;
         let class = decision.class.filter(|_| vocabulary.id() == decision.certificate.vocabulary)?;
-        vocabulary.label(class).or_else(|| self.names.get(&class).map(String::as_str))
+        vocabulary.label(class).or_else(|| self.names.get(&class).map(|called| called.title.as_str()))
     }
 
     /// Whether a decision may be announced under that label, as far as this robot knows what its gesture is called. Two robots may call one that was
-    /// named differently for a while, but for who named it.
+    /// named differently for a while.
     pub(super) fn may_be_called(&self, decision: &Decision, label: Option<&str>) -> bool {
         let Some(label) = label else { return true };
-        match (decision.class, self.label_of(decision)) {
-            (None, _) => false,
-            (Some(class), Some(known)) if class.is_named() => bare(label) == bare(known),
-            (Some(_), known) => known.is_none_or(|known| known == label),
-        }
+        let Some(class) = decision.class else { return false };
+        let Some(known) = self.label_of(decision) else { return true };
+        known == label || self.names.get(&class).is_some_and(|called| called.also.contains(label))
     }
 
     /// A decision in this robot's own words.
@@ -104,9 +102,4 @@ impl Rounds {
         let holders = self.config.holders(self.electorate.count());
         agreement.is_final(holders, self.me, &self.guests, |robot| self.counts(robot))
     }
-}
-
-/// What a gesture is called, without who named it.
-fn bare(title: &str) -> &str {
-    title.rsplit_once(" (").map_or(title, |(label, _)| label)
 }

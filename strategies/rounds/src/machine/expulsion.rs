@@ -16,6 +16,7 @@ impl Rounds {
         self.electorate.expel(robots);
         self.on_alive(Arc::new(alive));
         self.wanted.take_if(|wanted| robots.contains(&wanted.holder));
+        self.heard_pool.take_if(|(author, _)| robots.contains(author));
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.expel(robots);
         }

@@ -202,15 +202,18 @@ impl Rounds {
 
     /// Whether a decision counts votes that were cast under a name of the round known here: then it is of that round, whatever it calls it. Whoever heard
     /// those while its own round began took both for one; those who opened first heard of the other name too late to tell.
-    fn is_counted_in(&self, decision: &Decision) -> bool {
+    fn is_counted_in(&self, decision: &Decision, effects: &Effects<'_>) -> bool {
         let Certificate { votes, others, .. } = &decision.certificate;
         let mut names =
             votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
-        self.round.as_ref().is_some_and(|round| {
-            round.id.counter == decision.round.counter
-                && !self.past.contains(&decision.round)
+        let id = decision.round;
+        let is_counted = self.round.as_ref().is_some_and(|round| {
+            round.id.counter == id.counter
+                && !self.past.contains(&id)
                 && names.any(|name| round.is_named(name))
-        })
+        });
+        // What an instructor spoke of meanwhile was shown before.
+        is_counted && (self.is_this_round(id) || !effects.follower.taught(id.counter).contains(&id))
     }
 
     /// Whether this robot opened the round that is open, undecided, under a count which belongs to that earlier round: it did not
@@ -324,7 +327,7 @@ impl Rounds {
             return Heard::Refused;
         }
         let opened_at_once = self.is_this_round(decision.round) && self.is_as_old(&decision);
-        let this = opened_at_once || self.is_counted_in(&decision);
+        let this = opened_at_once || self.is_counted_in(&decision, effects);
         let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
         if held == Some(&decision) {
             return Heard::Known;
@@ -350,7 +353,7 @@ impl Rounds {
         let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
         for counted in &decision.certificate.votes {
-            if counted.robot != self.me {
+            if counted.robot != self.me && !self.past.contains(&counted.vote.round) {
                 round.ballot.cast(counted.held());
             }
         }

@@ -13,6 +13,7 @@ use super::members::Committee;
 use super::output::Output;
 use super::partners::Partners;
 use super::wanted::Wanted;
+use crate::called::Called;
 use crate::classify::Classify;
 use crate::config::{RoundsConfig, RoundsConfigError};
 use crate::electorate::Electorate;
@@ -103,12 +104,12 @@ pub struct Rounds {
     pub(super) config: RoundsConfig,
     pub(super) fusion: Arc<dyn Fuse>,
     /// Of what others found of how alike robots are and this one holds decisions by: what rests on most rounds.
-    pub(super) heard_pool: Option<Pool>,
+    pub(super) heard_pool: Option<(RobotId, Pool)>,
     pub(super) classifier: Option<Arc<dyn Classify>>,
     /// What gestures are called while there is no classifier.
     pub(super) vocabulary: Option<Vocabulary>,
     /// What gestures are called that were named since.
-    pub(super) names: BTreeMap<ClassId, String>,
+    pub(super) names: BTreeMap<ClassId, Called>,
     pub(super) signer: Option<Arc<dyn Sign>>,
     /// The votes that were cast, and that others are yet to be told.
     pub(super) unsaid: Vec<Envelope>,
@@ -234,7 +235,7 @@ impl Rounds {
     }
 
     /// Gestures that were named have these names from now on where this robot announces them.
-    pub fn call(&mut self, names: BTreeMap<ClassId, String>) {
+    pub fn call(&mut self, names: BTreeMap<ClassId, Called>) {
         self.names = names;
     }
 

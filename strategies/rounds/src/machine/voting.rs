@@ -70,8 +70,8 @@ impl Rounds {
         let is_anothers = decision.class.is_some() && decision.author != self.me;
         if let Some(pool) = decision.certificate.pool.filter(|pool| is_anothers && pool.rounds > 0) {
             let stated = Pool { rounds: pool.rounds.min(MOST_ROUNDS), ..pool };
-            self.heard_pool.take_if(|heard| heard.rounds <= stated.rounds);
-            self.heard_pool.get_or_insert(stated);
+            self.heard_pool.take_if(|(_, heard)| heard.rounds <= stated.rounds);
+            self.heard_pool.get_or_insert((decision.author, stated));
         }
         effects.follower.settled(decision, self.config.clip);
         (effects.carry_out)(Output::Hold(decision.clone()));
@@ -91,7 +91,7 @@ impl Rounds {
         let Some(round) = self.round.as_mut() else { return };
         // Where liars are expected nothing that anybody said moves the rule by which they are judged.
         let (found, heard) = match self.config.liars {
-            0 => (effects.follower.pool(), self.heard_pool),
+            0 => (effects.follower.pool(), self.heard_pool.map(|(_, pool)| pool)),
             _ => (None, None),
         };
         // Who has lived through few rounds, or does not learn, would be surer than all others, and the surest decision is the one that all hold.

@@ -1,6 +1,7 @@
 //! Gestures that were named since the list was made, which not all robots know.
 
 use super::*;
+use crate::called::Called;
 use crate::proof::follows;
 
 fn circle() -> ClassId {
@@ -21,7 +22,7 @@ fn for_unknown(counter: u32) -> Vote {
 #[test]
 fn a_gesture_that_some_know_is_decided_by_all_and_its_proof_stands() {
     let mut mind = mind(7);
-    mind.call([(circle(), "circle".to_owned())].into());
+    mind.call([(circle(), Called { title: "circle".to_owned(), ..Called::default() })].into());
     mind.handle(ms(0), Input::Alive(Arc::new(robots(1..4))));
     for (robot, said) in [(1, for_circle(1)), (2, for_circle(1)), (3, for_unknown(1))] {
         mind.handle(ms(u64::from(robot)), votes(robot, 1, said));
@@ -83,4 +84,18 @@ fn a_vote_names_what_its_robot_knows_in_order() {
     let by_number: Vec<f32> = named.iter().map(|class| vote.evidence_for(*class).unwrap()).collect();
     assert!(by_number[2] > by_number[0] && by_number[0] > by_number[1], "{vote:?}");
     assert_eq!(by_number[1], vote.evidence[0], "as likely as those of the list");
+}
+
+/// Two robots may know of more or of fewer that bear one label; nobody calls a gesture as it likes.
+#[test]
+fn a_named_gesture_is_announced_as_one_of_its_names() {
+    let called = Called { title: "stop".to_owned(), also: ["stop", "stop (ana)"].map(str::to_owned).into() };
+    let mut mind = mind(7);
+    mind.call([(circle(), called)].into());
+    let decision = Decision { class: Some(circle()), ..decision(1, None, 0, 9) };
+    for (label, is_it) in
+        [("stop", true), ("stop (ana)", true), ("stop (x)", false), ("go", false), ("", false)]
+    {
+        assert_eq!(mind.may_be_called(&decision, Some(label)), is_it, "{label}");
+    }
 }

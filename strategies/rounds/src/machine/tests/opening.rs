@@ -304,9 +304,41 @@ fn the_name_of_a_round_that_is_over_is_that_of_no_other() {
         mind.handle(ms(9250), gives(9, also));
         assert_eq!((mind.round(), mind.held()), (Some(round(1, 99)), None));
     }
+    // Votes of one that is over are none of this one, whoever gives them with a decision for nothing.
+    let voted = decision(1, Some(0), 4, 9).certificate;
+    let nothing = Decision { round: round(1, 99), certificate: voted, ..decision(1, None, 0, 9) };
+    mind.handle(ms(9270), gives(9, nothing));
+    assert!((10..14).all(|robot| !mind.ballot().unwrap().has_spoken(RobotId(robot))));
     // Of one that nobody here was in it is another name.
     mind.handle(ms(9300), votes(3, 5, Vote { round: round(1, 50), ..vote(1, 1, LEANING) }));
     assert_eq!(mind.round(), Some(round(1, 50)));
+}
+
+/// One in which nothing was decided was shown all the same, and may be spoken of later.
+#[test]
+fn nor_is_that_of_one_that_came_to_nothing() {
+    let mut mind = mind_with(7, RoundsConfig { settle: ms(0), ..adding_up() });
+    mind.handle(ms(0), Input::Open);
+    live(&mut mind, ms(9000));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 7)), false));
+    mind.handle(ms(9100), votes(3, 1, Vote { round: round(1, 99), ..null(1) }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 99)), true));
+    let stamp = Stamp { boot: 1, sequence: 9 };
+    let of_this = Vote { round: round(1, 99), ..null(1) };
+    let merges = |name: RoundId| {
+        let undecided = decision(1, None, 0, 9);
+        let held = HeldVote { robot: RobotId(3), stamp, vote: of_this.clone(), signature: None };
+        let certificate = gestalt_protocol::Certificate { others: vec![held], ..undecided.certificate };
+        Decision { round: name, certificate, ..undecided }
+    };
+    let mut follower = Taught([round(1, 50)].into());
+    // One that is over, and one that was spoken of meanwhile.
+    for name in [round(1, 7), round(1, 50)] {
+        mind.handle_with(ms(15_000), gives(9, merges(name)), &mut follower);
+        assert_eq!(mind.round(), Some(round(1, 99)), "{name}");
+    }
+    mind.handle_with(ms(15_100), gives(9, merges(round(1, 60))), &mut follower);
+    assert_eq!(mind.round(), Some(round(1, 60)), "as names of one showing do");
 }
 
 /// Knows what an instructor spoke of.

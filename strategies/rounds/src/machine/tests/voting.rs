@@ -182,6 +182,12 @@ fn who_found_less_than_others_of_how_alike_robots_are_goes_by_what_they_found() 
     let own = Pool { rounds: 64, ..Pool::PRIOR };
     assert_eq!(told(0, Some(own), clearly.clone()), (Some(ClassId(0)), Some(own)));
     assert_eq!(told(1, None, clearly.clone()).1, Some(Pool::PRIOR));
+    // Nor does it go by what one said that is expelled.
+    let mut mind = start(7, 0);
+    let config = mind.config().clone();
+    mind.handle_with(ms(9000), gives(1, by(&config, clearly.clone())), &mut Found(None));
+    mind.handle_with(ms(9500), Input::Expelled(robots([clearly.author.0])), &mut Found(None));
+    assert_eq!(comes_to(&mut mind, &mut Found(None), (2, 10_000), faint).certificate.pool, Some(Pool::PRIOR));
     // What another believed beforehand is nothing that it found.
     let unfounded = comes_to(&mut start(1, 0), &mut Found(None), (1, 0), clear);
     assert_eq!(told(0, None, unfounded).1, Some(Pool::PRIOR));
