@@ -62,6 +62,7 @@ mod token;
 mod trainer;
 mod voice;
 mod wake;
+mod watch;
 mod ways;
 mod words;
 mod worker;

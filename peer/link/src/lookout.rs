@@ -95,7 +95,8 @@ impl Lookout {
             return;
         }
         if robot == self.me {
-            if !is_of_life(id, self.nonce) {
+            // Of a sealed swarm whoever shouts it is no twin: that shows by its key.
+            if !is_of_life(id, self.nonce) && !self.inbox.is_sealed() {
                 self.account.twin();
             }
             return;

@@ -36,10 +36,11 @@ use crate::presence::Presence;
 use crate::roll::Roll;
 use crate::roll_call::keep_roll;
 use crate::seal::{Seal, SealError};
-use crate::session::{Guard, Node, watch_session};
+use crate::session::{Guard, Node};
 use crate::subscriptions::listen;
 use crate::supervisor::{Supervisor, run_apart};
 use crate::voice::Voice;
+use crate::watch::watch_session;
 use crate::words::Words;
 
 /// Everything a robot needs to take part in a swarm.

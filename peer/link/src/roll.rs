@@ -168,23 +168,23 @@ impl Roll {
         (held.roster.members().epoch, held.json.clone())
     }
 
-    /// Writes the roster held to its file: a robot that starts again must not go back to an older one.
-    pub async fn keep(&self) {
-        let Some(file) = self.file.clone() else { return };
+    /// Writes the roster held to its file: a robot that starts again must not go back to an older one. Says whether it is there now.
+    pub async fn keep(&self) -> bool {
+        let Some(file) = self.file.clone() else { return true };
         let roster = self.held().roster.clone();
         let write = move || match roster.write(&file) {
             // Of a robot that shares the folder, or of the authority itself, which were quicker.
             Err(RosterError::Older { .. }) => Ok(()),
             written => written,
         };
-        self.write("the new roster is gone by", write).await;
+        self.write("the new roster is gone by", "roster_unkept", write).await
     }
 
-    /// Writes evidence to the folder beside the roster: a robot that starts again must not believe again who was convicted.
-    pub async fn keep_evidence(&self, evidence: Vec<(RobotId, Evidence)>) {
-        let Some(folder) = self.convicted() else { return };
+    /// Writes evidence to the folder beside the roster: a robot that starts again must not believe again who was convicted. Says whether it is there now.
+    pub async fn keep_evidence(&self, evidence: Vec<(RobotId, Evidence)>) -> bool {
+        let Some(folder) = self.convicted() else { return true };
         let write = move || evidence.iter().try_for_each(|(robot, evidence)| evidence.keep(&folder, *robot));
-        self.write("who was convicted counts no more", write).await;
+        self.write("who was convicted counts no more", "evidence_unkept", write).await
     }
 
     /// The evidence that was kept before.
@@ -201,17 +201,29 @@ impl Roll {
         Some(self.file.as_ref()?.with_file_name(CONVICTED))
     }
 
+    /// `unkept` in the status is 1 for as long as it cannot be written; that is said once.
     async fn write<E: ToString + Send + 'static>(
         &self,
         done: &str,
+        unkept: &str,
         write: impl FnOnce() -> Result<(), E> + Send + 'static,
-    ) {
+    ) -> bool {
         let failed = match tokio::task::spawn_blocking(write).await {
-            Ok(Ok(())) => return,
-            Ok(Err(error)) => error.to_string(),
-            Err(error) => error.to_string(),
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some(error.to_string()),
+            Err(error) => Some(error.to_string()),
         };
-        self.account.error(&format!("{done}, but that is not kept: {failed}"));
+        let before = self.account.lock().counters.get(unkept).copied().unwrap_or(0);
+        match failed {
+            None if before == 0 => {}
+            None => self.account.set(unkept, 0),
+            Some(_) if before != 0 => {}
+            Some(failed) => {
+                self.account.set(unkept, 1);
+                self.account.error(&format!("{done}, but that is not kept, and is tried again: {failed}"));
+            }
+        }
+        self.account.lock().counters.get(unkept).copied().unwrap_or(0) == 0
     }
 }
 
@@ -257,6 +269,20 @@ mod tests {
         assert!(roll.may_read(next.len()));
         assert!(roll.take_up(&mut judge, next.as_bytes()).unwrap().is_some());
         assert_eq!(roll.newest().0, 2);
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_written_is_known_as_such_until_it_is() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("full");
+        let (mut roll, _) = roll();
+        roll.file = Some(folder.join("roster.json"));
+        let unkept = |roll: &Roll| roll.account.lock().counters.get("roster_unkept").copied();
+        assert!(!roll.keep().await && !roll.keep().await);
+        assert_eq!((unkept(&roll), roll.account.lock().errors.len()), (Some(1), 1), "said once");
+        std::fs::create_dir(&folder).unwrap();
+        assert!(roll.keep().await && folder.join("roster.json").exists());
+        assert_eq!(unkept(&roll), Some(0));
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Keys, Topic};
+use tokio::time::Instant;
 use zenoh::bytes::Encoding;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::session::ZenohId;
@@ -18,10 +19,16 @@ use crate::roll::Roll;
 use crate::session::Node;
 
 /// How often each neighbour is told of a roster: the first may come before it listens.
-const TOLD: u8 = 3;
+const TOLD: u32 = 3;
 
 /// How long after the one before.
 const AGAIN: Duration = Duration::from_millis(700);
+
+/// How often it is told of one that is new besides, each time after twice as long: somebody may flood it with others meanwhile.
+const TOLD_LATER: u32 = 6;
+
+/// How long after what could not be written it is tried again.
+const RETRY: Duration = Duration::from_secs(5);
 
 /// Acts on every new roster, and tells neighbours of it. Never returns.
 pub(crate) async fn keep_roll(
@@ -31,38 +38,60 @@ pub(crate) async fn keep_roll(
     keys: Keys,
     inbox: Arc<Inbox>,
 ) -> Result<(), String> {
-    let mut told: BTreeMap<ZenohId, (u64, u8)> = BTreeMap::new();
-    let mut kept = roll.newest().0;
+    let mut told: BTreeMap<ZenohId, Told> = BTreeMap::new();
+    let first = roll.newest().0;
+    let (mut kept, mut followed) = (first, first);
+    let mut evidence = Vec::new();
     loop {
         let (epoch, json) = roll.newest();
-        if epoch != kept {
-            // First what must not be lost, whoever is at the other end of links.
-            roll.keep().await;
-            node.look_through();
+        // First what must not be lost, whoever is at the other end of links.
+        if epoch != kept && roll.keep().await {
             kept = epoch;
         }
-        let evidence = inbox.unkept();
-        if !evidence.is_empty() {
-            roll.keep_evidence(evidence).await;
+        if epoch != followed {
+            node.look_through();
+            followed = epoch;
+        }
+        evidence.extend(inbox.unkept());
+        if !evidence.is_empty() && roll.keep_evidence(evidence.clone()).await {
+            evidence.clear();
         }
         let links = inbox.links();
         told.retain(|id, _| links.contains_key(id));
-        let mut again = false;
+        let mut next = (epoch != kept || !evidence.is_empty()).then(|| Instant::now() + RETRY);
         for (id, robot) in links {
-            let told = told.entry(id).or_insert((epoch, 0));
-            if told.0 != epoch {
-                *told = (epoch, 0);
+            let told = told.entry(id).or_insert_with(|| Told::new(epoch));
+            if told.epoch != epoch {
+                *told = Told::new(epoch);
             }
-            if told.1 < TOLD {
-                told.1 += 1;
-                again = true;
+            let times = if epoch == first { TOLD } else { TOLD + TOLD_LATER };
+            if told.times < times && Instant::now() >= told.next {
+                let later = (told.times + 1).saturating_sub(TOLD);
+                told.next = Instant::now() + AGAIN * 2_u32.pow(later);
+                told.times += 1;
                 tell(&account, &node, keys.key(&Topic::RosterFor(robot)), json.clone()).await;
+            }
+            if told.times < times {
+                next = Some(next.map_or(told.next, |next| next.min(told.next)));
             }
         }
         tokio::select! {
             () = roll.news() => {}
-            () = tokio::time::sleep(AGAIN), if again => {}
+            () = tokio::time::sleep_until(next.unwrap_or_else(Instant::now)), if next.is_some() => {}
         }
+    }
+}
+
+/// How often a neighbour was told of a roster, and when it is next.
+struct Told {
+    epoch: u64,
+    times: u32,
+    next: Instant,
+}
+
+impl Told {
+    fn new(epoch: u64) -> Self {
+        Self { epoch, times: 0, next: Instant::now() }
     }
 }
 

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use gestalt_protocol::RobotId;
+use tokio::task::JoinHandle;
 use zenoh::Session;
 use zenoh::config::WhatAmI;
 use zenoh::internal::runtime::{DynamicRuntime, Runtime, RuntimeBuilder};
@@ -24,9 +25,7 @@ use zenoh_transport::{
 
 use crate::account::Account;
 use crate::error::{LinkError, reason};
-use crate::failure::Part;
 use crate::identity::robot_of;
-use crate::supervisor::Supervisor;
 use crate::tls::{Door, Knocks, Seat, Stranger, Visitor};
 
 /// The other end of a link.
@@ -37,8 +36,8 @@ pub(crate) struct Far {
     pub relays: bool,
 }
 
-/// How often it is made sure that a session is still open.
-const LOOK_AFTER: Duration = Duration::from_millis(500);
+/// How long the end of a link is waited for.
+const PARTING: Duration = Duration::from_secs(1);
 
 /// A Zenoh session with a handle on each of its links.
 #[derive(Clone)]
@@ -133,12 +132,23 @@ impl Node {
 
     /// Ends the link to one other session, if there is one. Does not wait for its end.
     pub(super) fn hang_up(&self, id: ZenohId) {
-        for links in self.all_links() {
-            let link = links.lock().get(&id).map(|link| link.transport.clone());
-            if let Some(link) = link {
-                tokio::spawn(end(link));
-            }
+        self.end_links(|other| *other == id);
+    }
+
+    /// The same, and waits for its end, for a while: a client has one link, and a new one is refused until the old one is gone.
+    pub(super) async fn leave(&self, id: ZenohId) {
+        for ended in self.end_links(|other| *other == id) {
+            let _ = tokio::time::timeout(PARTING, ended).await;
         }
+    }
+
+    /// Ends those of all links, without waiting for it.
+    fn end_links(&self, which: impl Fn(&ZenohId) -> bool) -> Vec<JoinHandle<()>> {
+        let transports = |links: Arc<Links>| -> Vec<TransportUnicast> {
+            let state = links.lock();
+            state.iter().filter(|(id, _)| which(id)).map(|(_, link)| link.transport.clone()).collect()
+        };
+        self.all_links().flat_map(transports).map(|link| tokio::spawn(end(link))).collect()
     }
 
     /// Ends the links to all who would not be let in any more: the roster has changed. Does not wait for their end.
@@ -156,17 +166,6 @@ impl Node {
         }
         if let Err(error) = self.runtime.close().await {
             tracing::debug!("closing the Zenoh runtime: {error}");
-        }
-    }
-}
-
-/// Ends a robot whose session has been closed, by whomever. Never returns before.
-pub(crate) async fn watch_session(session: Session, supervisor: Arc<Supervisor>) -> Result<(), String> {
-    loop {
-        tokio::time::sleep(LOOK_AFTER).await;
-        if session.is_closed() {
-            supervisor.end(Part::Session, "Zenoh closed it".to_owned());
-            return Ok(());
         }
     }
 }
@@ -405,6 +404,13 @@ impl TransportEventHandler for Handler {
         _transport: TransportMulticast,
     ) -> zenoh::Result<Arc<dyn TransportMulticastEventHandler>> {
         Ok(Arc::new(DummyTransportMulticastEventHandler))
+    }
+}
+
+/// Zenoh tells of a link before it has refused it, and then says nothing of its end.
+impl Drop for OfLink {
+    fn drop(&mut self) {
+        self.links.lose(self.id, self.number);
     }
 }
 

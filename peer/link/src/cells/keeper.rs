@@ -109,7 +109,7 @@ impl CellKeeper {
         // A client has one link.
         let before = *self.uplink.borrow();
         if let Some((id, _)) = before {
-            node.hang_up(id);
+            node.leave(id).await;
         }
         account.count("relays_dialled");
         let Place { id, locators } = &place;

@@ -1,6 +1,7 @@
 //! Whole robots on the loopback interface, whose parts fail and whose neighbours do not read.
 
 mod failing;
+mod links;
 mod memory;
 mod sealed;
 mod slow;
