@@ -57,7 +57,8 @@ impl TrustSection {
         Ok(Some(Seal { identity, certificate, roster, roster_file: Some(file), guests: BTreeMap::new() }))
     }
 
-    /// The same for a robot through which others vote: with the keys of all others that are in the folder.
+    /// The same for a robot through which others vote: with the keys of all others that are in the folder. One that was given another key elsewhere cannot vote
+    /// through this robot until its key is here; it keeps nobody else out.
     ///
     /// # Errors
     /// As [`TrustSection::seal`].
@@ -67,8 +68,12 @@ impl TrustSection {
             seal.roster.members().robots.keys().copied().filter(|id| *id != robot).collect();
         for guest in others {
             let file = key_file(folder, guest);
-            if file.exists() {
-                seal.guests.insert(guest, Arc::new(Identity::read(&file).map_err(wrong)?));
+            if !file.exists() {
+                continue;
+            }
+            let identity = Identity::read(&file).map_err(wrong)?;
+            if seal.roster.members().robots.get(&guest) == Some(&identity.public_key()) {
+                seal.guests.insert(guest, Arc::new(identity));
             }
         }
         Ok(Some(seal))

@@ -88,7 +88,7 @@ pub mod statement;
 #[cfg(test)]
 mod testing;
 mod verify;
-mod whole_file;
+pub mod whole_file;
 mod witness;
 pub mod word;
 

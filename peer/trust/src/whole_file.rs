@@ -17,8 +17,23 @@ const PAUSE: Duration = Duration::from_millis(10);
 ///
 /// # Errors
 /// Those of the file system; what was there is left, and nothing beside it.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let (beside, mut file) = create_beside(path)?;
+pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    put(path, bytes, &mut OpenOptions::new())
+}
+
+/// The same, of a file that its owner alone can read.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_secret(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    put(path, bytes, &mut options)
+}
+
+fn put(path: &Path, bytes: &[u8], options: &mut OpenOptions) -> io::Result<()> {
+    let (beside, mut file) = create_beside(path, options)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     drop(file);
     written.and_then(|()| fs::rename(&beside, path)).inspect_err(|_| {
@@ -49,12 +64,12 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 /// A new file of a name that nobody else has: what another one is writing, or was when the power went, is left alone.
-fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
+fn create_beside(path: &Path, options: &mut OpenOptions) -> io::Result<(PathBuf, File)> {
     static COUNT: AtomicUsize = AtomicUsize::new(0);
     loop {
         let mut beside = path.as_os_str().to_owned();
         beside.push(format!(".{}-{}.new", process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
-        match OpenOptions::new().write(true).create_new(true).open(&beside) {
+        match options.write(true).create_new(true).open(&beside) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             opened => return opened.map(|file| (beside.into(), file)),
         }

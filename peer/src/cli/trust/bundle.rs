@@ -1,13 +1,11 @@
 //! What a member takes away from its enrolment: the roster and its certificate, none of it a secret; and the files of a client.
 
-use std::fs::OpenOptions;
-use std::io::Write;
 use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gestalt_link::{Bearer, Certificate, Credentials};
-use gestalt_trust::{Applicant, Identity, Roster};
+use gestalt_trust::{Applicant, Identity, Roster, whole_file};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;
@@ -128,7 +126,9 @@ pub(super) fn write_client(
          // Name the endpoint of a robot under connect.\n{config:#}\n",
         roster.members().swarm
     );
-    secret_file(&folder.join("zenoh.json5"), text.as_bytes())
+    let file = folder.join("zenoh.json5");
+    whole_file::write_secret(&file, text.as_bytes())
+        .map_err(|error| format!("cannot write {}: {error}", file.display()).into())
 }
 
 fn holder(who: &Applicant) -> Bearer {
@@ -136,21 +136,6 @@ fn holder(who: &Applicant) -> Bearer {
         Applicant::Robot(robot) => Bearer::Robot(*robot),
         Applicant::Client(name) => Bearer::Client(name.clone()),
     }
-}
-
-/// Writes a file that its owner alone can read.
-fn secret_file(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    let wrong = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
-    let mut options = OpenOptions::new();
-    options.write(true).create(true).truncate(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let mut file = options.open(path).map_err(wrong)?;
-    // One that was there keeps its mode otherwise.
-    #[cfg(unix)]
-    file.set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o600)).map_err(wrong)?;
-    file.write_all(content).map_err(wrong)?;
-    Ok(())
 }
 
 #[cfg(test)]
@@ -176,7 +161,7 @@ mod tests {
     fn a_robot_is_enrolled_by_one_line_there_and_one_block_back() {
         let folder = tempfile::tempdir().unwrap();
         let (there, here) = (folder.path().join("robot"), folder.path().join("desk"));
-        let mut authority = Authority::create(&here, "demo").unwrap();
+        let mut authority = Authority::create(&here, "demo", Roles::NONE).unwrap();
         let block = enrolled(&there, &mut authority, 7);
         let (who, roster) = accept(&there, &format!("pasted:\n{block}\n")).unwrap();
         assert_eq!((who, roster.members().swarm.as_str()), (Applicant::Robot(RobotId(7)), "demo"));
@@ -190,7 +175,7 @@ mod tests {
         let (_, newer) = accept(&there, &enrolled(&there, &mut authority, 7)).unwrap();
         assert!(accept(&there, &block).unwrap_err().to_string().contains("older"));
         assert_eq!(Roster::<gestalt_trust::Ed25519>::read(&there.join(ROSTER_FILE)).unwrap(), newer);
-        let mut elsewhere = Authority::create(&folder.path().join("elsewhere"), "demo").unwrap();
+        let mut elsewhere = Authority::create(&folder.path().join("elsewhere"), "demo", Roles::NONE).unwrap();
         let usurped = enrolled(&there, &mut elsewhere, 7);
         assert!(
             accept(&there, &usurped).unwrap_err().to_string().contains("another swarm or another authority")
@@ -205,7 +190,7 @@ mod tests {
     fn a_clients_files_are_its_owners_alone() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let mut authority = Authority::create(folder.path(), "demo").unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
         let desk: gestalt_protocol::InstructorId = "desk".parse().unwrap();
         let who = Applicant::Client(desk.clone());
         let own = folder.path().join("client-desk");

@@ -1,9 +1,11 @@
 //! The folder of whoever has the authority's key: who is a member, and with which key.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 
 use gestalt_link::{Bearer, Certificate};
 use gestalt_protocol::{InstructorId, Keys, RobotId};
@@ -15,6 +17,10 @@ use crate::config::{ROSTER_FILE, certificate_file, client_key_file, key_file};
 /// The secret of whoever may change the roster.
 const AUTHORITY_FILE: &str = "authority.key";
 
+/// How often a folder in which somebody else changes the roster is tried, and how long each time is waited.
+const TRIES: usize = 100;
+const PAUSE: Duration = Duration::from_millis(100);
+
 /// A swarm in the hands of its authority.
 pub(crate) struct Authority {
     folder: PathBuf,
@@ -22,37 +28,45 @@ pub(crate) struct Authority {
     members: Membership,
     /// Files that take the place of others once the roster is written, which needs them.
     new_files: Vec<(PathBuf, PathBuf)>,
+    /// Kept while the roster may change: of two who change it at once, the key of one would stand on it, and that of the other lie here.
+    _alone: Option<File>,
 }
 
 impl Authority {
-    /// Makes a swarm: its authority's key, and a roster without members.
+    /// Makes a swarm: its authority's key, and a roster without members. Goes on where that was interrupted before there was a roster.
     ///
     /// # Errors
     /// A name that no swarm can have, a folder that has a swarm already, and files that cannot be written.
-    pub fn create(folder: &Path, swarm: &str) -> Result<Self, Failure> {
+    pub fn create(folder: &Path, swarm: &str, local: Roles) -> Result<Self, Failure> {
         Keys::new(swarm)?;
         make(folder)?;
         let file = folder.join(AUTHORITY_FILE);
-        if file.exists() {
+        let identity = if file.exists() { Identity::read(&file)? } else { new_identity(&file)? };
+        let alone = alone(&file)?;
+        if folder.join(ROSTER_FILE).exists() {
             return Err(format!(
                 "{} is there already: this folder has its swarm; choose another",
                 file.display()
             )
             .into());
         }
-        let identity = Arc::new(new_identity(&file)?);
-        // Whoever works on a robot's own computer could as well show it gestures.
-        let members =
-            Membership { swarm: swarm.to_owned(), local: Roles::up_to(Role::Teach), ..Membership::default() };
-        let mut authority = Self { folder: folder.to_owned(), identity, members, new_files: Vec::new() };
+        let members = Membership { swarm: swarm.to_owned(), local, ..Membership::default() };
+        let mut authority = Self {
+            folder: folder.to_owned(),
+            identity: Arc::new(identity),
+            members,
+            new_files: Vec::new(),
+            _alone: alone,
+        };
         authority.save()?;
         Ok(authority)
     }
 
-    /// Opens the folder of a swarm.
+    /// Opens the folder of a swarm; nobody else changes it until this is dropped. New keys that are on the roster already take their places, where who made
+    /// them was interrupted.
     ///
     /// # Errors
-    /// A folder without the authority's key or its roster, or with that of another authority.
+    /// A folder without the authority's key or its roster, or with that of another authority; one that somebody else keeps.
     pub fn open(folder: &Path) -> Result<Self, Failure> {
         let file = folder.join(AUTHORITY_FILE);
         if !file.exists() {
@@ -62,13 +76,17 @@ impl Authority {
             )
             .into());
         }
+        let alone = alone(&file)?;
         let identity = Arc::new(Identity::read(&file)?);
         let roster: Roster = Roster::read(&folder.join(ROSTER_FILE))?;
         if roster.authority() != identity.public_key() {
             return Err(format!("{} is of another authority: choose another folder", folder.display()).into());
         }
         let members = roster.members().clone();
-        Ok(Self { folder: folder.to_owned(), identity, members, new_files: Vec::new() })
+        let mut authority =
+            Self { folder: folder.to_owned(), identity, members, new_files: Vec::new(), _alone: alone };
+        authority.go_on()?;
+        Ok(authority)
     }
 
     /// Opens the folder, or makes a swarm there.
@@ -76,8 +94,9 @@ impl Authority {
     /// # Errors
     /// As [`Authority::create`] and [`Authority::open`]; a folder of another swarm.
     pub fn open_or_create(folder: &Path, swarm: &str) -> Result<Self, Failure> {
-        if !folder.join(AUTHORITY_FILE).exists() {
-            return Self::create(folder, swarm);
+        if !folder.join(ROSTER_FILE).exists() {
+            // Whoever works on a robot's own computer could as well show it gestures.
+            return Self::create(folder, swarm, Roles::up_to(Role::Teach));
         }
         let authority = Self::open(folder)?;
         if authority.members.swarm != swarm {
@@ -92,11 +111,6 @@ impl Authority {
     /// The authority's own key.
     pub fn identity(&self) -> Arc<Identity> {
         self.identity.clone()
-    }
-
-    /// Says what whoever works on a robot's own computer may do.
-    pub fn let_local(&mut self, roles: Roles) {
-        self.members.local = roles;
     }
 
     /// Makes a robot a member, whose key is in this folder, or is made here now.
@@ -146,17 +160,56 @@ impl Authority {
         self.members.expelled.insert(robot, old);
         let who = Applicant::Robot(robot);
         let Some(key) = key else {
-            let file = key_file(&self.folder, robot);
-            let new = file.with_extension("new.key");
+            let (new, _) = self.new_key_file(robot);
             remove(&new)?;
             let key = new_identity(&new)?.public_key();
             self.enrol(&who, key, Roles::NONE)?;
             self.certify(&who, &key)?.write(&certificate_file(&new))?;
-            self.new_files.push((certificate_file(&new), certificate_file(&file)));
-            self.new_files.push((new, file));
+            self.will_take_its_place(robot);
             return Ok(());
         };
         self.enrol(&who, key, Roles::NONE)
+    }
+
+    /// Where a robot's new key lies until the roster has it, and where it is to lie then.
+    fn new_key_file(&self, robot: RobotId) -> (PathBuf, PathBuf) {
+        let file = key_file(&self.folder, robot);
+        (file.with_extension("new.key"), file)
+    }
+
+    /// The key last: while the new one lies beside the old one, it is known that this was not done.
+    fn will_take_its_place(&mut self, robot: RobotId) {
+        let (new, file) = self.new_key_file(robot);
+        self.new_files.push((certificate_file(&new), certificate_file(&file)));
+        self.new_files.push((new, file));
+    }
+
+    /// Does what was left to do when the roster had been written.
+    fn go_on(&mut self) -> Result<(), Failure> {
+        for (robot, key) in self.members.robots.clone() {
+            let (new, _) = self.new_key_file(robot);
+            if new.exists() && Identity::read(&new)?.public_key() == key {
+                self.will_take_its_place(robot);
+            }
+        }
+        self.put_new_files()
+    }
+
+    fn put_new_files(&mut self) -> Result<(), Failure> {
+        for (new, file) in self.new_files.drain(..) {
+            match fs::rename(&new, &file) {
+                // Done before it was interrupted.
+                Err(error) if error.kind() == ErrorKind::NotFound && file.exists() => {}
+                renamed => renamed.map_err(|error| {
+                    format!(
+                        "the roster is written, but not {}: {error}; rename {} to it",
+                        file.display(),
+                        new.display()
+                    )
+                })?,
+            }
+        }
+        Ok(())
     }
 
     /// Whether a client is a member with that key.
@@ -165,23 +218,33 @@ impl Authority {
         self.members.instructors.get(name).is_some_and(|held| held.key == *key)
     }
 
-    /// Takes a robot or a client off the roster.
+    /// Takes a robot or a client off the roster. Says whether it was on it: a robot that was expelled before is none already.
     ///
     /// # Errors
-    /// One that is no member.
-    pub fn expel(&mut self, who: &Applicant) -> Result<(), Failure> {
-        let known = match who {
+    /// One that was never a member, as far as is known: of clients nothing is kept.
+    pub fn expel(&mut self, who: &Applicant) -> Result<bool, Failure> {
+        let (was, before) = match who {
             Applicant::Robot(robot) => {
+                let before = self.members.expelled.contains_key(robot);
                 let key = self.members.robots.remove(robot);
                 self.members.expelled.extend(key.map(|key| (*robot, key)));
-                key.is_some()
+                (key.is_some(), before)
             }
-            Applicant::Client(name) => self.members.instructors.remove(name).is_some(),
+            Applicant::Client(name) => (self.members.instructors.remove(name).is_some(), false),
         };
-        if known {
-            return Ok(());
+        if was || before {
+            return Ok(was);
         }
-        Err(format!("{} is no member: gestalt trust roster shows who is", said(who)).into())
+        let words = "is no member: gestalt trust roster shows who is, and gestalt trust tell says it to a swarm that runs";
+        Err(format!("{} {words}", said(who)).into())
+    }
+
+    /// The roster as it is written.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn roster(&self) -> Result<Roster, Failure> {
+        Ok(Roster::read(&self.folder.join(ROSTER_FILE))?)
     }
 
     /// The certificate of a member.
@@ -204,15 +267,7 @@ impl Authority {
         self.members.epoch += 1;
         let roster = self.members.clone().sign(&self.identity)?;
         roster.write(&self.folder.join(ROSTER_FILE))?;
-        for (new, file) in self.new_files.drain(..) {
-            fs::rename(&new, &file).map_err(|error| {
-                format!(
-                    "the roster is written, but not {}: {error}; rename {} to it",
-                    file.display(),
-                    new.display()
-                )
-            })?;
-        }
+        self.put_new_files()?;
         Ok(roster)
     }
 }
@@ -224,10 +279,29 @@ impl Authority {
 pub(super) fn key_of(folder: &Path, who: &Applicant, anew: bool) -> Result<Identity, Failure> {
     make(folder)?;
     let file = key_path(folder, who);
-    if anew {
-        remove(&file)?;
+    if file.exists() && !anew {
+        return Ok(Identity::read(&file)?);
     }
-    if file.exists() { Ok(Identity::read(&file)?) } else { new_identity(&file) }
+    // One that is there stays until there is another.
+    let new = file.with_extension("new.key");
+    remove(&new)?;
+    let identity = new_identity(&new)?;
+    fs::rename(&new, &file).map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+    Ok(identity)
+}
+
+/// Keeps others that ask for the same out, until what is returned is dropped. `None` where files cannot be locked.
+fn alone(file: &Path) -> Result<Option<File>, Failure> {
+    let held = File::open(file).map_err(|error| format!("cannot read {}: {error}", file.display()))?;
+    for _ in 0..TRIES {
+        match held.try_lock() {
+            Ok(()) => return Ok(Some(held)),
+            Err(TryLockError::WouldBlock) => thread::sleep(PAUSE),
+            Err(TryLockError::Error(_)) => return Ok(None),
+        }
+    }
+    Err(format!("somebody else changes the roster in {} all the time", file.with_file_name("").display())
+        .into())
 }
 
 /// Where a member's key lies.
@@ -304,12 +378,18 @@ mod tests {
         let missing = trust.seal(RobotId(4)).unwrap_err().to_string();
         assert!(missing.contains("trust.keys") && missing.contains("robot-4.key"), "{missing}");
         assert_eq!(trust.seal_with_guests(RobotId(3)).unwrap().unwrap().guests.len(), 2);
+        // One has another key on the roster than here: the others vote through this robot as before.
+        let mut authority = Authority::open(trust.keys.as_ref().unwrap()).unwrap();
+        authority.rekey(RobotId(2), Some(authority.identity.public_key())).unwrap();
+        authority.save().unwrap();
+        let guests = trust.seal_with_guests(RobotId(3)).unwrap().unwrap().guests;
+        assert_eq!(guests.keys().copied().collect::<Vec<_>>(), [RobotId(1)]);
     }
 
     #[test]
     fn who_was_expelled_comes_back_with_a_new_key_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let mut authority = Authority::create(folder.path(), "demo").unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
         [1, 7].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
         let before = authority.save().unwrap().members().robots[&RobotId(7)];
         authority.expel(&Applicant::Robot(RobotId(7))).unwrap();
@@ -318,12 +398,14 @@ mod tests {
             !roster.members().robots.contains_key(&RobotId(7))
                 && roster.members().expelled[&RobotId(7)] == before
         );
+        assert!(!authority.expel(&Applicant::Robot(RobotId(7))).unwrap(), "it is none already");
         assert!(
-            authority.expel(&Applicant::Robot(RobotId(7))).unwrap_err().to_string().contains("no member")
+            authority.expel(&Applicant::Robot(RobotId(8))).unwrap_err().to_string().contains("no member")
         );
         // With its old key, which still lies there.
         authority.enrol_here(RobotId(7)).unwrap();
         assert!(authority.save().unwrap_err().to_string().contains("expelled"));
+        drop(authority);
         let mut authority = Authority::open(folder.path()).unwrap();
         authority.rekey(RobotId(7), None).unwrap();
         let after = authority.save().unwrap().members().clone();
@@ -333,9 +415,10 @@ mod tests {
     #[test]
     fn the_old_key_is_there_until_the_roster_has_the_new_one() {
         let folder = tempfile::tempdir().unwrap();
-        let mut authority = Authority::create(folder.path(), "demo").unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
         authority.enrol_here(RobotId(7)).unwrap();
         let before = authority.save().unwrap();
+        drop(authority);
         let key = || Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
         let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
         let starts = || trust.seal(RobotId(7)).unwrap().unwrap().credentials(RobotId(7)).is_ok();
@@ -353,5 +436,52 @@ mod tests {
         assert!(starts());
         let left = fs::read_dir(folder.path()).unwrap().flatten();
         assert!(left.into_iter().all(|file| !file.file_name().to_string_lossy().contains("new")));
+    }
+
+    #[test]
+    fn of_keys_that_are_made_at_once_the_one_on_the_roster_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+        authority.enrol_here(RobotId(7)).unwrap();
+        authority.save().unwrap();
+        drop(authority);
+        let rekey = || {
+            let mut authority = Authority::open(folder.path()).unwrap();
+            authority.rekey(RobotId(7), None).unwrap();
+            authority.save().unwrap();
+        };
+        std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(rekey))));
+        let roster = Authority::open(folder.path()).unwrap().roster().unwrap();
+        let key = Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
+        assert_eq!((roster.members().epoch, key), (6, roster.members().robots[&RobotId(7)]));
+    }
+
+    #[test]
+    fn who_was_interrupted_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        // When there was no roster yet.
+        new_identity(&folder.path().join(AUTHORITY_FILE)).unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::up_to(Role::Open)).unwrap();
+        assert_eq!(authority.roster().unwrap().members().local, Roles::up_to(Role::Open));
+        authority.enrol_here(RobotId(7)).unwrap();
+        authority.save().unwrap();
+        // When the roster had a new key that did not lie in its place yet; then with its certificate in place, and the key not.
+        let (new, file) = authority.new_key_file(RobotId(7));
+        for is_certificate_there in [false, true] {
+            authority.rekey(RobotId(7), None).unwrap();
+            authority.new_files.clear();
+            authority.save().unwrap();
+            if is_certificate_there {
+                fs::rename(certificate_file(&new), certificate_file(&file)).unwrap();
+            }
+            drop(authority);
+            authority = Authority::open(folder.path()).unwrap();
+            let key = Identity::read(&file).unwrap().public_key();
+            assert!(key == authority.members.robots[&RobotId(7)] && !new.exists());
+            let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
+            assert!(trust.seal(RobotId(7)).unwrap().unwrap().credentials(RobotId(7)).is_ok());
+        }
+        drop(authority);
+        assert!(Authority::create(folder.path(), "demo", Roles::NONE).is_err(), "it has its swarm");
     }
 }

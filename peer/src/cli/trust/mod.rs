@@ -39,6 +39,7 @@ enum Verb {
     Roster(Show),
     Expel(Expel),
     Rekey(Rekey),
+    Tell(Again),
 }
 
 /// Make a sealed swarm: the key of its authority, and a roster without members
@@ -163,6 +164,18 @@ struct Rekey {
     folder: PathBuf,
 }
 
+/// Say the roster to a swarm that runs, again: to those who were not reached when it changed
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  gestalt trust tell keys
+  gestalt trust tell keys -e tls/192.168.1.5:7447")]
+struct Again {
+    #[command(flatten)]
+    tell: Tell,
+    /// Folder with authority.key
+    folder: PathBuf,
+}
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -180,6 +193,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Verb::Roster(args) => show(args),
         Verb::Expel(args) => expel(args),
         Verb::Rekey(args) => rekey(args),
+        Verb::Tell(args) => {
+            let authority = Authority::open(&args.folder)?;
+            args.tell.now(&authority, &authority.roster()?)
+        }
     }
 }
 
@@ -194,9 +211,8 @@ fn say(words: &str) -> Result<(), Failure> {
 }
 
 fn new(args: &New) -> Result<(), Failure> {
-    let mut authority = Authority::create(&args.folder, &args.swarm)?;
-    authority.let_local(Roles::up_to(args.local_role));
-    let roster = authority.save()?;
+    let authority = Authority::create(&args.folder, &args.swarm, Roles::up_to(args.local_role))?;
+    let roster = authority.roster()?;
     say(&format!(
         "swarm \"{}\" {}: {} can enrol and expel, and is to be kept where no robot is",
         args.swarm,
@@ -299,9 +315,12 @@ fn show(args: &Show) -> Result<(), Failure> {
 
 fn expel(args: &Expel) -> Result<(), Failure> {
     let mut authority = Authority::open(&args.folder)?;
-    authority.expel(&args.who)?;
-    let roster = authority.save()?;
-    say(&format!("{} is no member from epoch {} on", said(&args.who), roster.members().epoch))?;
+    let roster = match authority.expel(&args.who)? {
+        true => authority.save()?,
+        // Said again, to those who were not reached.
+        false => authority.roster()?,
+    };
+    say(&format!("{} is no member by epoch {}", said(&args.who), roster.members().epoch))?;
     if args.offline { Ok(()) } else { args.tell.now(&authority, &roster) }
 }
 

@@ -47,7 +47,7 @@ impl Tell {
         };
         super::super::runtime()?.block_on(async {
             let client = Client::open(&roster.members().swarm, &link).await.map_err(|error| {
-                format!("the roster is written, but no robot was told: {error}; name one with -e, or tell them later by starting one with it")
+                format!("the roster is written, but no robot was told: {error}; say it again with `gestalt trust tell` and the endpoint of one (-e), or by starting one with it")
             })?;
             let told = told(&client, roster).await;
             client.close().await;
@@ -80,7 +80,7 @@ async fn told(client: &Client, roster: &Roster) -> Result<(), Failure> {
         }
         if began.elapsed() > PATIENCE {
             return Err(match left.is_empty() {
-                true => "the roster is written, but no robot answered: is one running there?".to_owned(),
+                true => "the roster is written, but no robot answered: is one running there? `gestalt trust tell` says it again".to_owned(),
                 false => format!(
                     "the roster is written, but robots {} do not go by it yet: they are told by their neighbours as soon as they can be reached",
                     robots(&left)
