@@ -144,8 +144,7 @@ impl Rounds {
         self.highest = self.highest.max(Some(id.counter));
         self.electorate.forget(self.now, self.config.lately, &self.alive);
         match self.round.as_ref().filter(|before| before.id.counter == id.counter) {
-            // Whether or not it came to a decision, what it showed was another gesture.
-            Some(before) if before.has_decided() || !before.open => self.past.extend(before.names()),
+            Some(before) if before.has_decided() => self.past.extend(before.names()),
             Some(_) => {}
             None => self.past.clear(),
         }

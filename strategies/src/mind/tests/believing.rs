@@ -375,8 +375,7 @@ fn what_is_said_of_a_name_is_said_of_none_that_nobody_gave() {
         (800, Instruction::Restore { class: Gesture::Label("circle (bob)".to_owned()) }, Fate::InUse),
         (900, Instruction::Restore { class: Gesture::Class(bobs) }, Fate::InUse),
     ];
-    let mut sequence = 0;
-    for (count, word, fate) in words {
+    for (sequence, (count, word, fate)) in (1..).zip(words) {
         swarm.hear(0, "ada", count, &word);
         swarm.pass(Duration::from_secs(10));
         let names = |swarm: &Swarm| swarm.minds[0].learning.as_ref().unwrap().names().clone();
@@ -392,7 +391,6 @@ fn what_is_said_of_a_name_is_said_of_none_that_nobody_gave() {
             said: Some(signed("ada", count, &word)),
         });
         let message = Message::Namings(gestalt_protocol::Namings { namings: made_up.collect() });
-        sequence += 1;
         let stamp = Stamp { boot: u32::MAX, sequence };
         swarm.input(0, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
         assert_eq!(names(&swarm), before);
