@@ -62,7 +62,6 @@ mod token;
 mod trainer;
 mod voice;
 mod wake;
-mod watch;
 mod ways;
 mod words;
 mod worker;

@@ -38,9 +38,8 @@ use crate::roll_call::keep_roll;
 use crate::seal::{Seal, SealError};
 use crate::session::{Guard, Node};
 use crate::subscriptions::listen;
-use crate::supervisor::{Supervisor, run_apart};
+use crate::supervisor::{Supervisor, run_apart, watch_session};
 use crate::voice::Voice;
-use crate::watch::watch_session;
 use crate::words::Words;
 
 /// Everything a robot needs to take part in a swarm.

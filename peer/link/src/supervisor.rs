@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{broadcast, watch};
 use tokio::task::{JoinError, JoinSet};
+use zenoh::Session;
 
 use crate::account::Account;
 use crate::event::Event;
@@ -18,6 +19,9 @@ use crate::panics::said;
 /// the first again.
 const PAUSE: Duration = Duration::from_millis(200);
 const MAX_PAUSE: Duration = Duration::from_secs(30);
+
+/// How often it is made sure that a session is still open.
+const LOOK_AFTER: Duration = Duration::from_millis(500);
 
 /// Watches over the parts of one robot.
 #[derive(Debug)]
@@ -104,6 +108,17 @@ impl Supervisor {
     pub async fn stop(&self) {
         let mut parts = std::mem::take(&mut *self.parts.lock().unwrap_or_else(PoisonError::into_inner));
         parts.shutdown().await;
+    }
+}
+
+/// Ends a robot whose session has been closed, by whomever. Never returns before.
+pub(crate) async fn watch_session(session: Session, supervisor: Arc<Supervisor>) -> Result<(), String> {
+    loop {
+        tokio::time::sleep(LOOK_AFTER).await;
+        if session.is_closed() {
+            supervisor.end(Part::Session, "Zenoh closed it".to_owned());
+            return Ok(());
+        }
     }
 }
 

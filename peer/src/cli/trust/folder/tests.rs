@@ -1,0 +1,130 @@
+//! Who is a member, whatever happens while that changes.
+
+use super::*;
+use crate::config::TrustSection;
+
+#[test]
+fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path().join("keys");
+    let enrol = |robots: &[u32]| {
+        let mut authority = Authority::open_or_create(&folder, "demo").unwrap();
+        robots.iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+        authority.save().unwrap()
+    };
+    let (first, second) = (enrol(&[1, 2]), enrol(&[2, 3]));
+    assert!(second.newer_than(&first));
+    let (first, second) = (first.members(), second.members());
+    assert_eq!((first.robots.len(), second.robots.len()), (2, 3));
+    assert_eq!(first.robots[&RobotId(2)], second.robots[&RobotId(2)]);
+    let other = Authority::open_or_create(&folder, "other").map(drop).unwrap_err().to_string();
+    assert!(other.contains("choose another folder"), "{other}");
+    let trust = TrustSection { keys: Some(folder), ..TrustSection::default() };
+    let seal = trust.seal(RobotId(3)).unwrap().unwrap();
+    assert_eq!(seal.identity.public_key(), second.robots[&RobotId(3)]);
+    assert!(seal.credentials(RobotId(3)).is_ok() && seal.credentials(RobotId(2)).is_err());
+    let missing = trust.seal(RobotId(4)).unwrap_err().to_string();
+    assert!(missing.contains("trust.keys") && missing.contains("robot-4.key"), "{missing}");
+    assert_eq!(trust.seal_with_guests(RobotId(3)).unwrap().unwrap().guests.len(), 2);
+    // One has another key on the roster than here: the others vote through this robot as before.
+    let mut authority = Authority::open(trust.keys.as_ref().unwrap()).unwrap();
+    authority.rekey(RobotId(2), Some(authority.identity.public_key())).unwrap();
+    authority.save().unwrap();
+    let guests = trust.seal_with_guests(RobotId(3)).unwrap().unwrap().guests;
+    assert_eq!(guests.keys().copied().collect::<Vec<_>>(), [RobotId(1)]);
+}
+
+#[test]
+fn who_was_expelled_comes_back_with_a_new_key_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+    [1, 7].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+    let before = authority.save().unwrap().members().robots[&RobotId(7)];
+    authority.expel(&Applicant::Robot(RobotId(7))).unwrap();
+    let roster = authority.save().unwrap();
+    assert!(
+        !roster.members().robots.contains_key(&RobotId(7))
+            && roster.members().expelled[&RobotId(7)] == before
+    );
+    assert!(!authority.expel(&Applicant::Robot(RobotId(7))).unwrap(), "it is none already");
+    assert!(authority.expel(&Applicant::Robot(RobotId(8))).unwrap_err().to_string().contains("no member"));
+    // With its old key, which still lies there.
+    authority.enrol_here(RobotId(7)).unwrap();
+    assert!(authority.save().unwrap_err().to_string().contains("expelled"));
+    drop(authority);
+    let mut authority = Authority::open(folder.path()).unwrap();
+    authority.rekey(RobotId(7), None).unwrap();
+    let after = authority.save().unwrap().members().clone();
+    assert!(after.robots[&RobotId(7)] != before && after.expelled[&RobotId(7)] == before);
+}
+
+#[test]
+fn the_old_key_is_there_until_the_roster_has_the_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+    authority.enrol_here(RobotId(7)).unwrap();
+    let before = authority.save().unwrap();
+    drop(authority);
+    let key = || Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
+    let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
+    let starts = || trust.seal(RobotId(7)).unwrap().unwrap().credentials(RobotId(7)).is_ok();
+    // Interrupted before the roster is written, twice.
+    for _ in 0..2 {
+        Authority::open(folder.path()).unwrap().rekey(RobotId(7), None).unwrap();
+        assert!(key() == before.members().robots[&RobotId(7)] && starts());
+    }
+    let mut authority = Authority::open(folder.path()).unwrap();
+    authority.rekey(RobotId(7), None).unwrap();
+    let after = authority.save().unwrap();
+    assert!(key() == after.members().robots[&RobotId(7)] && key() != before.members().robots[&RobotId(7)]);
+    assert!(starts());
+    let left = fs::read_dir(folder.path()).unwrap().flatten();
+    assert!(left.into_iter().all(|file| !file.file_name().to_string_lossy().contains("new")));
+}
+
+#[test]
+fn of_keys_that_are_made_at_once_the_one_on_the_roster_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+    authority.enrol_here(RobotId(7)).unwrap();
+    authority.save().unwrap();
+    drop(authority);
+    let rekey = || {
+        let mut authority = Authority::open(folder.path()).unwrap();
+        authority.rekey(RobotId(7), None).unwrap();
+        authority.save().unwrap();
+    };
+    std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(rekey))));
+    let roster = Authority::open(folder.path()).unwrap().roster().unwrap();
+    let key = Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
+    assert_eq!((roster.members().epoch, key), (6, roster.members().robots[&RobotId(7)]));
+}
+
+#[test]
+fn who_was_interrupted_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    // When there was no roster yet.
+    new_identity(&folder.path().join(AUTHORITY_FILE)).unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::up_to(Role::Open)).unwrap();
+    assert_eq!(authority.roster().unwrap().members().local, Roles::up_to(Role::Open));
+    authority.enrol_here(RobotId(7)).unwrap();
+    authority.save().unwrap();
+    // When the roster had a new key that did not lie in its place yet; then with its certificate in place, and the key not.
+    let (new, file) = authority.new_key_file(RobotId(7));
+    for is_certificate_there in [false, true] {
+        authority.rekey(RobotId(7), None).unwrap();
+        authority.new_files.clear();
+        authority.save().unwrap();
+        if is_certificate_there {
+            fs::rename(certificate_file(&new), certificate_file(&file)).unwrap();
+        }
+        drop(authority);
+        authority = Authority::open(folder.path()).unwrap();
+        let key = Identity::read(&file).unwrap().public_key();
+        assert!(key == authority.members.robots[&RobotId(7)] && !new.exists());
+        let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
+        assert!(trust.seal(RobotId(7)).unwrap().unwrap().credentials(RobotId(7)).is_ok());
+    }
+    drop(authority);
+    assert!(Authority::create(folder.path(), "demo", Roles::NONE).is_err(), "it has its swarm");
+}

@@ -1,0 +1,129 @@
+//! What becomes of names, in whatever order they are heard.
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn who(name: &str) -> InstructorId {
+    name.parse().unwrap()
+}
+
+fn naming(by: &str, label: &str, count: u64, fate: Fate) -> Naming {
+    Naming { by: who(by), label: label.to_owned(), count, at: 7, said_by: who(by), fate, said: None }
+}
+
+fn book(said: &[Naming]) -> NameBook {
+    let mut book = NameBook::default();
+    said.iter().for_each(|naming| {
+        book.hear(naming);
+    });
+    book
+}
+
+#[test]
+fn a_word_on_a_gesture_replaces_the_earlier_and_nothing_is_lost() {
+    let [circle, ring] = ["circle", "ring"].map(|label| ClassId::named(&who("ana"), label));
+    let mut book = book(&[naming("ana", "circle", 1, Fate::InUse), naming("ana", "ring", 1, Fate::InUse)]);
+    assert_eq!(book.in_use(64), [circle, ring].into());
+    book.hear(&naming("ana", "ring", 2, Fate::Same(circle)));
+    assert_eq!((book.stands_for(ring), book.in_use(64)), (Some(circle), [circle].into()));
+    assert_eq!(book.titles(&[])[&ring], "circle");
+    book.hear(&naming("ana", "circle", 2, Fate::Retired));
+    assert_eq!((book.stands_for(ring), book.stands_for(circle)), (None, None));
+    book.hear(&naming("ana", "circle", 3, Fate::InUse));
+    book.hear(&naming("ana", "ring", 3, Fate::InUse));
+    assert_eq!(book.in_use(64), [circle, ring].into());
+    assert_eq!(book.hear(&naming("ana", "ring", 2, Fate::Retired)), NamingReceipt::Known);
+    assert_eq!(book.hear(&naming("ana", "ring", 1 << 40, Fate::Retired)), NamingReceipt::FarAhead);
+}
+
+#[test]
+fn what_is_the_same_in_a_circle_is_the_smallest() {
+    let ids: Vec<ClassId> = ["a", "b", "c"].map(|label| ClassId::named(&who("ana"), label)).into();
+    let same = |label, other| naming("ana", label, 1, Fate::Same(ids[other]));
+    let book = book(&[same("a", 1), same("b", 2), same("c", 0)]);
+    for id in &ids {
+        assert_eq!(book.stands_for(*id), ids.iter().min().copied());
+    }
+    assert_eq!(NameBook::default().stands_for(ids[0]), None, "nobody named it");
+    assert_eq!(NameBook::default().stands_for(ClassId(3)), Some(ClassId(3)));
+}
+
+#[test]
+fn two_who_choose_one_label_name_two_gestures() {
+    let [anas, bobs] = ["ana", "bob"].map(|by| ClassId::named(&who(by), "circle"));
+    let mut book = book(&[naming("ana", "circle", 1, Fate::InUse)]);
+    assert_eq!(book.find("circle", &who("cyn")), Some(anas));
+    book.hear(&naming("bob", "circle", 1, Fate::InUse));
+    assert_eq!(book.find("circle", &who("ana")), Some(anas));
+    assert_eq!(book.find("circle", &who("bob")), Some(bobs));
+    assert_eq!(book.find("circle", &who("cyn")), None, "which one?");
+    assert_eq!(book.find("circle (bob)", &who("cyn")), Some(bobs));
+    assert_eq!(book.titles(&[])[&bobs], "circle (bob)");
+}
+
+proptest! {
+    #[test]
+    fn in_any_order_and_however_often_robots_come_to_the_same(
+        said in prop::collection::vec((0..3_usize, 0..5_usize, 0..4_u64, 0..8_usize), 0..60),
+        order in any::<prop::sample::Index>(),
+    ) {
+        let who = ["ana", "bob", "cyn"];
+        let labels = ["a", "b", "c", "d", "e"];
+        let id = |n: usize| ClassId::named(&who[n % 3].parse().unwrap(), labels[n % 5]);
+        let said: Vec<Naming> = said.into_iter().map(|(by, label, count, fate)| {
+            let fate = match fate {
+                0..3 => Fate::InUse,
+                3 => Fate::Retired,
+                4 => Fate::Same(ClassId(2)),
+                n => Fate::Same(id(n)),
+            };
+            naming(who[by], labels[label], count, fate)
+        }).collect();
+        let forwards = book(&said);
+        let middle = order.index(said.len() + 1);
+        let turned: Vec<Naming> =
+            said[middle..].iter().chain(&said[..middle]).rev().chain(&said).cloned().collect();
+        let turned = book(&turned);
+        prop_assert_eq!(forwards.digest(7), turned.digest(7));
+        for naming in forwards.iter() {
+            let stands = forwards.stands_for(naming.gesture());
+            prop_assert!(stands.is_none_or(|stands| forwards.stands_for(stands) == Some(stands)));
+        }
+        prop_assert_eq!(forwards, turned);
+    }
+}
+
+#[test]
+fn of_ever_so_many_all_robots_keep_the_same() {
+    let all: Vec<Naming> =
+        (0..3 * MAX_NAMED).map(|n| naming("ana", &n.to_string(), 1, Fate::InUse)).collect();
+    let forwards = book(&all);
+    let backwards = book(&all.iter().rev().cloned().collect::<Vec<_>>());
+    assert_eq!(forwards.iter().count(), MAX_NAMED);
+    assert_eq!(forwards, backwards);
+    assert_eq!(forwards.in_use(58).len(), 58);
+}
+
+#[test]
+fn whoever_may_only_vouch_makes_nobody_elses_gesture_give_way() {
+    let circle = naming("ana", "circle", 1, Fate::InUse);
+    let vouched = (0_u32..).map(|n| naming("guest", &n.to_string(), 1, Fate::InUse));
+    let vouched: Vec<Naming> =
+        vouched.filter(|naming| naming.gesture() < circle.gesture()).take(2 * MAX_NAMED).collect();
+    let (mut before, mut after) = (NameBook::default(), NameBook::default());
+    before.hear_by(&circle, Some(Standing::Teaches));
+    vouched.iter().for_each(|naming| {
+        before.hear_by(naming, Some(Standing::Vouched));
+    });
+    assert!(after.has_room(58, &circle, Some(Standing::Vouched)));
+    vouched.iter().rev().for_each(|naming| {
+        after.hear_by(naming, Some(Standing::Vouched));
+    });
+    assert!(!after.has_room(58, &circle, Some(Standing::Vouched)));
+    assert!(after.has_room(58, &circle, Some(Standing::Teaches)));
+    after.hear_by(&circle, Some(Standing::Teaches));
+    assert_eq!(before, after);
+    assert_eq!(before.iter().count(), MAX_NAMED);
+    assert!(before.in_use(58).contains(&circle.gesture()) && before.in_use(58).len() == 58);
+}
