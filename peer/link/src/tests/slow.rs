@@ -1,5 +1,6 @@
 //! A neighbour that does not read holds up nobody.
 
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Duration;
@@ -14,6 +15,24 @@ use zenoh::qos::{CongestionControl, Priority};
 
 use super::{PATIENCE, config, start, swarm, unique};
 use crate::RobotConfig;
+
+/// Set in the process of its own that a test runs in.
+const ALONE: &str = "GESTALT_LINK_TEST_ALONE";
+
+/// Runs that test of this file in a process of its own: all sessions of a process share Zenoh's two threads for what is received, and a session
+/// that is held up, as is the point here, may hold up both.
+fn alone(test: &str, it: impl Future<Output = ()>) {
+    if std::env::var_os(ALONE).is_some() {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(4).enable_all().build();
+        return runtime.unwrap().block_on(it);
+    }
+    let mut child = Command::new(std::env::current_exe().unwrap());
+    child.args([&format!("tests::slow::{test}"), "--exact", "--nocapture"]).env(ALONE, "1");
+    let output = child.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    let passed = output.status.success() && said.contains(" 1 passed");
+    assert!(passed, "{}\n{said}\n{}", output.status, String::from_utf8_lossy(&output.stderr));
+}
 
 /// Forwards between who connects and a robot, until it is told to forward nothing more from the robot. Gives where to
 /// connect.
@@ -55,8 +74,12 @@ async fn neighbour(at: String, more: &[(&str, serde_json::Value)]) -> zenoh::Ses
 }
 
 /// One that says it is a robot, asks for one queue for all, fills it, and never says a word, so that it is hung up: to say so to it, there is no room.
-#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn a_neighbour_that_does_not_read_is_hung_up_and_delays_nobody() {
+#[test]
+fn a_neighbour_that_does_not_read_is_hung_up_and_delays_nobody() {
+    alone("a_neighbour_that_does_not_read_is_hung_up_and_delays_nobody", one_with_one_queue());
+}
+
+async fn one_with_one_queue() {
     let name = unique();
     let mut first: RobotConfig = config(1, &name, &[]);
     first.link.lease = Duration::from_secs(60);
@@ -103,8 +126,12 @@ async fn a_neighbour_that_does_not_read_is_hung_up_and_delays_nobody() {
     }
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn a_neighbour_that_does_not_read_delays_no_decision() {
+#[test]
+fn a_neighbour_that_does_not_read_delays_no_decision() {
+    alone("a_neighbour_that_does_not_read_delays_no_decision", one_that_is_kept());
+}
+
+async fn one_that_is_kept() {
     let name = unique();
     let mut first: RobotConfig = config(1, &name, &[]);
     // A link that is silent stays, and a message that is not to be lost would wait for a minute.
