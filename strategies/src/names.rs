@@ -85,7 +85,10 @@ impl NameBook {
     /// Whether a word names a gesture that is known by later ones alone.
     pub(crate) fn lacks_first(&self, naming: &Naming) -> bool {
         let known = self.namings.get(&naming.gesture()).filter(|known| is_of_one(&known.naming, naming));
-        known.is_some_and(|known| known.first.is_none() && !is_named_by(&known.naming)) && is_named_by(naming)
+        // A word is read last: the one that is known comes again and again.
+        known.is_some_and(|known| {
+            known.first.is_none() && known.naming != *naming && !is_named_by(&known.naming)
+        }) && is_named_by(naming)
     }
 
     /// Keeps the word by which a gesture was named that is known by later ones alone.

@@ -52,6 +52,13 @@ struct Block {
     lines: Vec<String>,
 }
 
+impl Block {
+    /// What it stands in.
+    fn text(&self) -> &str {
+        self.place.split(':').next().unwrap_or_default()
+    }
+}
+
 fn blocks() -> Vec<Block> {
     let mut found = Vec::new();
     for text in TEXTS {
@@ -85,11 +92,24 @@ pub fn what_is_not_run_is_still_there() {
     }
 }
 
-pub fn every_shell_block_runs_as_it_is_written() {
+pub fn those_of_the_readme_run_as_they_are_written() {
+    run(|text| text == "README.md", 5);
+}
+
+pub fn those_of_the_guides_run_as_they_are_written() {
+    run(|text| text.starts_with("docs/") && text != "docs/results.md", 5);
+}
+
+pub fn all_others_run_as_they_are_written() {
+    run(|text| text != "README.md" && (!text.starts_with("docs/") || text == "docs/results.md"), 1);
+}
+
+/// Runs the blocks of such texts, of which there are so many at least.
+fn run(is_such: impl Fn(&str) -> bool, least: usize) {
     let mut failed = String::new();
-    let blocks = blocks();
-    assert!(blocks.len() >= 5, "{} blocks", blocks.len());
-    for (number, block) in (0..).zip(&blocks) {
+    let blocks: Vec<(u32, Block)> = (0..).zip(blocks()).filter(|(_, block)| is_such(block.text())).collect();
+    assert!(blocks.len() >= least, "{} blocks", blocks.len());
+    for (number, block) in &blocks {
         let lines: Vec<&str> =
             block.lines.iter().map(String::as_str).filter(|line| !is_apart(line)).collect();
         let lines = lines.join("\n");
@@ -97,7 +117,7 @@ pub fn every_shell_block_runs_as_it_is_written() {
             println!("{}: not run", block.place);
             continue;
         }
-        let stage = Stage::new(number);
+        let stage = Stage::new(*number);
         set(&stage, &lines);
         // What stands for something of the reader's own.
         let lines = lines.replace("CENTRE:7447", &format!("127.0.0.1:{}", stage.port()));

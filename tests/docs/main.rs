@@ -7,7 +7,9 @@ mod stage;
 
 fn main() -> std::process::ExitCode {
     gestalt_trials::run(gestalt_trials::trials![
-        [Works] blocks::every_shell_block_runs_as_it_is_written,
+        [Works] blocks::those_of_the_readme_run_as_they_are_written,
+        [Works] blocks::those_of_the_guides_run_as_they_are_written,
+        [Works] blocks::all_others_run_as_they_are_written,
         [Waits] blocks::what_is_not_run_is_still_there,
         [Works, Data] newcomer::photographs_and_a_video_lead_to_a_model_and_a_robot_that_decides,
     ])

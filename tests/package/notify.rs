@@ -76,9 +76,9 @@ pub fn a_robot_says_that_it_is_ready_that_it_lives_and_that_it_ends() {
     assert_eq!(ready.lines().count(), 2, "{ready}");
     let began = Instant::now();
     for _ in 0..4 {
-        assert_eq!(service.hears(WATCHDOG).as_deref(), Some("WATCHDOG=1\n"));
+        assert_eq!(service.hears(PATIENCE).as_deref(), Some("WATCHDOG=1\n"));
     }
-    // At once, and then at half the time it is given.
+    // At once, and then at half the time it is given: late words of a busy machine are not judged, too many are.
     assert!(began.elapsed() > WATCHDOG, "four words within {:?}", began.elapsed());
     service.signal("TERM");
     let last = std::iter::from_fn(|| service.hears(PATIENCE)).find(|word| word != "WATCHDOG=1\n");

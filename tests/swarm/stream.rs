@@ -20,6 +20,7 @@ use gestalt_tests::{Hands, center_config, config, sender_config, unique};
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::source::{Frame, Scene, Source, SourceError};
 use serde_json::json;
+use zenoh::qos::CongestionControl;
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -161,7 +162,8 @@ pub async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
         vandal.put(&key, vec![1; 100]).await.unwrap();
         vandal.put(&key, vec![1; 100]).attachment(vec![9; 400]).await.unwrap();
         vandal.put(&key, Vec::<u8>::new()).attachment(header.encode()).await.unwrap();
-        vandal.put(&key, vec![1; 5_000_000]).attachment(header.encode()).await.unwrap();
+        let large = vandal.put(&key, vec![1; 5_000_000]).attachment(header.encode());
+        large.congestion_control(CongestionControl::Block).await.unwrap();
         vandal.put(keys.key(&Topic::Taken(RobotId(robot))), vec![3; 77]).await.unwrap();
     }
     // Pictures that are none, in the name of a robot that is served, and of one that is not.
@@ -174,9 +176,13 @@ pub async fn nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks() {
             tokio::time::sleep(Duration::from_millis(300)).await;
         }
     }
-    let status = center.robot().status();
-    let refused = status.counters.iter().filter(|(name, _)| name.starts_with("refused_frame_"));
-    assert_eq!(refused.map(|(_, count)| count).sum::<u64>(), 8, "{:?}", status.counters);
+    let refused = || -> u64 {
+        let counters = center.robot().status().counters;
+        counters.iter().filter(|(name, _)| name.starts_with("refused_frame_")).map(|(_, count)| count).sum()
+    };
+    wait_for("refusals", || (refused() >= 8).then_some(())).await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(refused(), 8, "{:?}", center.robot().status().counters);
     assert_eq!(failed.load(Ordering::Relaxed), 1, "one of the acknowledgements was for the Parrot");
     let of = |id: u32| -> Status {
         center.served().into_iter().find(|status| status.robot == RobotId(id)).expect("it is served")

@@ -12,6 +12,7 @@ use gestalt_tests::{Fixed, Watched, agreed, config, start, unique};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::json;
+use zenoh::qos::CongestionControl;
 
 use crate::in_process::line;
 
@@ -63,7 +64,8 @@ pub async fn random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on
         ] {
             let mut bytes = vec![0; length];
             rng.fill_bytes(&mut bytes);
-            vandal.put(keys.key(&topic), bytes).await.unwrap();
+            let put = vandal.put(keys.key(&topic), bytes).congestion_control(CongestionControl::Block);
+            put.await.unwrap();
         }
     }
     for robot in [&first, &second] {

@@ -213,6 +213,7 @@ impl Roll {
             Ok(Err(error)) => Some(error.to_string()),
             Err(error) => Some(error.to_string()),
         };
+        let is_kept = failed.is_none();
         let before = self.account.lock().counters.get(unkept).copied().unwrap_or(0);
         match failed {
             None if before == 0 => {}
@@ -223,7 +224,7 @@ impl Roll {
                 self.account.error(&format!("{done}, but that is not kept, and is tried again: {failed}"));
             }
         }
-        self.account.lock().counters.get(unkept).copied().unwrap_or(0) == 0
+        is_kept
     }
 }
 

@@ -241,7 +241,7 @@ async fn a_word_is_passed_on_as_it_was_said_and_what_is_none_is_refused() {
 
 #[tokio::test]
 async fn five_hundred_readers_that_never_read_are_bounded_and_cost_the_others_nothing() {
-    let limits = Limits { connections: 40, readers: 20, patience: Duration::from_millis(1500) };
+    let limits = Limits { connections: 40, readers: 20, patience: Duration::from_secs(6) };
     let page = page(None, limits).await;
     let (mut good, mut read) = page.reader().await;
     let mut idle = Vec::new();
@@ -271,11 +271,11 @@ async fn five_hundred_readers_that_never_read_are_bounded_and_cost_the_others_no
         read.clear();
         read.push_str("HTTP/1.1 200 ");
     }
-    assert!(slowest < Duration::from_secs(1), "a reader that reads waited {slowest:?}");
+    assert!(slowest < Duration::from_secs(3), "a reader that reads waited {slowest:?}");
     // Those that took nothing for so long are gone, and there is room again.
     while page.board.readers() > 1 {
         assert!(
-            began.elapsed() < Duration::from_secs(60),
+            began.elapsed() < Duration::from_secs(120),
             "{} readers are still there",
             page.board.readers()
         );

@@ -174,7 +174,7 @@ impl Authority {
     /// Where a robot's new key lies until the roster has it, and where it is to lie then.
     fn new_key_file(&self, robot: RobotId) -> (PathBuf, PathBuf) {
         let file = key_file(&self.folder, robot);
-        (file.with_extension("new.key"), file)
+        (until_it_counts(&file), file)
     }
 
     /// The key last: while the new one lies beside the old one, it is known that this was not done.
@@ -283,11 +283,16 @@ pub(super) fn key_of(folder: &Path, who: &Applicant, anew: bool) -> Result<Ident
         return Ok(Identity::read(&file)?);
     }
     // One that is there stays until there is another.
-    let new = file.with_extension("new.key");
+    let new = until_it_counts(&file);
     remove(&new)?;
     let identity = new_identity(&new)?;
     fs::rename(&new, &file).map_err(|error| format!("cannot write {}: {error}", file.display()))?;
     Ok(identity)
+}
+
+/// Where the key that will lie there lies before.
+fn until_it_counts(key: &Path) -> PathBuf {
+    key.with_extension("new.key")
 }
 
 /// Keeps others that ask for the same out, until what is returned is dropped. `None` where files cannot be locked.

@@ -137,7 +137,7 @@ async fn nonsense_is_refused_and_counted_and_others_do_not_notice() {
 
 #[tokio::test]
 async fn who_never_reads_is_dropped_and_the_others_get_everything_at_once() {
-    let limits = Limits { patience: Duration::from_secs(2), ..Limits::default() };
+    let limits = Limits { patience: Duration::from_secs(6), ..Limits::default() };
     let stage = stage(None, limits).await;
     let mut good = stage.viewer().await;
     good.subscribe(1, 1).await;
@@ -158,10 +158,10 @@ async fn who_never_reads_is_dropped_and_the_others_get_everything_at_once() {
         slowest = slowest.max(began.elapsed());
     }
     println!("the slowest of 1,500 messages of 60 kB took {slowest:?} beside ten that never read");
-    assert!(slowest < Duration::from_secs(1), "{slowest:?}");
+    assert!(slowest < Duration::from_secs(3), "{slowest:?}");
     let began = Instant::now();
     while stage.hub.visits().dropped < 10 {
-        assert!(began.elapsed() < Duration::from_secs(20), "{:?}", stage.hub.visits());
+        assert!(began.elapsed() < Duration::from_secs(60), "{:?}", stage.hub.visits());
         good.settle().await;
         sleep(Duration::from_millis(100)).await;
     }
@@ -171,7 +171,7 @@ async fn who_never_reads_is_dropped_and_the_others_get_everything_at_once() {
 
 #[tokio::test]
 async fn who_gives_no_sign_of_life_is_dropped_though_nothing_waits_for_it() {
-    let limits = Limits { patience: Duration::from_millis(600), readers: 1, ..Limits::default() };
+    let limits = Limits { patience: Duration::from_secs(2), readers: 1, ..Limits::default() };
     let stage = stage(None, limits).await;
     let _silent = stage.viewer().await;
     assert_eq!(stage.connect("/", &[SPEAKS]).await.err(), Some(503), "there is room for one");
@@ -183,7 +183,7 @@ async fn who_gives_no_sign_of_life_is_dropped_though_nothing_waits_for_it() {
     sleep(Duration::from_millis(500)).await;
     // And one that answers stays.
     let mut good = stage.viewer().await;
-    for _ in 0..15 {
+    for _ in 0..40 {
         good.settle().await;
         sleep(Duration::from_millis(100)).await;
     }
