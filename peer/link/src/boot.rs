@@ -1,6 +1,11 @@
 //! The number of a robot's life.
 
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+use gestalt_trust::whole_file;
 
 use crate::identity::fresh_nonce;
 
@@ -18,6 +23,26 @@ pub fn boot_number(now: SystemTime) -> u32 {
     }
 }
 
+/// The same for a robot that signs what it says, and keeps the number of its last start in that file: higher than that one also where the clock is set
+/// to one moment at each start, as it is without a battery. Where the file can be neither read nor written the clock has to do, and the log says so.
+#[must_use]
+pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
+    let last = match fs::read_to_string(file) {
+        Ok(text) => text.trim().parse::<u32>().map_err(|error| error.to_string()),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(0),
+        Err(error) => Err(error.to_string()),
+    };
+    let last = last.unwrap_or_else(|error| {
+        tracing::warn!("the number of the last start is not known from {}: {error}", file.display());
+        0
+    });
+    let number = boot_number(now).max(last.saturating_add(1));
+    if let Err(error) = whole_file::write(file, format!("{number}\n").as_bytes()) {
+        tracing::warn!("the number of this start cannot be kept in {}: {error}", file.display());
+    }
+    number
+}
+
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
@@ -33,5 +58,20 @@ mod tests {
             let drawn: std::collections::BTreeSet<u32> = (0..20).map(|_| at(years)).collect();
             assert!(drawn.len() > 18 && drawn.last() < Some(&at(57)), "{drawn:?}");
         }
+    }
+
+    #[test]
+    fn starts_at_one_moment_have_numbers_that_grow_whatever_is_in_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("robot-7.starts");
+        let (now, of_clock) = (SystemTime::now(), boot_number(SystemTime::now()));
+        let first = counted_boot(&file, now);
+        assert!(first.abs_diff(of_clock) < 1000);
+        assert_eq!([counted_boot(&file, now), counted_boot(&file, UNIX_EPOCH)], [first + 1, first + 2]);
+        fs::write(&file, "nonsense").unwrap();
+        assert_eq!(counted_boot(&file, now), first);
+        assert_eq!(counted_boot(&file, now), first + 1);
+        // No folder: the clock has to do.
+        assert_eq!(counted_boot(&folder.path().join("none/starts"), now), first);
     }
 }

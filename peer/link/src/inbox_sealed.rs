@@ -139,10 +139,13 @@ impl Inbox {
 
     /// Who knows by the roster of today whose words count.
     pub(super) fn believer(&self) -> Option<Arc<dyn Believe>> {
+        let words = &self.sealed.as_ref()?.words;
+        let returned = words.lock().unwrap_or_else(PoisonError::into_inner).returned();
         self.judged(|judge, _| -> Arc<dyn Believe> {
             let roster = judge.roster().clone();
             let robots = roster.members().robots.keys().copied();
-            Arc::new(Believer { convicted: robots.filter(|robot| judge.convicts(*robot)).collect(), roster })
+            let convicted = robots.filter(|robot| judge.convicts(*robot)).collect();
+            Arc::new(Believer { convicted, me: self.me, roster, returned })
         })
     }
 

@@ -67,7 +67,7 @@ mod words;
 mod worker;
 
 pub use apprentice::RobotLearning;
-pub use boot::boot_number;
+pub use boot::{boot_number, counted_boot};
 pub use client::{Answers, Client, Decisions};
 pub use config::{Cells, LinkConfig, Scouting};
 pub use error::LinkError;

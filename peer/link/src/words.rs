@@ -1,10 +1,14 @@
 //! What a robot of a sealed swarm signs for those who speak on its own computer, and what it answers to instructors and whoever asks.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{FrameChallenge, InstructorId, Keys, RobotId, Signature, Topic};
 use gestalt_trust::{Identity, Speaker, SwarmId, WordHeading, answer, frame, statement, word};
+
+/// A day, in the units of counts: more than passed between the last word that is remembered and the last that was said.
+const UNREMEMBERED: u64 = 86_400 << 32;
 
 /// Signs words in the name of a robot.
 pub(crate) struct Words {
@@ -14,6 +18,8 @@ pub(crate) struct Words {
     keys: Keys,
     /// The count of the last word that was signed here.
     last: u64,
+    /// The highest count of a word of its own that came back: out of its memory, or from others.
+    returned: Arc<AtomicU64>,
 }
 
 /// A word that a robot signed for whoever said it on its own computer.
@@ -27,11 +33,24 @@ pub(crate) struct Vouched {
 
 impl Words {
     pub fn new(me: RobotId, identity: Arc<Identity>, swarm: SwarmId, keys: Keys) -> Self {
-        Self { me, identity, swarm, keys, last: 0 }
+        Self { me, identity, swarm, keys, last: 0, returned: Arc::default() }
+    }
+
+    /// Where the highest count of a word of this robot's own is put that comes back.
+    pub fn returned(&self) -> Arc<AtomicU64> {
+        self.returned.clone()
     }
 
     /// Signs a word in the name of whoever said it here.
     pub fn vouch(&mut self, by: &InstructorId, word: Vec<u8>) -> Vouched {
+        let returned = self.returned.load(Ordering::Relaxed);
+        if returned > self.last {
+            // One of before this start. By a clock that was set back since, what is said now would count for nothing beside it.
+            self.last = returned;
+            if next_count(0) < returned {
+                self.last = returned.saturating_add(UNREMEMBERED);
+            }
+        }
         let count = next_count(self.last);
         self.last = count;
         let heading = WordHeading { speaker: Speaker::For(self.me), count };
@@ -96,6 +115,11 @@ mod tests {
         assert!(second.count > first.count && first.key == "gestalt/demo/instructor/bob/word");
         let (heading, roles) = roster.check_word(&bob, b"word", Some(&first.attachment)).unwrap();
         assert_eq!((heading.count, roles), (first.count, Roles::up_to(Role::Open)));
+        // One of before a start came back, and the clock was set back since: the next comes after all that were said in the day after it.
+        let before = second.count + (100 * UNREMEMBERED);
+        words.returned().store(before, Ordering::Relaxed);
+        let [third, fourth] = [0, 1].map(|_| words.vouch(&bob, b"word".to_vec()));
+        assert!(third.count > before + UNREMEMBERED && fourth.count == third.count + 1);
         // Nobody with a key is spoken for.
         let ada = "ada".parse().unwrap();
         let vouched = words.vouch(&ada, b"word".to_vec());

@@ -15,7 +15,6 @@ use super::frame_queue::Put;
 use super::pace::Paces;
 use super::seat::Seat;
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
-use gestalt_link::boot_number;
 use gestalt_link::{FrameArrival, GuestConfig, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
 use gestalt_vision::model::RobotModel;
 
@@ -161,7 +160,7 @@ impl Door {
 
     async fn start(&self, id: RobotId, name: String) -> Result<Robot, LinkError> {
         // Grows from one admission to the next, also when the centre was killed between them.
-        let boot = boot_number(SystemTime::now());
+        let boot = self.config.trust.boot(id, SystemTime::now());
         match self.config.center.fuse {
             Fuse::Central => self.robot.guest(GuestConfig { id, name, boot }).await,
             Fuse::Swarm => {

@@ -14,7 +14,6 @@ use super::show::{Names, line};
 use super::{Failure, interrupted};
 use crate::center::Center;
 use crate::config::Fuse;
-use gestalt_link::boot_number;
 
 /// Run a fusion centre until Ctrl-C: it classifies the frames that robots stream, and votes for them
 #[derive(Debug, clap::Args)]
@@ -55,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         let center = tokio::select! {
-            center = Center::start(&config, model, boot_number(SystemTime::now())) => center?,
+            center = Center::start(&config, model, config.trust.boot(config.robot.id, SystemTime::now())) => center?,
             () = &mut interrupted => return Ok(()),
         };
         let mut events = center.robot().events();

@@ -15,7 +15,7 @@ use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::Config;
 use crate::service_manager::{ServiceEnvironment, ServiceManager};
-use gestalt_link::{Event, LinkConfig, boot_number};
+use gestalt_link::{Event, LinkConfig};
 
 /// Run one robot until Ctrl-C
 #[derive(Debug, clap::Args)]
@@ -84,7 +84,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         let body = tokio::select! {
-            body = Body::start(&config, model, boot_number(SystemTime::now())) => body?,
+            body = Body::start(&config, model, config.trust.boot(config.robot.id, SystemTime::now())) => body?,
             () = &mut interrupted => return Ok(()),
         };
         let mut events = body.robot().events();

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::SystemTime;
 
-use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal, SealError};
+use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal, SealError, boot_number, counted_boot};
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_trust::{FrameSigner, Identity, Roster};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,11 @@ pub fn key_file(folder: &Path, robot: RobotId) -> PathBuf {
 #[must_use]
 pub fn client_key_file(folder: &Path, client: &InstructorId) -> PathBuf {
     folder.join(format!("client-{client}.key"))
+}
+
+/// The number of a robot's last start, beside its key.
+fn starts_file(key: &Path) -> PathBuf {
+    key.with_extension("starts")
 }
 
 /// The certificate beside a key.
@@ -57,7 +63,16 @@ impl TrustSection {
         Ok(Some(Seal { identity, certificate, roster, roster_file: Some(file), guests: BTreeMap::new() }))
     }
 
-    /// The same for a robot through which others vote: with the keys of all others that are in the folder. One that was given another key elsewhere cannot vote
+    /// The number of a start of this robot that happens now: see [`boot_number`] and, where it has a key, [`counted_boot`].
+    #[must_use]
+    pub fn boot(&self, robot: RobotId, now: SystemTime) -> u32 {
+        match &self.keys {
+            Some(folder) => counted_boot(&starts_file(&key_file(folder, robot)), now),
+            None => boot_number(now),
+        }
+    }
+
+    /// As [`TrustSection::seal`] for a robot through which others vote: with the keys of all others that are in the folder. One that was given another key elsewhere cannot vote
     /// through this robot until its key is here; it keeps nobody else out.
     ///
     /// # Errors

@@ -13,7 +13,6 @@ use tokio::process::{Child, ChildStdout, Command};
 
 use crate::body::{Body, BodyError};
 use crate::config::Config;
-use gestalt_link::boot_number;
 use gestalt_vision::model::RobotModel;
 
 /// How long a process may take until it listens.
@@ -68,9 +67,13 @@ impl Members {
         let (mut endpoints, mut clients) = (Vec::<String>::new(), Vec::new());
         for (i, config) in configs.iter().enumerate() {
             let config = linked(config, i, links, &endpoints);
-            let body = Body::start(&config, Some(model.clone()), boot_number(SystemTime::now()))
-                .await
-                .map_err(|cause| MembersError::Body { name: config.name(), cause })?;
+            let body = Body::start(
+                &config,
+                Some(model.clone()),
+                config.trust.boot(config.robot.id, SystemTime::now()),
+            )
+            .await
+            .map_err(|cause| MembersError::Body { name: config.name(), cause })?;
             endpoints.push(body.robot().for_robots().unwrap_or_default().to_owned());
             clients.push(body.robot().for_clients().unwrap_or_default().to_owned());
             bodies.push(body);

@@ -259,7 +259,8 @@ impl Writing {
 
     /// A disk that was not there at the start may hold what this robot knew before.
     fn open_late(&mut self) -> Result<Option<Found>, StoreError> {
-        let (store, new) = Store::open(self.place.clone(), self.robot, self.boot)?;
+        // Under a number that nothing was said under: until now it voted under the clock's.
+        let (store, new) = Store::open(self.place.clone(), self.robot, self.boot.saturating_add(1))?;
         let memory = store.memory()?;
         let found = if new || memory.is_empty() {
             None
