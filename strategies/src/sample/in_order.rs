@@ -15,7 +15,18 @@ pub(super) struct InOrder {
 
 impl InOrder {
     pub fn get(&self, key: u64) -> Option<&HeldSample> {
-        self.samples[self.keys.binary_search(&key).ok()?].as_ref()
+        self.samples[self.place(key).ok()?].as_ref()
+    }
+
+    /// Where that key is; where it would be, if it is not. Keys are looked up all the time, and mostly follow each other without a gap.
+    fn place(&self, key: u64) -> Result<usize, usize> {
+        let first = self.keys.first().copied().unwrap_or(key);
+        let without_gaps = usize::try_from(key.saturating_sub(first)).unwrap_or(usize::MAX);
+        if self.keys.get(without_gaps) == Some(&key) {
+            return Ok(without_gaps);
+        }
+        // Gaps only bring it nearer to the first.
+        self.keys[..without_gaps.min(self.keys.len())].binary_search(&key)
     }
 
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = &HeldSample> {
@@ -28,7 +39,7 @@ impl InOrder {
 
     /// Takes a sample in, in place of another one of that key.
     pub fn insert(&mut self, sample: HeldSample) {
-        match self.keys.binary_search(&sample.key) {
+        match self.place(sample.key) {
             Ok(place) => {
                 let before = self.samples[place].replace(sample);
                 self.empty -= usize::from(before.is_none());
@@ -41,7 +52,8 @@ impl InOrder {
     }
 
     pub fn remove(&mut self, key: u64) -> Option<HeldSample> {
-        let sample = self.samples[self.keys.binary_search(&key).ok()?].take()?;
+        let place = self.place(key).ok()?;
+        let sample = self.samples[place].take()?;
         self.empty += 1;
         if self.empty * EMPTY > self.keys.len() {
             self.samples.retain(Option::is_some);
