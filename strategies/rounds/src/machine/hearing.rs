@@ -243,7 +243,9 @@ impl Rounds {
             // Its votes were heard; what they are worth, this robot finds itself.
             return Heard::Known;
         }
-        if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
+        // Where that is no name of this round by now, it had as many: it is a decision of this by any of one count.
+        let id = if round.is_named(decision.round) { decision.round } else { round.id };
+        if round.agreement.believe(Decision { round: id, ..decision }) { Heard::News } else { Heard::Known }
     }
 
     /// Whether that is another scale than this robot's own, if it has one.

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use gestalt_protocol::{Certificate, Decision, RobotId, RoundId};
+use gestalt_protocol::{Certificate, Decision, MAX_ROBOTS, RobotId, RoundId};
 
 use super::rounds::{Effects, Rounds};
 use crate::refusal::Refusal;
@@ -19,8 +19,8 @@ const AHEAD_PER_SECOND: u64 = 2;
 /// at other times.
 const LEAP: u32 = 1024;
 
-/// Under one count so many rounds that are over are remembered: where there were more, none that follows takes in another name.
-const MAX_PAST: usize = 4096;
+/// Under one count so many names of rounds that are over are remembered: where there were more, none that follows takes in another name.
+const MAX_PAST: usize = 4 * MAX_ROBOTS;
 
 impl Rounds {
     /// Whether that is a name of the newest round known: its own, or that of a round that was opened at the same time, as far as
@@ -76,9 +76,12 @@ impl Rounds {
             Some(_) if this => Ordering::Equal,
             Some(round) => newer(id, decided, round),
         };
-        if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
-            effects.follower.merged(round.id, id);
-            round.merge(id);
+        let by = self.known(from);
+        if let Some(round) = self.round.as_mut().filter(|_| order.is_eq()) {
+            let before = round.id;
+            if round.merge(id, by) {
+                effects.follower.merged(before, id);
+            }
         }
         Ok(order)
     }

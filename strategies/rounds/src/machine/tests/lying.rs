@@ -58,3 +58,46 @@ fn who_opened_a_round_opens_another_on_the_word_of_one_that_its_count_was_used_o
         assert!(mind.is_open());
     }
 }
+
+/// Whoever could have one of its names forgotten could have what was said under that heard as another round.
+#[test]
+fn a_round_keeps_its_name_however_many_others_one_robot_brings() {
+    let deadline = adding_up().deadline;
+    let voted = |opener| Vote { round: round(1, opener), ..null(1) };
+    for decides in [false, true] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 66]))));
+        mind.handle(ms(0), votes(3, 1, voted(500)));
+        for (k, opener) in (501..517).chain([400, 399, 398]).enumerate() {
+            let drawn = undecided(round(1, opener), 66);
+            let certificate = gestalt_protocol::Certificate { elapsed_ms: 0, ..drawn.certificate };
+            let says = match decides {
+                true => gives(66, Decision { certificate, ..drawn }),
+                false => votes(66, k as u32, voted(opener)),
+            };
+            mind.handle(ms(10 + 100 * k as u64), says);
+        }
+        assert_eq!(mind.round(), Some(round(1, 500)), "beyond what one may bring there is none");
+        assert_eq!(mind.ballot().unwrap().stamp(RobotId(66)).is_some(), !decides, "but its vote counts");
+        mind.handle(ms(3000), votes(4, 1, voted(350)));
+        assert_eq!(mind.round(), Some(round(1, 350)), "others bring theirs");
+        live(&mut mind, deadline + ms(500));
+        assert!(!mind.is_open());
+        mind.handle(deadline + ms(3000), votes(3, 1, voted(500)));
+        assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 350)), false));
+    }
+}
+
+/// What is decided under a name that came too late is held under one that all know.
+#[test]
+fn a_decision_under_a_name_beyond_those_is_held_under_that_of_the_round() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 66]))));
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, LEANING)));
+    for sequence in 1..20 {
+        mind.handle(ms(10), votes(66, sequence, Vote { round: round(1, 500 + sequence), ..null(1) }));
+    }
+    let drawn = Decision { round: round(1, 600), ..decision(1, Some(0), 3, 9) };
+    mind.handle(ms(20), gives(66, drawn.clone()));
+    assert_eq!(mind.held(), Some(&Decision { round: round(1, 1), ..drawn }));
+}
