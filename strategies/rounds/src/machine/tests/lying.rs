@@ -101,3 +101,16 @@ fn a_decision_under_a_name_beyond_those_is_held_under_that_of_the_round() {
     mind.handle(ms(20), gives(66, drawn.clone()));
     assert_eq!(mind.held(), Some(&Decision { round: round(1, 1), ..drawn }));
 }
+
+/// Whoever has a key to teach could speak of rounds to come, whose names are no secret.
+#[test]
+fn a_round_opens_whatever_was_said_of_rounds_to_come() {
+    let mut follower = Taught((2..66).map(|counter| round(counter, 7)).collect());
+    let mut mind = mind(7);
+    for (n, counter) in [1, 66, 67].into_iter().enumerate() {
+        let at = ms(9000 * n as u64);
+        live(&mut mind, at);
+        mind.handle_with(at, Input::Open, &mut follower);
+        assert_eq!((mind.round(), mind.is_open()), (Some(round(counter, 7)), true));
+    }
+}
