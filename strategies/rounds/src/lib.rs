@@ -29,6 +29,7 @@ pub mod fusion;
 mod life;
 mod lot;
 mod machine;
+mod names;
 mod observation;
 mod others;
 mod outcome;

@@ -17,13 +17,11 @@ use crate::electorate::Expected;
 use crate::evidence::{Evidence, JudgedFrame};
 use crate::fuse::Fuse;
 use crate::fusion::Fusion;
+use crate::names::Names;
 use crate::observation::Observation;
 use crate::rows::Rows;
 use crate::sign::Sign;
 use crate::vocabulary::Vocabulary;
-
-/// The most other names of a round that are remembered.
-const MAX_NAMES: usize = 64;
 
 /// A round: what this robot has seen, what it knows of the others' votes and decisions, and what it said.
 #[derive(Clone, Debug)]
@@ -46,8 +44,8 @@ pub(crate) struct Round {
     ends: Option<Duration>,
     /// Whether others go on to the next one: then nothing more is waited for.
     pub hurried: bool,
-    /// Its other names, under which robots opened it at the same time.
-    names: BTreeSet<RoundId>,
+    /// Its names, under which robots opened it at the same time.
+    names: Names,
 }
 
 /// What a robot says in a round.
@@ -100,14 +98,14 @@ impl Round {
             tried: None,
             ends: None,
             hurried: false,
-            names: BTreeSet::new(),
+            names: Names::new(id),
         }
     }
 
     /// Whether that is its name, or was found to be one while it began. A vote is passed on under the name that it was cast under, however late:
     /// who took that for another round would go on in one that nobody shows anything in.
     pub fn is_named(&self, id: RoundId) -> bool {
-        self.id == id || self.names.contains(&id)
+        self.names.contains(id)
     }
 
     /// Whether a decision for a gesture is held.
@@ -117,15 +115,16 @@ impl Round {
 
     /// All its names that are remembered.
     pub fn names(&self) -> impl Iterator<Item = RoundId> + '_ {
-        self.names.iter().copied().chain([self.id])
+        self.names.iter()
     }
 
-    /// Takes in another name: the smaller is its own.
-    pub fn merge(&mut self, other: RoundId) {
-        if self.names.len() < MAX_NAMES {
-            self.names.insert(self.id.max(other));
+    /// Takes in another name, brought by that robot, if it is known; whether it was news. The smallest is its own.
+    pub fn merge(&mut self, other: RoundId, by: Option<RobotId>) -> bool {
+        let is_news = self.names.add(other, by);
+        if is_news {
+            self.id = self.id.min(other);
         }
-        self.id = self.id.min(other);
+        is_news
     }
 
     /// Judges a frame and counts it; `false` when the classifier could not judge it, or gave no distribution.

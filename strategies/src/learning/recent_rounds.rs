@@ -8,7 +8,7 @@ use gestalt_protocol::RoundId;
 /// How many rounds are remembered: feedback that comes later than that labels nothing new.
 const MAX_ROUNDS: usize = 32;
 
-/// How many names of one round are remembered, the smallest: more robots than that do not open one at once.
+/// How many names of one round are remembered: that under which it became known, under which it is looked at, and the smallest.
 const MAX_NAMES: usize = 1024;
 
 /// One round.
@@ -16,6 +16,8 @@ const MAX_NAMES: usize = 1024;
 struct RecentRound {
     /// All names it was known under: robots that open at once merge their rounds on the smallest.
     names: BTreeSet<RoundId>,
+    /// The first of them.
+    known_as: RoundId,
     last_look: Option<Duration>,
     looks: usize,
     /// What was seen and has no label yet.
@@ -34,6 +36,7 @@ impl RecentRounds {
         }
         self.0.push_back(RecentRound {
             names: [round].into(),
+            known_as: round,
             last_look: None,
             looks: 0,
             unlabelled: Vec::new(),
@@ -49,8 +52,11 @@ impl RecentRounds {
         self.enter(round);
         let Some(known) = self.find_mut(round) else { return false };
         let new = known.names.insert(other);
-        let dropped = (known.names.len() > MAX_NAMES).then(|| known.names.pop_last()).flatten();
-        new && dropped != Some(other)
+        if known.names.len() <= MAX_NAMES {
+            return new;
+        }
+        let dropped = known.names.iter().rev().find(|name| **name != known.known_as).copied();
+        dropped.is_none_or(|dropped| known.names.remove(&dropped) && dropped != other)
     }
 
     /// Keeps what was seen, up to `keep` times a round, at least `spacing` apart. Says whether it did.
@@ -103,5 +109,26 @@ impl RecentRounds {
 
     fn find_mut(&mut self, round: RoundId) -> Option<&mut RecentRound> {
         self.0.iter_mut().rev().find(|known| known.names.contains(&round))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::RobotId;
+
+    use super::*;
+
+    #[test]
+    fn a_round_is_looked_at_under_its_first_name_and_spoken_of_under_its_smallest_however_many_it_has() {
+        let id = |opener| RoundId { counter: 1, opener: RobotId(opener), life: 0 };
+        let mut recent = RecentRounds::default();
+        recent.merge(id(9000), id(4000));
+        for opener in (1000..4000).rev() {
+            assert!(recent.merge(id(opener + 1), id(opener)), "{opener}");
+            assert!(recent.look(Duration::ZERO, id(9000), vec![1.0], usize::MAX, Duration::ZERO), "{opener}");
+        }
+        assert!(!recent.merge(id(1000), id(8000)), "of those beyond, the smallest are remembered");
+        assert_eq!((recent.0.len(), recent.names(id(1000)).count()), (1, MAX_NAMES));
+        assert_eq!(recent.take_unlabelled(id(1000)).len(), 3000);
     }
 }

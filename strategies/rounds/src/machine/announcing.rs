@@ -24,7 +24,7 @@ impl Rounds {
         // Who has no list of gestures announces without a label, and a liar may do so to keep it from all clients: who knows one still says it in its turn.
         let lacks_its_label = label.is_none() && self.label_of(&decision).is_some();
         // What nobody would decide, nobody announced.
-        if self.hear_decision(decision, effects) != Heard::Refused
+        if self.hear_decision(decision, announcer, effects) != Heard::Refused
             && !lacks_its_label
             && self.is_this_round(id)
             && let Some(round) = &mut self.round

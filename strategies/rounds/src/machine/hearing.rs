@@ -1,33 +1,18 @@
 //! What a robot makes of what the others say: of their votes, their decisions, and the rounds that these are about.
 
 use std::cmp::Ordering;
-
 use std::time::Duration;
 
-use gestalt_protocol::{
-    Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, RoundId, Stamp,
-};
+use gestalt_protocol::{Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, Stamp};
 
 use super::members::expected;
+use super::placing::newer;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
 use crate::proof::{follows, is_consistent};
 use crate::refusal::Refusal;
 use crate::round::{Round, View};
-
-/// Counters may run ahead of what this life of the robot began with by so many, which is two years of gestures without a pause,
-const MAX_AHEAD: u64 = 1 << 24;
-
-/// and by so many more a second, which is as fast as gestures can be shown. So nobody uses them up.
-const AHEAD_PER_SECOND: u64 = 2;
-
-/// One robot alone takes another so far ahead at once. Bounds on how far depend on how long a robot lives: one word in between would part those that started
-/// at other times.
-const LEAP: u32 = 1024;
-
-/// Under one count so many rounds that are over are remembered: where there were more, none that follows takes in another name.
-const MAX_PAST: usize = 4096;
 
 /// Who lacks a decision that another holds asks for it after this long: most have the votes, and conclude it themselves.
 const ASK_AFTER: Duration = Duration::from_millis(100);
@@ -113,118 +98,6 @@ impl Rounds {
         }
     }
 
-    /// Whether that is a name of the newest round known: its own, or that of a round that was opened at the same time, as far as
-    /// can be told. Equal counters alone do not say so: where memories were lost or the swarm was cut, they belong to other showings. And whoever may
-    /// vote could call it by the name of one that is over: two gestures would have one name.
-    pub(super) fn is_this_round(&self, id: RoundId) -> bool {
-        let opened_at_once = |round: &Round| {
-            round.id.counter == id.counter
-                && self.now <= round.since.saturating_add(self.config.deadline)
-                && !self.past.contains(&id)
-                && self.past.len() < MAX_PAST
-        };
-        self.round.as_ref().is_some_and(|round| round.is_named(id) || opened_at_once(round))
-    }
-
-    /// Where a round that was heard of stands to the newest one known. `decided`: whether something was decided in it; `None` while it may yet be.
-    pub(super) fn compare(&self, id: RoundId, decided: Option<bool>) -> Ordering {
-        match &self.round {
-            None => Ordering::Greater,
-            Some(_) if self.is_this_round(id) => Ordering::Equal,
-            Some(round) => newer(id, decided, round),
-        }
-    }
-
-    /// The same, of a round that robots are in, `by` whose vote; refuses one too far ahead, or too soon. Rounds opened at the same time
-    /// merge here, on the smaller name.
-    fn place(
-        &mut self,
-        (id, decided): (RoundId, Option<bool>),
-        this: bool,
-        by: Option<RobotId>,
-        effects: &mut Effects<'_>,
-    ) -> Result<Ordering, Refusal> {
-        let (first, began) = self.began;
-        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
-        if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
-            self.refusals.add(Refusal::FarAhead);
-            return Err(Refusal::FarAhead);
-        }
-        let known = self.highest.unwrap_or(first);
-        if id.counter > known.saturating_add(LEAP) && !self.is_vouched(known, (id, decided), by) {
-            self.refusals.add(Refusal::FarAhead);
-            return Err(Refusal::FarAhead);
-        }
-        if !this && self.is_too_soon(id, by, effects) {
-            self.refusals.add(Refusal::TooSoon);
-            return Err(Refusal::TooSoon);
-        }
-        self.highest = self.highest.max(Some(id.counter));
-        let order = match &self.round {
-            None => Ordering::Greater,
-            Some(_) if this => Ordering::Equal,
-            Some(round) => newer(id, decided, round),
-        };
-        if let Some(round) = self.round.as_mut().filter(|round| order.is_eq() && round.id != id) {
-            effects.follower.merged(round.id, id);
-            round.merge(id);
-        }
-        Ok(order)
-    }
-
-    /// Whether more robots than may lie say that the swarm is so far beyond what is `known` here, where there are that many: by a decision, which is the word of
-    /// many, or by their votes, which they repeat.
-    fn is_vouched(
-        &mut self,
-        known: u32,
-        (id, decided): (RoundId, Option<bool>),
-        by: Option<RobotId>,
-    ) -> bool {
-        let Some(by) = by else { return decided == Some(true) };
-        if self.electorate.count() <= 2 {
-            return true;
-        }
-        if self.known(by).is_some() {
-            self.far_ahead.insert(by, id.counter);
-        }
-        let beyond = |counter: &&u32| **counter > known.saturating_add(LEAP);
-        self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
-    }
-
-    /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
-    fn is_as_old(&self, decision: &Decision) -> bool {
-        let took = Duration::from_millis(decision.certificate.elapsed_ms.into());
-        self.round.as_ref().is_some_and(|round| {
-            round.id == decision.round
-                || self.now >= (round.since + took).saturating_sub(self.config.patience)
-        })
-    }
-
-    /// Whether a decision counts votes that were cast under a name of the round known here: then it is of that round, whatever it calls it. Whoever heard
-    /// those while its own round began took both for one; those who opened first heard of the other name too late to tell.
-    fn is_counted_in(&self, decision: &Decision, effects: &Effects<'_>) -> bool {
-        let Certificate { votes, others, .. } = &decision.certificate;
-        let mut names =
-            votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
-        let id = decision.round;
-        let is_counted = self.round.as_ref().is_some_and(|round| {
-            round.id.counter == id.counter
-                && !self.past.contains(&id)
-                && names.any(|name| round.is_named(name))
-        });
-        // What an instructor spoke of meanwhile was shown before.
-        is_counted && (self.is_this_round(id) || !effects.follower.taught(id.counter).contains(&id))
-    }
-
-    /// Whether this robot opened the round that is open, undecided, under a count which belongs to that earlier round: it did not
-    /// know of it.
-    fn is_displaced_by(&self, earlier: RoundId) -> bool {
-        self.round.as_ref().is_some_and(|round| {
-            let mine = round.id.opener == self.me && round.id.life == self.nonce;
-            mine && round.open && round.id.counter == earlier.counter && round.agreement.held().is_none()
-        })
-    }
-
     /// Lets a robot that opened a round under a count which belongs to an earlier one know of that.
     fn answer_displaced(&mut self, held: &HeldVote, effects: &mut Effects<'_>) {
         let opened = held.vote.round.opener == held.robot && held.vote.evidence.is_empty();
@@ -254,7 +127,7 @@ impl Rounds {
             return false;
         }
         let this = self.is_this_round(vote.round);
-        let order = match self.place((vote.round, None), this, Some(robot), effects) {
+        let order = match self.place((vote.round, None), this, robot, effects) {
             Err(refusal) => {
                 self.hear_of(robot);
                 if refusal == Refusal::TooSoon {
@@ -319,8 +192,13 @@ impl Rounds {
         allowed
     }
 
-    /// Takes in a decision, by whichever way it came.
-    pub(super) fn hear_decision(&mut self, decision: Decision, effects: &mut Effects<'_>) -> Heard {
+    /// Takes in a decision that comes from that robot, `given` or announced.
+    pub(super) fn hear_decision(
+        &mut self,
+        decision: Decision,
+        from: RobotId,
+        effects: &mut Effects<'_>,
+    ) -> Heard {
         let decision = Decision { is_final: false, ..decision };
         if decision.check().is_err() {
             self.refusals.add(Refusal::Impossible);
@@ -337,7 +215,7 @@ impl Rounds {
             return Heard::Refused;
         }
         let displaced = !this && self.is_displaced_by(decision.round);
-        match self.place((decision.round, Some(decision.class.is_some())), this, None, effects) {
+        match self.place((decision.round, Some(decision.class.is_some())), this, from, effects) {
             Err(_) | Ok(Ordering::Less) => return Heard::Refused,
             // The gesture of a round of this robot's own is still shown.
             Ok(Ordering::Greater) if displaced => {
@@ -365,7 +243,9 @@ impl Rounds {
             // Its votes were heard; what they are worth, this robot finds itself.
             return Heard::Known;
         }
-        if round.agreement.believe(decision) { Heard::News } else { Heard::Known }
+        // Where that is no name of this round by now, it had as many: it is a decision of this by any of one count.
+        let id = if round.is_named(decision.round) { decision.round } else { round.id };
+        if round.agreement.believe(Decision { round: id, ..decision }) { Heard::News } else { Heard::Known }
     }
 
     /// Whether that is another scale than this robot's own, if it has one.
@@ -404,20 +284,6 @@ impl Rounds {
         self.refusals.add(Refusal::DuplicateId);
         self.duplicate = Some(stamp);
     }
-}
-
-/// Whether a round is newer than the one known here, which belongs to another showing. Of two under one count the greater name is, for all alike; but of two that
-/// are over, one in which nothing was decided gives way to one in which something was: a part of a cut swarm that is too small to decide goes through rounds
-/// of its own.
-fn newer(id: RoundId, decided: Option<bool>, known: &Round) -> Ordering {
-    let known_decided = known.agreement.rank().map(|rank| rank.decided);
-    let by_outcome = match (decided, known_decided) {
-        (Some(decided), Some(known_decided)) if id.counter == known.id.counter && !known.open => {
-            decided.cmp(&known_decided)
-        }
-        _ => Ordering::Equal,
-    };
-    by_outcome.then(id.cmp(&known.id))
 }
 
 /// What became of a decision that was heard.

@@ -5,6 +5,7 @@
 //!                  voting (speak, decide)
 //!                  announcing (the decision, aloud for the swarm)
 //!                  hearing (votes and decisions of others)
+//!                  placing (which rounds these are of)
 //!                  repair (what a neighbour lacks)
 //! ```
 
@@ -20,6 +21,7 @@ mod inspect;
 mod members;
 mod output;
 mod partners;
+mod placing;
 mod preempting;
 mod repair;
 mod rounds;

@@ -5,34 +5,39 @@ use gestalt_protocol::{HeldVote, RobotId, RoundId};
 use super::rounds::{Effects, Rounds};
 
 impl Rounds {
-    /// Whether that newer round would end the open one, in which others take part, before that had its time. `by`: whose vote brings it,
-    /// if it is one.
+    /// Whether that newer round, which is not the open one by another name, would end this before it had its time, if others take part in it. `from`: whose
+    /// vote brings it, or who says what was `decided` in it.
     ///
     /// Robots are behind, and a newer round takes them along; but whoever may vote could begin one round after the other. So the votes of the open
     /// one decide first if they suffice, without waiting for more; and if they do not, nobody ends two rounds within a deadline. But where as many
     /// are as make a decision final, the swarm has gone on. A refractory time of zero switches all of that off.
     pub(super) fn is_too_soon(
         &mut self,
-        id: RoundId,
-        by: Option<RobotId>,
+        (id, decided): (RoundId, Option<bool>),
+        from: RobotId,
         effects: &mut Effects<'_>,
     ) -> bool {
-        let this = self.is_this_round(id);
         let Some(round) = &self.round else { return false };
         let begun = round.open && round.ballot.len() > 1;
-        if this || !begun || round.id > id || self.config.refractory.is_zero() {
+        if !begun || round.id > id || self.config.refractory.is_zero() {
             return false;
         }
         if self.now < round.since + self.config.refractory {
             return true;
         }
-        // A decision of others is the word of many.
-        let Some(by) = by else { return false };
+        match decided {
+            // A decision of others is the word of many.
+            Some(true) => return false,
+            // That nothing was decided is anybody's, and nobody looks in a round that is over: what is shown now would have none. But who opened the
+            // open one under a count that was used opens another.
+            Some(false) if !self.is_displaced_by(id) => return true,
+            Some(false) | None => {}
+        }
         if self.concludes_now(effects) {
             return true;
         }
-        let known = self.known(by);
-        let others = self.waiting.keys().filter(|robot| **robot != by && self.known(**robot).is_some());
+        let known = self.known(from);
+        let others = self.waiting.keys().filter(|robot| **robot != from && self.known(**robot).is_some());
         let elsewhere = others.count() + usize::from(known.is_some());
         if elsewhere >= self.config.holders(self.electorate.count()).max(2) as usize {
             return false;

@@ -85,7 +85,7 @@ impl Rounds {
             let known = self.round.as_ref().and_then(|round| round.agreement.best()).map(|best| best.class);
             // Of a greater one for the gesture that is held anyway the others are told, and ask for it if they lack it.
             let says_more = missed || known != Some(decision.class);
-            if self.hear_decision(decision.clone(), effects) == Heard::News {
+            if self.hear_decision(decision.clone(), from, effects) == Heard::News {
                 if !self.is_open() && missed {
                     self.note_missed_announcement();
                 }

@@ -5,6 +5,7 @@ mod committee;
 mod deciding;
 mod expelling;
 mod flooding;
+mod lying;
 mod naming;
 mod opening;
 mod order;
@@ -22,7 +23,7 @@ use gestalt_protocol::{
     RobotId, RoundId, Stamp, VocabularyId, Vote,
 };
 
-use super::{Input, Output, Rounds};
+use super::{Follow, Input, Output, Rounds};
 use crate::classify::{Classify, ClassifyError, Judgement};
 use crate::config::RoundsConfig;
 use crate::fuse::Fuse;
@@ -227,6 +228,16 @@ fn told(out: &[Output]) -> Vec<(u32, &Message)> {
             _ => None,
         })
         .collect()
+}
+
+/// Knows what an instructor spoke of.
+#[derive(Default)]
+struct Taught(BTreeSet<RoundId>);
+
+impl Follow for Taught {
+    fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
+        self.0.iter().copied().filter(|round| round.counter == counter).collect()
+    }
 }
 
 /// Ticks whenever the mind wants to, until `end`; collects what it wants done.

@@ -334,16 +334,6 @@ fn nor_is_that_of_one_that_was_spoken_of() {
     assert_eq!(mind.round(), Some(round(1, 60)), "as names of one showing do");
 }
 
-/// Knows what an instructor spoke of.
-#[derive(Default)]
-struct Taught(BTreeSet<RoundId>);
-
-impl crate::machine::Follow for Taught {
-    fn taught(&self, counter: u32) -> BTreeSet<RoundId> {
-        self.0.iter().copied().filter(|round| round.counter == counter).collect()
-    }
-}
-
 /// After a restart of all, in which some lost what they knew, counts come again.
 #[test]
 fn a_round_that_an_instructor_spoke_of_is_over() {

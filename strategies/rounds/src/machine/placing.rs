@@ -1,0 +1,152 @@
+//! Where a round that was heard of stands to the newest one known: whether it is that one by another name, an older one, or one to go on to.
+
+use std::cmp::Ordering;
+use std::time::Duration;
+
+use gestalt_protocol::{Certificate, Decision, MAX_ROBOTS, RobotId, RoundId};
+
+use super::rounds::{Effects, Rounds};
+use crate::refusal::Refusal;
+use crate::round::Round;
+
+/// Counters may run ahead of what this life of the robot began with by so many, which is two years of gestures without a pause,
+const MAX_AHEAD: u64 = 1 << 24;
+
+/// and by so many more a second, which is as fast as gestures can be shown. So nobody uses them up.
+const AHEAD_PER_SECOND: u64 = 2;
+
+/// One robot alone takes another so far ahead at once. Bounds on how far depend on how long a robot lives: one word in between would part those that started
+/// at other times.
+const LEAP: u32 = 1024;
+
+/// Under one count so many names of rounds that are over are remembered: where there were more, none that follows takes in another name.
+const MAX_PAST: usize = 4 * MAX_ROBOTS;
+
+impl Rounds {
+    /// Whether that is a name of the newest round known: its own, or that of a round that was opened at the same time, as far as
+    /// can be told. Equal counters alone do not say so: where memories were lost or the swarm was cut, they belong to other showings. And whoever may
+    /// vote could call it by the name of one that is over: two gestures would have one name.
+    pub(super) fn is_this_round(&self, id: RoundId) -> bool {
+        let opened_at_once = |round: &Round| {
+            round.id.counter == id.counter
+                && self.now <= round.since.saturating_add(self.config.deadline)
+                && !self.past.contains(&id)
+                && self.past.len() < MAX_PAST
+        };
+        self.round.as_ref().is_some_and(|round| round.is_named(id) || opened_at_once(round))
+    }
+
+    /// Where a round that was heard of stands to the newest one known. `decided`: whether something was decided in it; `None` while it may yet be.
+    pub(super) fn compare(&self, id: RoundId, decided: Option<bool>) -> Ordering {
+        match &self.round {
+            None => Ordering::Greater,
+            Some(_) if self.is_this_round(id) => Ordering::Equal,
+            Some(round) => newer(id, decided, round),
+        }
+    }
+
+    /// The same, of a round that robots are in by the word of `from`: by its vote, or by a decision that comes from it; refuses one too far ahead, or too
+    /// soon. `this`: whether it is the newest one known, of which a decision says more than its name. Rounds opened at the same time merge here, on the
+    /// smaller name.
+    pub(super) fn place(
+        &mut self,
+        (id, decided): (RoundId, Option<bool>),
+        this: bool,
+        from: RobotId,
+        effects: &mut Effects<'_>,
+    ) -> Result<Ordering, Refusal> {
+        let (first, began) = self.began;
+        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
+        if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
+            self.refusals.add(Refusal::FarAhead);
+            return Err(Refusal::FarAhead);
+        }
+        let known = self.highest.unwrap_or(first);
+        if id.counter > known.saturating_add(LEAP) && !self.is_vouched(known, (id, decided), from) {
+            self.refusals.add(Refusal::FarAhead);
+            return Err(Refusal::FarAhead);
+        }
+        if !this && self.is_too_soon((id, decided), from, effects) {
+            self.refusals.add(Refusal::TooSoon);
+            return Err(Refusal::TooSoon);
+        }
+        self.highest = self.highest.max(Some(id.counter));
+        let order = match &self.round {
+            None => Ordering::Greater,
+            Some(_) if this => Ordering::Equal,
+            Some(round) => newer(id, decided, round),
+        };
+        let by = self.known(from);
+        if let Some(round) = self.round.as_mut().filter(|_| order.is_eq()) {
+            let before = round.id;
+            if round.merge(id, by) {
+                effects.follower.merged(before, id);
+            }
+        }
+        Ok(order)
+    }
+
+    /// Whether more robots than may lie say that the swarm is so far beyond what is `known` here, where there are that many: by a decision, which is the word of
+    /// many, or by their votes, which they repeat.
+    fn is_vouched(&mut self, known: u32, (id, decided): (RoundId, Option<bool>), from: RobotId) -> bool {
+        if let Some(decided) = decided {
+            return decided;
+        }
+        if self.electorate.count() <= 2 {
+            return true;
+        }
+        if self.known(from).is_some() {
+            self.far_ahead.insert(from, id.counter);
+        }
+        let beyond = |counter: &&u32| **counter > known.saturating_add(LEAP);
+        self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
+    }
+
+    /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
+    pub(super) fn is_as_old(&self, decision: &Decision) -> bool {
+        let took = Duration::from_millis(decision.certificate.elapsed_ms.into());
+        self.round.as_ref().is_some_and(|round| {
+            round.id == decision.round
+                || self.now >= (round.since + took).saturating_sub(self.config.patience)
+        })
+    }
+
+    /// Whether a decision counts votes that were cast under a name of the round known here: then it is of that round, whatever it calls it. Whoever heard
+    /// those while its own round began took both for one; those who opened first heard of the other name too late to tell.
+    pub(super) fn is_counted_in(&self, decision: &Decision, effects: &Effects<'_>) -> bool {
+        let Certificate { votes, others, .. } = &decision.certificate;
+        let mut names =
+            votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
+        let id = decision.round;
+        let is_counted = self.round.as_ref().is_some_and(|round| {
+            round.id.counter == id.counter
+                && !self.past.contains(&id)
+                && names.any(|name| round.is_named(name))
+        });
+        // What an instructor spoke of meanwhile was shown before.
+        is_counted && (self.is_this_round(id) || !effects.follower.taught(id.counter).contains(&id))
+    }
+
+    /// Whether this robot opened the round that is open, undecided, under a count which belongs to that earlier round: it did not
+    /// know of it.
+    pub(super) fn is_displaced_by(&self, earlier: RoundId) -> bool {
+        self.round.as_ref().is_some_and(|round| {
+            let mine = round.id.opener == self.me && round.id.life == self.nonce;
+            mine && round.open && round.id.counter == earlier.counter && round.agreement.held().is_none()
+        })
+    }
+}
+
+/// Whether a round is newer than the one known here, which belongs to another showing. Of two under one count the greater name is, for all alike; but of two that
+/// are over, one in which nothing was decided gives way to one in which something was: a part of a cut swarm that is too small to decide goes through rounds
+/// of its own.
+pub(super) fn newer(id: RoundId, decided: Option<bool>, known: &Round) -> Ordering {
+    let known_decided = known.agreement.rank().map(|rank| rank.decided);
+    let by_outcome = match (decided, known_decided) {
+        (Some(decided), Some(known_decided)) if id.counter == known.id.counter && !known.open => {
+            decided.cmp(&known_decided)
+        }
+        _ => Ordering::Equal,
+    };
+    by_outcome.then(id.cmp(&known.id))
+}
