@@ -30,8 +30,9 @@ pub enum NamingReceipt {
     Unproven,
 }
 
-/// All gestures that were named, with what became of each: at most [`MAX_NAMED`]. Those that somebody with a key spoke of go before others, and of these those of
-/// the smallest numbers: so all robots keep the same, and whoever may only vouch makes nobody else's give way.
+/// All gestures that were named, with what became of each: at most [`MAX_NAMED`]. Those that somebody with a key spoke of go before others. Of these the first
+/// of each who named any go before the second ones and so on, by their numbers: so all robots keep the same, whoever may only vouch makes nobody else's give
+/// way, and whoever names ever so many makes most of its own do so, also where all of them are retired.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NameBook {
     namings: BTreeMap<ClassId, Said>,
@@ -64,7 +65,7 @@ impl NameBook {
         if receipt == NamingReceipt::New {
             self.put(naming, standing.unwrap_or(Standing::Overrules));
             if self.namings.len() > MAX_NAMED
-                && let Some((_, last)) = self.last()
+                && let Some((.., last)) = places(self.all()).pop()
             {
                 self.namings.remove(&last);
             }
@@ -110,9 +111,15 @@ impl NameBook {
         self.get(naming.gesture()).is_some_and(|known| is_of_one(known, naming))
     }
 
-    /// The place of the gesture that is the first to give way.
-    fn last(&self) -> Option<Place> {
-        self.namings.iter().map(|(gesture, said)| place(said.standing, *gesture)).max()
+    /// What each of them takes its place by.
+    fn all(&self) -> impl Iterator<Item = Candidate<'_>> {
+        self.namings.iter().map(|(gesture, said)| (&said.naming.by, said.standing, *gesture))
+    }
+
+    /// Whether a gesture that is new would be the first to give way.
+    fn would_be_last(&self, naming: &Naming, standing: Standing) -> bool {
+        let (by, gesture) = (&naming.by, naming.gesture());
+        places(self.all().chain([(by, standing, gesture)])).pop().is_some_and(|(.., last)| last == gesture)
     }
 
     /// What would come of it.
@@ -128,7 +135,7 @@ impl NameBook {
             NamingReceipt::FarAhead
         } else if known.is_none()
             && self.namings.len() >= MAX_NAMED
-            && self.last() <= Some(place(standing_here, gesture))
+            && self.would_be_last(naming, standing_here)
         {
             NamingReceipt::Full
         } else {
@@ -190,9 +197,7 @@ impl NameBook {
     /// The gestures of their own, at most so many: those that go before the others.
     #[must_use]
     pub fn in_use(&self, room: usize) -> BTreeSet<ClassId> {
-        let mut places: Vec<Place> = self.places_in_use().collect();
-        places.sort_unstable();
-        places.into_iter().take(room).map(|(_, gesture)| gesture).collect()
+        places(self.all_in_use()).into_iter().take(room).map(|(.., gesture)| gesture).collect()
     }
 
     /// Whether that word leaves no more gestures in use than so many, or than there were, of those that do not give way to what is said by that right.
@@ -201,15 +206,14 @@ impl NameBook {
         let mut after = self.clone();
         after.put(naming, standing);
         let beside = |book: &Self| {
-            let places = book.places_in_use();
-            places.filter(|(Reverse(other), _)| *other >= right(standing)).count()
+            let in_use = book.all_in_use();
+            in_use.filter(|(_, other, _)| right(*other) >= right(standing)).count()
         };
         beside(&after) <= room.max(beside(self))
     }
 
-    fn places_in_use(&self) -> impl Iterator<Item = Place> + '_ {
-        let in_use = self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture));
-        in_use.map(|(gesture, said)| place(said.standing, *gesture))
+    fn all_in_use(&self) -> impl Iterator<Item = Candidate<'_>> {
+        self.all().filter(|(.., gesture)| self.is_in_use(*gesture))
     }
 
     fn is_in_use(&self, gesture: ClassId) -> bool {
@@ -358,11 +362,24 @@ fn order(naming: &Naming) -> (u64, u64, &InstructorId, Fate, &InstructorId, &str
     (*count, *at, said_by, *fate, by, label)
 }
 
-/// Where a gesture stands among those that were named: the smaller first.
-type Place = (Reverse<Standing>, ClassId);
+/// What a gesture takes its place by: who named it, by which right it was last spoken of, its number.
+type Candidate<'a> = (&'a InstructorId, Standing, ClassId);
 
-fn place(standing: Standing, gesture: ClassId) -> Place {
-    (Reverse(right(standing)), gesture)
+/// Where a gesture stands among others: the smaller first. By the right, by how many of whoever named it stand before it, by its number.
+type Place = (Reverse<Standing>, usize, ClassId);
+
+/// The places of these gestures among each other, in order. Whatever else is heard, before none there stand fewer than did, unless it is itself spoken of by a
+/// greater right: so what gave way once would do so again, and the order in which robots hear makes no difference.
+fn places<'a>(gestures: impl Iterator<Item = Candidate<'a>>) -> Vec<Place> {
+    let by_namer = gestures.map(|(by, standing, gesture)| (by, Reverse(right(standing)), gesture));
+    let mut by_namer: Vec<_> = by_namer.collect();
+    by_namer.sort_unstable();
+    let of_one = by_namer.chunk_by(|one, other| one.0 == other.0);
+    let places =
+        of_one.flat_map(|own| (0..).zip(own).map(|(nth, (_, right, gesture))| (*right, nth, *gesture)));
+    let mut places: Vec<Place> = places.collect();
+    places.sort_unstable();
+    places
 }
 
 /// What was named may be merged, retired and restored by anybody who teaches; without a key, as long as nobody with one has spoken of it.

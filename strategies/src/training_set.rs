@@ -104,9 +104,9 @@ impl TrainingSet {
     }
 
     /// These other robots are alive now. From then on no author's samples push out those of the others when the set is full,
-    /// and when more series were seen than are kept track of, those of robots that are not there give way: each other robot
-    /// has at most max(5, ⌈1.25 · capacity / robots⌉) samples, all strangers together a quarter, and an own share stays.
-    /// Gives those that were not alive before.
+    /// and when more series were seen than are kept track of, those of robots that are not there give way, or where all are
+    /// there the oldest life of the robot that has most: each other robot has at most max(5, ⌈1.25 · capacity / robots⌉)
+    /// samples, all strangers together a quarter, and an own share stays. Gives those that were not alive before.
     pub fn meet(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
         self.shares.meet(self.me(), alive)
     }

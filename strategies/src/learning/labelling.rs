@@ -19,7 +19,9 @@ impl Learning {
     /// it in another order come to the same.
     pub(super) fn apply_to_round(&mut self, round: RoundId) {
         let names: BTreeSet<RoundId> = self.recent.names(round).collect();
-        match self.verdict(round) {
+        let verdict = self.verdict(round);
+        let kept_as = self.name_to_keep(round, &names, &verdict);
+        match verdict {
             Verdict::Class(class) => {
                 for name in &names {
                     let changes = self.set.relabel(*name, class);
@@ -31,7 +33,7 @@ impl Learning {
                     self.take_back(aside, class, is_new);
                 }
                 for vector in self.recent.take_unlabelled(round) {
-                    self.keep(round, class, vector, true);
+                    self.keep(kept_as, class, vector, true);
                 }
             }
             verdict @ (Verdict::Among(_) | Verdict::Retracted) => {
@@ -52,13 +54,22 @@ impl Learning {
                 refuted.into_iter().for_each(|number| self.guess(number, None));
                 if verdict != Verdict::Retracted {
                     for vector in self.recent.take_unlabelled(round) {
-                        let (part, vector) = (SetPart::Personal, vector.into());
+                        let (part, round, vector) = (SetPart::Personal, kept_as, vector.into());
                         self.put_aside(UnresolvedSample { part, shared: None, round, vector, guess: None });
                     }
                 }
             }
             Verdict::Unsaid => {}
         }
+    }
+
+    /// The name under which what was seen in a round is kept: one that instructors spoke of. Its other names are known to those alone who lived through it,
+    /// and to them not for long, so a later word on the one that was spoken of would not reach there. Of several, one that by itself says what all do.
+    fn name_to_keep(&self, round: RoundId, names: &BTreeSet<RoundId>, verdict: &Verdict) -> RoundId {
+        let mut spoken_of = names.iter().filter(|name| self.lessons.contains(**name)).peekable();
+        let first = spoken_of.peek().copied();
+        let says_all = spoken_of.find(|name| self.lessons.verdict(**name, &self.gestures) == *verdict);
+        says_all.or(first).copied().unwrap_or(round)
     }
 
     /// A sample of this robot's own. Of those that are new a part may be shared: what was taken back and is said again is none.

@@ -222,9 +222,10 @@ impl Learning {
         self.recent.contains(round) || self.lessons.contains(round) || self.held_of(round) > 0
     }
 
-    /// How many samples of that round are held.
+    /// How many samples of that round are held, by all its names.
     pub fn held_of(&self, round: RoundId) -> usize {
-        self.set.iter().filter(|sample| sample.round == round).count()
+        let names: BTreeSet<RoundId> = self.recent.names(round).collect();
+        self.set.iter().filter(|sample| names.contains(&sample.round)).count()
     }
 
     pub fn vocabulary(&self) -> &Vocabulary {

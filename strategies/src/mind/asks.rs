@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use gestalt_protocol::{Question, RoundId};
-use gestalt_rounds::Output as OfRounds;
+use gestalt_protocol::{Question, RobotId, RoundId};
+use gestalt_rounds::{Input as AboutRounds, Output as OfRounds};
 
 use crate::asking::{QuestionBudget, QuestionsConfig};
 
@@ -18,9 +18,20 @@ pub(super) struct Passed {
     pub announced: bool,
     /// It looks at a round no more.
     pub closed: bool,
+    /// It heard that robot announce what became of that round.
+    pub heard: Option<(RoundId, RobotId)>,
 }
 
 impl Passed {
+    /// Of what is about to be taken in.
+    pub fn of(input: &AboutRounds) -> Self {
+        let heard = match input {
+            AboutRounds::Announced(said) => Some((said.decision.round, said.announcer)),
+            _ => None,
+        };
+        Self { heard, ..Self::default() }
+    }
+
     pub fn note(&mut self, output: &OfRounds) {
         self.announced |= matches!(output, OfRounds::Announce(_));
         self.closed |= matches!(output, OfRounds::Closed(_));
@@ -33,6 +44,10 @@ pub(super) struct Asks {
     pub budget: QuestionBudget,
     /// The counter of the newest round that was counted.
     pub counted: Option<u32>,
+    /// Of the robots that announced what became of the newest round the one of the smallest number: it speaks for the swarm.
+    speaker: Option<RobotId>,
+    /// Whether the last question came from another robot than that.
+    out_of_turn: bool,
     /// When this robot, having announced what became of the newest round, looks whether to ask about it.
     pub due: Option<Duration>,
     /// The question that waits for its answer, and until when.
@@ -51,8 +66,19 @@ impl Asks {
             self.counted = counter;
             self.budget.enter(now);
             // What was not asked in time is not asked.
-            self.due = None;
+            (self.due, self.speaker) = (None, None);
         }
+    }
+
+    /// That robot announced what became of the newest round.
+    pub fn note_speaker(&mut self, robot: RobotId) {
+        self.speaker = Some(self.speaker.map_or(robot, |speaker| speaker.min(robot)));
+    }
+
+    /// Whether that robot may ask about the newest round, if anyone may: it speaks for the swarm, or the one before that asked did. Whoever asks the moment a
+    /// round is over, before others do, so has every other turn at most; and whoever asks where its announcement was lost is heard.
+    pub fn is_turn_of(&self, robot: RobotId) -> bool {
+        self.speaker == Some(robot) || !self.out_of_turn
     }
 
     /// Puts off by whole periods what was to be asked while the round was open still: several may have announced it, each in its turn, and
@@ -68,6 +94,7 @@ impl Asks {
     pub fn note(&mut self, now: Duration, question: Question, config: &QuestionsConfig) {
         self.budget.spend(now);
         self.due = None;
+        self.out_of_turn = self.speaker != Some(question.robot);
         self.open = Some((question, now.saturating_add(config.gone)));
     }
 

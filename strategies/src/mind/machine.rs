@@ -170,7 +170,7 @@ impl Mind {
             }
             None => &mut (),
         };
-        let mut passed = Passed::default();
+        let mut passed = Passed::of(&about_rounds);
         self.rounds.handle_into(now, about_rounds, follower, &mut |output| {
             passed.note(&output);
             carry_out(output.into());

@@ -20,7 +20,7 @@ impl Mind {
     }
 
     /// Another robot asked. What no honest robot would have asked now is refused: else one member, or whoever says again what one asked long ago, could keep all
-    /// others from asking, and have an instructor speak of a round of its choice.
+    /// others from asking, and have an instructor speak of rounds of its choice alone.
     pub(super) fn on_asked(&mut self, now: Duration, question: Question) -> AboutRounds {
         let Some(learning) = self.learning.as_ref().filter(|_| question.robot != self.rounds.me()) else {
             return AboutRounds::Tick;
@@ -29,7 +29,9 @@ impl Mind {
         let is_over = !self.rounds.is_open() && self.rounds.looking().is_none();
         let is_of_newest = self.rounds.round() == Some(question.round);
         let is_unsaid = learning.verdict(question.round) == Verdict::Unsaid;
-        if is_over && is_of_newest && is_unsaid && self.asks.budget.allows_another(now, config) {
+        let is_its_turn =
+            self.asks.is_turn_of(question.robot) && self.asks.budget.allows_another(now, config);
+        if is_over && is_of_newest && is_unsaid && is_its_turn {
             self.asks.note(now, question, config);
         } else {
             self.rounds.note_refusal(Refusal::Untimely);
@@ -41,7 +43,11 @@ impl Mind {
     pub(super) fn carry_on_asking(&mut self, now: Duration, passed: Passed, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
         self.asks.enter(now, self.rounds.round());
+        if let Some((_, robot)) = passed.heard.filter(|(round, _)| self.rounds.round() == Some(*round)) {
+            self.asks.note_speaker(robot);
+        }
         if passed.announced {
+            self.asks.note_speaker(self.rounds.me());
             self.asks.due.get_or_insert(now.saturating_add(learning.config().questions.after));
         }
         if passed.closed {
@@ -93,7 +99,7 @@ impl Mind {
         let (labels, quiet) = (learning.label_counts(), self.asks.budget.quiet(config));
         let occasion = Occasion { doubt: doubt.as_ref(), labels: &labels, before: &[], repeated, quiet };
         let before = self.asks.compare(occasion.worth(config));
-        if !self.asks.budget.allows(now, config) {
+        if !self.asks.budget.allows(now, config) || !self.asks.is_turn_of(self.rounds.me()) {
             return None;
         }
         let ask = worth_asking(&Occasion { before: &before, ..occasion }, config)?;

@@ -127,3 +127,79 @@ fn whoever_may_only_vouch_makes_nobody_elses_gesture_give_way() {
     assert_eq!(before.iter().count(), MAX_NAMED);
     assert!(before.in_use(58).contains(&circle.gesture()) && before.in_use(58).len() == 58);
 }
+
+/// Whoever may teach can look for labels of small numbers, and make room for more among those in use by retiring them.
+#[test]
+fn whoever_names_ever_so_many_makes_nobody_elses_give_way() {
+    let circle = naming("ana", "circle", 1, Fate::InUse);
+    let smaller = (0_u32..).map(|n| naming("eve", &n.to_string(), 2, Fate::Retired));
+    let smaller: Vec<Naming> =
+        smaller.filter(|naming| naming.gesture() < circle.gesture()).take(MAX_NAMED).collect();
+    let mut before = book(std::slice::from_ref(&circle));
+    let mut after = book(&smaller);
+    assert_eq!(after.iter().count(), MAX_NAMED);
+    smaller.iter().for_each(|naming| {
+        before.hear(naming);
+    });
+    assert!(after.has_room(58, &circle, None));
+    assert_eq!(after.hear(&circle), NamingReceipt::New);
+    assert_eq!(before, after);
+    let stays = after.get(circle.gesture());
+    assert_eq!((stays, after.iter().count()), (Some(&circle), MAX_NAMED));
+    let last = smaller.iter().max_by_key(|naming| naming.gesture()).unwrap();
+    assert_eq!(after.hear(last), NamingReceipt::Full, "what gave way does not come again and again");
+    // Of those in use that are more than can be told apart, it is one that is.
+    let restored = smaller.iter().map(|naming| Naming { count: 3, fate: Fate::InUse, ..naming.clone() });
+    restored.for_each(|naming| {
+        after.hear(&naming);
+    });
+    assert!(after.in_use(58).contains(&circle.gesture()));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    /// Some named many and some few, and of some gestures somebody with a key spoke as well.
+    #[test]
+    fn of_more_than_are_kept_robots_keep_the_same_in_any_order(
+        said in Just(crowd()).prop_shuffle(), again in Just(crowd()).prop_shuffle()
+    ) {
+        let heard = |said: &[(Naming, Standing)]| {
+            let mut book = NameBook::default();
+            said.iter().for_each(|(naming, standing)| {
+                book.hear_by(naming, Some(*standing));
+            });
+            book
+        };
+        let (one, other) = (heard(&said), heard(&again));
+        prop_assert_eq!(one.iter().count(), MAX_NAMED);
+        let mut kept: BTreeMap<InstructorId, usize> = BTreeMap::new();
+        one.iter().for_each(|naming| *kept.entry(naming.by.clone()).or_default() += 1);
+        let mut kept: Vec<usize> = kept.into_values().collect();
+        kept.sort_unstable();
+        // All of those who named few, and what somebody with a key spoke of.
+        prop_assert_eq!(kept, [3, 30, 34, 40, 74, 75]);
+        prop_assert_eq!(one, other);
+    }
+}
+
+fn crowd() -> Vec<(Naming, Standing)> {
+    let mut who_named = ["ana", "bob", "cyn", "eve"];
+    // Whoever named most has the smallest numbers.
+    who_named.sort_unstable_by_key(|by| ClassId::named(&who(by), "0"));
+    let named = who_named.into_iter().zip([300, 130, 40, 3]).chain([("guest", 100), ("other", 90)]);
+    let mut crowd = Vec::new();
+    for (by, n) in named {
+        let standing = if n == 100 || n == 90 { Standing::Vouched } else { Standing::Teaches };
+        for label in 0..n {
+            crowd.push((naming(by, &label.to_string(), 1, Fate::InUse), standing));
+            if standing == Standing::Vouched && label % 3 == 0 {
+                let said_by = who("bob");
+                let fate = Fate::Retired;
+                let retired = Naming { said_by, ..naming(by, &label.to_string(), 2, fate) };
+                crowd.push((retired, Standing::Teaches));
+            }
+        }
+    }
+    crowd
+}

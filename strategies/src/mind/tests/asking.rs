@@ -88,15 +88,19 @@ fn robots_that_disagree_ask_between_two_once_and_not_again_for_three_rounds() {
     assert!(apart, "{:?}", swarm.asked);
 }
 
-/// Asks all robots, in the name of the third.
+/// Asks all robots, in the name of a stranger.
 fn ask(swarm: &mut Swarm, round: RoundId) {
+    ask_as(swarm, RobotId(9), round);
+}
+
+fn ask_as(swarm: &mut Swarm, robot: RobotId, round: RoundId) {
     let question = Question {
         round,
         ask: Ask::Name { nearest: None },
         labels: vec![],
         entropy: 1.0,
         disagreement: 1.0,
-        robot: RobotId(9),
+        robot,
         stamp: Stamp { boot: 9, sequence: 9 },
         signature: None,
     };
@@ -143,6 +147,36 @@ fn what_no_robot_would_ask_now_is_refused_and_keeps_nobody_from_asking() {
     assert!(asked.len() >= 3 && apart.iter().all(|apart| (3..=6).contains(apart)), "{asked:?}");
     let refused = swarm.minds[1].refusals().count(Refusal::Untimely);
     assert!(refused > 1000, "{refused}");
+}
+
+/// Two liars together, or one alone, and each from the first moment on.
+#[test]
+fn whoever_asks_as_soon_as_a_round_is_over_has_every_other_turn_at_most() {
+    for liars in [&[RobotId(3)][..], &[RobotId(2), RobotId(3)]] {
+        let mut swarm = swarm(3, QuestionsConfig::default());
+        let mut turns: Vec<RobotId> = Vec::new();
+        for _ in 0..40 {
+            swarm.input(2, Input::Open);
+            for _ in 0..3 {
+                for (i, sure) in SPLIT.into_iter().enumerate() {
+                    let features = vec![2.0, sure, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+                    swarm.input(i, Input::Observed(Observation { features, quality: 1.0 }));
+                }
+                swarm.pass(Duration::from_millis(500));
+            }
+            let round = swarm.minds[0].round().unwrap();
+            let mut turn = None;
+            for _ in 0..160 {
+                swarm.pass(Duration::from_millis(50));
+                liars.iter().for_each(|liar| ask_as(&mut swarm, *liar, round));
+                turn = turn.or(swarm.minds[0].question().filter(|it| it.round == round).map(|it| it.robot));
+            }
+            turns.extend(turn);
+        }
+        let are_lies: Vec<bool> = turns.iter().map(|robot| liars.contains(robot)).collect();
+        assert!(turns.len() >= 12, "{turns:?}");
+        assert!(are_lies.contains(&true) && are_lies.windows(2).all(|two| two != [true, true]), "{turns:?}");
+    }
 }
 
 #[test]
@@ -199,9 +233,10 @@ fn who_speaks_for_the_swarm_after_another_counts_what_that_asked() {
     rest(&mut swarm);
     show(&mut swarm, 2, &SPLIT);
     assert_eq!(last(&swarm).robot, RobotId(1));
-    // The first is asked no more, and asks nothing; the second speaks.
+    // The first is not there to the others, leaves it to them to speak and asks nothing; the second speaks.
     swarm.config.questions.ask = false;
     swarm.restart(0);
+    swarm.input(0, Input::Alive(Arc::new([RobotId(0), RobotId(2), RobotId(3)].into())));
     let left: BTreeSet<RobotId> = [RobotId(2), RobotId(3)].into();
     for i in 1..3 {
         swarm.input(i, Input::Alive(Arc::new(left.clone())));

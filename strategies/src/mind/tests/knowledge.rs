@@ -138,10 +138,10 @@ fn rounds_are_counted_on_after_all_were_off() {
     assert_eq!(swarm.show(2).counter, first.counter + 1);
 }
 
-#[test]
-fn what_is_said_of_a_round_holds_for_all_its_names() {
-    let mut swarm = Swarm::new(3, config(3, 1.0), 13);
-    // All open at once, before they hear of each other.
+/// A swarm whose first three robots open at once, before they hear of each other. Gives the name that the last of them gave the round, and the one that it
+/// has since they merged.
+fn merged(n: usize, seed: u64) -> (Swarm, RoundId, RoundId) {
+    let mut swarm = Swarm::new(n, config(3, 1.0), seed);
     swarm.loss = 1.0;
     (0..3).for_each(|i| swarm.input(i, Input::Open));
     swarm.loss = 0.0;
@@ -149,30 +149,74 @@ fn what_is_said_of_a_round_holds_for_all_its_names() {
     swarm.pass(Duration::from_millis(1200));
     let round = swarm.minds[2].round().unwrap();
     assert_eq!((round.opener, alias.opener), (RobotId(1), RobotId(3)), "they merged");
-    // The word comes before they have seen it often enough, and under one name; its correction comes under another.
-    let look = |swarm: &mut Swarm| {
+    (swarm, alias, round)
+}
+
+impl Swarm {
+    /// The first three robots see something.
+    fn look(&mut self) {
         for i in 0..3 {
             let mut features = vec![0.1; 8];
             features[0] += 4.0;
-            swarm.input(i, Input::Observed(Observation { features, quality: 1.0 }));
+            self.input(i, Input::Observed(Observation { features, quality: 1.0 }));
         }
-        swarm.pass(Duration::from_millis(450));
-    };
-    look(&mut swarm);
-    swarm.was(alias, 4);
-    for _ in 0..3 {
-        look(&mut swarm);
+        self.pass(Duration::from_millis(450));
     }
-    let count = |swarm: &Swarm, class| {
+
+    fn count(&self, class: u32) -> Vec<usize> {
         let of = |mind: &Mind| mind.training_set().unwrap().class_count(ClassId(class));
-        swarm.minds.iter().map(of).collect::<Vec<_>>()
-    };
-    let learned = count(&swarm, 4);
+        self.minds.iter().map(of).collect()
+    }
+}
+
+#[test]
+fn what_is_said_of_a_round_holds_for_all_its_names() {
+    let (mut swarm, alias, round) = merged(3, 13);
+    // The word comes before they have seen it often enough, and under one name; its correction comes under another.
+    swarm.look();
+    swarm.was(alias, 4);
+    (0..3).for_each(|_| swarm.look());
+    let learned = swarm.count(4);
     assert!(learned.iter().all(|n| *n > 3), "what was seen after the word is labelled too: {learned:?}");
-    swarm.was(round, 5);
-    swarm.pass(Duration::from_secs(3));
-    assert_eq!(count(&swarm, 4), [0; 3]);
-    assert!(count(&swarm, 5).iter().all(|n| *n > 3));
+    let at = swarm.was(round, 5);
+    assert_eq!(swarm.outcome(at), Outcome::Learned, "of what is held under the other name");
+    assert_eq!(swarm.count(4), [0; 3]);
+    assert!(swarm.count(5).iter().all(|n| *n > 3));
+}
+
+#[test]
+fn a_correction_reaches_what_was_seen_after_the_word_also_where_other_names_of_its_round_are_not_known() {
+    for by_alias in [true, false] {
+        let (mut swarm, alias, round) = merged(4, 19);
+        let spoken_of = if by_alias { alias } else { round };
+        swarm.look();
+        // While they look still.
+        let instruction = Instruction::Was { round: spoken_of, class: Gesture::Class(ClassId(4)) };
+        for i in 0..4 {
+            let (by, instruction) = ("ada".parse().unwrap(), instruction.clone());
+            swarm.input(i, Input::Instructed(Instructed { by, at: 1, instruction, said: None }));
+        }
+        assert_eq!(swarm.count(4), [3; 4]);
+        (0..3).for_each(|_| swarm.look());
+        swarm.pass(Duration::from_secs(3));
+        let before = swarm.count(4);
+        assert!(before[..3].iter().all(|n| *n > 3), "what was seen after the word is labelled: {before:?}");
+        // One that starts again, and one that comes now.
+        swarm.restart(0);
+        swarm.restart_empty(3);
+        swarm.pass(Duration::from_secs(10));
+        assert_eq!(swarm.count(4)[..3], before[..3]);
+        for (class, corrected) in [(5, 4), (3, 5)] {
+            swarm.was(spoken_of, class);
+            swarm.pass(Duration::from_secs(10));
+            let all = swarm.count(class);
+            assert_eq!(swarm.count(corrected), [0; 4], "{all:?}");
+            assert_eq!(all[0], 9, "all that this one held when it started again");
+            swarm.restart_all();
+            assert_eq!(swarm.count(class), all);
+        }
+        swarm.check();
+    }
 }
 
 #[test]

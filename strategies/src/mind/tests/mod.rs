@@ -258,7 +258,14 @@ impl Swarm {
                         assert!(!self.minds[i].is_open(), "never while a round is open, as far as it knows");
                         self.asked.push((self.now, question));
                     }
-                    Output::Hold(_) | Output::Announce(_) | Output::Opened(_) | Output::Closed(_) => {}
+                    Output::Announce(announcement) => {
+                        for j in (0..self.minds.len()).filter(|j| *j != i) {
+                            if self.loss == 0.0 || self.arrives() {
+                                due.push_back((j, Input::Announced(announcement.clone())));
+                            }
+                        }
+                    }
+                    Output::Hold(_) | Output::Opened(_) | Output::Closed(_) => {}
                 }
             }
         }
