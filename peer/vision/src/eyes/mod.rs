@@ -41,11 +41,11 @@ use reading::Reading;
 use standard::standardise;
 
 /// The least confidence that a hand is one.
-pub const MINIMUM: f32 = 0.4;
+pub const MINIMUM: f32 = 0.55;
 /// A hand that is this likely where the last one was is the same.
 const STILL_THERE: f32 = 0.6;
-/// A first look that convinces less than this is followed by a finer one.
-const UNSURE: f32 = 0.5;
+/// A first look that does not convince is followed by a finer one.
+const UNSURE: f32 = MINIMUM;
 /// The finer look is for hands up to this size, in pixels of a frame 160 wide: of larger ones it finds parts.
 const SMALL: f32 = 28.0;
 /// A count that is less likely than this is read once more, mirrored.
