@@ -60,6 +60,16 @@ pub const ALL: &[Attack] = &[
         play: |seed| beside(&Plan::sealed().liars(1), seed, one_after_the_other, within_a_second),
     },
     Attack {
+        number: "A7",
+        what: "an enrolled robot says, ten times a second, that nothing was decided in the round that is open, or in the next",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "each gesture is decided, at most 1 s later",
+        counted: Counted::Some(&["refused_round_too_soon"]),
+        gap: None,
+        play: |seed| beside(&Plan::sealed().liars(1), seed, nothing_was_decided, within_a_second),
+    },
+    Attack {
         number: "A7 · 7",
         what: "an enrolled robot begins another round under the count of one that was taught, and calls it by that one's name",
         tier: Tier::T4,
@@ -197,6 +207,27 @@ fn one_after_the_other(swarm: &mut Swarm) {
             let said = forged::said(robot, stamp, forged::null_vote(round));
             let said = forged::signed(said, &key(robot), &swarm.id());
             swarm.put_to(1 + n % swarm.honest(), &Topic::Vote(said.author), &said.encode());
+        }
+        swarm.end(began);
+        swarm.pass(6000 * MS);
+    }
+}
+
+fn nothing_was_decided(swarm: &mut Swarm) {
+    let liar = swarm.liar();
+    for class in [1, 2] {
+        let began = swarm.now();
+        swarm.begin(class);
+        for n in 0..25 {
+            swarm.pass(100 * MS);
+            let counter = swarm.round().counter + n % 2;
+            let round = RoundId { counter, opener: RobotId(u32::MAX), life: 9 };
+            let own =
+                forged::said(liar, Stamp { boot: 1, sequence: 100 * class + n }, forged::null_vote(round));
+            let own = forged::held(forged::signed(own, &key(liar), &swarm.id()));
+            let mut decision = forged::decision(round, vec![own], liar);
+            (decision.class, decision.certificate.elapsed_ms) = (None, u32::MAX);
+            swarm.give(liar, Some(decision), Vec::new());
         }
         swarm.end(began);
         swarm.pass(6000 * MS);
