@@ -226,7 +226,9 @@ fn nothing_was_decided(swarm: &mut Swarm) {
                 forged::said(liar, Stamp { boot: 1, sequence: 100 * class + n }, forged::null_vote(round));
             let own = forged::held(forged::signed(own, &key(liar), &swarm.id()));
             let mut decision = forged::decision(round, vec![own], liar);
-            (decision.class, decision.certificate.elapsed_ms) = (None, u32::MAX);
+            let certificate = &mut decision.certificate;
+            (certificate.probabilities, certificate.elapsed_ms) = (Vec::new(), u32::MAX);
+            decision.class = None;
             swarm.give(liar, Some(decision), Vec::new());
         }
         swarm.end(began);
