@@ -19,6 +19,8 @@ pub struct Agreement {
     held: Option<Held>,
     /// The first gesture held. Whoever counts for one gesture of a round counts for no other, or two could be final.
     first: Option<ClassId>,
+    /// Who said something in this round in two of its lives: in the first it may have counted for a gesture that it has forgotten.
+    restarted: BTreeSet<RobotId>,
     announced: Option<Announced>,
 }
 
@@ -42,6 +44,9 @@ impl Agreement {
     /// Hears a robot's word of what it holds, its own or passed on: the latest replaces all earlier ones. Says whether it was news.
     pub fn note_holder(&mut self, holder: Holder) -> bool {
         let known = self.holders.get(&holder.robot);
+        if known.is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
+            self.restarted.insert(holder.robot);
+        }
         let is_news = match known {
             Some(known) => known.stamp < holder.stamp,
             None => self.holders.len() < MAX_ROBOTS,
@@ -50,6 +55,13 @@ impl Agreement {
             self.holders.insert(holder.robot, holder);
         }
         is_news
+    }
+
+    /// That robot started again in the midst of the round: from now on it counts for no gesture, or two could be final.
+    pub fn note_restart(&mut self, robot: RobotId) {
+        if self.restarted.len() < MAX_ROBOTS {
+            self.restarted.insert(robot);
+        }
     }
 
     /// Forgets what these robots hold, and every decision that counted one of them, or that one of them drew; whether there was one.
@@ -103,20 +115,26 @@ impl Agreement {
         let holds = |holder: &&Holder| {
             let Holder { robot, holding, .. } = holder;
             let other = *robot != me && !guests.contains(robot);
-            holding.class == Some(class) && !holding.changed && other && counts(*robot)
+            let stays = !holding.changed && !self.restarted.contains(robot);
+            holding.class == Some(class) && stays && other && counts(*robot)
         };
         let through_this = guests.iter().chain([&me]).filter(|robot| counts(**robot));
-        let own = if self.has_changed() { 0 } else { through_this.count() };
+        let own = if self.has_changed(me) {
+            0
+        } else {
+            through_this.filter(|robot| !self.restarted.contains(robot)).count()
+        };
         if own + self.holders.len() < quorum as usize {
             return false;
         }
         own + self.holders().filter(holds).count() >= quorum as usize
     }
 
-    /// Whether another gesture was held before this one.
+    /// Whether another gesture was held before this one, or may have been: by `me`, this robot, before it started.
     #[must_use]
-    pub fn has_changed(&self) -> bool {
-        self.held().is_some_and(|held| held.class.is_some() && held.class != self.first)
+    pub fn has_changed(&self, me: RobotId) -> bool {
+        let is_another = |held: &Decision| held.class != self.first || self.restarted.contains(&me);
+        self.held().is_some_and(|held| held.class.is_some() && is_another(held))
     }
 
     /// Takes the greater of this decision and the best known one. A robot's own conclusion needs no witnesses.
@@ -316,6 +334,37 @@ mod tests {
         assert_eq!(held_by(&agreement, &[]), Some(3), "this one counts once, also by its own word");
         assert!(agreement.note_holder(holds(6, 1, &of(1, 3), true)));
         assert_eq!(held_by(&agreement, &[]), Some(3), "who held another gesture before counts for none");
+    }
+
+    #[test]
+    fn who_started_again_in_the_midst_of_the_round_counts_for_no_gesture() {
+        let held = decision(Some(1), 3, 0.96, 5);
+        let agreement = |of: &[Holder]| {
+            let mut agreement = Agreement::default();
+            agreement.believe(held.clone());
+            agreement.settle(at(0), true);
+            for holder in of {
+                agreement.note_holder(holder.clone());
+            }
+            agreement
+        };
+        let word = |robot, boot, class| {
+            let stamp = Stamp { boot, sequence: 1 };
+            Holder { stamp, ..holds(robot, 1, &decision(Some(class), 3, 0.96, 5), false) }
+        };
+        let (before, after, other) = (word(3, 1, 0), word(3, 2, 1), word(2, 1, 1));
+        for order in [[&before, &after], [&after, &before]] {
+            assert_eq!(
+                held_by(&agreement(&[order[0].clone(), order[1].clone(), other.clone()]), &[]),
+                Some(2)
+            );
+        }
+        // By its votes as well, and so does this robot itself.
+        let mut known = agreement(&[after, other]);
+        assert_eq!((held_by(&known, &[]), known.has_changed(RobotId(1))), (Some(3), false));
+        known.note_restart(RobotId(3));
+        known.note_restart(RobotId(1));
+        assert_eq!((held_by(&known, &[]), known.has_changed(RobotId(1))), (Some(1), true));
     }
 
     #[test]

@@ -56,9 +56,23 @@ impl Rounds {
 
     /// Hears what a robot says that it holds, itself or by way of another. Says whether it was news.
     pub(super) fn note_holder(&mut self, holder: Holder) -> bool {
-        let of_this = holder.robot != self.me && self.is_this_round(holder.holding.round);
-        let round = self.round.as_mut().filter(|_| of_this);
-        round.is_some_and(|round| round.agreement.note_holder(holder))
+        if !self.is_this_round(holder.holding.round) {
+            return false;
+        }
+        if holder.robot == self.me {
+            if holder.stamp.boot < self.stamp.boot {
+                self.note_restart(holder.robot);
+            }
+            return false;
+        }
+        self.round.as_mut().is_some_and(|round| round.agreement.note_holder(holder))
+    }
+
+    /// The newest round was one before that robot started.
+    fn note_restart(&mut self, robot: RobotId) {
+        if let Some(round) = &mut self.round {
+            round.agreement.note_restart(robot);
+        }
     }
 
     /// Asks a robot for what it says that it holds, if that is lacking here. That is a hint: what it then gives is looked into.
@@ -114,6 +128,8 @@ impl Rounds {
             // From an earlier life it is merely old.
             if stamp > self.stamp {
                 self.meet_duplicate(stamp);
+            } else if stamp.boot < self.stamp.boot && self.is_this_round(vote.round) {
+                self.note_restart(robot);
             }
             return false;
         }
@@ -148,6 +164,9 @@ impl Rounds {
             self.join(vote.round, effects);
         }
         let Some(round) = self.round.as_mut() else { return false };
+        if round.ballot.stamp(robot).is_some_and(|known| known.boot != stamp.boot) {
+            round.agreement.note_restart(robot);
+        }
         let is_news = match round.ballot.cast(effects.follower.keep(held)) {
             Cast::Counted => {
                 self.electorate.hear(robot, self.now);

@@ -108,7 +108,7 @@ impl Rounds {
         let counts = self.counts(self.me) || self.guests.iter().any(|guest| self.counts(*guest));
         let round = self.round.as_ref().filter(|_| counts);
         let Some(agreement) = round.map(|round| &round.agreement) else { return };
-        let Some(holding) = agreement.held().map(|held| held.holding(agreement.has_changed())) else {
+        let Some(holding) = agreement.held().map(|held| held.holding(agreement.has_changed(self.me))) else {
             return;
         };
         let said = agreement.holder(self.me).map(|own| (own.holding.class, own.holding.changed));
