@@ -123,10 +123,16 @@ impl Ballot {
             .is_some_and(|held| !held.vote.evidence.is_empty() || held.vote.vocabulary == VocabularyId::NONE)
     }
 
+    /// The vote of that robot.
+    #[must_use]
+    pub fn of(&self, robot: RobotId) -> Option<&HeldVote> {
+        self.votes.get(&robot).map(|held| &**held)
+    }
+
     /// Which vote of that robot is held.
     #[must_use]
     pub fn stamp(&self, robot: RobotId) -> Option<Stamp> {
-        self.votes.get(&robot).map(|held| held.stamp)
+        self.of(robot).map(|held| held.stamp)
     }
 
     /// Which votes are held, by robot.

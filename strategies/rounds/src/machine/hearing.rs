@@ -3,7 +3,9 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use gestalt_protocol::{Certificate, Decision, Envelope, HeldVote, Holder, Holding, Message, RobotId, Stamp};
+use gestalt_protocol::{
+    Certificate, Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp,
+};
 
 use super::members::expected;
 use super::placing::newer;
@@ -130,6 +132,7 @@ impl Rounds {
                 self.meet_duplicate(stamp);
             } else if stamp.boot < self.stamp.boot && self.is_this_round(vote.round) {
                 self.note_restart(robot);
+                self.say_holding(effects);
             }
             return false;
         }
@@ -164,7 +167,8 @@ impl Rounds {
             self.join(vote.round, effects);
         }
         let Some(round) = self.round.as_mut() else { return false };
-        if round.ballot.stamp(robot).is_some_and(|known| known.boot != stamp.boot) {
+        let of_other_life = round.ballot.of(robot).filter(|known| known.stamp.boot != stamp.boot).cloned();
+        if of_other_life.is_some() {
             round.agreement.note_restart(robot);
         }
         let is_news = match round.ballot.cast(effects.follower.keep(held)) {
@@ -184,6 +188,11 @@ impl Rounds {
         };
         if order.is_gt() {
             self.hear_waiting(effects);
+        }
+        if let Some(earlier) = of_other_life.filter(|known| known.stamp < stamp) {
+            // It does not know that it was in this round before, and would count itself.
+            let give = Give { decision: None, votes: vec![earlier], holders: Vec::new() };
+            self.tell(robot, Message::Give(give), effects);
         }
         is_news
     }

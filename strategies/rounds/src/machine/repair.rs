@@ -199,7 +199,7 @@ impl Rounds {
         self.partners.pass_on(self.now, from, self.config.repair_busy);
     }
 
-    fn tell(&mut self, robot: RobotId, message: Message, effects: &mut Effects<'_>) {
+    pub(super) fn tell(&mut self, robot: RobotId, message: Message, effects: &mut Effects<'_>) {
         let envelope = self.stamped(message);
         (effects.carry_out)(Output::Tell(robot, envelope));
     }

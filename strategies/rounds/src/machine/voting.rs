@@ -103,7 +103,7 @@ impl Rounds {
     }
 
     /// Says which gesture this robot holds, unless that is what it said last: a greater decision for the same is news to nobody.
-    fn say_holding(&mut self, effects: &mut Effects<'_>) {
+    pub(super) fn say_holding(&mut self, effects: &mut Effects<'_>) {
         // Of those who were drawn that is counted; what all others hold they can tell by that.
         let counts = self.counts(self.me) || self.guests.iter().any(|guest| self.counts(*guest));
         let round = self.round.as_ref().filter(|_| counts);

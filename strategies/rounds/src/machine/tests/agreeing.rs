@@ -300,3 +300,35 @@ fn what_robots_said_that_they_hold_reaches_who_could_not_hear_it() {
     let digest = |mind: &Rounds| mind.round.as_ref().unwrap().agreement.digest();
     assert_eq!(digest(&knows), digest(&lacks), "then both are at rest");
 }
+
+/// It may have held another gesture with others before, and cannot know.
+#[test]
+fn who_started_again_in_the_midst_of_a_round_is_told_and_counts_for_none() {
+    let word = |robot, boot, sequence, message| {
+        let (author, stamp) = (RobotId(robot), Stamp { boot, sequence });
+        Input::Received(Envelope { author, stamp, message, signature: None })
+    };
+    let said = |boot| word(3, boot, 5, Message::Vote(vote(1, 0, LEANING)));
+    let there = &mut mind(7);
+    there.handle(ms(0), Input::Alive(Arc::new(robots([3, 7]))));
+    there.handle(ms(0), said(1));
+    let told = there.handle(ms(10), said(2)).into_iter().find_map(|output| match output {
+        Output::Tell(RobotId(3), Envelope { message: Message::Give(give), .. }) => Some(give),
+        _ => None,
+    });
+    let told = told.expect("it is told what it said before");
+    assert_eq!(told.votes.iter().map(|held| (held.robot.0, held.stamp.boot)).collect::<Vec<_>>(), [(3, 1)]);
+    // Robot 3 in its second life.
+    let here = &mut Rounds::new(RobotId(3), Life { boot: 2, nonce: 8 }, adding_up()).unwrap();
+    here.handle(ms(0), Input::Alive(Arc::new(robots([3, 7]))));
+    here.handle(ms(0), word(7, 1, 1, Message::Vote(null(1))));
+    let holds = |mind: &mut Rounds, input| -> Option<bool> {
+        let outputs = mind.handle(ms(20), input);
+        outputs.into_iter().find_map(|output| match output {
+            Output::Broadcast(Envelope { message: Message::Holding(holding), .. }) => Some(holding.changed),
+            _ => None,
+        })
+    };
+    assert_eq!(holds(here, gives(7, decision(1, Some(0), 3, 9))), Some(false));
+    assert_eq!(holds(here, word(7, 1, 60, Message::Give(told))), Some(true), "it counts no more");
+}
