@@ -43,10 +43,10 @@ struct Announced {
 impl Agreement {
     /// Hears a robot's word of what it holds, its own or passed on: the latest replaces all earlier ones. Says whether it was news.
     pub fn note_holder(&mut self, holder: Holder) -> bool {
-        let known = self.holders.get(&holder.robot);
-        if known.is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
-            self.restarted.insert(holder.robot);
+        if self.holder(holder.robot).is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
+            self.note_restart(holder.robot);
         }
+        let known = self.holders.get(&holder.robot);
         let is_news = match known {
             Some(known) => known.stamp < holder.stamp,
             None => self.holders.len() < MAX_ROBOTS,
@@ -112,18 +112,14 @@ impl Agreement {
         counts: impl Fn(RobotId) -> bool,
     ) -> bool {
         let Some(class) = self.held().and_then(|held| held.class) else { return false };
+        let counts = |robot: RobotId| !self.restarted.contains(&robot) && counts(robot);
         let holds = |holder: &&Holder| {
             let Holder { robot, holding, .. } = holder;
             let other = *robot != me && !guests.contains(robot);
-            let stays = !holding.changed && !self.restarted.contains(robot);
-            holding.class == Some(class) && stays && other && counts(*robot)
+            holding.class == Some(class) && !holding.changed && other && counts(*robot)
         };
         let through_this = guests.iter().chain([&me]).filter(|robot| counts(**robot));
-        let own = if self.has_changed(me) {
-            0
-        } else {
-            through_this.filter(|robot| !self.restarted.contains(robot)).count()
-        };
+        let own = if self.has_changed(me) { 0 } else { through_this.count() };
         if own + self.holders.len() < quorum as usize {
             return false;
         }

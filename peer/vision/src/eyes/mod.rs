@@ -44,8 +44,6 @@ use standard::standardise;
 pub const MINIMUM: f32 = 0.55;
 /// A hand that is this likely where the last one was is the same.
 const STILL_THERE: f32 = 0.6;
-/// A first look that does not convince is followed by a finer one.
-const UNSURE: f32 = MINIMUM;
 /// The finer look is for hands up to this size, in pixels of a frame 160 wide: of larger ones it finds parts.
 const SMALL: f32 = 28.0;
 /// A count that is less likely than this is read once more, mirrored.
@@ -156,7 +154,8 @@ impl Eyes {
         }
         let mut search = Search::default();
         self.search(frame, 1, &mut search)?;
-        if search.best.is_none_or(|best| best.score < UNSURE) {
+        // A first look that does not convince is followed by a finer one.
+        if search.best.is_none_or(|best| best.score < MINIMUM) {
             self.search(frame, 2, &mut search)?;
         }
         let Some(best) = search.best else { return Err(unrecognised(search.dismissed)) };

@@ -45,6 +45,14 @@ fn decision(class: Option<u32>, robots: u32, confidence: f64, author: u32) -> De
     }
 }
 
+/// That of a robot which holds gesture 1, by the votes of so many, from then on.
+fn holding(robots: u32, since: Duration) -> Agreement {
+    let mut agreement = Agreement::default();
+    agreement.believe(decision(Some(1), robots, 0.96, 5));
+    agreement.settle(since, true);
+    agreement
+}
+
 /// Nobody need be known to hold it, and nothing waits for that.
 fn announcement(agreement: &Agreement) -> Option<Duration> {
     agreement.announcement(at(200), true, at(5000))
@@ -89,9 +97,7 @@ fn held_by(agreement: &Agreement, guests: &[u32]) -> Option<u32> {
 
 #[test]
 fn a_decision_is_final_once_so_many_robots_are_known_to_hold_its_class() {
-    let mut agreement = Agreement::default();
-    agreement.believe(decision(Some(1), 3, 0.96, 5));
-    agreement.settle(at(0), true);
+    let mut agreement = holding(3, at(0));
     let of = |class, robots| decision(Some(class), robots, 0.96, 5);
     assert!(agreement.note_holder(holds(2, 7, &of(1, 2), false)));
     assert!(agreement.note_holder(holds(2, 8, &of(1, 3), false)));
@@ -110,11 +116,8 @@ fn a_decision_is_final_once_so_many_robots_are_known_to_hold_its_class() {
 
 #[test]
 fn who_started_again_in_the_midst_of_the_round_counts_for_no_gesture() {
-    let held = decision(Some(1), 3, 0.96, 5);
     let agreement = |of: &[Holder]| {
-        let mut agreement = Agreement::default();
-        agreement.believe(held.clone());
-        agreement.settle(at(0), true);
+        let mut agreement = holding(3, at(0));
         for holder in of {
             agreement.note_holder(holder.clone());
         }
@@ -154,9 +157,7 @@ fn who_knows_the_same_words_has_the_same_digest() {
 
 #[test]
 fn what_no_majority_holds_is_announced_late_and_again_when_one_does() {
-    let mut agreement = Agreement::default();
-    agreement.believe(decision(Some(1), 3, 0.96, 5));
-    agreement.settle(at(100), true);
+    let mut agreement = holding(3, at(100));
     let due = |agreement: &Agreement| {
         let is_final = agreement.is_final(2, RobotId(1), &BTreeSet::new(), |_| true);
         agreement.announcement(at(200), is_final, at(5000))
@@ -190,9 +191,7 @@ fn what_was_announced_is_not_announced_again_unless_the_class_changes() {
 
 #[test]
 fn an_earlier_announcement_that_comes_again_is_not_answered() {
-    let mut agreement = Agreement::default();
-    agreement.believe(decision(Some(1), 2, 0.96, 5));
-    agreement.settle(at(0), true);
+    let mut agreement = holding(2, at(0));
     for is_final in [false, true, false] {
         agreement.note_announced(at(300), Some(ClassId(1)), is_final);
     }
@@ -201,18 +200,14 @@ fn an_earlier_announcement_that_comes_again_is_not_answered() {
 
 #[test]
 fn an_announcement_that_contradicts_is_answered() {
-    let mut agreement = Agreement::default();
-    agreement.believe(decision(Some(1), 2, 0.96, 5));
-    agreement.settle(at(0), true);
+    let mut agreement = holding(2, at(0));
     agreement.note_announced(at(900), Some(ClassId(3)), true);
     assert_eq!(announcement(&agreement), Some(at(1100)));
 }
 
 #[test]
 fn who_goes_on_contradicting_keeps_nobody_from_answering() {
-    let mut agreement = Agreement::default();
-    agreement.believe(decision(Some(1), 2, 0.96, 5));
-    agreement.settle(at(0), true);
+    let mut agreement = holding(2, at(0));
     for time in [100, 200, 290] {
         agreement.note_announced(at(time), Some(ClassId(3)), false);
     }
