@@ -56,7 +56,7 @@ pub use fit::{Testimony, Weights, fit};
 pub use fuse::Fuse;
 pub use life::Life;
 pub use lot::{Lottery, lot};
-pub use machine::{Follow, Input, Output, Rounds};
+pub use machine::{Follow, Input, Output, Rounds, TAUGHT_AHEAD};
 pub use observation::Observation;
 pub use outcome::outcome;
 pub use proof::{follows, is_refuted};

@@ -1,20 +1,18 @@
 //! Which rounds lie ahead of all that are known here: names of rounds to come can be guessed, and whoever speaks of one does not end it.
 
 use gestalt_protocol::RoundId;
+use gestalt_rounds::TAUGHT_AHEAD;
 
 use super::memory::Item;
 use super::state::Learning;
 
-/// How far beyond the newest round known one may lie that is spoken of.
-const LEAP: u32 = 64;
-
-/// The same for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
+/// As [`TAUGHT_AHEAD`] for a robot that knows of no round yet: nobody shows a million gestures unnoticed.
 const LEAP_OF_A_NEWBORN: u32 = 1_000_000;
 
 impl Learning {
     /// The highest counter of a round of which a lesson is taken in: lessons come after their rounds.
     pub(super) fn furthest(&self) -> u32 {
-        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(LEAP))
+        self.newest.map_or(LEAP_OF_A_NEWBORN, |newest| newest.saturating_add(TAUGHT_AHEAD))
     }
 
     /// Something was said of that round. What is said of one before any of its count is known ends none.

@@ -6,16 +6,13 @@ use std::time::Duration;
 
 use gestalt_protocol::RoundId;
 
-use super::follow::Follow;
+use super::follow::{Follow, TAUGHT_AHEAD};
 use super::output::Output;
 use super::rounds::{Effects, Rounds};
 use crate::classify::Classify;
 use crate::observation::Observation;
 use crate::refusal::Refusal;
 use crate::round::Round;
-
-/// So many counts at most are passed over for a round to be opened: lessons on rounds further ahead are not taken in.
-const MOST_SKIPPED: u32 = 64;
 
 impl Rounds {
     pub(super) fn on_open(&mut self, effects: &mut Effects<'_>) {
@@ -32,7 +29,7 @@ impl Rounds {
             return self.refusals.add(Refusal::CountersUsedUp);
         };
         let named = |counter| RoundId { counter, opener: self.me, life: self.nonce };
-        let last = next.saturating_add(MOST_SKIPPED);
+        let last = next.saturating_add(TAUGHT_AHEAD);
         let is_free = |id: &RoundId| !effects.follower.taught(id.counter).contains(id);
         let id = (next..=last).map(named).find(is_free).unwrap_or_else(|| named(last));
         self.join(id, effects);

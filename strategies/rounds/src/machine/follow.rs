@@ -5,6 +5,9 @@ use std::sync::Arc;
 
 use gestalt_protocol::{Decision, Digest, HeldVote, Pool, RoundId};
 
+/// How far beyond the newest round known one may lie of which an instructor spoke: names of rounds to come can be guessed.
+pub const TAUGHT_AHEAD: u32 = 64;
+
 /// Follows the rounds that a robot lives through: is told of them, and asked for the little they need to know of it.
 ///
 /// `()` follows nothing: a robot that decides and does not learn. Calls come in the order in which things happen, within

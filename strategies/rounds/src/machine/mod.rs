@@ -30,7 +30,7 @@ mod tests;
 mod voting;
 mod wanted;
 
-pub use follow::Follow;
+pub use follow::{Follow, TAUGHT_AHEAD};
 pub use input::Input;
 pub use output::Output;
 pub use rounds::Rounds;
