@@ -287,8 +287,8 @@ impl Round {
             || own.is_none_or(spoke) && view.expected.all(spoke)
     }
 
-    /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too. Where liars are expected they may have
-    /// chosen what it rests on, and decided before the others had a say.
+    /// Whether what this robot knows of the votes, those of the decision among them, speaks for it too, whichever of them lie. Where liars are
+    /// expected they may have chosen what it rests on, and decided before the others had a say.
     pub fn bears_out(
         &self,
         now: Duration,
@@ -301,7 +301,8 @@ impl Round {
         let scale = Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() };
         let likeliest = || {
             let fusion = self.ballot.fuse(rule, config.clip, scale)?;
-            self.ballot.columns(scale).class(fusion.top.index())
+            let leads_always = self.ballot.withstands(rule, config, scale, &fusion) > 0.0;
+            self.ballot.columns(scale).class(fusion.top.index()).filter(|_| leads_always)
         };
         (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
     }
