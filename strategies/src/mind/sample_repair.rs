@@ -180,6 +180,10 @@ impl Mind {
     pub(super) fn on_batch(&mut self, from: RobotId, batch: HeldBatch) {
         let is_neighbour = self.compares_with(from);
         let author = batch.robot;
+        // In another's name, whom nobody would believe that passes it on.
+        if batch.samples.first().is_none_or(|first| first.author != author) {
+            return self.rounds.note_refusal(Refusal::Impossible);
+        }
         let Some(learning) = &mut self.learning else { return };
         if self.contradictions.len() < MAX_CONTRADICTIONS
             && let Some(held) = learning.contradicted(&batch)

@@ -146,6 +146,10 @@ impl Rounds {
             return false;
         }
         let this = self.is_this_round(vote.round);
+        if !this && self.has_come_here(&held) {
+            self.hear_of(robot);
+            return false;
+        }
         let order = match self.place((vote.round, None), this, robot, effects) {
             Err(refusal) => {
                 self.hear_of(robot);
@@ -195,6 +199,15 @@ impl Rounds {
             self.tell(robot, Message::Give(give), effects);
         }
         is_news
+    }
+
+    /// Whether a robot has said since that vote what it holds of the round known here. It called that by another name then, or has left another for it: it is in
+    /// none of that name.
+    fn has_come_here(&self, vote: &HeldVote) -> bool {
+        self.round.as_ref().is_some_and(|round| {
+            round.id.counter == vote.vote.round.counter
+                && round.agreement.holder(vote.robot).is_some_and(|holder| vote.stamp < holder.stamp)
+        })
     }
 
     /// A robot that is there votes, if not in the round that this one is in: it says something, and counts as one that does. Whoever took it for a name

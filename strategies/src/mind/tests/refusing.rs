@@ -13,7 +13,12 @@ fn a_sample_that_is_none_is_refused_and_counted() {
         vector,
     };
     let sound = Vector::F32(vec![0.5; 4]);
+    let in_anothers_name = {
+        let theirs = sample(1, 1, sound.clone());
+        SharedSample { id: SampleId { author: RobotId(8), ..theirs.id }, ..theirs }
+    };
     for (space, sample, refusal) in [
+        (space, in_anothers_name, Refusal::Impossible),
         (FeatureSpaceId(1), sample(1, 1, sound.clone()), Refusal::OtherSpace),
         (space, sample(1, 1, Vector::F32(vec![0.5; 3])), Refusal::BadVector),
         (space, sample(1, 1, Vector::I8(vec![1; 5])), Refusal::BadVector),

@@ -332,3 +332,48 @@ fn who_started_again_in_the_midst_of_a_round_is_told_and_counts_for_none() {
     assert_eq!(holds(here, gives(7, decision(1, Some(0), 3, 9))), Some(false));
     assert_eq!(holds(here, word(7, 1, 60, Message::Give(told))), Some(true), "it counts no more");
 }
+
+/// The part that was cut off has another name for the round; whoever has heard of both holds what one of them decided.
+#[test]
+fn two_decisions_that_count_one_robot_are_of_one_round_however_late_they_meet() {
+    let counted = |(robot, sequence, opener): (u32, u32, u32), class: u32| CountedVote {
+        robot: RobotId(robot),
+        stamp: Stamp { boot: 1, sequence },
+        class: ClassId(class),
+        weight: 1.0,
+        vote: Vote { round: round(1, opener), ..vote(1, class as usize, SURE) },
+        signature: None,
+    };
+    for (boot, held) in [(1, Some(ClassId(0))), (2, Some(ClassId(1)))] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 7]))));
+        mind.handle(ms(0), votes(3, 1, Vote { round: round(1, 3), ..null(1) }));
+        mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 1, SURE) }));
+        let late = adding_up().deadline + ms(2000);
+        live(&mut mind, late);
+        assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(1)), "with what it heard");
+        assert_eq!(mind.round(), Some(round(1, 3)));
+        // Robot 3 was in the round that robot 2 opened from then, or has started since.
+        let theirs = [(1, 1, 2), (2, 1, 2), (3, 9, 2)].map(|of| counted(of, 0));
+        let theirs = theirs.map(|vote| CountedVote { stamp: Stamp { boot, ..vote.stamp }, ..vote });
+        mind.handle(late, gives(1, decided(round(1, 2), Some(0), theirs.to_vec(), 1)));
+        assert_eq!(mind.held().and_then(|held| held.class), held, "boot {boot}");
+    }
+}
+
+/// A relay may bring it last.
+#[test]
+fn a_vote_from_before_its_robot_came_to_this_round_opens_no_other() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+    let decision = decision(1, Some(0), 3, 3);
+    mind.handle(ms(10), gives(3, decision.clone()));
+    live(&mut mind, adding_up().deadline + ms(500));
+    let (here, at) = (round(1, 1), adding_up().deadline + ms(600));
+    let elsewhere = |sequence| votes(9, sequence, Vote { round: round(1, 9), ..null(1) });
+    mind.handle(at, says_it_holds(9, &decision));
+    mind.handle(at, elsewhere(39));
+    assert_eq!((mind.round(), mind.is_open()), (Some(here), false));
+    mind.handle(at, elsewhere(41));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "it is in another since");
+}
