@@ -154,13 +154,27 @@ impl Rounds {
             None => self.past.clear(),
         }
         let taught = effects.follower.taught(id.counter);
-        let open = open && !taught.contains(&id);
+        let mut round = Round::new(id, self.now, open && !taught.contains(&id));
+        if self.may_have_been_in(id, open) {
+            round.agreement.note_restart(self.me);
+        }
+        let open = round.open;
         self.past.extend(taught);
         self.past.remove(&id);
-        self.round = Some(Round::new(id, self.now, open));
+        self.round = Some(round);
         self.committee = None;
         self.draw(&BTreeSet::new());
         self.looking = open.then_some(id);
         effects.follower.entered(id);
+    }
+
+    /// Whether this robot may have counted for a gesture of that round in an earlier life, which it has forgotten: where it heard of it soon after its start, or when it was
+    /// over.
+    fn may_have_been_in(&mut self, id: RoundId, open: bool) -> bool {
+        let mine = id.opener == self.me && id.life == self.nonce;
+        let started = self.began.1.unwrap_or(self.now);
+        let since_then = open && self.now > started.saturating_add(self.config.deadline);
+        self.afresh &= !(mine || since_then);
+        self.afresh
     }
 }

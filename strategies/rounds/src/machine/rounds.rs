@@ -126,6 +126,8 @@ pub struct Rounds {
     pub(super) far_ahead: BTreeMap<RobotId, u32>,
     /// The counter that this life began with, and when it began.
     pub(super) began: (u32, Option<Duration>),
+    /// Whether this robot has lived before, and has been in no round since from its beginning.
+    pub(super) afresh: bool,
     pub(super) electorate: Electorate,
     /// Who votes in the newest round, where not all do.
     pub(super) committee: Option<Committee>,
@@ -186,6 +188,7 @@ impl Rounds {
             far_ahead: BTreeMap::new(),
             highest: None,
             began: (0, None),
+            afresh: false,
             electorate: Electorate::new(config.all_vote_up_to()),
             committee: None,
             wanted: None,
@@ -208,6 +211,14 @@ impl Rounds {
             shown: None,
             blind: false,
         })
+    }
+
+    /// The same rounds, of a robot that has lived before: it counts for no gesture of a round that may have begun before this life, until it is in one that
+    /// did not. It may have counted for another, and forgotten it.
+    #[must_use]
+    pub fn started_again(mut self) -> Self {
+        self.afresh = true;
+        self
     }
 
     /// The same rounds, that go on counting from there: from the newest that an earlier life knew of.

@@ -377,3 +377,32 @@ fn a_vote_from_before_its_robot_came_to_this_round_opens_no_other() {
     mind.handle(at, elsewhere(41));
     assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "it is in another since");
 }
+
+/// It may have been for another gesture of the round, and have forgotten it; nobody that it hears knows.
+#[test]
+fn who_lived_before_counts_for_no_gesture_of_a_round_that_may_have_begun_before_it_did() {
+    let deadline = adding_up().deadline;
+    let is_final = |afresh: bool, start: Duration, opens: bool| {
+        let mind = mind(7);
+        let mut mind = if afresh { mind.started_again() } else { mind };
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 7]))));
+        if opens {
+            mind.handle(start, Input::Open);
+        }
+        let id = mind.round().unwrap_or(round(1, 3));
+        mind.handle(start, votes(3, 1, Vote { round: id, ..vote(1, 0, SURE) }));
+        live(&mut mind, start + ms(1500));
+        let held = mind.held().expect("it suffices").clone();
+        assert_eq!(held.class, Some(ClassId(0)));
+        mind.handle(start + ms(1500), says_it_holds(3, &held));
+        mind.held_aloud().expect("it holds it").decision.is_final
+    };
+    for (afresh, start, opens, expected) in [
+        (true, ms(10), false, false),
+        (false, ms(10), false, true),
+        (true, ms(10), true, true),
+        (true, deadline + ms(10), false, true),
+    ] {
+        assert_eq!(is_final(afresh, start, opens), expected, "{afresh} {start:?} {opens}");
+    }
+}

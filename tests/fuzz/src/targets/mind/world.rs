@@ -53,6 +53,8 @@ pub struct World {
     holders: BTreeMap<(u32, ClassId), BTreeSet<usize>>,
     /// The robots that were not told who is there.
     misled: BTreeSet<RobotId>,
+    /// Whether a robot started again with an empty disk: it cannot know what it counted for before.
+    forgot_all: bool,
     /// The batch that each sample was first said in.
     batches: BTreeMap<SampleId, Samples>,
     /// Series of which a sample was said in two batches.
@@ -71,6 +73,7 @@ impl World {
             finals: BTreeMap::new(),
             holders: BTreeMap::new(),
             misled: BTreeSet::new(),
+            forgot_all: false,
             batches: BTreeMap::new(),
             contradictory: BTreeSet::new(),
         };
@@ -95,6 +98,7 @@ impl World {
     /// # Panics
     /// If it cannot read its disk.
     pub fn restart(&mut self, robot: usize, keeps_disk: bool) {
+        self.forgot_all |= !keeps_disk;
         self.robots[robot].restart(keeps_disk);
         self.gates[robot] = Gate::default();
         self.input(robot, Input::Learned(Arc::new(ByFirst)));
@@ -165,6 +169,11 @@ impl World {
     /// A round for which two gestures were final.
     pub fn contradiction(&self) -> Option<RoundId> {
         self.finals.iter().find(|(_, (first, last))| first != last).map(|(round, _)| *round)
+    }
+
+    /// Whether a robot lost its disk.
+    pub fn forgot_all(&self) -> bool {
+        self.forgot_all
     }
 
     /// Whether samples of that series were said in batches that overlap, of which each robot keeps the one that it heard first.
