@@ -61,20 +61,20 @@ fn alike(world: &World, one: &Mind, other: &Mind) {
     // A round may have another name here than there: whoever opened it under that has forgotten it.
     let counter = |mind: &Mind| mind.round().map(|round| round.counter);
     let gesture = |mind: &Mind| mind.held().and_then(|held| held.class);
-    // Whom a stranger has made believe in robots that are not there decides nothing, and believes nobody who counts fewer: it may not even hear of the
+    // Whom a stranger has made believe in robots that are not there believes nobody who counts fewer: it keeps what it held, and may not even hear of the
     // round that they decided.
-    let knows_of_none = |mind: &Mind| world.was_misled(mind.me()) && gesture(mind).is_none();
+    let was_misled = world.was_misled(one.me()) || world.was_misled(other.me());
     // One that started again goes to no round by its own earlier word alone.
-    let knows_a_round = |mind: &Mind| mind.round().is_some();
-    let decided = gesture(one).or(gesture(other)).is_some();
-    let all_know = decided || knows_a_round(one) && knows_a_round(other);
-    if all_know && !knows_of_none(one) && !knows_of_none(other) {
+    let one_knows_of_none = one.round().is_none() || other.round().is_none();
+    let undecided = gesture(one).or(gesture(other)).is_none();
+    if !was_misled && !(undecided && one_knows_of_none) {
         assert_eq!(counter(one), counter(other), "rounds of robots {} and {}", one.me(), other.me());
     }
-    // What it had decided before, it keeps.
-    let was_misled = world.was_misled(one.me()) || world.was_misled(other.me());
+    // Of two names of a round, which a cut kept apart, a person spoke of one: for who knew the other, that was another showing.
+    let names = [one, other].map(|mind| mind.round());
+    let are_two = names[0] != names[1] && names.into_iter().flatten().any(|name| world.was_spoken_of(name));
     let is_misled = world.misled() && (gesture(one).is_none() || gesture(other).is_none());
-    if !was_misled && !is_misled {
+    if !was_misled && !is_misled && !are_two {
         assert_eq!(gesture(one), gesture(other), "robots {} and {}", one.me(), other.me());
     }
     let lessons = |mind: &Mind| mind.learned().map(|learned| learned.lessons);

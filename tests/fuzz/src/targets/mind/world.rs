@@ -55,6 +55,8 @@ pub struct World {
     misled: BTreeSet<RobotId>,
     /// Whether a robot started again with an empty disk: it cannot know what it counted for before.
     forgot_all: bool,
+    /// Rounds that people spoke of.
+    spoken_of: BTreeSet<RoundId>,
     /// The batch that each sample was first said in.
     batches: BTreeMap<SampleId, Samples>,
     /// Series of which a sample was said in two batches.
@@ -74,6 +76,7 @@ impl World {
             holders: BTreeMap::new(),
             misled: BTreeSet::new(),
             forgot_all: false,
+            spoken_of: BTreeSet::new(),
             batches: BTreeMap::new(),
             contradictory: BTreeSet::new(),
         };
@@ -125,6 +128,9 @@ impl World {
     /// If it announces as final what no majority ever held, and knows who is there.
     pub fn input(&mut self, robot: usize, input: Input) {
         let me = RobotId(robot as u32 + 1);
+        if let Input::Instructed(word) = &input {
+            self.spoken_of.extend(word.instruction.round());
+        }
         for output in self.robots[robot].handle(self.now, input) {
             match output {
                 Output::Broadcast(envelope) => self.tell_all(robot, Said::Message(envelope)),
@@ -169,6 +175,11 @@ impl World {
     /// A round for which two gestures were final.
     pub fn contradiction(&self) -> Option<RoundId> {
         self.finals.iter().find(|(_, (first, last))| first != last).map(|(round, _)| *round)
+    }
+
+    /// Whether a person spoke of that round.
+    pub fn was_spoken_of(&self, round: RoundId) -> bool {
+        self.spoken_of.contains(&round)
     }
 
     /// Whether a robot lost its disk.
