@@ -64,6 +64,12 @@ impl Agreement {
         }
     }
 
+    /// Whether it did, as far as is known.
+    #[must_use]
+    pub fn has_restarted(&self, robot: RobotId) -> bool {
+        self.restarted.contains(&robot)
+    }
+
     /// Forgets what these robots hold, and every decision that counted one of them, or that one of them drew; whether there was one.
     pub fn expel(&mut self, robots: &BTreeSet<RobotId>) -> bool {
         let counts = |decision: &Decision| {
@@ -112,7 +118,7 @@ impl Agreement {
         counts: impl Fn(RobotId) -> bool,
     ) -> bool {
         let Some(class) = self.held().and_then(|held| held.class) else { return false };
-        let counts = |robot: RobotId| !self.restarted.contains(&robot) && counts(robot);
+        let counts = |robot: RobotId| !self.has_restarted(robot) && counts(robot);
         let holds = |holder: &&Holder| {
             let Holder { robot, holding, .. } = holder;
             let other = *robot != me && !guests.contains(robot);
@@ -129,7 +135,7 @@ impl Agreement {
     /// Whether another gesture was held before this one, or may have been: by `me`, this robot, before it started.
     #[must_use]
     pub fn has_changed(&self, me: RobotId) -> bool {
-        let is_another = |held: &Decision| held.class != self.first || self.restarted.contains(&me);
+        let is_another = |held: &Decision| held.class != self.first || self.has_restarted(me);
         self.held().is_some_and(|held| held.class.is_some() && is_another(held))
     }
 

@@ -102,11 +102,13 @@ impl Rounds {
         self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
     }
 
-    /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted.
+    /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted. One that began before this robot
+    /// did has lasted longer than it knows.
     pub(super) fn is_as_old(&self, decision: &Decision) -> bool {
         let took = Duration::from_millis(decision.certificate.elapsed_ms.into());
         self.round.as_ref().is_some_and(|round| {
             round.id == decision.round
+                || round.agreement.has_restarted(self.me)
                 || self.now >= (round.since + took).saturating_sub(self.config.patience)
         })
     }

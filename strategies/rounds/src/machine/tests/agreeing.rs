@@ -406,3 +406,19 @@ fn who_lived_before_counts_for_no_gesture_of_a_round_that_may_have_begun_before_
         assert_eq!(is_final(afresh, start, opens), expected, "{afresh} {start:?} {opens}");
     }
 }
+
+#[test]
+fn who_started_again_in_the_midst_of_a_round_takes_what_was_decided_in_it_under_another_name() {
+    for afresh in [true, false] {
+        let mind = mind(7);
+        let mut mind = if afresh { mind.started_again() } else { mind };
+        mind.handle(ms(0), votes(9, 1, Vote { round: round(1, 9), ..vote(1, 1, SURE) }));
+        mind.handle(ms(10), gives(9, Decision { round: round(1, 9), ..decision(1, Some(1), 1, 9) }));
+        // It was opened three seconds before this robot heard of it.
+        let theirs = decision(1, Some(0), 3, 3);
+        let certificate = gestalt_protocol::Certificate { elapsed_ms: 3000, ..theirs.certificate };
+        mind.handle(ms(20), gives(3, Decision { certificate, ..theirs }));
+        let held = mind.held().and_then(|held| held.class);
+        assert_eq!(held, Some(ClassId(if afresh { 0 } else { 1 })), "{afresh}");
+    }
+}
