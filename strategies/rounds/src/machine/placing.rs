@@ -123,7 +123,8 @@ impl Rounds {
         let is_counted = self.round.as_ref().is_some_and(|round| {
             round.id.counter == id.counter
                 && !self.past.contains(&id)
-                && (names.any(|name| round.is_named(name)) || counts_one_of(decision, round))
+                && (names.any(|name| round.is_named(name))
+                    || counts_some_of(decision, round, self.config.liars))
         });
         // What an instructor spoke of meanwhile was shown before.
         is_counted && (self.is_this_round(id) || !effects.follower.taught(id.counter).contains(&id))
@@ -139,19 +140,17 @@ impl Rounds {
     }
 }
 
-/// Whether a decision counts a robot that voted in this round too, in the same life and before: it has heard by which other name the round goes. Asked where
-/// both are decided, as otherwise one gives way to the other.
-fn counts_one_of(decision: &Decision, round: &Round) -> bool {
+/// Whether a decision counts more robots than may lie that voted in this round too, in the same life and before: they have heard by which other name the round
+/// goes. Asked where both are decided, as otherwise one gives way to the other.
+fn counts_some_of(decision: &Decision, round: &Round, liars: u32) -> bool {
     let Certificate { votes, others, .. } = &decision.certificate;
-    let mut counted = votes
-        .iter()
-        .map(|counted| (counted.robot, counted.stamp))
-        .chain(others.iter().map(|held| (held.robot, held.stamp)));
+    let voted = votes.iter().map(|counted| (counted.robot, counted.stamp));
+    let counted = voted.chain(others.iter().map(|held| (held.robot, held.stamp)));
     let both_decided = decision.class.is_some() && round.agreement.rank().is_some_and(|rank| rank.decided);
-    let was_here = |(robot, stamp): (RobotId, Stamp)| {
-        round.ballot.stamp(robot).is_some_and(|known| known.boot == stamp.boot && known < stamp)
+    let was_here = |(robot, stamp): &(RobotId, Stamp)| {
+        round.ballot.stamp(*robot).is_some_and(|known| known.boot == stamp.boot && known < *stamp)
     };
-    both_decided && counted.any(was_here)
+    both_decided && counted.filter(was_here).count() > liars as usize
 }
 
 /// Whether a round is newer than the one known here, which belongs to another showing. Of two under one count the greater name is, for all alike; but of two that

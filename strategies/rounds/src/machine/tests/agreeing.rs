@@ -335,7 +335,7 @@ fn who_started_again_in_the_midst_of_a_round_is_told_and_counts_for_none() {
 
 /// The part that was cut off has another name for the round; whoever has heard of both holds what one of them decided.
 #[test]
-fn two_decisions_that_count_one_robot_are_of_one_round_however_late_they_meet() {
+fn two_decisions_that_count_a_robot_that_does_not_lie_are_of_one_round_however_late_they_meet() {
     let counted = |(robot, sequence, opener): (u32, u32, u32), class: u32| CountedVote {
         robot: RobotId(robot),
         stamp: Stamp { boot: 1, sequence },
