@@ -323,11 +323,6 @@ impl RobotMemory {
         self.owner.is_none()
     }
 
-    /// Whether a robot wrote it that has ended since.
-    pub(crate) fn is_of_an_earlier_life(&self) -> bool {
-        self.owner.is_some()
-    }
-
     /// The highest count of a round that this robot saw something of itself, or heard spoken of: of rounds that anybody may have made up nothing is written.
     /// What others say they saw is not looked at: of that nobody checks the count.
     pub(crate) fn newest_counter(&self) -> Option<u32> {

@@ -119,7 +119,7 @@ impl Mind {
     /// See [`LearningError`].
     pub fn learning(mut self, setup: LearningSetup) -> Result<Self, LearningError> {
         let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
-        let starts_again = setup.memory.as_ref().is_some_and(RobotMemory::is_of_an_earlier_life);
+        let starts_again = setup.memory.as_ref().is_some_and(|memory| !memory.is_empty());
         let vocabulary = setup.vocabulary.clone();
         self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
         self.rounds = self.rounds.counting_from(counter).naming(vocabulary);

@@ -155,7 +155,7 @@ impl Rounds {
         }
         let taught = effects.follower.taught(id.counter);
         let mut round = Round::new(id, self.now, open && !taught.contains(&id));
-        if self.may_have_been_in(id, open) {
+        if self.may_have_been_in(&round) {
             round.agreement.note_restart(self.me);
         }
         let open = round.open;
@@ -169,12 +169,11 @@ impl Rounds {
     }
 
     /// Whether this robot may have counted for a gesture of that round in an earlier life, which it has forgotten: where it heard of it soon after its start, or when it was
-    /// over.
-    fn may_have_been_in(&mut self, id: RoundId, open: bool) -> bool {
-        let mine = id.opener == self.me && id.life == self.nonce;
+    /// over. Of one that it opens nobody has heard before; but others of its count may be one with it.
+    fn may_have_been_in(&mut self, round: &Round) -> bool {
+        let mine = round.id.opener == self.me && round.id.life == self.nonce;
         let started = self.began.1.unwrap_or(self.now);
-        let since_then = open && self.now > started.saturating_add(self.config.deadline);
-        self.afresh &= !(mine || since_then);
-        self.afresh
+        self.afresh &= !(round.open && self.now > started.saturating_add(self.config.deadline));
+        self.afresh && !mine
     }
 }

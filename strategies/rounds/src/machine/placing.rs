@@ -82,6 +82,9 @@ impl Rounds {
             if round.merge(id, by) {
                 effects.follower.merged(before, id);
             }
+            if self.afresh && id != before {
+                round.agreement.note_restart(self.me);
+            }
         }
         Ok(order)
     }
@@ -140,15 +143,19 @@ impl Rounds {
     }
 }
 
-/// Whether a decision counts more robots than may lie that voted in this round too, in the same life and before: they have heard by which other name the round
-/// goes. Asked where both are decided, as otherwise one gives way to the other.
+/// Whether a decision counts more robots than may lie that voted in this round too, in the same life, and came to call it by another name: by a smaller one, as
+/// robots do where rounds merge. Whoever went to a greater one may have gone on to another showing. Asked where both are decided, as otherwise one gives
+/// way to the other.
 fn counts_some_of(decision: &Decision, round: &Round, liars: u32) -> bool {
     let Certificate { votes, others, .. } = &decision.certificate;
-    let voted = votes.iter().map(|counted| (counted.robot, counted.stamp));
-    let counted = voted.chain(others.iter().map(|held| (held.robot, held.stamp)));
+    let voted = votes.iter().map(|counted| (counted.robot, counted.stamp, counted.vote.round));
+    let counted = voted.chain(others.iter().map(|held| (held.robot, held.stamp, held.vote.round)));
     let both_decided = decision.class.is_some() && round.agreement.rank().is_some_and(|rank| rank.decided);
-    let was_here = |(robot, stamp): &(RobotId, Stamp)| {
-        round.ballot.stamp(*robot).is_some_and(|known| known.boot == stamp.boot && known < *stamp)
+    let was_here = |(robot, stamp, name): &(RobotId, Stamp, RoundId)| {
+        round.ballot.of(*robot).is_some_and(|known| {
+            let moved = known.stamp.boot == stamp.boot && known.vote.round != *name;
+            moved && (known.stamp < *stamp) == (*name < known.vote.round)
+        })
     };
     both_decided && counted.filter(was_here).count() > liars as usize
 }

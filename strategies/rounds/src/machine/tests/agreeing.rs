@@ -344,20 +344,27 @@ fn two_decisions_that_count_a_robot_that_does_not_lie_are_of_one_round_however_l
         vote: Vote { round: round(1, opener), ..vote(1, class as usize, SURE) },
         signature: None,
     };
-    for (boot, held) in [(1, Some(ClassId(0))), (2, Some(ClassId(1)))] {
+    // When robot 3 voted here, under the name 3, and there, under which name: and by which names the round goes then, and what is held.
+    for (here, (boot, there, name), called, held) in [
+        (1, (1, 9, 2), 2, 0), // It has heard of a smaller one since,
+        (9, (1, 1, 7), 3, 0), // or had before,
+        (1, (2, 9, 2), 3, 1), // or has started since;
+        (1, (1, 9, 7), 7, 0), // or has gone on to another round,
+        (9, (1, 1, 2), 3, 1), // or had come from one.
+    ] {
         let mut mind = mind(7);
         mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 7]))));
-        mind.handle(ms(0), votes(3, 1, Vote { round: round(1, 3), ..null(1) }));
+        mind.handle(ms(0), votes(3, here, Vote { round: round(1, 3), ..null(1) }));
         mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 1, SURE) }));
         let late = adding_up().deadline + ms(2000);
         live(&mut mind, late);
         assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(1)), "with what it heard");
         assert_eq!(mind.round(), Some(round(1, 3)));
-        // Robot 3 was in the round that robot 2 opened from then, or has started since.
-        let theirs = [(1, 1, 2), (2, 1, 2), (3, 9, 2)].map(|of| counted(of, 0));
+        let theirs = [(1, 1, name), (2, 1, name), (3, there, name)].map(|of| counted(of, 0));
         let theirs = theirs.map(|vote| CountedVote { stamp: Stamp { boot, ..vote.stamp }, ..vote });
-        mind.handle(late, gives(1, decided(round(1, 2), Some(0), theirs.to_vec(), 1)));
-        assert_eq!(mind.held().and_then(|held| held.class), held, "boot {boot}");
+        mind.handle(late, gives(1, decided(round(1, name), Some(0), theirs.to_vec(), 1)));
+        let holds = mind.held().and_then(|held| held.class);
+        assert_eq!((mind.round(), holds), (Some(round(1, called)), Some(ClassId(held))), "{there} as {name}");
     }
 }
 
@@ -376,49 +383,4 @@ fn a_vote_from_before_its_robot_came_to_this_round_opens_no_other() {
     assert_eq!((mind.round(), mind.is_open()), (Some(here), false));
     mind.handle(at, elsewhere(41));
     assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true), "it is in another since");
-}
-
-/// It may have been for another gesture of the round, and have forgotten it; nobody that it hears knows.
-#[test]
-fn who_lived_before_counts_for_no_gesture_of_a_round_that_may_have_begun_before_it_did() {
-    let deadline = adding_up().deadline;
-    let is_final = |afresh: bool, start: Duration, opens: bool| {
-        let mind = mind(7);
-        let mut mind = if afresh { mind.started_again() } else { mind };
-        mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 7]))));
-        if opens {
-            mind.handle(start, Input::Open);
-        }
-        let id = mind.round().unwrap_or(round(1, 3));
-        mind.handle(start, votes(3, 1, Vote { round: id, ..vote(1, 0, SURE) }));
-        live(&mut mind, start + ms(1500));
-        let held = mind.held().expect("it suffices").clone();
-        assert_eq!(held.class, Some(ClassId(0)));
-        mind.handle(start + ms(1500), says_it_holds(3, &held));
-        mind.held_aloud().expect("it holds it").decision.is_final
-    };
-    for (afresh, start, opens, expected) in [
-        (true, ms(10), false, false),
-        (false, ms(10), false, true),
-        (true, ms(10), true, true),
-        (true, deadline + ms(10), false, true),
-    ] {
-        assert_eq!(is_final(afresh, start, opens), expected, "{afresh} {start:?} {opens}");
-    }
-}
-
-#[test]
-fn who_started_again_in_the_midst_of_a_round_takes_what_was_decided_in_it_under_another_name() {
-    for afresh in [true, false] {
-        let mind = mind(7);
-        let mut mind = if afresh { mind.started_again() } else { mind };
-        mind.handle(ms(0), votes(9, 1, Vote { round: round(1, 9), ..vote(1, 1, SURE) }));
-        mind.handle(ms(10), gives(9, Decision { round: round(1, 9), ..decision(1, Some(1), 1, 9) }));
-        // It was opened three seconds before this robot heard of it.
-        let theirs = decision(1, Some(0), 3, 3);
-        let certificate = gestalt_protocol::Certificate { elapsed_ms: 3000, ..theirs.certificate };
-        mind.handle(ms(20), gives(3, Decision { certificate, ..theirs }));
-        let held = mind.held().and_then(|held| held.class);
-        assert_eq!(held, Some(ClassId(if afresh { 0 } else { 1 })), "{afresh}");
-    }
 }

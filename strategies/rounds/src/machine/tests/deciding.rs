@@ -236,10 +236,10 @@ fn where_liars_are_expected_a_decision_that_leaves_out_what_is_known_is_not_beli
 /// The honest who voted first lean where the liar wants them, by chance; the one that the liar left out tells them otherwise.
 #[test]
 fn where_liars_are_expected_no_decision_is_believed_whose_gesture_leads_by_them_alone() {
-    let config = RoundsConfig { liars: 1, ..adding_up() };
+    let config = RoundsConfig { liars: 1, quorum: Quorum::Evidence(3), ..adding_up() };
     let mut mind = mind_with(7, config.clone());
     mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 3, 4, 66]))));
-    let first = [(66, vote(1, 2, SURE)), (1, vote(1, 2, 3.0)), (3, vote(1, 2, LEANING))];
+    let first = [(1, vote(1, 2, 3.0)), (3, vote(1, 2, LEANING)), (66, vote(1, 2, SURE))];
     let counted = |(robot, vote): &(u32, Vote)| CountedVote {
         robot: RobotId(*robot),
         stamp: Stamp { boot: 1, sequence: 1 },
@@ -252,11 +252,14 @@ fn where_liars_are_expected_no_decision_is_believed_whose_gesture_leads_by_them_
     for (robot, vote) in first.into_iter().chain([(4, vote(1, 0, 5.5))]) {
         mind.handle(ms(0), votes(robot, 1, vote));
     }
+    // Nobody is waited for any more.
+    live(&mut mind, ms(1500));
     let scale = crate::ballot::Scale { vocabulary: vocabulary().id(), classes: 3 };
     let of_all = mind.ballot().unwrap().fuse(&config.rule, config.clip, scale).unwrap();
     assert_eq!((of_all.top, mind.held()), (ClassId(2), None), "it leads, and does not convince");
-    mind.handle(ms(1), gives(66, by(&config, chosen)));
+    mind.handle(ms(1500), gives(66, by(&config, chosen)));
     assert_eq!(mind.held(), None);
+    assert!(mind.refusals().iter().all(|(_, count)| count == 0), "it follows from its votes");
 }
 
 fn evidence(class: usize, strength: f32) -> Vec<f32> {

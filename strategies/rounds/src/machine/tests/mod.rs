@@ -10,6 +10,7 @@ mod naming;
 mod opening;
 mod order;
 mod repair;
+mod restarting;
 mod showing;
 mod signing;
 mod voting;
