@@ -67,7 +67,8 @@ fn alike(world: &World, one: &Mind, other: &Mind) {
     // One that started again goes to no round by its own earlier word alone.
     let one_knows_of_none = one.round().is_none() || other.round().is_none();
     let undecided = gesture(one).or(gesture(other)).is_none();
-    if !was_misled && !(undecided && one_knows_of_none) {
+    let both_know = !(undecided && one_knows_of_none);
+    if both_know && !was_misled {
         assert_eq!(counter(one), counter(other), "rounds of robots {} and {}", one.me(), other.me());
     }
     // Of two names of a round, which a cut kept apart, a person spoke of one: for who knew the other, that was another showing.
