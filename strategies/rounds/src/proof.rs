@@ -1,6 +1,6 @@
 //! Whether a decision follows from the votes in its certificate.
 
-use gestalt_protocol::{Certificate, CountedVote, Decision, FusionRule, Pool, RobotId, Vote};
+use gestalt_protocol::{Certificate, CountedVote, Decision, FusionRule, Pool, RobotId, Stamp, Vote};
 
 use crate::ballot::{Scale, weight};
 use crate::columns::Columns;
@@ -70,7 +70,13 @@ fn voters(certificate: &Certificate) -> impl Iterator<Item = RobotId> + '_ {
 }
 
 fn reached(certificate: &Certificate) -> impl Iterator<Item = RobotId> + '_ {
-    voters(certificate).chain(certificate.others.iter().map(|held| held.robot))
+    said(certificate).map(|(robot, ..)| robot)
+}
+
+/// All votes of a certificate, those that are counted first: whose, which of its votes, and what it said.
+pub(crate) fn said(certificate: &Certificate) -> impl Iterator<Item = (RobotId, Stamp, &Vote)> {
+    let counted = certificate.votes.iter().map(|counted| (counted.robot, counted.stamp, &counted.vote));
+    counted.chain(certificate.others.iter().map(|held| (held.robot, held.stamp, &held.vote)))
 }
 
 /// Whether all that it claims holds, by its own terms, of its votes: fused by that rule, if that is to be asked. `suffice`: whether they are enough, where the

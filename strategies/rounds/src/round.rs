@@ -300,9 +300,11 @@ impl Round {
         let certificate = &decision.certificate;
         let scale = Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() };
         let likeliest = || {
-            let fusion = self.ballot.fuse(rule, config.clip, scale)?;
-            let leads_always = self.ballot.withstands(rule, config, scale, &fusion) > 0.0;
-            self.ballot.columns(scale).class(fusion.top.index()).filter(|_| leads_always)
+            let columns = self.ballot.columns(scale);
+            let rows = self.ballot.rows(&columns, config.clip, scale);
+            let fusion = rows.fuse(rule, config.clip)?;
+            let leads_always = rows.withstands(rule, config.clip, &fusion, config.liars) > 0.0;
+            columns.class(fusion.top.index()).filter(|_| leads_always)
         };
         (!self.open || self.has_heard_all(now, view, config)) && likeliest() == decision.class
     }

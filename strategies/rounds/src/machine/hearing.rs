@@ -3,16 +3,14 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use gestalt_protocol::{
-    Certificate, Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp,
-};
+use gestalt_protocol::{Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp};
 
 use super::members::expected;
 use super::placing::newer;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
-use crate::proof::{follows, is_consistent};
+use crate::proof::{follows, is_consistent, said};
 use crate::refusal::Refusal;
 use crate::round::{Round, View};
 
@@ -302,14 +300,12 @@ impl Rounds {
             let somebody = this || decision.certificate.reached() > 0;
             return if somebody && is_consistent(decision) { Ok(()) } else { Err(Refusal::Unfounded) };
         }
-        let Certificate { vocabulary, votes, others, .. } = &decision.certificate;
-        if self.is_foreign(Scale { vocabulary: *vocabulary, classes: decision.certificate.listed() }) {
+        let certificate = &decision.certificate;
+        if self.is_foreign(Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() }) {
             return Err(Refusal::Vocabulary);
         }
-        let counted = votes.iter().map(|counted| (counted.robot, counted.stamp, &counted.vote));
-        let mut said = counted.chain(others.iter().map(|held| (held.robot, held.stamp, &held.vote)));
         let ballot = self.round.as_ref().filter(|_| this).map(|round| &round.ballot);
-        let true_words = said.all(|(robot, stamp, vote)| {
+        let true_words = said(certificate).all(|(robot, stamp, vote)| {
             let known = ballot.and_then(|ballot| ballot.confirms(robot, stamp, vote));
             let never_said = robot == self.me && stamp > self.stamp;
             let is_past = ballot.is_some() && self.past.contains(&vote.round);

@@ -3,9 +3,10 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use gestalt_protocol::{Certificate, Decision, MAX_ROBOTS, RobotId, RoundId, Stamp};
+use gestalt_protocol::{Decision, MAX_ROBOTS, RobotId, RoundId, Stamp, Vote};
 
 use super::rounds::{Effects, Rounds};
+use crate::proof::said;
 use crate::refusal::Refusal;
 use crate::round::Round;
 
@@ -119,9 +120,7 @@ impl Rounds {
     /// Whether a decision counts votes that were cast under a name of the round known here: then it is of that round, whatever it calls it. Whoever heard
     /// those while its own round began took both for one; those who opened first heard of the other name too late to tell.
     pub(super) fn is_counted_in(&self, decision: &Decision, effects: &Effects<'_>) -> bool {
-        let Certificate { votes, others, .. } = &decision.certificate;
-        let mut names =
-            votes.iter().map(|counted| counted.vote.round).chain(others.iter().map(|held| held.vote.round));
+        let mut names = said(&decision.certificate).map(|(_, _, vote)| vote.round);
         let id = decision.round;
         let is_counted = self.round.as_ref().is_some_and(|round| {
             round.id.counter == id.counter
@@ -147,17 +146,15 @@ impl Rounds {
 /// robots do where rounds merge. Whoever went to a greater one may have gone on to another showing. Asked where both are decided, as otherwise one gives
 /// way to the other.
 fn counts_some_of(decision: &Decision, round: &Round, liars: u32) -> bool {
-    let Certificate { votes, others, .. } = &decision.certificate;
-    let voted = votes.iter().map(|counted| (counted.robot, counted.stamp, counted.vote.round));
-    let counted = voted.chain(others.iter().map(|held| (held.robot, held.stamp, held.vote.round)));
     let both_decided = decision.class.is_some() && round.agreement.rank().is_some_and(|rank| rank.decided);
-    let was_here = |(robot, stamp, name): &(RobotId, Stamp, RoundId)| {
+    let was_here = |(robot, stamp, vote): &(RobotId, Stamp, &Vote)| {
         round.ballot.of(*robot).is_some_and(|known| {
-            let moved = known.stamp.boot == stamp.boot && known.vote.round != *name;
-            moved && (known.stamp < *stamp) == (*name < known.vote.round)
+            let (here, there) = (known.vote.round, vote.round);
+            let moved = known.stamp.boot == stamp.boot && here != there;
+            moved && (known.stamp < *stamp) == (there < here)
         })
     };
-    both_decided && counted.filter(was_here).count() > liars as usize
+    both_decided && said(&decision.certificate).filter(was_here).count() > liars as usize
 }
 
 /// Whether a round is newer than the one known here, which belongs to another showing. Of two under one count the greater name is, for all alike; but of two that
