@@ -17,7 +17,7 @@ pub struct Agreement {
     /// What each robot said last that it holds, this one among them. At most [`MAX_ROBOTS`].
     holders: BTreeMap<RobotId, Holder>,
     held: Option<Held>,
-    /// The first gesture held. Whoever counts for one gesture of a round counts for no other, or two could be final.
+    /// The first gesture held, in this round or in one before it under its count. Whoever counts for one gesture of a round counts for no other, or two could be final.
     first: Option<ClassId>,
     /// Who said something in this round in two of its lives: in the first it may have counted for a gesture that it has forgotten.
     restarted: BTreeSet<RobotId>,
@@ -130,6 +130,11 @@ impl Agreement {
             return false;
         }
         own + self.holders().filter(holds).count() >= quorum as usize
+    }
+
+    /// The first gesture held counts in this round too: a vote that a cut held back may have opened it a second time, under another name.
+    pub fn follow(&mut self, under_the_same_count: &Self) {
+        self.first = under_the_same_count.first;
     }
 
     /// Whether another gesture was held before this one, or may have been: by `me`, this robot, before it started.

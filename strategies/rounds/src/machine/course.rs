@@ -148,13 +148,16 @@ impl Rounds {
         self.stop_looking(effects);
         self.highest = self.highest.max(Some(id.counter));
         self.electorate.forget(self.now, self.config.lately, &self.alive);
-        match self.round.as_ref().filter(|before| before.id.counter == id.counter) {
-            Some(before) if before.has_decided() => self.past.extend(before.names()),
-            Some(_) => {}
+        let before = self.round.take().filter(|before| before.id.counter == id.counter);
+        match &before {
+            Some(before) => self.past.extend(before.names()),
             None => self.past.clear(),
         }
         let taught = effects.follower.taught(id.counter);
         let mut round = Round::new(id, self.now, open && !taught.contains(&id));
+        if let Some(before) = before {
+            round.agreement.follow(&before.agreement);
+        }
         if self.may_have_been_in(&round) {
             round.agreement.note_restart(self.me);
         }

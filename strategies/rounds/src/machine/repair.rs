@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
-use gestalt_protocol::{Give, Have, Message, RobotId, Stamp};
+use gestalt_protocol::{Decision, Give, Have, Message, RobotId, Stamp};
 
 use super::hearing::Heard;
 use super::output::Output;
@@ -135,6 +135,9 @@ impl Rounds {
             _ => (None, BTreeMap::<RobotId, Stamp>::new()),
         };
         let decision = round.agreement.held().filter(|held| Some(held.rank()) > rank).cloned();
+        // Under the name that the neighbour knows: it may have heard of the other one too late to take both for one.
+        let called = have.round.filter(|name| order.is_eq() && round.is_named(*name));
+        let decision = decision.map(|held| Decision { round: called.unwrap_or(held.round), ..held });
         // Who gets a decision gets the votes with it.
         let votes = if rank.is_none() && decision.is_none() {
             round.ballot.lacking(&known).take(MAX_GIVEN).collect()

@@ -5,6 +5,7 @@ mod committee;
 mod deciding;
 mod expelling;
 mod flooding;
+mod healing;
 mod lying;
 mod naming;
 mod opening;

@@ -1,0 +1,86 @@
+//! What becomes of rounds of one count when a cut heals: of one showing, or of two.
+
+use super::*;
+
+/// A vote that the cut held back opens the round again, at who does not know it by that name: both gestures would be final.
+#[test]
+fn who_held_a_gesture_in_a_round_counts_for_no_other_in_one_of_its_count() {
+    for (class, changed) in [(0, false), (1, true)] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+        let late = adding_up().deadline + ms(1000);
+        live(&mut mind, late);
+        assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(0)));
+        let said = mind.handle(late, votes(9, 1, Vote { round: round(1, 9), ..vote(1, class, SURE) }));
+        let holdings = said.iter().filter_map(|output| match output {
+            Output::Broadcast(Envelope { message: Message::Holding(holding), .. }) => Some(holding),
+            _ => None,
+        });
+        let words: Vec<_> = holdings.map(|holding| (holding.round, holding.class, holding.changed)).collect();
+        assert_eq!(words, [(round(1, 9), Some(ClassId(class as u32)), changed)]);
+        // In the next one it counts for any.
+        mind.handle(late + ms(9000), gives(3, decision(2, Some(2), 3, 3)));
+        assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(2)));
+        assert!(!mind.round.as_ref().unwrap().agreement.has_changed(RobotId(7)));
+    }
+}
+
+/// Who heard of the other name when its round was over, or never, takes it for that of another one.
+#[test]
+fn a_neighbour_is_given_a_decision_under_the_name_that_it_knows() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+    mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, SURE) }));
+    let late = adding_up().deadline + ms(1000);
+    live(&mut mind, late);
+    let held = mind.held().expect("two are sure").clone();
+    // By no name that is known here it is another round, an older one.
+    for (calls, given) in [(5, 5), (1, 1), (0, 1)] {
+        let have = Have {
+            round: Some(round(1, calls)),
+            decision: None,
+            holders: 0,
+            votes: vec![],
+            knowledge: None,
+            answer: true,
+        };
+        let out = mind.handle(late, says(20 + calls, 2, Message::Have(have)));
+        let [(_, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
+        assert_eq!(give.decision, Some(Decision { round: round(1, given), ..held.clone() }), "it says {calls}");
+    }
+}
+
+/// It gave way to what others had decided of another showing: whoever goes on under its name is not in that.
+#[test]
+fn the_name_of_a_round_that_gave_way_is_none_of_the_one_it_gave_way_to() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    live(&mut mind, ms(9000));
+    assert_eq!((mind.round(), mind.held().unwrap().class), (Some(round(1, 7)), None));
+    let certificate =
+        gestalt_protocol::Certificate { elapsed_ms: 5000, ..decision(1, Some(0), 3, 9).certificate };
+    let theirs = Decision { certificate, ..decision(1, Some(0), 3, 9) };
+    mind.handle(ms(9001), gives(9, theirs.clone()));
+    assert_eq!(mind.held(), Some(&theirs));
+    mind.handle(ms(9002), votes(3, 1, Vote { round: round(1, 7), ..vote(1, 1, LEANING) }));
+    assert_eq!((mind.round(), mind.held()), (Some(round(1, 7)), None), "it is the greater name");
+}
+
+/// Nothing was said yet of the one that came to nothing; whoever speaks of it then does not mean what is shown now.
+#[test]
+fn nor_of_one_that_is_opened_after_it_came_to_nothing() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Open);
+    live(&mut mind, ms(9000));
+    mind.handle(ms(9001), votes(3, 1, Vote { round: round(1, 9), ..null(1) }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true));
+    mind.handle(ms(9002), votes(3, 2, Vote { round: round(1, 7), ..vote(1, 1, LEANING) }));
+    let held =
+        HeldVote { robot: RobotId(3), stamp: Stamp { boot: 1, sequence: 1 }, vote: null(1), signature: None };
+    let of_this = HeldVote { vote: Vote { round: round(1, 9), ..null(1) }, ..held };
+    let nothing = decision(1, None, 0, 3);
+    let certificate = gestalt_protocol::Certificate { others: vec![of_this], ..nothing.certificate };
+    mind.handle(ms(9003), gives(3, Decision { round: round(1, 7), certificate, ..nothing }));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true));
+    assert!(!mind.round.as_ref().unwrap().is_named(round(1, 7)));
+}
