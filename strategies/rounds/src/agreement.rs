@@ -31,6 +31,8 @@ struct Held {
     since: Duration,
     /// When the class last changed, or was first contradicted by an announcement.
     unsettled: Duration,
+    /// Whether it is to be replaced, by a lesser one if need be.
+    gives_way: bool,
 }
 
 /// What was last said aloud for the swarm.
@@ -137,6 +139,20 @@ impl Agreement {
         self.first = under_the_same_count.first;
     }
 
+    /// Whether so many robots say that they hold that gesture, whatever they held before: of whom that is said, they count.
+    #[must_use]
+    pub fn is_held_by(&self, quorum: u32, class: Option<ClassId>, counts: impl Fn(RobotId) -> bool) -> bool {
+        let holds = |holder: &&Holder| holder.holding.class == class && counts(holder.robot);
+        class.is_some() && self.holders().filter(holds).count() >= quorum as usize
+    }
+
+    /// Gives way to this decision, though it may be lesser than the one that is held.
+    pub fn give_way(&mut self, decision: Decision) {
+        self.best_rank = None;
+        self.believe(decision);
+        self.held.iter_mut().for_each(|held| held.gives_way = true);
+    }
+
     /// Whether another gesture was held before this one, or may have been: by `me`, this robot, before it started.
     #[must_use]
     pub fn has_changed(&self, me: RobotId) -> bool {
@@ -160,14 +176,17 @@ impl Agreement {
         let best = self.best.as_ref().filter(|best| best.class.is_some() || or_none)?;
         let rank = self.best_rank?;
         match &mut self.held {
-            Some(held) if rank <= held.rank => return None,
+            Some(held) if rank <= held.rank && !held.gives_way => return None,
             Some(held) => {
                 if best.class != held.decision.class {
                     held.unsettled = now;
                 }
-                (held.decision, held.rank) = (best.clone(), rank);
+                (held.decision, held.rank, held.gives_way) = (best.clone(), rank, false);
             }
-            None => self.held = Some(Held { decision: best.clone(), rank, since: now, unsettled: now }),
+            None => {
+                let decision = best.clone();
+                self.held = Some(Held { decision, rank, since: now, unsettled: now, gives_way: false });
+            }
         }
         self.first = self.first.or(best.class);
         self.held()

@@ -3,13 +3,16 @@
 use std::cmp::Ordering;
 use std::time::Duration;
 
-use gestalt_protocol::{Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp};
+use gestalt_protocol::{
+    ClassId, Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp,
+};
 
 use super::members::expected;
 use super::placing::newer;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
+use crate::quorum::Quorum;
 use crate::proof::{follows, is_consistent, said};
 use crate::refusal::Refusal;
 use crate::round::{Round, View};
@@ -284,7 +287,33 @@ impl Rounds {
         }
         // Where that is no name of this round by now, it had as many: it is a decision of this by any of one count.
         let id = if round.is_named(decision.round) { decision.round } else { round.id };
-        if round.agreement.believe(Decision { round: id, ..decision }) { Heard::News } else { Heard::Known }
+        let (class, decision) = (decision.class, Decision { round: id, ..decision });
+        match self.most_have_settled_on(class) {
+            Some(true) => {
+                self.round.iter_mut().for_each(|round| round.agreement.give_way(decision.clone()));
+                Heard::News
+            }
+            Some(false) => Heard::Known,
+            None => match self.round.as_mut().is_some_and(|round| round.agreement.believe(decision)) {
+                true => Heard::News,
+                false => Heard::Known,
+            },
+        }
+    }
+
+    /// Whether most hold this gesture where this robot holds another (`true`), or the other (`false`), long after the round was over. By then all have met
+    /// all decisions that they take: where robots differ on which rounds are one, the greatest is not the same for all, and what most hold stands.
+    fn most_have_settled_on(&self, class: Option<ClassId>) -> Option<bool> {
+        let round = self.round.as_ref().filter(|round| !round.open)?;
+        let held = round.agreement.held()?.class;
+        let long_over = self.now >= round.since.saturating_add(self.config.deadline.saturating_mul(2));
+        let differ = held.is_some() && class.is_some() && held != class;
+        if !long_over || !differ || self.config.quorum != Quorum::Majority {
+            return None;
+        }
+        let most = self.config.holders(self.electorate.count());
+        let hold = |class| round.agreement.is_held_by(most, class, |robot| self.counts(robot));
+        if hold(class) { Some(true) } else { hold(held).then_some(false) }
     }
 
     /// Whether that is another scale than this robot's own, if it has one.

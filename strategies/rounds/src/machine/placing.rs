@@ -39,9 +39,15 @@ impl Rounds {
 
     /// Where a round that was heard of stands to the newest one known. `decided`: whether something was decided in it; `None` while it may yet be.
     pub(super) fn compare(&self, id: RoundId, decided: Option<bool>) -> Ordering {
+        self.compare_known(id, decided, self.is_this_round(id))
+    }
+
+    /// Nobody goes back to a round that it was in before the newest for what may be said in that yet: two robots would call each other back without end.
+    fn compare_known(&self, id: RoundId, decided: Option<bool>, this: bool) -> Ordering {
         match &self.round {
             None => Ordering::Greater,
-            Some(_) if self.is_this_round(id) => Ordering::Equal,
+            Some(_) if this => Ordering::Equal,
+            Some(_) if decided.is_none() && self.past.contains(&id) => Ordering::Less,
             Some(round) => newer(id, decided, round),
         }
     }
@@ -72,11 +78,7 @@ impl Rounds {
             return Err(Refusal::TooSoon);
         }
         self.highest = self.highest.max(Some(id.counter));
-        let order = match &self.round {
-            None => Ordering::Greater,
-            Some(_) if this => Ordering::Equal,
-            Some(round) => newer(id, decided, round),
-        };
+        let order = self.compare_known(id, decided, this);
         let by = self.known(from);
         if let Some(round) = self.round.as_mut().filter(|_| order.is_eq()) {
             let before = round.id;

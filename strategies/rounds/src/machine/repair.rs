@@ -135,8 +135,10 @@ impl Rounds {
             _ => (None, BTreeMap::<RobotId, Stamp>::new()),
         };
         let decision = round.agreement.held().filter(|held| Some(held.rank()) > rank).cloned();
-        // Under the name that the neighbour knows: it may have heard of the other one too late to take both for one.
-        let called = have.round.filter(|name| order.is_eq() && round.is_named(*name));
+        // Where it holds another gesture, under the name that it knows: it may have heard of this one too late to take both for one, and gives way to none that is
+        // older.
+        let holds_another = rank.is_some_and(|rank| rank.decided);
+        let called = have.round.filter(|name| holds_another && round.is_named(*name));
         let decision = decision.map(|held| Decision { round: called.unwrap_or(held.round), ..held });
         // Who gets a decision gets the votes with it.
         let votes = if rank.is_none() && decision.is_none() {

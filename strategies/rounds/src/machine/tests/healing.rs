@@ -25,20 +25,21 @@ fn who_held_a_gesture_in_a_round_counts_for_no_other_in_one_of_its_count() {
     }
 }
 
-/// Who heard of the other name when its round was over, or never, takes it for that of another one.
+/// Who heard of the other name when its round was over, or never, takes it for that of another one, and what is older for nothing.
 #[test]
-fn a_neighbour_is_given_a_decision_under_the_name_that_it_knows() {
+fn a_neighbour_that_holds_another_gesture_is_given_a_decision_under_the_name_that_it_knows() {
     let mut mind = mind(7);
     mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
     mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, SURE) }));
     let late = adding_up().deadline + ms(1000);
     live(&mut mind, late);
     let held = mind.held().expect("two are sure").clone();
-    // By no name that is known here it is another round, an older one.
-    for (calls, given) in [(5, 5), (1, 1), (0, 1)] {
+    let (another, nothing) = (decision(1, Some(2), 1, 20).rank(), decision(1, None, 0, 20).rank());
+    // By no name that is known here it is another round, an older one. Who holds nothing gives way to any.
+    for (calls, holds, given) in [(5, another, 5), (1, another, 1), (0, another, 1), (5, nothing, 1)] {
         let have = Have {
             round: Some(round(1, calls)),
-            decision: None,
+            decision: Some(holds),
             holders: 0,
             votes: vec![],
             knowledge: None,
@@ -46,7 +47,11 @@ fn a_neighbour_is_given_a_decision_under_the_name_that_it_knows() {
         };
         let out = mind.handle(late, says(20 + calls, 2, Message::Have(have)));
         let [(_, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
-        assert_eq!(give.decision, Some(Decision { round: round(1, given), ..held.clone() }), "it says {calls}");
+        assert_eq!(
+            give.decision,
+            Some(Decision { round: round(1, given), ..held.clone() }),
+            "it says {calls}"
+        );
     }
 }
 
@@ -57,13 +62,15 @@ fn the_name_of_a_round_that_gave_way_is_none_of_the_one_it_gave_way_to() {
     mind.handle(ms(0), Input::Open);
     live(&mut mind, ms(9000));
     assert_eq!((mind.round(), mind.held().unwrap().class), (Some(round(1, 7)), None));
-    let certificate =
-        gestalt_protocol::Certificate { elapsed_ms: 5000, ..decision(1, Some(0), 3, 9).certificate };
-    let theirs = Decision { certificate, ..decision(1, Some(0), 3, 9) };
+    let theirs = drawn_late(round(1, 1), Some(0), 3);
     mind.handle(ms(9001), gives(9, theirs.clone()));
     assert_eq!(mind.held(), Some(&theirs));
     mind.handle(ms(9002), votes(3, 1, Vote { round: round(1, 7), ..vote(1, 1, LEANING) }));
-    assert_eq!((mind.round(), mind.held()), (Some(round(1, 7)), None), "it is the greater name");
+    assert_eq!((mind.round(), mind.is_open()), (Some(theirs.round), false), "nor is it gone through again,");
+    assert!(!mind.round.as_ref().unwrap().is_named(round(1, 7)));
+    let drawn = drawn_late(round(1, 7), Some(1), 3);
+    mind.handle(ms(9003), gives(9, drawn.clone()));
+    assert_eq!(mind.held(), Some(&drawn), "unless something was decided in it: it is the greater name");
 }
 
 /// Nothing was said yet of the one that came to nothing; whoever speaks of it then does not mean what is shown now.
@@ -83,4 +90,31 @@ fn nor_of_one_that_is_opened_after_it_came_to_nothing() {
     mind.handle(ms(9003), gives(3, Decision { round: round(1, 7), certificate, ..nothing }));
     assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true));
     assert!(!mind.round.as_ref().unwrap().is_named(round(1, 7)));
+}
+
+/// One of them takes two rounds for one, which are two for the others: it holds the greatest decision, and they another.
+#[test]
+fn what_most_hold_long_after_a_round_stands() {
+    let word = |robot, decision: &Decision| says_it_holds(robot, decision);
+    let (greater, lesser) = (decision(1, Some(0), 4, 9), decision(1, Some(1), 3, 8));
+    let late = adding_up().deadline * 2 + ms(100);
+    // Who says what it holds beside this robot of three, and what that holds then.
+    for (of_the_lesser, early, held) in [(2, false, 1), (1, false, 0), (2, true, 0)] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([7, 8, 9]))));
+        mind.handle(ms(0), gives(9, greater.clone()));
+        let at = if early { ms(4000) } else { late };
+        live(&mut mind, at);
+        for robot in [8, 9].into_iter().take(of_the_lesser) {
+            mind.handle(at, word(robot, &lesser));
+        }
+        mind.handle(at, gives(8, lesser.clone()));
+        assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(held)), "{of_the_lesser} {early}");
+        let changed = mind.round.as_ref().unwrap().agreement.has_changed(RobotId(7));
+        assert_eq!(changed, held == 1, "it counts for what it held first");
+        if held == 1 {
+            mind.handle(at, gives(9, greater.clone()));
+            assert_eq!(mind.held(), Some(&lesser), "whoever still gives the other");
+        }
+    }
 }

@@ -177,6 +177,18 @@ fn decided(round: RoundId, class: Option<u32>, votes: Vec<CountedVote>, author: 
     }
 }
 
+/// What robot 9 decided of that round on `counted` votes of it, 5 s after it began.
+fn drawn_late(id: RoundId, class: Option<u32>, counted: u32) -> Decision {
+    let votes = decision(id.counter, class.or(Some(0)), counted, 9).certificate.votes;
+    let votes = votes.into_iter().map(|counted| {
+        let vote = Vote { round: id, ..counted.vote };
+        gestalt_protocol::CountedVote { vote, ..counted }
+    });
+    let drawn = decided(id, class, votes.collect(), 9);
+    let certificate = gestalt_protocol::Certificate { elapsed_ms: 5000, ..drawn.certificate };
+    Decision { certificate, ..drawn }
+}
+
 /// The same decision by the terms of that configuration.
 fn by(config: &RoundsConfig, decision: Decision) -> Decision {
     let (terms, quorum) = (config.terms(), config.needs(decision.certificate.robots));

@@ -389,18 +389,6 @@ fn a_round_under_a_count_that_was_used_elsewhere_is_opened_anew() {
     assert_eq!((merges.round(), merges.held().unwrap().class), (Some(round(1, 1)), Some(ClassId(2))));
 }
 
-/// What robot 9 decided of that round on `counted` votes of it, 5 s after it began.
-fn drawn_late(id: RoundId, class: Option<u32>, counted: u32) -> Decision {
-    let votes = decision(id.counter, Some(0), counted, 9).certificate.votes;
-    let votes = votes.into_iter().map(|counted| {
-        let vote = Vote { round: id, ..counted.vote };
-        gestalt_protocol::CountedVote { vote, ..counted }
-    });
-    let drawn = decided(id, class, votes.collect(), 9);
-    let certificate = gestalt_protocol::Certificate { elapsed_ms: 5000, ..drawn.certificate };
-    Decision { certificate, ..drawn }
-}
-
 #[test]
 fn a_round_in_which_nothing_was_decided_gives_way_to_one_under_its_count_in_which_something_was() {
     // Robot 7 was cut off, and went through the showing alone; the others had another one later.
