@@ -138,6 +138,11 @@ impl Prepared {
         Ok(prepared)
     }
 
+    /// Whether the robot has lived before, as far as its disk tells.
+    pub fn has_lived(&self) -> bool {
+        self.store.is_some() && !self.new
+    }
+
     /// What the mind needs of it.
     pub fn setup(&mut self, id: RobotId) -> LearningSetup {
         self.learning.setup(id, self.boot, self.memory.take())

@@ -121,6 +121,10 @@ impl Robot {
         )?;
         if let Some(prepared) = &mut prepared {
             mind = mind.learning(prepared.setup(id))?;
+            // It was there, though nothing may have been taught yet.
+            if prepared.has_lived() {
+                mind = mind.started_again();
+            }
         }
         let keys = Keys::new(&swarm)?;
         let zenoh = link.to_zenoh(id, &swarm, nonce)?;

@@ -21,6 +21,8 @@ pub struct Agreement {
     first: Option<ClassId>,
     /// Who said something in this round in two of its lives: in the first it may have counted for a gesture that it has forgotten.
     restarted: BTreeSet<RobotId>,
+    /// What each robot said last that it holds in any round of its count, and when. At most [`MAX_ROBOTS`].
+    words: BTreeMap<RobotId, (Stamp, Option<ClassId>)>,
     announced: Option<Announced>,
 }
 
@@ -48,6 +50,7 @@ impl Agreement {
         if self.holder(holder.robot).is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
             self.note_restart(holder.robot);
         }
+        self.note_word(holder.robot, holder.stamp, holder.holding.class);
         let known = self.holders.get(&holder.robot);
         let is_news = match known {
             Some(known) => known.stamp < holder.stamp,
@@ -81,6 +84,7 @@ impl Agreement {
             voters.chain(others).chain([decision.author]).any(|robot| robots.contains(&robot))
         };
         self.holders.retain(|robot, _| !robots.contains(robot));
+        self.words.retain(|robot, _| !robots.contains(robot));
         let forgotten = self.best.take_if(|best| counts(best)).is_some();
         self.best_rank.take_if(|_| forgotten);
         self.held.take_if(|held| counts(&held.decision)).is_some() || forgotten
@@ -134,23 +138,41 @@ impl Agreement {
         own + self.holders().filter(holds).count() >= quorum as usize
     }
 
-    /// The first gesture held counts in this round too: a vote that a cut held back may have opened it a second time, under another name.
-    pub fn follow(&mut self, under_the_same_count: &Self) {
-        self.first = under_the_same_count.first;
+    /// The first gesture held counts in this round too, of the same count: a vote that a cut held back may have opened it a second time, under another name.
+    pub fn follow(&mut self, before: Self) {
+        (self.first, self.words) = (before.first, before.words);
     }
 
-    /// Whether so many robots say that they hold that gesture, whatever they held before: of whom that is said, they count.
+    /// Hears a robot's word on any round of this count.
+    pub fn note_word(&mut self, robot: RobotId, stamp: Stamp, class: Option<ClassId>) {
+        let is_news = match self.words.get(&robot) {
+            Some((known, _)) => *known < stamp,
+            None => self.words.len() < MAX_ROBOTS,
+        };
+        if is_news {
+            self.words.insert(robot, (stamp, class));
+        }
+    }
+
+    /// What that robot said last that it holds in any round of this count, if it said anything.
+    #[must_use]
+    pub fn word(&self, robot: RobotId) -> Option<Option<ClassId>> {
+        self.words.get(&robot).map(|(_, class)| *class)
+    }
+
+    /// Whether so many robots say that they hold that gesture, in whichever round of this count, and whatever they held before: of whom that is said, they count.
     #[must_use]
     pub fn is_held_by(&self, quorum: u32, class: Option<ClassId>, counts: impl Fn(RobotId) -> bool) -> bool {
-        let holds = |holder: &&Holder| holder.holding.class == class && counts(holder.robot);
-        class.is_some() && self.holders().filter(holds).count() >= quorum as usize
+        let holds =
+            |(robot, (_, held)): &(&RobotId, &(Stamp, Option<ClassId>))| *held == class && counts(**robot);
+        class.is_some() && self.words.iter().filter(holds).count() >= quorum as usize
     }
 
     /// Gives way to this decision, though it may be lesser than the one that is held.
-    pub fn give_way(&mut self, decision: Decision) {
+    pub fn give_way(&mut self, decision: Decision) -> bool {
         self.best_rank = None;
-        self.believe(decision);
         self.held.iter_mut().for_each(|held| held.gives_way = true);
+        self.believe(decision)
     }
 
     /// Whether another gesture was held before this one, or may have been: by `me`, this robot, before it started.

@@ -108,6 +108,11 @@ impl Round {
         self.names.contains(id)
     }
 
+    /// Whether a decision for a gesture is held.
+    pub fn has_decided(&self) -> bool {
+        self.agreement.held().is_some_and(|held| held.class.is_some())
+    }
+
     /// All its names that are remembered.
     pub fn names(&self) -> impl Iterator<Item = RoundId> + '_ {
         self.names.iter()

@@ -113,6 +113,13 @@ impl Mind {
         self
     }
 
+    /// The same mind, of a robot that has lived before, see [`Rounds::started_again`]. One that learns is told so by a memory that is not empty, too.
+    #[must_use]
+    pub fn started_again(mut self) -> Self {
+        self.rounds = self.rounds.started_again();
+        self
+    }
+
     /// The same mind, set up to learn: it keeps what it sees, labels it by what instructors say, shares and forgets.
     ///
     /// # Errors
@@ -123,11 +130,8 @@ impl Mind {
         let vocabulary = setup.vocabulary.clone();
         self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
         self.rounds = self.rounds.counting_from(counter).naming(vocabulary);
-        if starts_again {
-            self.rounds = self.rounds.started_again();
-        }
         self.call_by_names();
-        Ok(self)
+        Ok(if starts_again { self.started_again() } else { self })
     }
 
     /// The same mind, which holds what other minds of this process hold as well in one place with them.

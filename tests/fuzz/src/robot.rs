@@ -140,7 +140,9 @@ impl Robot {
     pub fn restart(&mut self, keeps_disk: bool) {
         self.boot += 1;
         self.disk.iter_mut().filter(|_| !keeps_disk).for_each(Records::clear);
-        self.mind = mind(self.mind.me(), self.boot, self.disk.as_ref());
+        let mind = mind(self.mind.me(), self.boot, self.disk.as_ref());
+        // A disk tells that its robot has lived before, also where nothing was taught.
+        self.mind = if keeps_disk { mind.started_again() } else { mind };
         self.refusals = self.mind.refusals().clone();
     }
 

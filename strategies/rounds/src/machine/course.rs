@@ -150,13 +150,15 @@ impl Rounds {
         self.electorate.forget(self.now, self.config.lately, &self.alive);
         let before = self.round.take().filter(|before| before.id.counter == id.counter);
         match &before {
+            // What is left for what others say in another round may yet be that, by its other name.
+            Some(before) if open && !before.has_decided() => {}
             Some(before) => self.past.extend(before.names()),
             None => self.past.clear(),
         }
         let taught = effects.follower.taught(id.counter);
         let mut round = Round::new(id, self.now, open && !taught.contains(&id));
         if let Some(before) = before {
-            round.agreement.follow(&before.agreement);
+            round.agreement.follow(before.agreement);
         }
         if self.may_have_been_in(&round) {
             round.agreement.note_restart(self.me);

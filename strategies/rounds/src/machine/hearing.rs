@@ -12,8 +12,8 @@ use super::placing::newer;
 use super::rounds::{Effects, Rounds};
 use super::wanted::Wanted;
 use crate::ballot::{Cast, Scale};
-use crate::quorum::Quorum;
 use crate::proof::{follows, is_consistent, said};
+use crate::quorum::Quorum;
 use crate::refusal::Refusal;
 use crate::round::{Round, View};
 
@@ -60,6 +60,10 @@ impl Rounds {
     /// Hears what a robot says that it holds, itself or by way of another. Says whether it was news.
     pub(super) fn note_holder(&mut self, holder: Holder) -> bool {
         if !self.is_this_round(holder.holding.round) {
+            let Holder { robot, stamp, holding: Holding { round: id, class, .. }, .. } = holder;
+            if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == id.counter) {
+                round.agreement.note_word(robot, stamp, class);
+            }
             return false;
         }
         if holder.robot == self.me {
@@ -97,8 +101,9 @@ impl Rounds {
         }
         match &self.round {
             Some(round) if self.is_this_round(holding.round) => {
+                let greater = |held: &Decision| held.class != holding.class && held.rank() < holding.rank;
                 let held = round.agreement.held();
-                held.is_none_or(|held| held.class != holding.class && held.rank() < holding.rank)
+                held.is_none_or(|held| greater(held) && !self.have_settled_on(held.class))
             }
             Some(round) => newer(holding.round, Some(true), round).is_gt(),
             None => true,
@@ -247,14 +252,20 @@ impl Rounds {
             return Heard::Refused;
         }
         let opened_at_once = self.is_this_round(decision.round) && self.is_as_old(&decision);
-        let this = opened_at_once || self.is_counted_in(&decision, effects);
+        let most_hold = self.most_have_settled_on(&decision);
+        let this = opened_at_once || most_hold == Some(true) || self.is_counted_in(&decision, effects);
         let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
         if held == Some(&decision) {
             return Heard::Known;
         }
-        if let Err(refusal) = self.judge(&decision, this) {
+        let gives_way = most_hold == Some(true);
+        if let Err(refusal) = self.judge(&decision, this && !gives_way) {
             self.refusals.add(refusal);
             return Heard::Refused;
+        }
+        if gives_way {
+            let names = said(&decision.certificate).map(|(_, _, vote)| vote.round);
+            names.chain([decision.round]).for_each(|name| _ = self.past.remove(&name));
         }
         let displaced = !this && self.is_displaced_by(decision.round);
         match self.place((decision.round, Some(decision.class.is_some())), this, from, effects) {
@@ -287,33 +298,34 @@ impl Rounds {
         }
         // Where that is no name of this round by now, it had as many: it is a decision of this by any of one count.
         let id = if round.is_named(decision.round) { decision.round } else { round.id };
-        let (class, decision) = (decision.class, Decision { round: id, ..decision });
-        match self.most_have_settled_on(class) {
-            Some(true) => {
-                self.round.iter_mut().for_each(|round| round.agreement.give_way(decision.clone()));
-                Heard::News
-            }
-            Some(false) => Heard::Known,
-            None => match self.round.as_mut().is_some_and(|round| round.agreement.believe(decision)) {
-                true => Heard::News,
-                false => Heard::Known,
-            },
-        }
+        let decision = Decision { round: id, ..decision };
+        let news = match most_hold {
+            Some(true) => round.agreement.give_way(decision),
+            Some(false) => false,
+            None => round.agreement.believe(decision),
+        };
+        if news { Heard::News } else { Heard::Known }
     }
 
-    /// Whether most hold this gesture where this robot holds another (`true`), or the other (`false`), long after the round was over. By then all have met
-    /// all decisions that they take: where robots differ on which rounds are one, the greatest is not the same for all, and what most hold stands.
-    fn most_have_settled_on(&self, class: Option<ClassId>) -> Option<bool> {
-        let round = self.round.as_ref().filter(|round| !round.open)?;
-        let held = round.agreement.held()?.class;
-        let long_over = self.now >= round.since.saturating_add(self.config.deadline.saturating_mul(2));
-        let differ = held.is_some() && class.is_some() && held != class;
-        if !long_over || !differ || self.config.quorum != Quorum::Majority {
+    /// Whether most hold the gesture of that decision where this robot holds another (`true`), or the other (`false`), long after its round was over.
+    fn most_have_settled_on(&self, decision: &Decision) -> Option<bool> {
+        let round = self.round.as_ref().filter(|round| round.id.counter == decision.round.counter)?;
+        let (held, class) = (round.agreement.held()?.class, decision.class);
+        if held == class {
             return None;
         }
+        if self.have_settled_on(class) { Some(true) } else { self.have_settled_on(held).then_some(false) }
+    }
+
+    /// Whether most say that they hold that gesture, long after the newest round was over. By then all have met all decisions that they take: where robots differ
+    /// on which rounds of a count are one, the greatest is not the same for all, and what most hold stands.
+    pub(super) fn have_settled_on(&self, class: Option<ClassId>) -> bool {
+        let Some(round) = self.round.as_ref().filter(|round| !round.open) else { return false };
+        let long_over = self.now >= round.since.saturating_add(self.config.deadline.saturating_mul(2));
         let most = self.config.holders(self.electorate.count());
-        let hold = |class| round.agreement.is_held_by(most, class, |robot| self.counts(robot));
-        if hold(class) { Some(true) } else { hold(held).then_some(false) }
+        long_over
+            && self.config.quorum == Quorum::Majority
+            && round.agreement.is_held_by(most, class, |robot| self.counts(robot))
     }
 
     /// Whether that is another scale than this robot's own, if it has one.

@@ -134,7 +134,12 @@ impl Rounds {
             Ordering::Equal => (have.decision, have.votes.iter().copied().collect()),
             _ => (None, BTreeMap::<RobotId, Stamp>::new()),
         };
-        let decision = round.agreement.held().filter(|held| Some(held.rank()) > rank).cloned();
+        // Most hold this gesture, and the neighbour another: it gives way.
+        let word = round.agreement.word(from);
+        let gives_way =
+            |held: &Decision| word.is_some_and(|word| word != held.class) && self.have_settled_on(held.class);
+        let lacks = |held: &&Decision| Some(held.rank()) > rank || gives_way(held);
+        let decision = round.agreement.held().filter(lacks).cloned();
         // Where it holds another gesture, under the name that it knows: it may have heard of this one too late to take both for one, and gives way to none that is
         // older.
         let holds_another = rank.is_some_and(|rank| rank.decided);
@@ -172,7 +177,8 @@ impl Rounds {
             *robot != self.me && round.ballot.stamp(*robot).is_none_or(|mine| mine < *stamp)
         };
         let unsure = rank.is_some_and(|rank| rank.decided) && !self.is_final(&round.agreement);
-        have.decision > rank
+        let settled = || self.have_settled_on(round.agreement.held().and_then(|held| held.class));
+        (have.decision > rank && !settled())
             || (rank.is_none() && have.votes.iter().any(newer))
             || (unsure && have.holders != round.agreement.digest())
     }

@@ -73,33 +73,16 @@ fn the_name_of_a_round_that_gave_way_is_none_of_the_one_it_gave_way_to() {
     assert_eq!(mind.held(), Some(&drawn), "unless something was decided in it: it is the greater name");
 }
 
-/// Nothing was said yet of the one that came to nothing; whoever speaks of it then does not mean what is shown now.
-#[test]
-fn nor_of_one_that_is_opened_after_it_came_to_nothing() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), Input::Open);
-    live(&mut mind, ms(9000));
-    mind.handle(ms(9001), votes(3, 1, Vote { round: round(1, 9), ..null(1) }));
-    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true));
-    mind.handle(ms(9002), votes(3, 2, Vote { round: round(1, 7), ..vote(1, 1, LEANING) }));
-    let held =
-        HeldVote { robot: RobotId(3), stamp: Stamp { boot: 1, sequence: 1 }, vote: null(1), signature: None };
-    let of_this = HeldVote { vote: Vote { round: round(1, 9), ..null(1) }, ..held };
-    let nothing = decision(1, None, 0, 3);
-    let certificate = gestalt_protocol::Certificate { others: vec![of_this], ..nothing.certificate };
-    mind.handle(ms(9003), gives(3, Decision { round: round(1, 7), certificate, ..nothing }));
-    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 9)), true));
-    assert!(!mind.round.as_ref().unwrap().is_named(round(1, 7)));
-}
-
 /// One of them takes two rounds for one, which are two for the others: it holds the greatest decision, and they another.
 #[test]
 fn what_most_hold_long_after_a_round_stands() {
     let word = |robot, decision: &Decision| says_it_holds(robot, decision);
     let (greater, lesser) = (decision(1, Some(0), 4, 9), decision(1, Some(1), 3, 8));
     let late = adding_up().deadline * 2 + ms(100);
-    // Who says what it holds beside this robot of three, and what that holds then.
-    for (of_the_lesser, early, held) in [(2, false, 1), (1, false, 0), (2, true, 0)] {
+    // Who says what it holds beside this robot of three, when, and whether one of them has left for another round since; and what this robot holds then.
+    for (of_the_lesser, early, left, held) in
+        [(2, false, false, 1), (1, false, false, 0), (2, true, false, 0), (2, false, true, 0)]
+    {
         let mut mind = mind(7);
         mind.handle(ms(0), Input::Alive(Arc::new(robots([7, 8, 9]))));
         mind.handle(ms(0), gives(9, greater.clone()));
@@ -108,13 +91,46 @@ fn what_most_hold_long_after_a_round_stands() {
         for robot in [8, 9].into_iter().take(of_the_lesser) {
             mind.handle(at, word(robot, &lesser));
         }
+        if left {
+            let elsewhere = Message::Holding(drawn_late(round(1, 9), Some(0), 3).holding(true));
+            mind.handle(at, says(9, 41, elsewhere));
+        }
         mind.handle(at, gives(8, lesser.clone()));
-        assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(held)), "{of_the_lesser} {early}");
+        let holds = mind.held().and_then(|held| held.class);
+        assert_eq!(holds, Some(ClassId(held)), "{of_the_lesser} {early} {left}");
         let changed = mind.round.as_ref().unwrap().agreement.has_changed(RobotId(7));
         assert_eq!(changed, held == 1, "it counts for what it held first");
         if held == 1 {
             mind.handle(at, gives(9, greater.clone()));
             assert_eq!(mind.held(), Some(&lesser), "whoever still gives the other");
         }
+    }
+}
+
+/// It says what it has, which is greater: it is given what most hold, and not asked for its own.
+#[test]
+fn who_holds_another_gesture_than_most_long_after_a_round_is_given_theirs() {
+    let (greater, lesser) = (decision(1, Some(0), 4, 9), decision(1, Some(1), 3, 8));
+    for (at, given) in [(adding_up().deadline, false), (adding_up().deadline * 2 + ms(100), true)] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([7, 8, 9]))));
+        mind.handle(ms(0), gives(8, lesser.clone()));
+        mind.handle(ms(0), says_it_holds(8, &lesser));
+        mind.handle(ms(0), says_it_holds(9, &greater));
+        live(&mut mind, at);
+        let have = Have {
+            round: Some(greater.round),
+            decision: Some(greater.rank()),
+            holders: 0,
+            votes: vec![],
+            knowledge: None,
+            answer: false,
+        };
+        let out = mind.handle(at, says(9, 50, Message::Have(have)));
+        let theirs = told(&out).iter().any(|(_, message)| match message {
+            Message::Give(give) => give.decision.as_ref() == Some(&lesser),
+            _ => false,
+        });
+        assert_eq!(theirs, given);
     }
 }
