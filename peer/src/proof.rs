@@ -1,7 +1,7 @@
 //! Whether a decision was really made: checked offline, by whoever has the roster.
 
 use gestalt_protocol::{
-    Announcement, CountedVote, Decision, DecodeError, Envelope, FusionRule, HeldVote, RobotId, decode_json,
+    Announcement, Decision, DecodeError, Envelope, FusionRule, HeldVote, RobotId, decode_json,
 };
 use gestalt_strategies::{MindConfig, follows};
 use gestalt_trust::{Distrust, Roster, RosterError};
@@ -121,8 +121,7 @@ fn check_votes(
     robots: u32,
 ) -> Result<(), Unproven> {
     let certificate = &decision.certificate;
-    let votes: Vec<HeldVote> =
-        certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned()).collect();
+    let votes: Vec<HeldVote> = certificate.held_votes().collect();
     // On all cores: signatures are nearly all of the work.
     let unproven = votes.into_par_iter().find_map_first(|held| {
         let robot = held.robot;

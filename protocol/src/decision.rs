@@ -96,6 +96,11 @@ impl Certificate {
     pub fn reached(&self) -> usize {
         self.votes.len() + self.others.len()
     }
+
+    /// All votes that it brings, counted or not, as their authors said them.
+    pub fn held_votes(&self) -> impl Iterator<Item = HeldVote> + '_ {
+        self.votes.iter().map(CountedVote::held).chain(self.others.iter().cloned())
+    }
 }
 
 /// One vote in a certificate.

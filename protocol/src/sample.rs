@@ -190,6 +190,12 @@ impl Samples {
         self.samples.first().map(|sample| sample.id)
     }
 
+    /// Whether there are some, and all are that robot's own.
+    #[must_use]
+    pub fn are_by(&self, robot: RobotId) -> bool {
+        !self.samples.is_empty() && self.samples.iter().all(|sample| sample.id.author == robot)
+    }
+
     pub(crate) fn check(&self) -> Result<(), DecodeError> {
         let of_one_series = |pair: &[SharedSample]| {
             pair[0].id.series() == pair[1].id.series() && pair[0].id.number < pair[1].id.number
@@ -233,9 +239,9 @@ impl HeldBatch {
     /// [`DecodeError::Impossible`] names what is wrong.
     pub fn check(&self) -> Result<(), DecodeError> {
         self.samples.check()?;
-        match self.samples.first() {
-            Some(first) if first.author == self.robot => Ok(()),
-            _ => Err(DecodeError::Impossible("samples in another's name")),
+        match self.samples.are_by(self.robot) {
+            true => Ok(()),
+            false => Err(DecodeError::Impossible("samples in another's name")),
         }
     }
 }

@@ -268,8 +268,7 @@ impl Inbox {
         match &envelope.message {
             // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
             Message::Samples(_) if id == self.me => Ok(()),
-            // All samples of a batch are of one author.
-            Message::Samples(samples) if samples.first().is_some_and(|first| first.author == id) => {
+            Message::Samples(samples) if samples.are_by(id) => {
                 self.believe(&envelope)?;
                 self.queue(Input::Received(envelope))
             }

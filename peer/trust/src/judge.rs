@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Batches, CountedVote, Decision, Envelope, Give, HeldBatch, Instruction, InstructorId,
-    Message, RobotId, Signature,
+    Announcement, Batches, Decision, Envelope, Give, HeldBatch, Instruction, InstructorId, Message, RobotId,
+    Signature,
 };
 
 use crate::answer::Answers;
@@ -194,10 +194,7 @@ impl<S: Scheme> Judge<S> {
 
     /// Whether all the votes were cast that a decision rests on, which that robot gave or announced.
     fn decision(&mut self, by: RobotId, now: Duration, decision: &Decision) -> Result<(), Distrust> {
-        let certificate = &decision.certificate;
-        let votes = certificate.votes.iter().map(CountedVote::held);
-        let mut all = votes.chain(certificate.others.iter().cloned());
-        all.try_for_each(|held| self.relayed(by, now, &held.into()))
+        decision.certificate.held_votes().try_for_each(|held| self.relayed(by, now, &held.into()))
     }
 
     /// Whether its announcer said it, to the last word, and all the votes that it rests on were cast.

@@ -21,8 +21,8 @@ pub struct Agreement {
     first: Option<ClassId>,
     /// Who said something in this round in two of its lives: in the first it may have counted for a gesture that it has forgotten.
     restarted: BTreeSet<RobotId>,
-    /// What each robot said last that it holds in any round of its count, and when. At most [`MAX_ROBOTS`].
-    words: BTreeMap<RobotId, (Stamp, Option<ClassId>)>,
+    /// What robots said last that they hold in other rounds of its count, and when. At most [`MAX_ROBOTS`].
+    elsewhere: BTreeMap<RobotId, (Stamp, Option<ClassId>)>,
     announced: Option<Announced>,
 }
 
@@ -50,7 +50,6 @@ impl Agreement {
         if self.holder(holder.robot).is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
             self.note_restart(holder.robot);
         }
-        self.note_word(holder.robot, holder.stamp, holder.holding.class);
         let known = self.holders.get(&holder.robot);
         let is_news = match known {
             Some(known) => known.stamp < holder.stamp,
@@ -84,7 +83,7 @@ impl Agreement {
             voters.chain(others).chain([decision.author]).any(|robot| robots.contains(&robot))
         };
         self.holders.retain(|robot, _| !robots.contains(robot));
-        self.words.retain(|robot, _| !robots.contains(robot));
+        self.elsewhere.retain(|robot, _| !robots.contains(robot));
         let forgotten = self.best.take_if(|best| counts(best)).is_some();
         self.best_rank.take_if(|_| forgotten);
         self.held.take_if(|held| counts(&held.decision)).is_some() || forgotten
@@ -140,32 +139,39 @@ impl Agreement {
 
     /// The first gesture held counts in this round too, of the same count: a vote that a cut held back may have opened it a second time, under another name.
     pub fn follow(&mut self, before: Self) {
-        (self.first, self.words) = (before.first, before.words);
+        (self.first, self.elsewhere) = (before.first, before.elsewhere);
+        for Holder { robot, stamp, holding, .. } in before.holders.into_values() {
+            self.note_elsewhere(robot, stamp, holding.class);
+        }
     }
 
-    /// Hears a robot's word on any round of this count.
-    pub fn note_word(&mut self, robot: RobotId, stamp: Stamp, class: Option<ClassId>) {
-        let is_news = match self.words.get(&robot) {
+    /// Hears a robot's word on another round of this count.
+    pub fn note_elsewhere(&mut self, robot: RobotId, stamp: Stamp, class: Option<ClassId>) {
+        let is_news = match self.elsewhere.get(&robot) {
             Some((known, _)) => *known < stamp,
-            None => self.words.len() < MAX_ROBOTS,
+            None => self.elsewhere.len() < MAX_ROBOTS,
         };
         if is_news {
-            self.words.insert(robot, (stamp, class));
+            self.elsewhere.insert(robot, (stamp, class));
         }
     }
 
     /// What that robot said last that it holds in any round of this count, if it said anything.
     #[must_use]
     pub fn word(&self, robot: RobotId) -> Option<Option<ClassId>> {
-        self.words.get(&robot).map(|(_, class)| *class)
+        let here = self.holder(robot).map(|holder| (holder.stamp, holder.holding.class));
+        let elsewhere = self.elsewhere.get(&robot).copied();
+        // One word may have been of another round until its name was found to be one of this.
+        here.into_iter().chain(elsewhere).max_by_key(|(stamp, _)| *stamp).map(|(_, class)| class)
     }
 
     /// Whether so many robots say that they hold that gesture, in whichever round of this count, and whatever they held before: of whom that is said, they count.
     #[must_use]
     pub fn is_held_by(&self, quorum: u32, class: Option<ClassId>, counts: impl Fn(RobotId) -> bool) -> bool {
-        let holds =
-            |(robot, (_, held)): &(&RobotId, &(Stamp, Option<ClassId>))| *held == class && counts(**robot);
-        class.is_some() && self.words.iter().filter(holds).count() >= quorum as usize
+        let not_here = self.elsewhere.keys().filter(|robot| !self.holders.contains_key(robot));
+        let robots = self.holders.keys().chain(not_here);
+        let holds = |robot: &&RobotId| self.word(**robot) == Some(class) && counts(**robot);
+        class.is_some() && robots.filter(holds).count() >= quorum as usize
     }
 
     /// Gives way to this decision, though it may be lesser than the one that is held.

@@ -181,7 +181,7 @@ impl Mind {
         let is_neighbour = self.compares_with(from);
         let author = batch.robot;
         // In another's name, whom nobody would believe that passes it on.
-        if !batch.samples.samples.iter().all(|sample| sample.id.author == author) {
+        if !batch.samples.are_by(author) {
             return self.rounds.note_refusal(Refusal::Impossible);
         }
         let Some(learning) = &mut self.learning else { return };

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, CountedVote, Decision, Envelope, Give, HeldVote, Message, Signature};
+use gestalt_protocol::{Announcement, Decision, Envelope, Give, Message, Signature};
 use gestalt_strategies::{Sign, is_refuted};
 use gestalt_trust::{Budget, Distrust, Evidence, Fake, Lie, Verifier};
 
@@ -58,7 +58,7 @@ impl Gate {
     /// # Errors
     /// Why one is not believed.
     pub fn decision(&mut self, now: Duration, decision: &Decision) -> Result<(), Distrust> {
-        votes(decision).into_iter().try_for_each(|held| self.envelope(now, &held.into()))
+        decision.certificate.held_votes().try_for_each(|held| self.envelope(now, &held.into()))
     }
 
     fn envelope(&mut self, now: Duration, envelope: &Envelope) -> Result<(), Distrust> {
@@ -83,12 +83,6 @@ impl Gate {
         give.holders.retain(|holder| self.envelope(now, &holder.clone().into()).is_ok());
         give.decision.take_if(|_| stands.is_err());
     }
-}
-
-/// All votes that a decision brings with it.
-pub fn votes(decision: &Decision) -> Vec<HeldVote> {
-    let certificate = &decision.certificate;
-    certificate.votes.iter().map(CountedVote::held).chain(certificate.others.iter().cloned()).collect()
 }
 
 /// Signs for a member.

@@ -15,7 +15,7 @@ use gestalt_strategies::{
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::gate::{Signer, votes};
+use crate::gate::Signer;
 use crate::swarm::roster;
 
 /// How many gestures there are.
@@ -214,7 +214,7 @@ impl Robot {
             ballot.lacking(&Default::default()).for_each(|held| signed(held.into()));
         }
         if let Some(held) = self.mind.held() {
-            votes(held).into_iter().for_each(|held| signed(held.into()));
+            held.certificate.held_votes().for_each(|held| signed(held.into()));
         }
         if let (Some(set), Some(learned)) = (self.mind.training_set(), self.mind.learned()) {
             assert!(set.len() <= set.capacity() && learned.lessons <= MAX_LESSONS);

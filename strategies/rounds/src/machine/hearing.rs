@@ -62,7 +62,7 @@ impl Rounds {
         if !self.is_this_round(holder.holding.round) {
             let Holder { robot, stamp, holding: Holding { round: id, class, .. }, .. } = holder;
             if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == id.counter) {
-                round.agreement.note_word(robot, stamp, class);
+                round.agreement.note_elsewhere(robot, stamp, class);
             }
             return false;
         }
@@ -252,20 +252,20 @@ impl Rounds {
             return Heard::Refused;
         }
         let opened_at_once = self.is_this_round(decision.round) && self.is_as_old(&decision);
-        let most_hold = self.most_have_settled_on(&decision);
-        let this = opened_at_once || most_hold == Some(true) || self.is_counted_in(&decision, effects);
+        let this = opened_at_once || self.is_counted_in(&decision, effects);
         let held = self.round.as_ref().filter(|_| this).and_then(|round| round.agreement.held());
         if held == Some(&decision) {
             return Heard::Known;
         }
+        let most_hold = self.most_have_settled_on(&decision).filter(|_| this);
         let gives_way = most_hold == Some(true);
         if let Err(refusal) = self.judge(&decision, this && !gives_way) {
             self.refusals.add(refusal);
             return Heard::Refused;
         }
         if gives_way {
-            let names = said(&decision.certificate).map(|(_, _, vote)| vote.round);
-            names.chain([decision.round]).for_each(|name| _ = self.past.remove(&name));
+            // Its votes may be of a round that was gone through here before this one, which is one with it for all others.
+            said(&decision.certificate).for_each(|(_, _, vote)| _ = self.past.remove(&vote.round));
         }
         let displaced = !this && self.is_displaced_by(decision.round);
         match self.place((decision.round, Some(decision.class.is_some())), this, from, effects) {

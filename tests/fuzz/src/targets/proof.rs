@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, CountedVote, Decision, Envelope, FusionRule, Message, RobotId, Stamp, decode_json,
+    ClassId, CountedVote, Decision, Envelope, FusionRule, HeldVote, Message, RobotId, Stamp, decode_json,
 };
 use gestalt_strategies::{Fuse, MindConfig, Quorum, follows, fusion, is_refuted};
 
-use crate::gate::{Gate, votes};
+use crate::gate::Gate;
 use crate::memory::bounded;
 use crate::swarm::{roster, seal_decision};
 use crate::values;
@@ -104,9 +104,9 @@ fn names_one_gesture(decision: &Decision, follows: &impl Fn(&Decision) -> bool) 
 
 /// What one robot believes all do, and a change of a vote ends it.
 fn believed(decision: &Decision, change: usize) {
-    let votes = votes(decision);
+    let votes: Vec<HeldVote> = decision.certificate.held_votes().collect();
     let proven = |decision: &Decision| {
-        let mut held = self::votes(decision).into_iter().map(Envelope::from);
+        let mut held = decision.certificate.held_votes().map(Envelope::from);
         held.all(|said| said.signature.is_some_and(|by| roster().check(&said.statement(), &by).is_ok()))
     };
     let (believed, proven_here) = (Gate::default().decision(Duration::ZERO, decision), proven(decision));
