@@ -4,10 +4,11 @@ use std::fs;
 use std::path::Path;
 
 use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
+use gestalt_strategies::MindConfig;
 use tokio::time::timeout;
 
 use super::{PATIENCE, Watched, config, learning, swarm, unique};
-use crate::{Client, LinkConfig, LinkError, Robot, RobotConfig, StoreError};
+use crate::{Client, Event, LinkConfig, LinkError, Robot, RobotConfig, StoreError};
 
 fn with_memory(name: &str, path: &Path) -> RobotConfig {
     RobotConfig { learning: Some(learning(Some(path.to_owned()))), ..config(1, name, &[]) }
@@ -77,4 +78,26 @@ async fn a_memory_that_comes_late_is_taken_up() {
     // And what it hears now is remembered: a correction of what it was taught before.
     teach(&robot, &name, taught, 0).await;
     timeout(PATIENCE, robot.stop()).await.expect("it stops");
+}
+
+/// Nothing was taught, so nothing is remembered but that it was there.
+#[tokio::test(flavor = "multi_thread")]
+async fn who_has_started_again_counts_for_no_gesture_of_a_round_that_it_hears_of_soon() {
+    let folder = tempfile::tempdir().unwrap();
+    let (name, path) = (unique(), folder.path().join("memory"));
+    for is_final in [true, false] {
+        let first = with_memory(&name, &path);
+        // So long it may have been in one before, however slowly this machine starts the other robot.
+        let mind = MindConfig { deadline: 3 * PATIENCE, ..first.mind.clone() };
+        let mut robots = swarm(&name, 2, RobotConfig { mind, ..first }).await;
+        robots[1].robot.open_round();
+        let said = |event: &Event| match event {
+            Event::Announced(announcement) => Some(announcement.decision.is_final),
+            _ => None,
+        };
+        assert_eq!(robots[1].event("announced", said).await, is_final, "both are a majority");
+        for robot in robots {
+            robot.stop().await;
+        }
+    }
 }

@@ -150,9 +150,8 @@ impl Rounds {
         self.electorate.forget(self.now, self.config.lately, &self.alive);
         let before = self.round.take().filter(|before| before.id.counter == id.counter);
         match &before {
-            // What is left for what others say in another round may yet be that, by its other name.
-            Some(before) if open && !before.has_decided() => {}
-            Some(before) => self.past.extend(before.names()),
+            Some(before) if before.has_decided() => self.past.extend(before.names()),
+            Some(_) => {}
             None => self.past.clear(),
         }
         let taught = effects.follower.taught(id.counter);

@@ -135,16 +135,17 @@ impl Rounds {
             _ => (None, BTreeMap::<RobotId, Stamp>::new()),
         };
         // Most hold this gesture, and the neighbour another: it gives way.
-        let word = round.agreement.word(from);
-        let gives_way =
-            |held: &Decision| word.is_some_and(|word| word != held.class) && self.have_settled_on(held.class);
+        let word = round.agreement.word(from).flatten();
+        let holds_another = |held: &Decision| word.is_some() && word != held.class;
+        let gives_way = |held: &Decision| holds_another(held) && self.have_settled_on(held.class);
         let lacks = |held: &&Decision| Some(held.rank()) > rank || gives_way(held);
         let decision = round.agreement.held().filter(lacks).cloned();
-        // Where it holds another gesture, under the name that it knows: it may have heard of this one too late to take both for one, and gives way to none that is
-        // older.
-        let holds_another = rank.is_some_and(|rank| rank.decided);
-        let called = have.round.filter(|name| holds_another && round.is_named(*name));
-        let decision = decision.map(|held| Decision { round: called.unwrap_or(held.round), ..held });
+        // Under the name that it knows then: it may have heard of this one too late to take both for one, and gives way to none that is older.
+        let called = have.round.filter(|name| round.is_named(*name));
+        let decision = decision.map(|held| match called.filter(|_| holds_another(&held)) {
+            Some(round) => Decision { round, ..held },
+            None => held,
+        });
         // Who gets a decision gets the votes with it.
         let votes = if rank.is_none() && decision.is_none() {
             round.ballot.lacking(&known).take(MAX_GIVEN).collect()

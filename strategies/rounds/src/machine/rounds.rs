@@ -118,8 +118,7 @@ pub struct Rounds {
     pub(super) now: Duration,
     /// The newest round known.
     pub(super) round: Option<Round>,
-    /// The names of earlier rounds under its count in which this robot held a gesture, or that gave way to a decision, or of which an instructor spoke: names of this one
-    /// they never become.
+    /// The names of earlier rounds under its count in which this robot held a gesture, or of which an instructor spoke: names of this one they never become.
     pub(super) past: BTreeSet<RoundId>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
     pub(super) highest: Option<u32>,

@@ -28,24 +28,25 @@ fn who_held_a_gesture_in_a_round_counts_for_no_other_in_one_of_its_count() {
 /// Who heard of the other name when its round was over, or never, takes it for that of another one, and what is older for nothing.
 #[test]
 fn a_neighbour_that_holds_another_gesture_is_given_a_decision_under_the_name_that_it_knows() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
-    mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, SURE) }));
-    let late = adding_up().deadline + ms(1000);
-    live(&mut mind, late);
-    let held = mind.held().expect("two are sure").clone();
-    let (another, nothing) = (decision(1, Some(2), 1, 20).rank(), decision(1, None, 0, 20).rank());
-    // By no name that is known here it is another round, an older one. Who holds nothing gives way to any.
-    for (calls, holds, given) in [(5, another, 5), (1, another, 1), (0, another, 1), (5, nothing, 1)] {
+    let (another, same) = (decision(1, Some(2), 1, 20), decision(1, Some(0), 1, 20));
+    // By no name that is known here it is another round, an older one. Who holds the same gesture comes to call it as all do.
+    for (calls, holds, given) in [(5, &another, 5), (1, &another, 1), (0, &another, 1), (5, &same, 1)] {
         let have = Have {
             round: Some(round(1, calls)),
-            decision: Some(holds),
+            decision: Some(gestalt_protocol::Rank { confidence: 0.1, ..holds.rank() }),
             holders: 0,
             votes: vec![],
             knowledge: None,
             answer: true,
         };
-        let out = mind.handle(late, says(20 + calls, 2, Message::Have(have)));
+        let mut mind = mind(7);
+        mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+        mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, SURE) }));
+        let late = adding_up().deadline + ms(1000);
+        live(&mut mind, late);
+        let held = mind.held().expect("two are sure").clone();
+        mind.handle(late, says_it_holds(20, holds));
+        let out = mind.handle(late, says(20, 41, Message::Have(have)));
         let [(_, Message::Give(give))] = &told(&out)[..] else { panic!("{out:?}") };
         assert_eq!(
             give.decision,
@@ -53,24 +54,6 @@ fn a_neighbour_that_holds_another_gesture_is_given_a_decision_under_the_name_tha
             "it says {calls}"
         );
     }
-}
-
-/// It gave way to what others had decided of another showing: whoever goes on under its name is not in that.
-#[test]
-fn the_name_of_a_round_that_gave_way_is_none_of_the_one_it_gave_way_to() {
-    let mut mind = mind(7);
-    mind.handle(ms(0), Input::Open);
-    live(&mut mind, ms(9000));
-    assert_eq!((mind.round(), mind.held().unwrap().class), (Some(round(1, 7)), None));
-    let theirs = drawn_late(round(1, 1), Some(0), 3);
-    mind.handle(ms(9001), gives(9, theirs.clone()));
-    assert_eq!(mind.held(), Some(&theirs));
-    mind.handle(ms(9002), votes(3, 1, Vote { round: round(1, 7), ..vote(1, 1, LEANING) }));
-    assert_eq!((mind.round(), mind.is_open()), (Some(theirs.round), false), "nor is it gone through again,");
-    assert!(!mind.round.as_ref().unwrap().is_named(round(1, 7)));
-    let drawn = drawn_late(round(1, 7), Some(1), 3);
-    mind.handle(ms(9003), gives(9, drawn.clone()));
-    assert_eq!(mind.held(), Some(&drawn), "unless something was decided in it: it is the greater name");
 }
 
 /// One of them takes two rounds for one, which are two for the others: it holds the greatest decision, and they another.
