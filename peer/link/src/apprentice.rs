@@ -7,8 +7,8 @@ use std::time::SystemTime;
 
 use gestalt_protocol::{Digest, LearningStatus, RobotId};
 use gestalt_strategies::{
-    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningSetup, Mind, MindConfig,
-    OwnRules, RecordChange, RobotMemory, TrainingChange, Vocabulary,
+    Classifier, FeatureSpace, Input, LearnError, Learner, LearningConfig, LearningError, LearningSetup, Mind,
+    MindConfig, OwnRules, RecordChange, RobotMemory, TrainingChange, Vocabulary,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -138,14 +138,15 @@ impl Prepared {
         Ok(prepared)
     }
 
-    /// Whether the robot has lived before, as far as its disk tells.
-    pub fn has_lived(&self) -> bool {
-        self.store.is_some() && !self.new
-    }
-
-    /// What the mind needs of it.
-    pub fn setup(&mut self, id: RobotId) -> LearningSetup {
-        self.learning.setup(id, self.boot, self.memory.take())
+    /// That mind, set up to learn, with what was on the disk: which tells that it has lived before also where nothing was taught.
+    ///
+    /// # Errors
+    /// See [`Mind::learning`].
+    pub fn bring_up(&mut self, mind: Mind) -> Result<Mind, LearningError> {
+        let has_lived = self.store.is_some() && !self.new;
+        let setup = self.learning.setup(mind.me(), self.boot, self.memory.take());
+        let mind = mind.learning(setup)?;
+        Ok(if has_lived { mind.started_again() } else { mind })
     }
 
     /// The classifier to start with.
@@ -165,7 +166,7 @@ impl RobotLearning {
             let key = "learning.memory".to_owned();
             return Err(LinkError::Config { key, cause: failure.to_string() });
         }
-        Mind::new(robot, identity::life(prepared.boot, 0), mind.clone())?.learning(prepared.setup(robot))?;
+        prepared.bring_up(Mind::new(robot, identity::life(prepared.boot, 0), mind.clone())?)?;
         Ok(())
     }
 }

@@ -120,11 +120,7 @@ impl Robot {
             vocabulary.clone(),
         )?;
         if let Some(prepared) = &mut prepared {
-            mind = mind.learning(prepared.setup(id))?;
-            // It was there, though nothing may have been taught yet.
-            if prepared.has_lived() {
-                mind = mind.started_again();
-            }
+            mind = prepared.bring_up(mind)?;
         }
         let keys = Keys::new(&swarm)?;
         let zenoh = link.to_zenoh(id, &swarm, nonce)?;

@@ -2,12 +2,13 @@
 
 use std::fs;
 use std::path::Path;
+use std::time::Duration;
 
 use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
 use gestalt_strategies::MindConfig;
 use tokio::time::timeout;
 
-use super::{PATIENCE, Watched, config, learning, swarm, unique};
+use super::{PATIENCE, Watched, config, learning, start, swarm, unique};
 use crate::{Client, Event, LinkConfig, LinkError, Robot, RobotConfig, StoreError};
 
 fn with_memory(name: &str, path: &Path) -> RobotConfig {
@@ -86,18 +87,25 @@ async fn who_has_started_again_counts_for_no_gesture_of_a_round_that_it_hears_of
     let folder = tempfile::tempdir().unwrap();
     let (name, path) = (unique(), folder.path().join("memory"));
     for is_final in [true, false] {
-        let first = with_memory(&name, &path);
-        // So long it may have been in one before, however slowly this machine starts the other robot.
-        let mind = MindConfig { deadline: 3 * PATIENCE, ..first.mind.clone() };
-        let mut robots = swarm(&name, 2, RobotConfig { mind, ..first }).await;
-        robots[1].robot.open_round();
+        let first = start(with_memory(&name, &path)).await;
+        let other = config(2, &name, first.robot.locators());
+        // It says so when the time of the round is over; the first one may have been in one before for longer than this takes.
+        let times = MindConfig {
+            patience: Duration::from_secs(1),
+            deadline: Duration::from_secs(8),
+            ..other.mind.clone()
+        };
+        let mut second = start(RobotConfig { mind: times, ..other }).await;
+        for robot in [&first, &second] {
+            robot.status("both are alive", |status| status.alive.len() == 2).await;
+        }
+        second.robot.open_round();
         let said = |event: &Event| match event {
             Event::Announced(announcement) => Some(announcement.decision.is_final),
             _ => None,
         };
-        assert_eq!(robots[1].event("announced", said).await, is_final, "both are a majority");
-        for robot in robots {
-            robot.stop().await;
-        }
+        assert_eq!(second.event("announced", said).await, is_final, "both are a majority");
+        first.stop().await;
+        second.stop().await;
     }
 }

@@ -163,7 +163,8 @@ fn counts_some_of(decision: &Decision, round: &Round, liars: u32) -> bool {
 /// are over, one in which nothing was decided gives way to one in which something was: a part of a cut swarm that is too small to decide goes through rounds
 /// of its own.
 pub(super) fn newer(id: RoundId, decided: Option<bool>, known: &Round) -> Ordering {
-    let known_decided = known.agreement.rank().map(|rank| rank.decided);
+    // One that was over when it was heard of holds nothing.
+    let known_decided = known.agreement.rank().map(|rank| rank.decided).or((!known.open).then_some(false));
     let by_outcome = match (decided, known_decided) {
         (Some(decided), Some(known_decided)) if id.counter == known.id.counter && !known.open => {
             decided.cmp(&known_decided)

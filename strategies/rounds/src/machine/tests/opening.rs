@@ -354,6 +354,19 @@ fn a_round_that_an_instructor_spoke_of_is_over() {
     assert_eq!((mind.round(), mind.is_open()), (Some(round(8, 2)), true));
 }
 
+/// By a vote under that name robots have no gesture, where others decided one in another round of its count.
+#[test]
+fn who_came_to_a_round_when_it_was_over_holds_what_was_decided_in_another() {
+    let mut mind = mind(7);
+    let decided = decision(1, Some(0), 3, 9);
+    mind.handle(ms(0), gives(9, decided.clone()));
+    let mut follower = Taught([round(1, 9)].into());
+    mind.handle_with(ms(9000), votes(3, 1, Vote { round: round(1, 9), ..null(1) }), &mut follower);
+    assert_eq!((mind.round(), mind.is_open(), mind.held()), (Some(round(1, 9)), false, None));
+    mind.handle_with(ms(9001), gives(9, decided.clone()), &mut follower);
+    assert_eq!(mind.held(), Some(&decided));
+}
+
 #[test]
 fn a_round_under_a_count_that_was_used_elsewhere_is_opened_anew() {
     // It was cut off while others had a first round, which they could not decide.
