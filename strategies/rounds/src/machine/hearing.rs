@@ -101,8 +101,8 @@ impl Rounds {
         }
         match &self.round {
             Some(round) if self.is_this_round(holding.round) => {
-                let greater = |held: &Decision| held.class != holding.class && held.rank() < holding.rank;
-                let held = round.agreement.held();
+                let (held, rank) = (round.agreement.held(), round.agreement.rank());
+                let greater = |held: &Decision| held.class != holding.class && rank < Some(holding.rank);
                 held.is_none_or(|held| greater(held) && !self.have_settled_on(held.class))
             }
             Some(round) => newer(holding.round, Some(true), round).is_gt(),

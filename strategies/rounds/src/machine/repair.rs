@@ -138,7 +138,7 @@ impl Rounds {
         let word = round.agreement.word(from).flatten();
         let holds_another = |held: &Decision| word.is_some() && word != held.class;
         let gives_way = |held: &Decision| holds_another(held) && self.have_settled_on(held.class);
-        let lacks = |held: &&Decision| Some(held.rank()) > rank || gives_way(held);
+        let lacks = |held: &&Decision| round.agreement.rank() > rank || gives_way(held);
         let decision = round.agreement.held().filter(lacks).cloned();
         // Under the name that it knows then: it may have heard of this one too late to take both for one, and gives way to none that is older.
         let called = have.round.filter(|name| round.is_named(*name));

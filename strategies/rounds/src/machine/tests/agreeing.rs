@@ -228,14 +228,7 @@ fn who_drew_a_decision_or_has_it_counts_for_none_that_did_not_say_that_it_holds_
     mind.handle(ms(0), Input::Open);
     for author in 2..=5 {
         mind.handle(ms(0), gives(author, decision(1, Some(1), 5, author)));
-        let have = Have {
-            round: mind.round(),
-            decision: mind.held().map(Decision::rank),
-            holders: 0,
-            votes: vec![],
-            knowledge: None,
-            answer: false,
-        };
+        let have = having(mind.round().unwrap(), mind.held().unwrap().rank());
         mind.handle(ms(1), says(author, 51, Message::Have(have)));
     }
     assert!(!mind.held_aloud().unwrap().decision.is_final);

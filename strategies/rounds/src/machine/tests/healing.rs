@@ -31,14 +31,8 @@ fn a_neighbour_that_holds_another_gesture_is_given_a_decision_under_the_name_tha
     let (another, same) = (decision(1, Some(2), 1, 20), decision(1, Some(0), 1, 20));
     // By no name that is known here it is another round, an older one. Who holds the same gesture comes to call it as all do.
     for (calls, holds, given) in [(5, &another, 5), (1, &another, 1), (0, &another, 1), (5, &same, 1)] {
-        let have = Have {
-            round: Some(round(1, calls)),
-            decision: Some(gestalt_protocol::Rank { confidence: 0.1, ..holds.rank() }),
-            holders: 0,
-            votes: vec![],
-            knowledge: None,
-            answer: true,
-        };
+        let rank = gestalt_protocol::Rank { confidence: 0.1, ..holds.rank() };
+        let have = Have { answer: true, ..having(round(1, calls), rank) };
         let mut mind = mind(7);
         mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
         mind.handle(ms(10), votes(5, 1, Vote { round: round(1, 5), ..vote(1, 0, SURE) }));
@@ -59,7 +53,6 @@ fn a_neighbour_that_holds_another_gesture_is_given_a_decision_under_the_name_tha
 /// One of them takes two rounds for one, which are two for the others: it holds the greatest decision, and they another.
 #[test]
 fn what_most_hold_long_after_a_round_stands() {
-    let word = |robot, decision: &Decision| says_it_holds(robot, decision);
     let (greater, lesser) = (decision(1, Some(0), 4, 9), decision(1, Some(1), 3, 8));
     let late = adding_up().deadline * 2 + ms(100);
     // Who says what it holds beside this robot of three, when, and whether one of them has left for another round since; and what this robot holds then.
@@ -72,7 +65,7 @@ fn what_most_hold_long_after_a_round_stands() {
         let at = if early { ms(4000) } else { late };
         live(&mut mind, at);
         for robot in [8, 9].into_iter().take(of_the_lesser) {
-            mind.handle(at, word(robot, &lesser));
+            mind.handle(at, says_it_holds(robot, &lesser));
         }
         if left {
             let elsewhere = Message::Holding(drawn_late(round(1, 9), Some(0), 3).holding(true));
@@ -101,14 +94,7 @@ fn who_holds_another_gesture_than_most_long_after_a_round_is_given_theirs() {
         mind.handle(ms(0), says_it_holds(8, &lesser));
         mind.handle(ms(0), says_it_holds(9, &greater));
         live(&mut mind, at);
-        let have = Have {
-            round: Some(greater.round),
-            decision: Some(greater.rank()),
-            holders: 0,
-            votes: vec![],
-            knowledge: None,
-            answer: false,
-        };
+        let have = having(greater.round, greater.rank());
         let out = mind.handle(at, says(9, 50, Message::Have(have)));
         let theirs = told(&out).iter().any(|(_, message)| match message {
             Message::Give(give) => give.decision.as_ref() == Some(&lesser),

@@ -206,6 +206,12 @@ fn says_it_holds(robot: u32, decision: &Decision) -> Input {
     says(robot, 40, Message::Holding(decision.holding(false)))
 }
 
+/// What a robot has: it is in that round, and holds a decision of that rank.
+fn having(round: RoundId, decision: gestalt_protocol::Rank) -> Have {
+    let (round, decision) = (Some(round), Some(decision));
+    Have { round, decision, holders: 0, votes: vec![], knowledge: None, answer: false }
+}
+
 /// A robot announces a decision.
 fn announced(announcer: u32, decision: Decision) -> Input {
     let (announcer, stamp) = (RobotId(announcer), Stamp { boot: 1, sequence: 60 });

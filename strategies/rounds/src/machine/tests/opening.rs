@@ -236,14 +236,7 @@ fn a_round_decided_elsewhere_is_adopted_without_opening() {
     assert_eq!(holds(&out), [Some(2)]);
     assert_eq!(mind.held(), Some(&decision(9, Some(2), 4, 1)));
     assert!(!mind.is_open());
-    let have = Have {
-        round: Some(round(12, 1)),
-        decision: Some(decision(12, Some(1), 2, 1).rank()),
-        holders: 0,
-        votes: vec![],
-        knowledge: None,
-        answer: false,
-    };
+    let have = having(round(12, 1), decision(12, Some(1), 2, 1).rank());
     let out = mind.handle(ms(1), says(3, 1, Message::Have(have)));
     assert!(matches!(told(&out)[..], [(3, Message::Have(Have { answer: true, .. }))]), "it asks for it");
     mind.handle(ms(2000), Input::Open);
@@ -411,14 +404,7 @@ fn a_round_in_which_nothing_was_decided_gives_way_to_one_under_its_count_in_whic
         live(&mut mind, ms(9000));
         assert_eq!((mind.round(), mind.held().unwrap().class), (Some(round(1, 7)), None));
         let theirs = drawn_late(round(1, elsewhere), Some(0), 3);
-        let have = Have {
-            round: Some(theirs.round),
-            decision: Some(theirs.rank()),
-            holders: 0,
-            votes: vec![],
-            knowledge: None,
-            answer: false,
-        };
+        let have = having(theirs.round, theirs.rank());
         let out = mind.handle(ms(9001), says(9, 1, Message::Have(have)));
         let asked = told(&out);
         assert!(matches!(&asked[..], [(9, Message::Have(_))]), "{by} name: it asks for it: {asked:?}");
