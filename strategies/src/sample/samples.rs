@@ -14,8 +14,8 @@ use super::in_order::InOrder;
 #[derive(Debug, Default)]
 pub struct HeldSamples {
     held: InOrder,
-    /// The keys of those that have a name in the swarm, in the order of the names: a third of what a map from name to key takes.
-    named: Vec<u64>,
+    /// Those that have a name in the swarm, in the order of the names, and their keys: half of what a map from name to key takes.
+    named: Vec<(SampleId, u64)>,
     classes: BTreeMap<ClassId, ClassKeys>,
     /// How many external ones there are, by author. Of most authors there are few, so there are many authors: a tree of them would be twice as large.
     authors: Vec<(RobotId, u32)>,
@@ -41,12 +41,12 @@ impl HeldSamples {
     /// The sample with that name.
     #[must_use]
     pub fn find(&self, id: SampleId) -> Option<&HeldSample> {
-        self.get(self.named[self.place_of(id).ok()?])
+        self.get(self.named[self.place_of(id).ok()?].1)
     }
 
     /// Where that name is among the names; where it would be, if it is not.
     fn place_of(&self, id: SampleId) -> Result<usize, usize> {
-        self.named.binary_search_by(|key| self.get(*key).and_then(|sample| sample.id).cmp(&Some(id)))
+        self.named.binary_search_by_key(&id, |(named, _)| *named)
     }
 
     /// All samples, by key.
@@ -169,8 +169,8 @@ impl HeldSamples {
         self.arrivals = self.arrivals.max(sample.key);
         if let Some(id) = sample.id {
             match self.place_of(id) {
-                Ok(place) => self.named[place] = sample.key,
-                Err(place) => insert(&mut self.named, place, sample.key),
+                Ok(place) => self.named[place].1 = sample.key,
+                Err(place) => insert(&mut self.named, place, (id, sample.key)),
             }
             if sample.part == SetPart::External {
                 self.count_author(id.author, true);

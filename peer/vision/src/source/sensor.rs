@@ -1,5 +1,7 @@
 //! From a perfect picture to what a camera makes of it.
 
+use std::sync::LazyLock;
+
 use opencv::core::{self, Mat, Point, Rect, Size, no_array};
 use opencv::imgproc;
 use opencv::prelude::*;
@@ -103,11 +105,15 @@ fn levels(camera: &CameraModel) -> Result<Mat, SourceError> {
 fn transmission(camera: &CameraModel) -> Result<Mat, SourceError> {
     let (rows, columns) = (camera.height_px, camera.width_px);
     let mut lens = Mat::new_rows_cols_with_default(rows, columns, core::CV_8UC3, 0.into())?;
-    for (i, out) in lens.data_typed_mut::<core::Vec3b>()?.iter_mut().enumerate() {
-        let x = (i as i32 % columns) as f64 / f64::from(columns) - 0.5;
-        let y = (i as i32 / columns) as f64 / f64::from(rows) - 0.5;
-        let share = 1.0 - camera.vignetting * 2.0 * (x * x + y * y);
-        *out = core::Vec3b::all((255.0 * share).round() as u8);
+    let squared = |at: i32, of: i32| (f64::from(at) / f64::from(of) - 0.5).powi(2);
+    let along: Vec<f64> = (0..columns).map(|x| squared(x, columns)).collect();
+    for (y, row) in (0..).zip(lens.data_typed_mut::<core::Vec3b>()?.chunks_exact_mut(along.len())) {
+        let down = squared(y, rows);
+        for (out, across) in row.iter_mut().zip(&along) {
+            let share = 1.0 - camera.vignetting * 2.0 * (across + down);
+            // Rounded: it is a share of the light.
+            *out = core::Vec3b::all((255.0 * share + 0.5) as u8);
+        }
     }
     Ok(lens)
 }
@@ -116,9 +122,10 @@ fn transmission(camera: &CameraModel) -> Result<Mat, SourceError> {
 ///
 /// A sum of twelve uniform variables would need twelve draws a sample; a table needs ten bits.
 fn gaussian_levels(sigma: f64) -> Vec<i16> {
-    (0..1024)
-        .map(|i| (sigma * standard_normal_quantile((f64::from(i) + 0.5) / 1024.0)).round() as i16)
-        .collect()
+    static QUANTILES: LazyLock<Vec<f64>> = LazyLock::new(|| {
+        (0..1024).map(|i| standard_normal_quantile((f64::from(i) + 0.5) / 1024.0)).collect()
+    });
+    QUANTILES.iter().map(|quantile| (sigma * quantile).round() as i16).collect()
 }
 
 /// Φ⁻¹(p) to three decimals (Abramowitz and Stegun, 26.2.23).

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
 use super::kernel::{kernel, push, roomy};
-use super::shared::SharedKernel;
+use super::shared::{Row, SharedKernel};
 
 /// Names a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,14 +135,15 @@ impl KernelMatrix {
         let is_last = count(&self.classes) + 1 >= self.room.iter().sum();
         let mut own = is_last.then(|| lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
         let known = self.known.as_ref().map(|known| known.row(shared));
+        let values = known.as_ref().map_or(&[][..], Row::values);
         for (of, (samples, places)) in self.classes.iter_mut().zip(&self.shared).enumerate() {
             for (sample, place) in samples.iter_mut().zip(places) {
                 let Some(row) = sample.kernel.get_mut() else {
                     own = None;
                     continue;
                 };
-                let known = known.as_ref().and_then(|known| known.with(*place));
-                let value = known.unwrap_or_else(|| kernel(self.gamma, &sample.vector, &new.vector));
+                let value = look_up(values, *place);
+                let value = value.unwrap_or_else(|| kernel(self.gamma, &sample.vector, &new.vector));
                 push(&mut row[class], value);
                 if let Some(own) = &mut own {
                     own[of].push(value);
@@ -201,14 +202,14 @@ impl KernelMatrix {
     fn work_out(&self, place: Place) -> Vec<Vec<f32>> {
         let (of, its) = (self.at(place), self.shared[place.class][place.position]);
         let known = self.known.as_ref().map(|known| known.row(its));
+        let values = known.as_ref().map_or(&[][..], Row::values);
         let theirs = |other: &KernelRow| other.kernel.get().map(|row| row[place.class][place.position]);
         let reckoned = |other: &KernelRow| kernel(self.gamma, &other.vector, &of.vector);
         let all = self.classes.iter().zip(&self.shared).zip(&self.room);
         let of_class = |((samples, places), room): ((&Vec<KernelRow>, &Vec<Option<u32>>), &usize)| {
             let mut row = Vec::with_capacity(roomy_for(samples.len(), *room));
             row.extend(places.iter().zip(samples).map(|(place, other)| {
-                let known = known.as_ref().and_then(|known| known.with(*place));
-                known.or_else(|| theirs(other)).unwrap_or_else(|| reckoned(other))
+                look_up(values, *place).or_else(|| theirs(other)).unwrap_or_else(|| reckoned(other))
             }));
             row
         };
@@ -218,6 +219,11 @@ impl KernelMatrix {
 
 fn count(classes: &[Vec<KernelRow>]) -> usize {
     classes.iter().map(Vec::len).sum()
+}
+
+/// What stands at that place of a row of the shared kernel.
+fn look_up(values: &[f32], place: Option<u32>) -> Option<f32> {
+    values.get(place? as usize).copied()
 }
 
 fn roomy_for(length: usize, room: usize) -> usize {

@@ -92,8 +92,10 @@ pub(super) struct Row<'a> {
 }
 
 impl Row<'_> {
-    pub fn with(&self, other: Option<u32>) -> Option<f32> {
-        self.known.rows.get(self.place? as usize)?.get(other? as usize).copied()
+    /// By place; nothing where the vector is not known.
+    pub fn values(&self) -> &[f32] {
+        let row = self.place.and_then(|place| self.known.rows.get(place as usize));
+        row.map_or(&[], Vec::as_slice)
     }
 }
 

@@ -62,13 +62,15 @@ fn clutter(image: &mut Mat, rng: &mut impl Rng) -> opencv::Result<()> {
 fn light_unevenly(image: &mut Mat, rng: &mut impl Rng) -> opencv::Result<()> {
     let (width, height) = (image.cols() as f32, image.rows() as f32);
     let (slope_x, slope_y): (f32, f32) = (rng.random_range(-0.2..0.2), rng.random_range(-0.2..0.1));
-    let columns = image.cols() as usize;
-    for (i, pixel) in image.data_typed_mut::<Vec3b>()?.iter_mut().enumerate() {
-        let (x, y) = ((i % columns) as f32 / width - 0.5, (i / columns) as f32 / height - 0.5);
-        let light = 1.0 + slope_x * x + slope_y * y;
-        let grain: f32 = rng.random_range(-3.0..3.0);
-        for value in &mut pixel.0 {
-            *value = (f32::from(*value) * light + grain) as u8;
+    let across: Vec<f32> = (0..image.cols()).map(|x| 1.0 + slope_x * (x as f32 / width - 0.5)).collect();
+    for (y, row) in image.data_typed_mut::<Vec3b>()?.chunks_exact_mut(across.len()).enumerate() {
+        let down = slope_y * (y as f32 / height - 0.5);
+        for (pixel, across) in row.iter_mut().zip(&across) {
+            let light = across + down;
+            let grain: f32 = rng.random_range(-3.0..3.0);
+            for value in &mut pixel.0 {
+                *value = (f32::from(*value) * light + grain) as u8;
+            }
         }
     }
     Ok(())
