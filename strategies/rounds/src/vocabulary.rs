@@ -32,6 +32,8 @@ pub enum VocabularyError {
 #[serde(try_from = "Vec<String>", into = "Vec<String>")]
 pub struct Vocabulary {
     labels: Vec<String>,
+    /// Of the labels: votes are held against it all the time.
+    id: VocabularyId,
     named: Vec<ClassId>,
     titles: BTreeMap<ClassId, String>,
 }
@@ -57,7 +59,8 @@ impl Vocabulary {
                 return Err(VocabularyError::Repeated(label.clone()));
             }
         }
-        Ok(Self { labels, named: Vec::new(), titles: BTreeMap::new() })
+        let id = id_of(&labels);
+        Ok(Self { labels, id, named: Vec::new(), titles: BTreeMap::new() })
     }
 
     /// The gestures that a robot says it can tell apart, with what those are called that were named since; `None` where it reports none.
@@ -169,13 +172,17 @@ impl Vocabulary {
     /// Names this list on the wire: the CRC-32 of the labels, each followed by a zero byte.
     #[must_use]
     pub fn id(&self) -> VocabularyId {
-        let mut hash = crc32fast::Hasher::new();
-        for label in &self.labels {
-            hash.update(label.as_bytes());
-            hash.update(&[0]);
-        }
-        VocabularyId(hash.finalize())
+        self.id
     }
+}
+
+fn id_of(labels: &[String]) -> VocabularyId {
+    let mut hash = crc32fast::Hasher::new();
+    for label in labels {
+        hash.update(label.as_bytes());
+        hash.update(&[0]);
+    }
+    VocabularyId(hash.finalize())
 }
 
 impl TryFrom<Vec<String>> for Vocabulary {
