@@ -46,7 +46,7 @@ impl Extent {
                 honest: 17,
                 liars: 3,
                 time,
-                settled: time.min(Duration::from_secs(6000)) / 10,
+                settled: Duration::from_secs(600).min(time / 2),
                 growth: 1.05,
             },
             None => {
