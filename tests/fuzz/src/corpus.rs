@@ -9,7 +9,7 @@ use crate::targets::Target;
 /// Where the inputs of a target are kept.
 #[must_use]
 pub fn folder(target: Target) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.name())
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.corpus().name())
 }
 
 /// All inputs of a folder, by name.

@@ -73,6 +73,11 @@ fn three_honest_minds_come_to_know_the_same_whatever_a_stranger_says() {
 }
 
 #[test]
+fn no_round_of_theirs_has_two_final_gestures() {
+    stands(Target::Finals, 1000);
+}
+
+#[test]
 fn what_is_final_stands_however_late_votes_are() {
     let _alone = alone();
     let known = corpus::read(&corpus::folder(Target::Mind).join("../../late/mind")).expect("a folder");

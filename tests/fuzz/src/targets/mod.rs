@@ -38,11 +38,13 @@ pub enum Target {
     Inbox,
     /// Three honest minds, and one who means them ill.
     Mind,
+    /// The same, of whom no more is asked than that no round has two final gestures.
+    Finals,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Envelope,
         Self::Json,
         Self::Roster,
@@ -51,9 +53,10 @@ impl Target {
         Self::Frame,
         Self::Inbox,
         Self::Mind,
+        Self::Finals,
     ];
 
-    /// Its name on the command line, and that of its corpus.
+    /// Its name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -65,7 +68,14 @@ impl Target {
             Self::Frame => "frame",
             Self::Inbox => "inbox",
             Self::Mind => "mind",
+            Self::Finals => "finals",
         }
+    }
+
+    /// The target whose corpus it is tried on.
+    #[must_use]
+    pub fn corpus(self) -> Self {
+        if self == Self::Finals { Self::Mind } else { self }
     }
 
     /// Tries one input.
@@ -82,6 +92,7 @@ impl Target {
             Self::Frame => frame::run(bytes),
             Self::Inbox => inbox::run(bytes),
             Self::Mind => mind::run(bytes),
+            Self::Finals => mind::finals(bytes),
         }
     }
 
@@ -95,7 +106,7 @@ impl Target {
             Self::Key => key_seed(rng),
             Self::Frame => values::beside_a_frame(rng),
             Self::Inbox => inbox::seed(rng),
-            Self::Mind => mind::seed(rng),
+            Self::Mind | Self::Finals => mind::seed(rng),
         }
     }
 }
