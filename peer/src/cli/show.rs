@@ -158,7 +158,8 @@ fn because(outcome: RoundOutcome, reason: &Reason, decision: &Decision, names: &
         Reason::FarFromAll { nearest, nats } => {
             format!("nearest is {}, and less likely by {nats:.1} nats", name(nearest))
         }
-        Reason::NothingSeen => "no robot saw a hand".to_owned(),
+        // Who learns from nothing has no gesture to vote for before the first was taught.
+        Reason::NothingSeen => "no robot that knows a gesture saw a hand".to_owned(),
         Reason::TooFewRobots { counted: number, needed } => format!(
             "{number} of {} took part, {needed} needed",
             counted(certificate.robots as usize, "robot")

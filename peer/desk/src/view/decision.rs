@@ -118,7 +118,8 @@ fn why(reason: &Reason, name: &dyn Fn(ClassId) -> String) -> String {
     match *reason {
         Reason::Sure => String::new(),
         Reason::FarFromAll { nearest, .. } => format!("unlike all it knows; nearest is {}", name(nearest)),
-        Reason::NothingSeen => "no robot saw a hand".to_owned(),
+        // Who learns from nothing has no gesture to vote for before the first was taught.
+        Reason::NothingSeen => "no robot that knows a gesture saw a hand".to_owned(),
         Reason::TooFewRobots { counted, needed } => format!("{counted} robots took part, {needed} needed"),
         Reason::Disagreement { between: [a, b], robots: [for_a, for_b] } => {
             format!("{for_a} for {}, {for_b} for {}", name(a), name(b))
