@@ -16,6 +16,9 @@ use super::{Failure, interrupted};
 use gestalt_desk::{Event, View};
 use gestalt_link::{Client, News};
 
+/// How long a swarm that is there takes at most until it is heard of.
+const SILENCE: Duration = Duration::from_secs(3);
+
 /// Attach to a swarm and print its decisions, and robots joining and leaving, until Ctrl-C
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -57,7 +60,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     super::runtime()?.block_on(async {
         let client = Client::open(&swarm, &link).await?;
         if args.status {
-            statuses(args.json, &client).await?;
+            statuses(args.json, &swarm, &client).await?;
         } else if args.robots {
             tokio::select! {
                 () = interrupted() => {}
@@ -69,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let foxglove = args.foxglove.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}
-                watched = watch(args, &client, &mut news) => watched?,
+                watched = watch(args, &swarm, &client, &mut news) => watched?,
             }
             if let Some(page) = page {
                 page.close().await;
@@ -83,11 +86,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Failure> {
+async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Result<(), Failure> {
     let (mut view, began) = (View::default(), Instant::now());
     let mut names = Names::default();
     let mut decisions = 0;
-    while let Some(heard) = news.next().await {
+    let mut next = tokio::time::timeout(SILENCE, news.next()).await;
+    if next.is_err() {
+        hint_at_nobody(swarm);
+        next = Ok(news.next().await);
+    }
+    let mut next = next.ok().flatten();
+    while let Some(heard) = next {
         match view.hear(began.elapsed(), heard.into()) {
             Some(Event::Decided(it)) => {
                 if !args.json && !names.cover(&it.decision) {
@@ -113,8 +122,17 @@ async fn watch(args: &Args, client: &Client, news: &mut News) -> Result<(), Fail
             // What each robot holds is in the decision's own message already.
             Some(Event::Answered(_)) | None => {}
         }
+        next = news.next().await;
     }
     Ok(())
+}
+
+/// Says on the error stream that there may be nobody to watch: a swarm of another name is as silent as one that is off.
+fn hint_at_nobody(swarm: &str) {
+    eprintln!(
+        "no robot of the swarm \"{swarm}\" is heard of: start one; or name one that runs: -e tcp/ITS-ADDRESS:7447, and the swarm: \
+         --swarm NAME; 'gestalt doctor' looks for it"
+    );
 }
 
 /// Shows how all robots are, again and again.
@@ -136,8 +154,11 @@ async fn robots(as_json: bool, client: &Client) -> Result<(), Failure> {
     }
 }
 
-async fn statuses(as_json: bool, client: &Client) -> Result<(), Failure> {
+async fn statuses(as_json: bool, swarm: &str, client: &Client) -> Result<(), Failure> {
     let statuses = client.statuses(super::ANSWER).await?;
+    if statuses.is_empty() {
+        hint_at_nobody(swarm);
+    }
     for (status, camera) in statuses.iter().zip(table(&statuses, false)) {
         let state = match (status.round, status.open) {
             (Some(round), true) => format!("round {} open", round.counter),

@@ -19,7 +19,7 @@ pub struct Agreement {
     held: Option<Held>,
     /// The first gesture held, in this round or in one before it under its count. Whoever counts for one gesture of a round counts for no other, or two could be final.
     first: Option<ClassId>,
-    /// Who said something in this round in two of its lives: in the first it may have counted for a gesture that it has forgotten.
+    /// Who said something in rounds of its count in two of its lives: in the first it may have counted for a gesture that it has forgotten.
     restarted: BTreeSet<RobotId>,
     /// What robots said last that they hold in other rounds of its count, and when. At most [`MAX_ROBOTS`].
     elsewhere: BTreeMap<RobotId, (Stamp, Option<ClassId>)>,
@@ -47,9 +47,7 @@ struct Announced {
 impl Agreement {
     /// Hears a robot's word of what it holds, its own or passed on: the latest replaces all earlier ones. Says whether it was news.
     pub fn note_holder(&mut self, holder: Holder) -> bool {
-        if self.holder(holder.robot).is_some_and(|known| known.stamp.boot != holder.stamp.boot) {
-            self.note_restart(holder.robot);
-        }
+        self.note_life(holder.robot, holder.stamp);
         let known = self.holders.get(&holder.robot);
         let is_news = match known {
             Some(known) => known.stamp < holder.stamp,
@@ -59,6 +57,15 @@ impl Agreement {
             self.holders.insert(holder.robot, holder);
         }
         is_news
+    }
+
+    /// A word of that stamp: one of another life than those before, on whichever round of this count, tells that the robot started again.
+    fn note_life(&mut self, robot: RobotId, stamp: Stamp) {
+        let here = self.holder(robot).map(|holder| holder.stamp);
+        let elsewhere = self.elsewhere.get(&robot).map(|(stamp, _)| *stamp);
+        if here.into_iter().chain(elsewhere).any(|known| known.boot != stamp.boot) {
+            self.note_restart(robot);
+        }
     }
 
     /// That robot started again in the midst of the round: from now on it counts for no gesture, or two could be final.
@@ -137,9 +144,10 @@ impl Agreement {
         own + self.holders().filter(holds).count() >= quorum as usize
     }
 
-    /// The first gesture held counts in this round too, of the same count: a vote that a cut held back may have opened it a second time, under another name.
+    /// The first gesture held counts in this round too, of the same count: a vote that a cut held back may have opened it a second time, under another name. And who
+    /// started again in the midst of that counts for none in this.
     pub fn follow(&mut self, before: Self) {
-        (self.first, self.elsewhere) = (before.first, before.elsewhere);
+        (self.first, self.elsewhere, self.restarted) = (before.first, before.elsewhere, before.restarted);
         for Holder { robot, stamp, holding, .. } in before.holders.into_values() {
             self.note_elsewhere(robot, stamp, holding.class);
         }
@@ -147,6 +155,7 @@ impl Agreement {
 
     /// Hears a robot's word on another round of this count.
     pub fn note_elsewhere(&mut self, robot: RobotId, stamp: Stamp, class: Option<ClassId>) {
+        self.note_life(robot, stamp);
         let is_news = match self.elsewhere.get(&robot) {
             Some((known, _)) => *known < stamp,
             None => self.elsewhere.len() < MAX_ROBOTS,
