@@ -256,16 +256,16 @@ impl LessonBook {
         let leading = leading(&words);
         let Some((_, latest)) = leading.last() else { return Verdict::Retracted };
         // What was shown has a name, also where nobody uses that any more, or this robot has not heard of it.
-        let named = match latest.word {
+        let named = |said: &Said| match said.word {
             Word::Was(class) if class.is_named() => Some(class),
             _ => None,
         };
         let mut candidates = classes.clone();
-        candidates.classes.extend(named);
+        candidates.classes.extend(leading.iter().filter_map(|(_, said)| named(said)));
         leading.iter().for_each(|(_, said)| candidates.restrict(said.word));
         if candidates.classes.is_empty() {
             candidates = classes.clone();
-            candidates.classes.extend(named);
+            candidates.classes.extend(named(latest));
             candidates.restrict(latest.word);
         }
         match candidates.only() {

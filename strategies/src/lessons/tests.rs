@@ -61,6 +61,9 @@ fn who_denies_a_gesture_denies_what_it_has_become() {
         (vec![was(4), not_ring], vec![0, 1, 2, 3, 5]),
         (vec![was_ring, not(4)], vec![0, 1, 2, 3, 5]),
         (vec![not_ring, was(4)], vec![4]),
+        // None, whichever was said first.
+        (vec![was_ring, not(3)], vec![ring.0]),
+        (vec![not(3), was_ring], vec![ring.0]),
     ] {
         let mut book = LessonBook::default();
         for (n, word) in words.iter().enumerate() {

@@ -55,8 +55,12 @@ pub(super) fn inspect(bytes: &[u8]) -> Result<Claim, PictureError> {
     }
 }
 
-/// Walks the chunks (length, type, data, checksum) up to the end chunk.
+/// Walks the chunks (length, type, data, checksum) up to the end chunk. The first tells the size: a decoder passes over others before it that it does not know.
 fn inspect_png(mut rest: &[u8]) -> Result<Claim, PictureError> {
+    const HEADER: &[u8] = b"\0\0\0\x0dIHDR";
+    if !rest.starts_with(&HEADER[..HEADER.len().min(rest.len())]) {
+        return Err(PictureError::NotAnImage);
+    }
     let fields = rest.get(8..16).ok_or(PictureError::Truncated)?;
     let (width, height) = (big_endian(&fields[..4]), big_endian(&fields[4..]));
     loop {
@@ -75,6 +79,9 @@ fn inspect_png(mut rest: &[u8]) -> Result<Claim, PictureError> {
 }
 
 /// Walks the marker segments, and through the scans between them, up to the end-of-image marker (ITU-T T.81, B.1).
+///
+/// What decoders may read otherwise is no image: a second frame, of which some take the first, or a marker without a segment where there is none to be, behind
+/// which another size could hide.
 fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
     const START_OF_SCAN: u8 = 0xda;
     const END_OF_IMAGE: u8 = 0xd9;
@@ -94,6 +101,9 @@ fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
             let claim: Claim = claim.ok_or(PictureError::NotAnImage)?;
             return Ok(Claim { plain_jpeg: claim.plain_jpeg && !may_be_turned, ..claim });
         }
+        if matches!(marker, 0x00 | 0x01 | 0xd0..=0xd8) || (marker == START_OF_SCAN && claim.is_none()) {
+            return Err(PictureError::NotAnImage);
+        }
         let Some(length) = rest.get(..2) else { return Err(PictureError::Truncated) };
         let length = big_endian(length) as usize;
         let Some(segment) = rest.get(..length) else { return Err(PictureError::Truncated) };
@@ -102,6 +112,9 @@ fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
         if matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc) {
             let fields = segment.get(3..8).ok_or(PictureError::NotAnImage)?;
             let (height, width) = (big_endian(&fields[..2]), big_endian(&fields[2..4]));
+            if claim.is_some() {
+                return Err(PictureError::NotAnImage);
+            }
             claim = Some(Claim { width, height, plain_jpeg: matches!(fields[4], 1 | 3) });
         }
         rest = &rest[length..];
@@ -151,6 +164,31 @@ mod tests {
         let mut jpeg = encoded(".jpg", 40, 30);
         jpeg.splice(2..2, *b"\xff\xe1\x00\x08Exif\0\0");
         assert_eq!(inspect(&jpeg), Ok(Claim { width: 40, height: 30, plain_jpeg: false }));
+    }
+
+    /// Decoders read the first size of a JPEG, pass over markers that have no segment, and over chunks of a PNG that they do not know.
+    #[test]
+    fn no_size_hides_behind_another() {
+        let jpeg = encoded(".jpg", 40, 30);
+        let frame = jpeg.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        let small = jpeg[frame..frame + 19].to_vec();
+        let mut large = small.clone();
+        large[5..9].fill(0x7f);
+        let put = |bytes: &[u8], at: usize| {
+            let mut jpeg = jpeg.clone();
+            jpeg.splice(at..at, bytes.iter().copied());
+            inspect(&jpeg)
+        };
+        assert_eq!(put(&large, frame), Err(PictureError::NotAnImage));
+        assert_eq!(put(&small, jpeg.len() - 2), Err(PictureError::NotAnImage));
+        for marker in [0x00, 0x01, 0xd0, 0xd7, 0xd8] {
+            // Taken for a segment, it would reach to behind the frame that it hides.
+            let hiding = [&[0xff, marker], &large[..]].concat();
+            assert_eq!(put(&hiding, frame), Err(PictureError::NotAnImage), "{marker:x}");
+        }
+        let mut png = encoded(".png", 40, 30);
+        png.splice(8..8, *b"\0\0\0\x08teSt\0\0\0\x01\0\0\0\x01sum.");
+        assert_eq!(inspect(&png), Err(PictureError::NotAnImage));
     }
 
     proptest::proptest! {

@@ -44,6 +44,11 @@ pub fn decode_reduced(
             return Ok(size);
         }
     }
+    // Should the library read another size than this was let in for, it is not decoded.
+    let found = Decompressor::new().and_then(|mut reader| reader.read_header(bytes)).ok();
+    if found.is_some_and(|found| (found.width, found.height) != (width as usize, height as usize)) {
+        return Err(PictureError::NotAnImage);
+    }
     // OpenCV says "cannot decode" with an empty image or with an error, depending on the decoder.
     let decoded = Mat::from_slice(bytes)
         .and_then(|bytes| imgcodecs::imdecode_to(&bytes, imgcodecs::IMREAD_COLOR, image));
