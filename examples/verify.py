@@ -17,8 +17,11 @@ import re
 import struct
 import sys
 
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+try:
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+except ImportError:
+    sys.exit("verify.py checks signatures by another library: pip install cryptography")
 
 ROLES = ("open", "teach", "overrule")
 VERSION, VOTE, ANNOUNCED = 3, 0, 8

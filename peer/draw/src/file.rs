@@ -1,6 +1,7 @@
 //! A drawing's file: SVG or PNG, by its name.
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 use crate::error::DrawError;
@@ -52,12 +53,26 @@ pub fn write(svg: &str, path: &Path) -> Result<(), DrawError> {
     }
 }
 
-/// Writes the bytes of a picture that is drawn already.
+/// Writes the bytes of a picture that is drawn already. Where they cannot all be written, what was there before stays.
 ///
 /// # Errors
 /// A [`DrawError`] that names the path and what to do about it.
 pub fn save(bytes: &[u8], path: &Path) -> Result<(), DrawError> {
-    fs::write(path, bytes).map_err(|cause| DrawError::io(path, cause))
+    replace(bytes, path).map_err(|cause| DrawError::io(path, cause))
+}
+
+fn replace(bytes: &[u8], path: &Path) -> io::Result<()> {
+    // A device, a pipe or a link is written to, not replaced.
+    if fs::symlink_metadata(path).is_ok_and(|there| !there.is_file()) {
+        return fs::write(path, bytes);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new();
+    #[cfg(unix)]
+    file.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = file.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.persist(path).map(drop).map_err(|refused| refused.error)
 }
 
 #[cfg(test)]

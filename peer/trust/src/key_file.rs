@@ -21,7 +21,9 @@ pub enum KeyFileError {
         path: PathBuf,
     },
     /// It could not be written; what had been written of it is gone.
-    #[error("{path}: the key could not be written: make sure its folder exists and can be written to")]
+    #[error(
+        "{path}: the key could not be written: {source}: make sure that its folder exists, can be written to and has room"
+    )]
     Write {
         /// The file.
         path: PathBuf,
@@ -30,7 +32,7 @@ pub enum KeyFileError {
     },
     /// It could not be read.
     #[error(
-        "{path}: the key could not be read: check the path, and that the file belongs to who runs the robot"
+        "{path}: the key could not be read: {source}: check the path, and that the file belongs to who runs the robot"
     )]
     Read {
         /// The file.

@@ -46,7 +46,7 @@ pub struct Args {
     topology: NetworkShape,
 
     /// Number of gestures to show (one round each)
-    #[arg(long, default_value_t = 12, value_name = "N")]
+    #[arg(long, default_value_t = 12, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     rounds: u32,
 
     /// How rounds are opened: by an instructor, or by the robots' own motion detection (a gesture is shown every six
@@ -103,7 +103,7 @@ pub struct Args {
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
     swarm: String,
 
-    /// Keep the robots' keys and the roster in this folder [default: made for this run alone]
+    /// Keep the robots' keys and the roster in this folder [default: beside the memory, or made for this run alone]
     #[arg(long, value_name = "DIR")]
     keys: Option<PathBuf>,
 
@@ -142,8 +142,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(curve) = &args.curve {
         gestalt_draw::check(curve)?;
     }
+    if let Some(memory) = &args.memory {
+        std::fs::create_dir_all(memory).map_err(|error| {
+            format!("--memory {}: {error}: name a folder that can be written to", memory.display())
+        })?;
+    }
     let folder = tempfile::tempdir()?;
-    let keys = (!args.open).then(|| args.keys.clone().unwrap_or_else(|| folder.path().join("keys")));
+    // What robots remember of others is signed: with other keys it counts for nothing.
+    let beside = args.memory.as_deref().unwrap_or(folder.path());
+    let keys = (!args.open).then(|| args.keys.clone().unwrap_or_else(|| beside.join("keys")));
     let configs = plan::configs(args, keys.as_deref())?;
     if let Some(keys) = &keys {
         let mut authority = Authority::open_or_create(keys, &args.swarm)?;
