@@ -53,7 +53,7 @@ impl Attached {
         let door = Arc::new(Door::new(credentials.roster().clone()));
         let guard = Guard { swarm: swarm_checksum(swarm), door, account: None };
         let node = match Node::open(config, Some(guard), None, |_, _| {}).await {
-            Err(LinkError::Start { cause, .. }) => return Err(LinkError::Open(cause)),
+            Err(LinkError::Start { cause, .. }) => return Err(LinkError::unreached_for(&cause)),
             opened => opened?,
         };
         // Whatever becomes of this attempt, the session ends with it.

@@ -62,7 +62,7 @@ impl Client {
         };
         let session = match attached.as_ref().and_then(Attached::session) {
             Some(session) => session,
-            None => zenoh::open(link.client()?).await.map_err(|error| LinkError::open(&*error))?,
+            None => zenoh::open(link.client()?).await.map_err(|error| LinkError::unreached(&*error))?,
         };
         let speaker = link.credentials.clone().map(|credentials| (credentials, Mutex::new(0)));
         Ok(Self { session, keys, speaker, attached })

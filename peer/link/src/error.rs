@@ -73,6 +73,19 @@ pub(super) fn reason(cause: &(dyn std::error::Error + Send + Sync)) -> String {
 }
 
 impl LinkError {
+    /// No robot was reached by a client: Zenoh itself says no more than that time has passed.
+    pub(super) fn unreached(cause: &(dyn std::error::Error + Send + Sync)) -> Self {
+        Self::unreached_for(&reason(cause))
+    }
+
+    /// The same where only the words are left.
+    pub(super) fn unreached_for(cause: &str) -> Self {
+        Self::Open(format!(
+            "no robot was reached ({cause}): start one; or name one that runs: -e tcp/ITS-ADDRESS:7447, or tls/… and --keys where the \
+             swarm is sealed; 'gestalt doctor' says what is in the way"
+        ))
+    }
+
     pub(super) fn config(path: &str, cause: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::Config {
             key: format!("zenoh.{}", path.replace('/', ".")),
