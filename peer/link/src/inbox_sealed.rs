@@ -204,6 +204,8 @@ impl Inbox {
 
     /// Nothing counts that these said, in the midst of a round; nor are they there, unless they are members under another key.
     fn expel(&self, gone: BTreeSet<RobotId>) {
+        // Before the state is held: whoever vouches for a word comes to that with the words held, which this asks for.
+        let believer = self.believer();
         let mut state = self.lock();
         state.votes.retain(|robot, _| !gone.contains(robot));
         let left = |robot: &RobotId| !gone.contains(robot) || !self.is_stranger(*robot);
@@ -211,7 +213,7 @@ impl Inbox {
         state.alive_changed = true;
         // Before anything that it may be asked to believe from now on.
         state.queue.push_back(Input::Expelled(gone));
-        state.queue.extend(self.believer().map(Input::Believe));
+        state.queue.extend(believer.map(Input::Believe));
         drop(state);
         // Who is new was refused until now, its token too.
         self.unrest.notify_one();

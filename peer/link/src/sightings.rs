@@ -10,6 +10,10 @@ use zenoh::session::ZenohId;
 /// The most places kept for one robot.
 const MAX_PLACES: usize = 8;
 
+/// The most endpoints kept of one place, and the longest, in bytes: a robot has one for each address, and an answer has room for thousands.
+const MAX_LOCATORS: usize = 16;
+const MAX_LOCATOR: usize = 128;
+
 /// A place that could not be dialled so often in a row is forgotten, unless it is heard of anew.
 const MAX_FAILURES: u32 = 3;
 
@@ -36,7 +40,10 @@ pub(super) struct Sightings(BTreeMap<RobotId, Vec<Sighting>>);
 
 impl Sightings {
     /// A robot is said to be at that place.
-    pub(super) fn hear(&mut self, now: Duration, robot: RobotId, place: Place) {
+    pub(super) fn hear(&mut self, now: Duration, robot: RobotId, mut place: Place) {
+        // They are dialled one after the other, a second each.
+        place.locators.retain(|locator| locator.len() <= MAX_LOCATOR);
+        place.locators.truncate(MAX_LOCATORS);
         if self.0.len() >= MAX_ROBOTS && !self.0.contains_key(&robot) {
             return;
         }
@@ -116,6 +123,16 @@ mod tests {
             }
         }
         assert!(sightings.0[&ROBOT].len() <= MAX_PLACES);
+    }
+
+    #[test]
+    fn who_names_thousands_of_endpoints_is_dialled_at_a_few() {
+        let mut sightings = Sightings::default();
+        let many = (0..4000).map(|port| format!("tls/10.0.0.7:{port}"));
+        let locators = std::iter::once("x".repeat(60_000)).chain(many).collect();
+        sightings.hear(second(1), ROBOT, Place { locators, ..place(1, 1) });
+        let kept = sightings.next(ROBOT).unwrap().locators;
+        assert_eq!((kept.len(), kept[0].as_str()), (MAX_LOCATORS, "tls/10.0.0.7:0"));
     }
 
     #[test]
