@@ -61,9 +61,7 @@ impl Agreement {
 
     /// A word of that stamp: one of another life than those before, on whichever round of this count, tells that the robot started again.
     fn note_life(&mut self, robot: RobotId, stamp: Stamp) {
-        let here = self.holder(robot).map(|holder| holder.stamp);
-        let elsewhere = self.elsewhere.get(&robot).map(|(stamp, _)| *stamp);
-        if here.into_iter().chain(elsewhere).any(|known| known.boot != stamp.boot) {
+        if self.words(robot).any(|(known, _)| known.boot != stamp.boot) {
             self.note_restart(robot);
         }
     }
@@ -168,10 +166,14 @@ impl Agreement {
     /// What that robot said last that it holds in any round of this count, if it said anything.
     #[must_use]
     pub fn word(&self, robot: RobotId) -> Option<Option<ClassId>> {
-        let here = self.holder(robot).map(|holder| (holder.stamp, holder.holding.class));
-        let elsewhere = self.elsewhere.get(&robot).copied();
         // One word may have been of another round until its name was found to be one of this.
-        here.into_iter().chain(elsewhere).max_by_key(|(stamp, _)| *stamp).map(|(_, class)| class)
+        self.words(robot).max_by_key(|(stamp, _)| *stamp).map(|(_, class)| class)
+    }
+
+    /// What that robot said last that it holds in this round, and in others of this count, and when.
+    fn words(&self, robot: RobotId) -> impl Iterator<Item = (Stamp, Option<ClassId>)> {
+        let here = self.holder(robot).map(|holder| (holder.stamp, holder.holding.class));
+        here.into_iter().chain(self.elsewhere.get(&robot).copied())
     }
 
     /// Whether so many robots say that they hold that gesture, in whichever round of this count, and whatever they held before: of whom that is said, they count.

@@ -58,7 +58,7 @@ pub(super) fn inspect(bytes: &[u8]) -> Result<Claim, PictureError> {
 /// Walks the chunks (length, type, data, checksum) up to the end chunk. The first tells the size: a decoder passes over others before it that it does not know.
 fn inspect_png(mut rest: &[u8]) -> Result<Claim, PictureError> {
     const HEADER: &[u8] = b"\0\0\0\x0dIHDR";
-    if !rest.starts_with(&HEADER[..HEADER.len().min(rest.len())]) {
+    if rest.iter().zip(HEADER).any(|(found, meant)| found != meant) {
         return Err(PictureError::NotAnImage);
     }
     let fields = rest.get(8..16).ok_or(PictureError::Truncated)?;

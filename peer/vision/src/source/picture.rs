@@ -45,8 +45,7 @@ pub fn decode_reduced(
         }
     }
     // Should the library read another size than this was let in for, it is not decoded.
-    let found = Decompressor::new().and_then(|mut reader| reader.read_header(bytes)).ok();
-    if found.is_some_and(|found| (found.width, found.height) != (width as usize, height as usize)) {
+    if jpeg_size(bytes).is_some_and(|found| found != (width as usize, height as usize)) {
         return Err(PictureError::NotAnImage);
     }
     // OpenCV says "cannot decode" with an empty image or with an error, depending on the decoder.
@@ -56,6 +55,13 @@ pub fn decode_reduced(
         Ok(decoded) if !decoded.empty() => Ok(Size::new(decoded.cols(), decoded.rows())),
         _ => Err(PictureError::NotAnImage),
     }
+}
+
+/// The width and height that the library reads; `None` of what it takes for no JPEG.
+fn jpeg_size(bytes: &[u8]) -> Option<(usize, usize)> {
+    // It is not set up to find that a PNG is none.
+    let mut library = bytes.starts_with(b"\xff\xd8").then(Decompressor::new)?.ok()?;
+    library.read_header(bytes).ok().map(|found| (found.width, found.height))
 }
 
 /// Decodes a JPEG at one of the sizes that its library can reduce it to.

@@ -14,9 +14,6 @@ use self::world::{ROBOTS, World};
 /// How long nothing bad happens at the end: what a robot lacks is found when its turn comes, every four seconds.
 const CALM: Duration = Duration::from_secs(60);
 
-/// The same where nothing is asked of what they come to know: a round lasts five seconds, and what it left open is settled after ten.
-const SHORT_CALM: Duration = Duration::from_secs(12);
-
 /// An input is a list of events, each of a byte and its arguments, see [`adversary::event`].
 ///
 /// What is final was held by a majority, and never are two gestures final for one round, whatever a stranger says and however late messages
@@ -26,7 +23,7 @@ const SHORT_CALM: Duration = Duration::from_secs(12);
 /// # Panics
 /// If not.
 pub fn run(bytes: &[u8]) {
-    let world = live(bytes, CALM);
+    let world = live(bytes);
     has_one_final(&world);
     let minds: Vec<&Mind> = world.robots().iter().map(|robot| robot.mind()).collect();
     for other in &minds[1..] {
@@ -45,7 +42,7 @@ pub fn run(bytes: &[u8]) {
 /// # Panics
 /// If not.
 pub fn finals(bytes: &[u8]) {
-    has_one_final(&live(bytes, SHORT_CALM));
+    has_one_final(&live(bytes));
 }
 
 fn has_one_final(world: &World) {
@@ -57,17 +54,17 @@ fn has_one_final(world: &World) {
 /// Whether two gestures become final for one round, however late messages are.
 #[must_use]
 pub fn contradicts(bytes: &[u8]) -> bool {
-    live(bytes, CALM).contradiction().is_some()
+    live(bytes).contradiction().is_some()
 }
 
 /// All events, then calm.
-fn live(bytes: &[u8], calm: Duration) -> World {
+fn live(bytes: &[u8]) -> World {
     let mut world = World::new();
     let mut events = adversary::Events::new(bytes);
     while adversary::event(&mut world, &mut events).is_some() {}
     world.robots().iter().for_each(|robot| robot.check());
     world.introduce();
-    world.pass(calm, true);
+    world.pass(CALM, true);
     world.robots().iter().for_each(|robot| robot.check());
     world
 }
