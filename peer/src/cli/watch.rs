@@ -13,6 +13,7 @@ use super::robots::table;
 use super::show::{self, Names, clean, line};
 use super::web::WebArgs;
 use super::{Failure, interrupted};
+use crate::doctor::swarm::NOBODY_ANSWERS;
 use gestalt_desk::{Event, View};
 use gestalt_link::{Client, News};
 
@@ -90,12 +91,13 @@ async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Re
     let (mut view, began) = (View::default(), Instant::now());
     let mut names = Names::default();
     let mut decisions = 0;
-    let mut next = tokio::time::timeout(SILENCE, news.next()).await;
-    if next.is_err() {
-        hint_at_nobody(swarm);
-        next = Ok(news.next().await);
-    }
-    let mut next = next.ok().flatten();
+    let mut next = match tokio::time::timeout(SILENCE, news.next()).await {
+        Ok(heard) => heard,
+        Err(_) => {
+            hint_at_nobody(swarm);
+            news.next().await
+        }
+    };
     while let Some(heard) = next {
         match view.hear(began.elapsed(), heard.into()) {
             Some(Event::Decided(it)) => {
@@ -130,8 +132,7 @@ async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Re
 /// Says on the error stream that there may be nobody to watch: a swarm of another name is as silent as one that is off.
 fn hint_at_nobody(swarm: &str) {
     eprintln!(
-        "no robot of the swarm \"{swarm}\" is heard of: start one; or name one that runs: -e tcp/ITS-ADDRESS:7447, and the swarm: \
-         --swarm NAME; 'gestalt doctor' looks for it"
+        "no robot of the swarm \"{swarm}\" is heard of: {NOBODY_ANSWERS}; 'gestalt doctor' looks for it"
     );
 }
 

@@ -11,6 +11,10 @@ use gestalt_protocol::{RobotId, Status};
 
 use super::finding::Finding;
 
+/// What to do where no robot of a swarm answers.
+pub(crate) const NOBODY_ANSWERS: &str =
+    "start a robot; or name one that runs: -e tcp/ITS-ADDRESS:7447, and the swarm: --swarm NAME";
+
 /// What was gathered about a swarm.
 #[derive(Clone, Debug, Default)]
 pub struct SwarmFacts {

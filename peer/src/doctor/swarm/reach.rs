@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::RobotId;
 
-use super::{Answer, SwarmFacts, robots, short};
+use super::{Answer, NOBODY_ANSWERS, SwarmFacts, robots, short};
 use crate::doctor::Finding;
 
 pub(super) fn findings(facts: &SwarmFacts) -> Vec<Finding> {
@@ -34,7 +34,7 @@ fn swarm(facts: &SwarmFacts) -> Finding {
             "swarm",
             format!("no robot of the swarm \"{name}\" answers"),
             "nothing can be said of the swarm",
-            "start a robot; or name one that runs: -e tcp/ITS-ADDRESS:7447, and the swarm: --swarm NAME",
+            NOBODY_ANSWERS,
         );
     }
     Finding::fine(
