@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use gestalt_link::{Bearer, Client, Credentials, LinkConfig, RobotConfig, Scouting};
 use gestalt_protocol::ClassId;
-use gestalt_tests::{by_tls, credentials, key, sealed, start, unique, with_eve};
+use gestalt_tests::{by_tls, config, credentials, key, sealed, start, unique, with_eve};
 use gestalt_trust::{Instructor, Membership, Role, Roles};
 use serde_json::{Value, json};
 
@@ -141,7 +141,7 @@ pub async fn a_client_of_a_sealed_swarm_attaches_to_its_robots_and_to_no_one_els
 
     // They answer, and nobody else does.
     let alone = attached(&members, &ada, looks()).await;
-    assert!(alone.as_ref().is_err_and(|error| error.contains("no robot of this swarm")), "{alone:?}");
+    assert!(alone.as_ref().is_err_and(|error| error.contains("none answers")), "{alone:?}");
     let named = attached(&members, &ada, names(std::slice::from_ref(&at_eve))).await;
     assert!(named.as_ref().is_err_and(|error| error.contains("relay for others")), "{named:?}");
     let far = attached(&members, &ada, names(&["tcp/192.0.2.1:7447".to_owned()])).await;
@@ -166,4 +166,53 @@ pub async fn a_client_of_a_sealed_swarm_attaches_to_its_robots_and_to_no_one_els
     open.close().await.unwrap();
     of_eve.close().await.unwrap();
     robot.stop().await;
+}
+
+pub async fn a_client_attaches_to_its_own_swarm_and_comes_back_to_it() {
+    let port = 20_000 + (std::process::id() % 20_000) as u16;
+    let scouting = Scouting { address: format!("239.255.77.80:{port}"), interface: "lo".to_owned() };
+    let looks = LinkConfig { scouting: Some(scouting.clone()), ..LinkConfig::default() };
+    let (swarm, other) = (unique("own"), unique("other"));
+    let robot = |id: u32, swarm: &str| {
+        let plain = config(id, swarm, &[]);
+        let link = LinkConfig { scouting: Some(scouting.clone()), ..plain.link };
+        start(RobotConfig { link, ..plain }, None)
+    };
+    // Another swarm answers, and a router through which nobody of this one is reached.
+    let stranger = robot(9, &other).await;
+    let (router, at) = router("tcp", &scouting, None).await;
+    let nobody = Client::open(&swarm, &looks).await;
+    assert!(nobody.as_ref().is_err_and(|error| error.to_string().contains(&swarm)), "{nobody:?}");
+    // A robot that answers no calls is behind it.
+    let plain = config(1, &swarm, &[at]);
+    let zenoh = json!({"mode": "client"}).as_object().unwrap().clone();
+    let behind =
+        start(RobotConfig { link: LinkConfig { zenoh, listen: Vec::new(), ..plain.link }, ..plain }, None)
+            .await;
+    let client = Client::open(&swarm, &looks).await.unwrap();
+    let heard = client.statuses(Duration::from_secs(2)).await.unwrap();
+    assert_eq!(heard.iter().map(|status| status.robot.0).collect::<Vec<_>>(), [1]);
+    client.close().await;
+    behind.stop().await;
+    let first = robot(2, &swarm).await;
+    for _ in 0..3 {
+        let client = Client::open(&swarm, &looks).await.unwrap();
+        assert_eq!(client.attached().await.map(|robot| robot.0), Some(2));
+        client.close().await;
+    }
+    // It goes, and another one of its swarm is there by then, as is the stranger.
+    let client = Client::open(&swarm, &looks).await.unwrap();
+    first.stop().await;
+    let second = robot(3, &swarm).await;
+    let came_back = async {
+        while client.attached().await.map(|robot| robot.0) != Some(3) {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, came_back).await.expect("it looks again");
+    client.close().await;
+    router.close().await.unwrap();
+    for robot in [stranger, second] {
+        robot.stop().await;
+    }
 }

@@ -128,6 +128,7 @@ fn main() -> std::process::ExitCode {
         [Waits] knocking::who_was_expelled_and_links_ten_times_a_second_changes_nothing_and_is_kept_waiting.await,
         [Waits] false_answers::robots_that_find_each_other_do_so_though_their_calls_are_answered_by_a_liar.await,
         [Waits] false_answers::a_client_of_a_sealed_swarm_attaches_to_its_robots_and_to_no_one_else.await,
+        [Waits] false_answers::a_client_attaches_to_its_own_swarm_and_comes_back_to_it.await,
         [Works, Browser] talking::a_question_of_the_swarm_is_answered_by_its_button_and_a_new_gesture_is_named.await,
         [Waits] cost::signatures_cost_a_link_less_than_as_much_again.await,
         [Waits] liar::who_gives_what_does_not_follow_is_known_to_all_and_counts_no_more.await,

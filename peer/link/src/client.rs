@@ -32,8 +32,8 @@ pub struct Client {
     pub(super) keys: Keys,
     /// Whoever speaks through it, in a sealed swarm, and the count of their last word.
     speaker: Option<(Credentials, Mutex<u64>)>,
-    /// What the session is one of, in a sealed swarm.
-    attached: Option<Attached>,
+    /// Holds the session to robots of the swarm.
+    attached: Attached,
 }
 
 /// The swarm's decisions, as they are announced.
@@ -48,22 +48,17 @@ pub struct Answers {
 }
 
 impl Client {
-    /// Attaches to a robot at one of `link.connect`, or to one found by `link.scouting`. With `link.credentials` to no other than a robot
+    /// Attaches to a robot at one of `link.connect`, or to one of that swarm found by `link.scouting`; where none answers, to a router of another kind through which
+    /// one does. With `link.credentials` to no other than a robot
     /// on their roster, with the key that it has there, by TLS; or to whoever is at an endpoint of this computer that is named.
     ///
     /// # Errors
-    /// [`LinkError::Config`] names what Zenoh cannot take, and an endpoint at which anybody could be; [`LinkError::Open`] says that no
+    /// [`LinkError::Config`] names what Zenoh cannot take, and an endpoint at which anybody could be; [`LinkError::Unreached`] says that no
     /// robot could be reached.
     pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
         let keys = Keys::new(swarm)?;
-        let attached = match &link.credentials {
-            Some(credentials) => Some(Attached::open(swarm, link, credentials).await?),
-            None => None,
-        };
-        let session = match attached.as_ref().and_then(Attached::session) {
-            Some(session) => session,
-            None => zenoh::open(link.client()?).await.map_err(|error| LinkError::unreached(&*error))?,
-        };
+        let attached = Attached::open(&keys, link).await?;
+        let session = attached.session().clone();
         let speaker = link.credentials.clone().map(|credentials| (credentials, Mutex::new(0)));
         Ok(Self { session, keys, speaker, attached })
     }
@@ -233,9 +228,7 @@ impl Client {
         if let Err(error) = self.session.close().await {
             tracing::debug!("closing the client's session: {error}");
         }
-        if let Some(attached) = self.attached {
-            attached.close().await;
-        }
+        self.attached.close().await;
     }
 }
 

@@ -260,10 +260,11 @@ impl LinkConfig {
     }
 
     /// Zenoh's configuration for a session that stands for a whole swarm: clients attach to it as to a robot.
-    pub(super) fn stage(&self) -> Result<zenoh::Config, LinkError> {
+    pub(super) fn stage(&self, id: &str) -> Result<zenoh::Config, LinkError> {
         let config = self.with_defaults(
             Value::Null,
             &serde_json::json!({
+                "id": id,
                 "mode": "router",
                 "listen/endpoints": self.listening(false),
                 "timestamping/enabled": false,

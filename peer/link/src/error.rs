@@ -58,6 +58,17 @@ pub enum LinkError {
     /// A robot that is there already cannot be a guest.
     #[error("robot {0} is here already: give each robot an id of its own")]
     Guest(gestalt_protocol::RobotId),
+    /// A client reached no robot. Zenoh itself says no more than that time has passed.
+    #[error(
+        "no robot of the swarm \"{swarm}\" was reached ({cause}): start one; or name one that runs: -e tcp/ITS-ADDRESS:7447, or tls/… and \
+         --keys where the swarm is sealed; 'gestalt doctor' says what is in the way"
+    )]
+    Unreached {
+        /// Its name.
+        swarm: String,
+        /// What is known of why.
+        cause: String,
+    },
     /// Zenoh refused to build the session or one of its subscriptions.
     #[error("cannot open the Zenoh session: {0}")]
     Open(String),
@@ -73,19 +84,6 @@ pub(super) fn reason(cause: &(dyn std::error::Error + Send + Sync)) -> String {
 }
 
 impl LinkError {
-    /// No robot was reached by a client: Zenoh itself says no more than that time has passed.
-    pub(super) fn unreached(cause: &(dyn std::error::Error + Send + Sync)) -> Self {
-        Self::unreached_for(&reason(cause))
-    }
-
-    /// The same where only the words are left.
-    pub(super) fn unreached_for(cause: &str) -> Self {
-        Self::Open(format!(
-            "no robot was reached ({cause}): start one; or name one that runs: -e tcp/ITS-ADDRESS:7447, or tls/… and --keys where the \
-             swarm is sealed; 'gestalt doctor' says what is in the way"
-        ))
-    }
-
     pub(super) fn config(path: &str, cause: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::Config {
             key: format!("zenoh.{}", path.replace('/', ".")),

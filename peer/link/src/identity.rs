@@ -39,6 +39,16 @@ pub(super) fn relay_id(robot: RobotId, swarm: &str, nonce: u64, count: u16) -> S
     zenoh_id(robot, swarm, nonce ^ u64::from(count))
 }
 
+/// The Zenoh id of a session that speaks for a whole swarm and is no robot: clients attach to it, and no robot dials it.
+pub(super) fn stage_id(swarm: &str, nonce: u64) -> String {
+    format!("{:016x}{:08x}{:08x}", (nonce & !HIGHEST) | HIGHEST >> 1, swarm_checksum(swarm), 0)
+}
+
+/// Whether clients of that swarm may attach to a session with that Zenoh id.
+pub(super) fn serves(id: ZenohId, swarm: u32) -> bool {
+    word(id, 4) == swarm
+}
+
 /// Whether a Zenoh id of a robot is that of its session, or of one of its relays, in the life with that nonce.
 pub(super) fn is_of_life(id: ZenohId, nonce: u64) -> bool {
     let bytes = id.to_le_bytes();
@@ -48,9 +58,12 @@ pub(super) fn is_of_life(id: ZenohId, nonce: u64) -> bool {
 
 /// The robot behind a Zenoh id; `None` for clients, routers of other kinds and other swarms.
 pub(super) fn robot_of(id: ZenohId, swarm: u32) -> Option<RobotId> {
+    (word(id, 4) == swarm && word(id, 12) >> 31 == 1).then(|| RobotId(word(id, 0)))
+}
+
+fn word(id: ZenohId, at: usize) -> u32 {
     let bytes = id.to_le_bytes();
-    let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
-    (word(4) == swarm && word(12) >> 31 == 1).then(|| RobotId(word(0)))
+    u32::from_le_bytes(std::array::from_fn(|i| bytes[at + i]))
 }
 
 #[cfg(test)]
@@ -64,6 +77,20 @@ mod tests {
             assert_eq!(robot_of(id, swarm_checksum("demo")), Some(RobotId(robot)));
             assert_eq!(robot_of(id, swarm_checksum("other")), None);
         }
+    }
+
+    #[test]
+    fn what_speaks_for_a_swarm_serves_its_clients_and_is_no_robot() {
+        for nonce in [0, fresh_nonce(), u64::MAX] {
+            let id: ZenohId = stage_id("demo", nonce).parse().unwrap();
+            assert_eq!(robot_of(id, swarm_checksum("demo")), None);
+            assert_eq!(
+                [swarm_checksum("demo"), swarm_checksum("other")].map(|it| serves(id, it)),
+                [true, false]
+            );
+        }
+        let robot: ZenohId = zenoh_id(RobotId(7), "demo", 0).parse().unwrap();
+        assert!(serves(robot, swarm_checksum("demo")));
     }
 
     #[test]

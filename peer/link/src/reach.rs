@@ -18,7 +18,7 @@ enum Reach {
 }
 
 /// The endpoints that Zenoh is told, for whichever mode.
-fn endpoints(config: &zenoh::Config, key: &str) -> Vec<String> {
+pub(crate) fn endpoints(config: &zenoh::Config, key: &str) -> Vec<String> {
     fn texts(value: Value) -> Vec<String> {
         match value {
             Value::String(text) => vec![text],

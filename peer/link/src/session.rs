@@ -26,6 +26,7 @@ use zenoh_transport::{
 use crate::account::Account;
 use crate::error::{LinkError, reason};
 use crate::identity::robot_of;
+use crate::reach::{endpoints, names_any};
 use crate::tls::{Door, Knocks, Seat, Stranger, Visitor};
 
 /// The other end of a link.
@@ -59,8 +60,7 @@ impl Node {
         room: Option<Room>,
         on_link: impl Fn(Far, bool) + Send + Sync + 'static,
     ) -> Result<Self, LinkError> {
-        let of = |key: &str| config.get_json(key).unwrap_or_default();
-        let (listen, dials_nobody) = (of("listen/endpoints"), of("connect/endpoints") == "[]");
+        let (listen, dials_nobody) = (endpoints(&config, "listen/endpoints"), !names_any(&config));
         let mut runtime = RuntimeBuilder::new(config).build().await.map_err(|e| LinkError::open(&*e))?;
         let links = Arc::new(Links::new(guard, room, Box::new(on_link)));
         DynamicRuntime::from(runtime.clone()).new_handler(Arc::new(Handler(links.clone())));
@@ -69,12 +69,12 @@ impl Node {
         let node = Self { session, runtime, links, relay: Arc::default() };
         if let Err(error) = started {
             // A client says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
-            let listens = listen == "[]" || !node.locators().is_empty();
+            let listens = listen.is_empty() || !node.locators().is_empty();
             if node.runtime.whatami() == WhatAmI::Client && dials_nobody && listens {
                 return Ok(node);
             }
             node.close().await;
-            return Err(LinkError::Start { listen, cause: reason(&*error) });
+            return Err(LinkError::Start { listen: listen.join(", "), cause: reason(&*error) });
         }
         Ok(node)
     }

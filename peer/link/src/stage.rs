@@ -10,6 +10,7 @@ use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::query::Query;
 
+use super::identity::{fresh_nonce, stage_id};
 use super::session::Node;
 use super::{LinkConfig, LinkError};
 
@@ -30,7 +31,7 @@ impl Stage {
     /// [`LinkError::Config`] names what Zenoh cannot take, [`LinkError::Start`] an endpoint that is taken.
     pub async fn open(swarm: &str, link: &LinkConfig) -> Result<Self, LinkError> {
         let keys = Keys::new(swarm)?;
-        let node = Node::open(link.stage()?, None, None, |_, _| {}).await?;
+        let node = Node::open(link.stage(&stage_id(swarm, fresh_nonce()))?, None, None, |_, _| {}).await?;
         let latest = Arc::<Mutex<BTreeMap<String, Vec<u8>>>>::default();
         for key in [keys.every_robot("status"), keys.key(&Topic::Decision)] {
             let latest = latest.clone();

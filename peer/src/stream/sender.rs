@@ -116,7 +116,8 @@ impl Sender {
         loop {
             let client = match Client::open(&self.config.swarm, &self.config.link).await {
                 Ok(client) => client,
-                Err(LinkError::Open(cause)) => {
+                Err(error @ (LinkError::Open(_) | LinkError::Unreached { .. })) => {
+                    let cause = error.to_string();
                     if cause != unattached {
                         unattached.clone_from(&cause);
                         tell(StreamEvent::Detached { cause });
