@@ -233,7 +233,7 @@ pub struct Answer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// It is known from now on, and what was seen in that round is labelled by it.
+    /// It is known from now on, and what was seen in that round is labelled by it, or, where it says only what it was not, kept until its gesture is said.
     Learned,
     /// It was known already: nothing changed.
     Known,
@@ -252,6 +252,19 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Whether the word changed nothing, and was not known before.
+    #[must_use]
+    pub fn is_refusal(self) -> bool {
+        match self {
+            Self::Learned | Self::Known | Self::NothingSeen => false,
+            Self::UnknownRound
+            | Self::UnknownGesture
+            | Self::NoRoom
+            | Self::NotLearning
+            | Self::NotAllowed => true,
+        }
+    }
+
     /// The outcome in words.
     #[must_use]
     pub fn describe(self) -> &'static str {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use gestalt_protocol::{
-    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, Question, Reason, RobotId,
-    RoundId, RoundOutcome, Status,
+    Announcement, Answer, Certificate, ClassId, Decision, FusionRule, Instruction, Outcome, Question, Reason,
+    RobotId, RoundId, RoundOutcome, Status,
 };
 use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde_json::Value;
@@ -189,18 +189,24 @@ pub(super) fn answer(answer: &Answer, names: &Names) -> String {
     if let Some(named) = named.filter(|_| answer.to.round().is_none()) {
         return format!("{named}: {}", answer.outcome.describe());
     }
+    let round = answer.to.round().map(|round| format!("round {}: ", round.counter)).unwrap_or_default();
+    if answer.outcome.is_refusal() {
+        return format!("{round}{}", answer.outcome.describe());
+    }
     let alike = answer.looks_like.map(|class| match names.title(class) {
         Some(title) => format!("; it looks like {}: the two may be hard to tell apart", quoted(title)),
         None => format!("; it looks like class {class}: the two may be hard to tell apart"),
     });
     let samples = match (&answer.to, answer.samples) {
         (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
+        (Instruction::Wrong { .. }, 0) if matches!(answer.outcome, Outcome::Learned | Outcome::Known) => {
+            "what was seen in it is kept until its gesture is said".to_owned()
+        }
         (_, samples) => {
             let samples = counted(samples as usize, "sample");
             format!("robot {} learns from {samples} of this round", answer.robot)
         }
     };
-    let round = answer.to.round().map(|round| format!("round {}: ", round.counter)).unwrap_or_default();
     format!("{round}{}; {samples}{}", answer.outcome.describe(), alike.unwrap_or_default())
 }
 

@@ -67,7 +67,7 @@ pub struct Args {
 /// Runs the verb.
 ///
 /// # Errors
-/// When no robot is reached, none answers, or a word means nothing.
+/// When no robot is reached, none answers, a word means nothing, or it is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let words: Vec<&str> = args.words.iter().map(String::as_str).collect();
     let book = match &args.vocabulary {
@@ -220,7 +220,7 @@ impl Lesson<'_> {
         self.tell(&instruction).await.map(|_| ())
     }
 
-    /// Says it to the swarm, and prints the answer.
+    /// Says it to the swarm, and prints the answer. A refusal is an error, in words.
     async fn tell(&mut self, instruction: &Instruction) -> Result<Answer, Failure> {
         let timeout = self.args.timeout;
         // Also what nobody answers may have arrived.
@@ -231,8 +231,11 @@ impl Lesson<'_> {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }
         let words = show::answer(&answer, &self.names);
-        line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)?;
-        Ok(answer)
+        let refused = answer.outcome.is_refusal();
+        if self.args.json || !refused {
+            line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)?;
+        }
+        if refused { Err(words.into()) } else { Ok(answer) }
     }
 
     /// Has a round opened, and shows what is decided; says which it was.

@@ -102,7 +102,7 @@ impl Mind {
                 Outcome::NotAllowed
             }
             LessonReceipt::New if again => Outcome::Known,
-            LessonReceipt::New if word != Word::Retracted && learning.held_of(round) == 0 => {
+            LessonReceipt::New if word != Word::Retracted && !learning.has_seen(round) => {
                 Outcome::NothingSeen
             }
             LessonReceipt::New => Outcome::Learned,

@@ -54,8 +54,7 @@ impl Asked {
 
     /// A word on that round was answered: where it was heeded, the question is settled.
     pub fn answer(&mut self, round: RoundId, outcome: Outcome) {
-        let heeded = matches!(outcome, Outcome::Learned | Outcome::Known | Outcome::NothingSeen);
-        self.open.take_if(|(question, _)| heeded && question.round == round);
+        self.open.take_if(|(question, _)| !outcome.is_refusal() && question.round == round);
     }
 
     /// The one that waits for its answer.

@@ -90,7 +90,7 @@ fn right_and_wrong_are_about_the_decision() {
     assert_eq!(swarm.minds[1].training_set().unwrap().class_count(ClassId(3)), 4);
     let round = swarm.show(2);
     let at = swarm.say("ada", Instruction::Wrong { round, of: Gesture::Label("2".to_owned()) });
-    assert_eq!(swarm.outcome(at), Outcome::NothingSeen, "nothing of it can be trained on yet");
+    assert_eq!(swarm.outcome(at), Outcome::Learned, "what was seen is kept until its name is known");
     assert_eq!(swarm.minds[0].training_set().unwrap().class_count(ClassId(2)), 0);
     assert_eq!(swarm.minds[0].learned().unwrap().aside, 2);
     swarm.restart(0);
