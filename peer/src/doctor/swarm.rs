@@ -26,12 +26,21 @@ pub struct SwarmFacts {
     pub unreached: Vec<(String, String)>,
     /// Robots that answer by multicast, and not when they are asked.
     pub silent: BTreeSet<RobotId>,
-    /// The robots that the roster names; `None` in an open swarm.
-    pub members: Option<BTreeSet<RobotId>>,
+    /// The roster that is at hand; `None` in an open swarm.
+    pub roster: Option<RosterFacts>,
     /// What the robot that is described would say of itself.
     pub mine: Option<Status>,
     /// Whether that very robot is among those that answer.
     pub running: bool,
+}
+
+/// What a roster says.
+#[derive(Clone, Debug)]
+pub struct RosterFacts {
+    /// The greatest is the newest.
+    pub epoch: u64,
+    /// The robots that it names.
+    pub robots: BTreeSet<RobotId>,
 }
 
 /// What one robot said, and when.

@@ -7,7 +7,7 @@ use gestalt_strategies::MindConfig;
 use serde_json::json;
 
 use super::robot::{CameraFacts, Given, KeyFacts, MemoryFacts, PortFacts, RobotFacts, Room};
-use super::swarm::{Answer, SwarmFacts};
+use super::swarm::{Answer, RosterFacts, SwarmFacts};
 use super::{Finding, Severity, robot, swarm};
 
 /// November 2026.
@@ -76,6 +76,19 @@ fn sound() -> SwarmFacts {
 fn with(change: impl FnOnce(&mut Status)) -> SwarmFacts {
     let mut facts = sound();
     change(&mut facts.parts[0][2].status);
+    facts
+}
+
+fn roster(robots: u32, epoch: u64) -> RosterFacts {
+    RosterFacts { epoch, robots: (1..=robots).map(RobotId).collect() }
+}
+
+/// A swarm that goes by a roster of that epoch, and its third robot by another.
+fn going_by(epoch: u64, third: u64) -> SwarmFacts {
+    let mut facts = sound();
+    for (answer, epoch) in facts.parts[0].iter_mut().zip([epoch, epoch, third]) {
+        answer.status.counters.insert("roster_epoch".to_owned(), epoch);
+    }
     facts
 }
 
@@ -297,12 +310,10 @@ fn what_may_be_meant_is_a_warning() {
             "robot 3 met",
             "--id N",
         ),
-        (
-            SwarmFacts { members: Some((1..=4).map(RobotId).collect()), ..sound() },
-            "members",
-            "robot 4",
-            "start them",
-        ),
+        (SwarmFacts { roster: Some(roster(4, 0)), ..sound() }, "members", "robot 4", "start them"),
+        (SwarmFacts { roster: Some(roster(3, 2)), ..going_by(2, 1) }, "roster", "robot 3", "trust tell"),
+        (SwarmFacts { roster: Some(roster(3, 3)), ..going_by(2, 2) }, "roster", "epoch 3", "trust tell"),
+        (SwarmFacts { roster: Some(roster(3, 1)), ..going_by(2, 2) }, "roster", "roster here", "newest"),
         (SwarmFacts { name: "demo".to_owned(), ..SwarmFacts::default() }, "swarm", "no robot", "-e tcp/"),
     ] {
         is_named(what, swarm::findings(&facts), Severity::Warning, check, what, fix);

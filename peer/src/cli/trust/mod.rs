@@ -273,7 +273,7 @@ fn enrol(args: &Enrol) -> Result<(), Failure> {
     if let Some((who, certificate)) = print {
         say(&bundle::block(&who, &roster, &certificate)?)?;
     }
-    args.tell.if_named(&authority, &roster)
+    args.tell.if_named(&args.folder, &authority, &roster)
 }
 
 fn accept(args: &Accept) -> Result<(), Failure> {
@@ -348,7 +348,7 @@ fn rekey(args: &Rekey) -> Result<(), Failure> {
     if let Some(certificate) = print {
         say(&bundle::block(&Applicant::Robot(robot), &roster, &certificate)?)?;
     }
-    args.tell.if_named(&authority, &roster)
+    args.tell.if_named(&args.folder, &authority, &roster)
 }
 
 fn in_words(folder: &Path, roster: &Roster) -> String {

@@ -1,5 +1,6 @@
 //! Tells a swarm that runs of its next roster, and waits until its robots go by it.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use gestalt_link::{Client, Credentials, LinkConfig, Scouting};
@@ -24,12 +25,16 @@ pub(super) struct Tell {
 }
 
 impl Tell {
-    /// Tells the swarm if it was said where it runs.
+    /// Tells the swarm if it was said where it runs, or else says how to.
     ///
     /// # Errors
     /// As [`Tell::now`].
-    pub fn if_named(&self, authority: &Authority, roster: &Roster) -> Result<(), Failure> {
-        if self.connect.is_empty() { Ok(()) } else { self.now(authority, roster) }
+    pub fn if_named(&self, folder: &Path, authority: &Authority, roster: &Roster) -> Result<(), Failure> {
+        if !self.connect.is_empty() {
+            return self.now(authority, roster);
+        }
+        eprintln!("if robots run, tell them: gestalt trust tell {}", folder.display());
+        Ok(())
     }
 
     /// Tells the swarm; one that was not named is looked for.

@@ -6,7 +6,6 @@ mod files;
 mod network;
 mod statuses;
 
-use std::collections::BTreeSet;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_link::rounds_in_words;
@@ -15,7 +14,7 @@ use gestalt_trust::Roster;
 use tokio::task::spawn_blocking;
 
 use super::robot::RobotFacts;
-use super::swarm::SwarmFacts;
+use super::swarm::{RosterFacts, SwarmFacts};
 use crate::config::{Config, ROSTER_FILE};
 
 /// What is to be looked at.
@@ -67,7 +66,7 @@ pub async fn gather(subject: &Subject) -> (RobotFacts, Option<SwarmFacts>) {
         swarm.mine = Some(mine);
     }
     swarm.running = robot.running;
-    swarm.members = members(config);
+    swarm.roster = roster(config);
     // Whoever is heard is proof enough.
     if config.links.scouting.enabled && swarm.parts.is_empty() {
         robot.multicast = Some(network::multicast(&config.links.scouting));
@@ -88,9 +87,10 @@ fn account(config: &Config) -> Status {
     }
 }
 
-fn members(config: &Config) -> Option<BTreeSet<RobotId>> {
+fn roster(config: &Config) -> Option<RosterFacts> {
     let roster: Roster = Roster::read(&config.trust.keys.as_ref()?.join(ROSTER_FILE)).ok()?;
-    Some(roster.members().robots.keys().copied().collect())
+    let members = roster.members();
+    Some(RosterFacts { epoch: members.epoch, robots: members.robots.keys().copied().collect() })
 }
 
 #[cfg(feature = "opencv")]

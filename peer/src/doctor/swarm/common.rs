@@ -19,6 +19,7 @@ pub(super) fn findings(facts: &SwarmFacts) -> Vec<Finding> {
     let mut found = vec![versions(facts), sealed(facts), vocabularies(facts), spaces(facts)];
     found.extend(rounds(facts));
     found.extend(quorum(facts));
+    found.extend(rosters(facts));
     found
 }
 
@@ -90,6 +91,30 @@ fn sealed(facts: &SwarmFacts) -> Finding {
             ),
         ),
     }
+}
+
+/// Whether all of a sealed swarm go by its newest roster.
+fn rosters(facts: &SwarmFacts) -> Option<Finding> {
+    let groups = values(facts, |status| status.counters.get("roster_epoch").copied());
+    let held = facts.roster.as_ref().map(|roster| roster.epoch);
+    let newest = groups.iter().map(|(epoch, _)| *epoch).chain(held).max()?;
+    let behind = groups.iter().filter(|(epoch, _)| *epoch < newest).flat_map(|(_, who)| who.iter().cloned());
+    let behind: BTreeSet<String> = behind.collect();
+    if !behind.is_empty() {
+        return Some(Finding::warning(
+            "roster",
+            format!("an older roster than that of epoch {newest} is gone by at {}", some(&behind)),
+            "whoever was enrolled since is refused there, and whoever was expelled is still believed",
+            "gestalt trust tell, where the swarm's authority key is",
+        ));
+    }
+    let stale = held.filter(|held| *held < newest)?;
+    Some(Finding::warning(
+        "roster",
+        format!("the roster here is of epoch {stale}, and the swarm goes by that of epoch {newest}"),
+        "a robot or a client that goes by it refuses whoever was enrolled since",
+        "take the newest roster.json from where the swarm's authority key is",
+    ))
 }
 
 fn vocabularies(facts: &SwarmFacts) -> Finding {

@@ -166,7 +166,7 @@ fn twins(facts: &SwarmFacts) -> Vec<Finding> {
 /// Members of a sealed swarm that do not answer.
 fn missing(facts: &SwarmFacts) -> Option<Finding> {
     let there: BTreeSet<RobotId> = facts.answers().map(|answer| answer.status.robot).collect();
-    let missing: BTreeSet<RobotId> = facts.members.as_ref()?.difference(&there).copied().collect();
+    let missing: BTreeSet<RobotId> = facts.roster.as_ref()?.robots.difference(&there).copied().collect();
     (!missing.is_empty() && !there.is_empty()).then(|| {
         Finding::warning(
             "members",
