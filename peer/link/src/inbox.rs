@@ -23,8 +23,9 @@ use super::roll::Roll;
 use super::ways::Ways;
 use super::words::{Vouched, Words};
 
-/// The most messages that wait for the mind, votes apart.
+/// The most messages that wait for the mind, votes apart, and the most bytes that they came in.
 pub(super) const MAX_QUEUE: usize = 8192;
+const MAX_QUEUED_BYTES: usize = 64 * 1024 * 1024;
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;
@@ -64,6 +65,8 @@ pub(super) struct Sealed {
 pub(super) struct State {
     pub(super) votes: BTreeMap<RobotId, Envelope>,
     pub(super) queue: VecDeque<Input>,
+    /// In how many bytes those came.
+    queued_bytes: usize,
     own_votes: VecDeque<u32>,
     pub(super) links: BTreeMap<ZenohId, RobotId>,
     /// Those of them that relay for others.
@@ -172,6 +175,7 @@ impl Inbox {
             inputs.push(Input::Neighbours(state.links.values().copied().collect()));
         }
         inputs.extend(state.queue.drain(..));
+        state.queued_bytes = 0;
         inputs.extend(std::mem::take(&mut state.votes).into_values().map(Input::Received));
         inputs
     }
@@ -270,7 +274,7 @@ impl Inbox {
             Message::Samples(_) if id == self.me => Ok(()),
             Message::Samples(samples) if samples.are_by(id) => {
                 self.believe(&envelope)?;
-                self.queue(Input::Received(envelope))
+                self.queue(Input::Received(envelope), sample)
             }
             Message::Samples(_) => Err(Refusal::Author),
             _ => Err(Refusal::Kind),
@@ -307,14 +311,14 @@ impl Inbox {
             let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
             self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
         }
-        self.queue(Input::Received(envelope))
+        self.queue(Input::Received(envelope), sample)
     }
 
     fn on_decision(&self, sample: &Sample) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
         announcement.decision.check()?;
         self.judged(|judge, now| judge.announcement(now, &announcement)).unwrap_or(Ok(()))?;
-        self.queue(Input::Announced(announcement))
+        self.queue(Input::Announced(announcement), sample)
     }
 
     fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
@@ -342,7 +346,7 @@ impl Inbox {
             Message::Holding(_) => {
                 self.believe(&envelope)?;
                 // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
-                if id == self.me { Ok(()) } else { self.queue(Input::Received(envelope)) }
+                if id == self.me { Ok(()) } else { self.queue(Input::Received(envelope), sample) }
             }
             _ => Err(Refusal::Kind),
         }
@@ -355,7 +359,7 @@ impl Inbox {
         }
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
-        self.queue(Input::Instructed(Instructed { by, at, instruction, said: None }))
+        self.queue(Input::Instructed(Instructed { by, at, instruction, said: None }), sample)
     }
 
     /// Hands over what this robot's own threads have done. Never refused: they do one thing at a time.
@@ -364,11 +368,14 @@ impl Inbox {
         self.ready.notify_one();
     }
 
-    pub(super) fn queue(&self, input: Input) -> Result<(), Refusal> {
+    /// What came in a message waits for the mind.
+    pub(super) fn queue(&self, input: Input, sample: &Sample) -> Result<(), Refusal> {
         let mut state = self.lock();
-        if state.queue.len() >= MAX_QUEUE {
+        let bytes = state.queued_bytes + sample.payload().len();
+        if state.queue.len() >= MAX_QUEUE || bytes > MAX_QUEUED_BYTES {
             return Err(Refusal::Full);
         }
+        state.queued_bytes = bytes;
         state.queue.push_back(input);
         Ok(())
     }

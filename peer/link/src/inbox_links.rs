@@ -31,7 +31,9 @@ impl Inbox {
         } else {
             state.links.remove(&id);
             state.relays.remove(&id);
-            state.heard.remove(&robot);
+            if !state.links.values().any(|other| *other == robot) {
+                state.heard.remove(&robot);
+            }
             self.lost_links.send_modify(|lost| *lost += 1);
         }
         state.links_changed = true;

@@ -13,6 +13,6 @@ impl Inbox {
         let question: Question = decode_json(&payload(sample, MAX_JSON)?)?;
         question.check()?;
         self.believe(&question.clone().into())?;
-        self.queue(Input::Asked(question))
+        self.queue(Input::Asked(question), sample)
     }
 }

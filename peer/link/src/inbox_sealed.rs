@@ -39,7 +39,7 @@ impl Inbox {
         let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
         let said = Instructed { by, at: vouched.count, instruction, said: Some(signed) };
         if !allowed {
-            return self.queue(Input::Disallowed(said));
+            return self.queue(Input::Disallowed(said), sample);
         }
         let mut state = self.lock();
         if state.queue.len() >= MAX_QUEUE || state.vouched.len() >= MAX_VOUCHED {
@@ -105,7 +105,7 @@ impl Inbox {
             sample.attachment().filter(|it| it.len() <= Signature::LENGTH).map(|it| it.to_bytes());
         self.judged(|judge, now| judge.answer(now, answer.robot, &to, &json, attachment.as_deref()))
             .unwrap_or(Ok(()))?;
-        self.queue(Input::Answered(to, answer.at, answer.robot))
+        self.queue(Input::Answered(to, answer.at, answer.robot), sample)
     }
 
     pub(super) fn on_word(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
@@ -119,7 +119,7 @@ impl Inbox {
         let attachment = attachment.unwrap_or_default().into_owned();
         let signed = SignedWord { word: word.into_owned(), attachment };
         let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
-        self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) })
+        self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) }, sample)
     }
 
     /// Whether that robot is a member that is believed, with the key that it has here; in an open swarm, where there is no seal, always.

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use gestalt_protocol::{
-    Announcement, DecodeError, Envelope, Holding, Keys, Message, Question, RobotId, RoundId, Topic,
-    decode_json,
+    Announcement, DecodeError, Envelope, Holding, Keys, MAX_ROBOTS, Message, Question, RobotId, RoundId,
+    Topic, decode_json,
 };
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
@@ -141,7 +141,9 @@ impl Listener {
         let round = match &heard {
             Heard::Decided(announcement) => Some(announcement.decision.round.counter),
             Heard::Held(robot, holding) => {
-                known.held.insert(*robot, holding.clone());
+                if known.held.len() < MAX_ROBOTS || known.held.contains_key(robot) {
+                    known.held.insert(*robot, holding.clone());
+                }
                 Some(holding.round.counter)
             }
             Heard::Asked(_) | Heard::Came(_) | Heard::Left(_) => None,
@@ -156,6 +158,7 @@ impl Listener {
         let Some(Topic::Alive(robot)) = self.keys.parse(sample.key_expr()) else { return };
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let heard = match sample.kind() {
+            SampleKind::Put if known.alive.len() >= MAX_ROBOTS => None,
             SampleKind::Put => known.alive.insert(robot).then_some(Heard::Came(robot)),
             SampleKind::Delete => known.alive.remove(&robot).then_some(Heard::Left(robot)),
         };

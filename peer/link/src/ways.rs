@@ -79,11 +79,21 @@ impl Ways {
             let began = Instant::now();
             tokio::time::sleep(SETTLED).await;
             self.calm(began + LONGEST).await;
-            let new = std::mem::take(&mut self.lock().undeclared);
-            for few in new.chunks(FEW) {
-                for session in node.sessions() {
-                    self.declare(&session, &keys, few).await?;
+            loop {
+                let new = std::mem::take(&mut self.lock().undeclared);
+                let (few, rest) = new.split_at(new.len().min(FEW));
+                if few.is_empty() {
+                    break;
                 }
+                for session in node.sessions() {
+                    if let Err(error) = self.declare(&session, &keys, few).await {
+                        // They are declared when this begins anew.
+                        self.lock().undeclared.extend_from_slice(&new);
+                        self.news.notify_one();
+                        return Err(error);
+                    }
+                }
+                self.lock().undeclared.extend_from_slice(rest);
                 tokio::time::sleep(PAUSE).await;
             }
         }

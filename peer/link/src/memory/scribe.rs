@@ -196,6 +196,9 @@ impl Writing {
             if let Some(error) = error {
                 tell(Told::Failed(error));
             }
+            // What came and went while the disk failed leaves nothing: what the file holds beyond what is known is removed when it is opened again.
+            let known = &self.known;
+            let changes = changes.into_iter().filter(|it| it.value.is_some() || known.contains_key(&it.key));
             // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
             let ended = tray.put_back(
                 |pending| {
