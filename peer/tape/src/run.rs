@@ -170,7 +170,11 @@ impl Run {
                     Truth::Is(class(gesture)?)
                 }
                 Instruction::Wrong { of, .. } => Truth::IsNot(class(of)?),
-                Instruction::New { label, .. } => Truth::Is(ClassId::named(by, label)),
+                // As robots take it: a gesture that is listed needs no new name.
+                Instruction::New { label, .. } => {
+                    let listed = self.vocabularies.get(&vocabulary.0).and_then(|listed| listed.class(label));
+                    Truth::Is(listed.unwrap_or_else(|| ClassId::named(by, label)))
+                }
                 Instruction::Open
                 | Instruction::Retract { .. }
                 | Instruction::Same { .. }

@@ -37,6 +37,16 @@ pub enum DatasetError {
     /// It has no folder with images of a gesture in it.
     #[error("{} has no subfolders with images: put them into one folder per gesture, as .jpg, .jpeg or .png (convert others)", .0.display())]
     Empty(PathBuf),
+    /// It has images, and none of a gesture that counts.
+    #[error("{} has no images of {wanted}: its folders are {}", folder.display(), found.join(", "))]
+    Others {
+        /// The folder.
+        folder: PathBuf,
+        /// Its folders with images.
+        found: Vec<String>,
+        /// What was looked for, in words.
+        wanted: String,
+    },
     /// Named more than once: it would be learned from and measured on at the same time.
     #[error("{} is given twice: name each dataset once", .0.display())]
     Twice(PathBuf),
@@ -67,6 +77,26 @@ pub enum DatasetError {
     /// More images than are ever needed.
     #[error("{} holds more than {MAX_IMAGES} images", .0.display())]
     TooLarge(PathBuf),
+}
+
+/// Why nothing of a folder counts.
+fn nothing_in(folder: &Path, ignored: &[Ignored], labels: &[String], naming: Naming) -> DatasetError {
+    if ignored.is_empty() {
+        return DatasetError::Empty(folder.to_owned());
+    }
+    let gestures = match labels {
+        [] => "a gesture".to_owned(),
+        labels => format!("any of the gestures {}", labels.join(", ")),
+    };
+    let counts = match naming {
+        Naming::Names => "",
+        Naming::Counts => " (folders named by counts of fingers: 3, or 3_anything)",
+    };
+    DatasetError::Others {
+        folder: folder.to_owned(),
+        found: ignored.iter().map(|folder| folder.label.clone()).collect(),
+        wanted: gestures + counts,
+    }
 }
 
 /// Some folders, in words.
@@ -148,7 +178,7 @@ impl Dataset {
         let read = |folder: &PathBuf| -> Result<Folders, DatasetError> {
             match Folders::read(folder, naming)? {
                 found if found.gestures.is_empty() && found.none.is_empty() => {
-                    Err(DatasetError::Empty(folder.clone()))
+                    Err(nothing_in(folder, &found.left(), &[], naming))
                 }
                 found => Ok(found),
             }
@@ -157,7 +187,11 @@ impl Dataset {
         let found: BTreeSet<String> = sets.iter().flat_map(|set| set.gestures.keys().cloned()).collect();
         let found = in_order(found.into_iter().collect());
         if found.is_empty() {
-            return Err(DatasetError::Empty(folders.first().cloned().unwrap_or_default()));
+            return Err(DatasetError::Others {
+                folder: folders.first().cloned().unwrap_or_default(),
+                found: vec![NONE.to_owned()],
+                wanted: "a gesture".to_owned(),
+            });
         }
         let labels = labels.map_or_else(|| found.clone(), <[String]>::to_vec);
         if labels.iter().any(|label| label == NONE) {
@@ -178,13 +212,13 @@ impl Dataset {
     /// Lists the images of those gestures of `vocabulary` that `folder` has, under the vocabulary's class ids.
     ///
     /// # Errors
-    /// [`DatasetError::Empty`] when it has none of them and no images without a gesture either, unless its folders are
+    /// [`DatasetError::Others`] when it has none of them and no images without a gesture either, unless its folders are
     /// counts of fingers: they are all ignored then. Else see [`DatasetError`].
     pub fn list_known(folder: &Path, naming: Naming, vocabulary: &Vocabulary) -> Result<Self, DatasetError> {
         let dataset = Self::of(Folders::read(folder, naming)?, vocabulary);
         let nothing = dataset.images.is_empty() && dataset.none.is_empty();
         if nothing && (naming == Naming::Names || dataset.ignored.is_empty()) {
-            return Err(DatasetError::Empty(folder.to_owned()));
+            return Err(nothing_in(folder, &dataset.ignored, vocabulary.labels(), naming));
         }
         Ok(dataset)
     }
@@ -278,6 +312,27 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_of_other_gestures_is_not_called_empty() {
+        let folder = dataset(&["fist/1.png", "palm/2.png"]);
+        let of = |error: DatasetError| error.to_string();
+        let others = of(Dataset::list_known(
+            folder.path(),
+            Naming::Names,
+            &Vocabulary::new(["0", "1"].map(str::to_owned).to_vec()).unwrap(),
+        )
+        .unwrap_err());
+        assert!(others.contains("the gestures 0, 1: its folders are fist, palm"), "{others}");
+        let counts =
+            of(Dataset::list_several(&[folder.path().to_owned()], Naming::Counts, None).unwrap_err());
+        assert!(counts.contains("counts of fingers") && counts.contains("fist, palm"), "{counts}");
+        let nothing = dataset(&["none/1.png"]);
+        let nothing = of(Dataset::list(nothing.path(), None).unwrap_err());
+        assert!(nothing.ends_with("its folders are none"), "{nothing}");
+        let empty = of(Dataset::list(tempfile::tempdir().unwrap().path(), None).unwrap_err());
+        assert!(empty.contains("no subfolders with images"), "{empty}");
+    }
+
+    #[test]
     fn folders_are_gestures_and_prefixes_are_people() {
         let folder = dataset(&[
             "10/s003_a.jpg",
@@ -337,7 +392,7 @@ mod tests {
         assert_eq!(said(&known), ["background (1 images)"]);
         let stranger = Vocabulary::new(["x", "y"]).unwrap();
         let unknown = Dataset::list_known(folder.path(), Naming::Names, &stranger);
-        assert!(matches!(unknown, Err(DatasetError::Empty(_))));
+        assert!(matches!(unknown, Err(DatasetError::Others { .. })));
         // A count that the model does not know is said, and no error.
         let unknown = Dataset::list_known(folder.path(), Naming::Counts, &stranger).unwrap();
         assert!(unknown.images.is_empty());

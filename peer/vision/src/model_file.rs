@@ -21,11 +21,18 @@ const HEADER: usize = 8 + 2 + 8 + 4;
 /// Longest body that is read: a classifier, and the record of its training.
 const MAX_BODY: u64 = 2 * MAX_MODEL as u64;
 
+fn remedy(action: &str) -> &'static str {
+    match action {
+        "write" => "its folder must be there, with room, and yours to write to",
+        _ => "check the path; `gestalt train --out FILE` writes one",
+    }
+}
+
 /// A file that is not a usable model.
 #[derive(Debug, Error)]
 pub enum ModelFileError {
     /// It cannot be read or written.
-    #[error("cannot {action} the model {}: {source}: check the path; `gestalt train --out FILE` writes one", path.display())]
+    #[error("cannot {action} the model {}: {source}: {}", path.display(), remedy(action))]
     Io {
         /// `read` or `write`.
         action: &'static str,

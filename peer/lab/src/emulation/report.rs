@@ -289,7 +289,7 @@ impl fmt::Display for Table<'_> {
             let rule = summary.rule;
             let decided = match summary.decided_ms {
                 Mean { n: 0, .. } => "–".to_owned(),
-                Mean { mean, half_width, .. } => format!("{mean:.0} ± {half_width:<4.0}"),
+                decided => decided.decimals(0),
             };
             writeln!(
                 f,
@@ -326,7 +326,7 @@ impl fmt::Display for Table<'_> {
                 "{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
                 summary.rule,
                 summary.alpha,
-                format!("{:.3} ± {:.3}", error.mean, error.half_width),
+                error.decimals(3),
                 of(summary.calibration.sure_and_wrong),
                 of(summary.calibration.untaught_and_sure),
                 of(summary.calibration.taught_and_decided),

@@ -48,10 +48,26 @@ impl Mean {
         Self::of(&measured.collect::<Vec<_>>())
     }
 
-    /// The mean of shares with its interval, in percent, for a table.
+    /// The mean and its interval with so many decimals, for a table; of a single number there is no interval.
+    #[must_use]
+    pub fn decimals(self, decimals: usize) -> String {
+        format!("{:.decimals$}{}", self.mean, self.interval(1.0, decimals))
+    }
+
+    /// The same of shares, in percent.
     #[must_use]
     pub fn percent(self) -> String {
-        format!("{:.1} ± {:.1}", 100.0 * self.mean, 100.0 * self.half_width)
+        format!("{:.1}{}", 100.0 * self.mean, self.interval(100.0, 1))
+    }
+
+    /// The same of differences of shares, in points.
+    #[must_use]
+    pub fn points(self) -> String {
+        format!("{:+.1}{}", 100.0 * self.mean, self.interval(100.0, 1))
+    }
+
+    fn interval(self, scale: f64, decimals: usize) -> String {
+        if self.n < 2 { String::new() } else { format!(" ± {:.decimals$}", scale * self.half_width) }
     }
 
     /// The mean with its interval by Student's t.
@@ -83,6 +99,16 @@ mod tests {
 
     fn near(found: f64, expected: f64) {
         assert!((found - expected).abs() < 0.01 * expected.abs().max(0.05), "{found} is not {expected}");
+    }
+
+    #[test]
+    fn of_one_number_no_interval_is_shown() {
+        let shown = |numbers: &[f64]| {
+            let mean = Mean::of(numbers);
+            [mean.decimals(2), mean.percent(), mean.points()]
+        };
+        assert_eq!(shown(&[0.5]), ["0.50", "50.0", "+50.0"]);
+        assert_eq!(shown(&[0.5, 0.5]), ["0.50 ± 0.00", "50.0 ± 0.0", "+50.0 ± 0.0"]);
     }
 
     #[test]

@@ -55,12 +55,11 @@ pub fn asking(
         let name = cell.name();
         let _ = write!(
             text,
-            "| {name} | {:.1} | {} | {} | {:+.1} ± {:.1} ",
+            "| {name} | {:.1} | {} | {} | {} ",
             last(|standing| standing.labels).mean,
             Mean::percent(last(|standing| standing.swarm)),
             Mean::percent(last(|standing| standing.single)),
-            100.0 * gain.mean,
-            100.0 * gain.half_width,
+            gain.points(),
         );
         for (_, measure) in WHOSE {
             for milestone in MILESTONES {
@@ -101,8 +100,7 @@ fn reached(labels: &[f64], seeds: usize) -> String {
     match labels {
         [] => format!("– (0 of {seeds})"),
         _ => {
-            let mean = Mean::of(labels);
-            format!("{:.1} ± {:.1} ({} of {seeds})", mean.mean, mean.half_width, labels.len())
+            format!("{} ({} of {seeds})", Mean::of(labels).decimals(1), labels.len())
         }
     }
 }

@@ -111,7 +111,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Mean {
 }
 
 fn nats(mean: Mean) -> String {
-    format!("{:.2} ± {:.2}", mean.mean, mean.half_width)
+    mean.decimals(2)
 }
 
 #[cfg(test)]

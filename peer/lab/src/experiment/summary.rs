@@ -128,8 +128,6 @@ impl Summary {
         let _ = writeln!(text, "|{}", "---|".repeat(13 + usize::from(self.lines)));
         for (cell, curves) in &self.cells {
             let last = |means: &[Mean]| means.last().copied().unwrap_or(Mean::of(&[]));
-            let signed = |mean: Mean| format!("{:+.1} ± {:.1}", 100.0 * mean.mean, 100.0 * mean.half_width);
-            let bytes = |mean: Mean| format!("{:.0} ± {:.0}", mean.mean, mean.half_width);
             let [low, high] =
                 MILESTONES.map(|m| rounds_to(&curves.single, m).map_or("–".to_owned(), |n| n.to_string()));
             let line = if self.lines { format!("{} | ", cell.line) } else { String::new() };
@@ -142,11 +140,11 @@ impl Summary {
                 Mean::percent(last(&curves.swarm)),
                 Mean::percent(last(&curves.majority)),
                 Mean::percent(curves.over_rounds),
-                signed(curves.gain_at_the_end),
-                signed(curves.gain_over_rounds),
-                bytes(last(&curves.published)),
-                bytes(last(&curves.on_links)),
-                bytes(last(&curves.samples)),
+                Mean::points(curves.gain_at_the_end),
+                Mean::points(curves.gain_over_rounds),
+                last(&curves.published).decimals(0),
+                last(&curves.on_links).decimals(0),
+                last(&curves.samples).decimals(0),
             );
         }
         text.push_str(
@@ -174,10 +172,9 @@ impl Summary {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "\n{line}{}: at the end single robots judge {:.1} ± {:.1} % rightly, whatever {} had said.",
+                "\n{line}{}: at the end single robots judge {} % rightly, whatever {} had said.",
                 cell.value,
-                100.0 * last.mean,
-                100.0 * last.half_width,
+                last.percent(),
                 match cell.setting.liars {
                     0 | 1 => "any one other robot".to_owned(),
                     liars => format!("any {liars} others"),

@@ -66,6 +66,9 @@ pub(super) fn variants(args: &Args, run: &Run, was: &MindConfig) -> Result<Vec<V
     let liars = or(&args.liars, swept(Axis::Liars), || (0..=n.saturating_sub(1) / 2).collect());
     let untils = or(&args.until, swept(Axis::Until), || vec![100, 200, 300, 400, 600, 800, 1200, 2000, 5000]);
     let given: BTreeSet<RobotId> = args.without.iter().copied().collect();
+    if let Some(nobody) = given.difference(&robots).next() {
+        return Err(format!("--without {nobody}: there is no such robot in the recording").into());
+    }
     let mut absent = vec![given.clone()];
     if swept(Axis::Robots) {
         let one_more = |robot: &RobotId| given.iter().chain([robot]).copied().collect();

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_protocol::{Announcement, ClassId, Decision, Gesture, Instruction, InstructorId, RoundId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Gesture, Instruction, InstructorId};
 use serde_json::json;
 
 use super::super::Failure;
@@ -130,20 +130,23 @@ impl<'a> Showing<'a> {
                 picture::draw(path, self.configs, bodies, decision, truth)?;
             }
         }
+        let was = Instruction::Was { round: decision.round, class: Gesture::Class(truth) };
         if self.args.learn.is_some() {
-            self.teach(decision.round, truth).await?;
+            self.teach(&was).await?;
+        } else if self.args.record.is_some() {
+            // Nobody learns it, but the recording says what was shown.
+            self.swarm.client.instruct(&INSTRUCTOR.parse()?, &was).await?;
         }
         Ok(())
     }
 
     /// Says what the gesture was, and waits until that is learned.
-    async fn teach(&self, round: RoundId, truth: ClassId) -> Result<(), Failure> {
+    async fn teach(&self, was: &Instruction) -> Result<(), Failure> {
         const PATIENCE: Duration = Duration::from_secs(10);
         let instructor: InstructorId = INSTRUCTOR.parse()?;
-        let was = Instruction::Was { round, class: Gesture::Class(truth) };
-        let answer = self.swarm.client.teach(&instructor, &was, PATIENCE).await?;
-        let answer =
-            answer.ok_or_else(|| format!("no robot answered the feedback on round {}", round.counter))?;
+        let answer = self.swarm.client.teach(&instructor, was, PATIENCE).await?;
+        let round = || was.round().map_or(0, |round| round.counter);
+        let answer = answer.ok_or_else(|| format!("no robot answered the feedback on round {}", round()))?;
         let words = format!("  feedback: {}", answer.outcome.describe());
         line(self.args.json, &json!({"event": "taught", "answer": answer}), &words)
     }

@@ -60,7 +60,7 @@ impl Summary {
         // Who never decides takes no time over it.
         let seconds = |mean: Mean| match mean.n {
             0 => "–".to_owned(),
-            _ => format!("{:.2} ± {:.2}", mean.mean, mean.half_width),
+            _ => mean.decimals(2),
         };
         let mut text = format!(
             "# {}\n\n{}, drawn hands of people the classifier was not trained on. Means with 95 % intervals (Student's t), \
@@ -73,14 +73,13 @@ impl Summary {
         for row in &self.rows {
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {} | {:+.1} ± {:.1} | {} | {} |",
+                "| {} | {} | {} | {} | {} | {} | {} | {} |",
                 row.line,
                 row.made_of,
                 row.right.percent(),
                 row.wrong.percent(),
                 row.undecided.percent(),
-                100.0 * row.gain.mean,
-                100.0 * row.gain.half_width,
+                row.gain.points(),
                 row.frames_right.percent(),
                 seconds(row.decided_s),
             );
