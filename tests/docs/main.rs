@@ -2,6 +2,7 @@
 //! configurations. And a newcomer's way with real hands. What cannot run is named, with the reason.
 
 mod blocks;
+mod figures;
 mod newcomer;
 mod stage;
 
@@ -11,6 +12,7 @@ fn main() -> std::process::ExitCode {
         [Works] blocks::those_of_the_guides_run_as_they_are_written,
         [Works] blocks::all_others_run_as_they_are_written,
         [Waits] blocks::what_is_not_run_is_still_there,
+        [Works] figures::those_of_the_rules_of_fusion_are_what_is_printed,
         [Works, Data] newcomer::photographs_and_a_video_lead_to_a_model_and_a_robot_that_decides,
     ])
 }
