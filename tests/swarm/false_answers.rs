@@ -179,7 +179,10 @@ pub async fn a_client_attaches_to_its_own_swarm_and_comes_back_to_it() {
         start(RobotConfig { link, ..plain }, None)
     };
     // Another swarm answers, and a router through which nobody of this one is reached.
-    let stranger = robot(9, &other).await;
+    let mut strangers = Vec::new();
+    for id in 5..13 {
+        strangers.push(robot(id, &other).await);
+    }
     let (router, at) = router("tcp", &scouting, None).await;
     let nobody = Client::open(&swarm, &looks).await;
     assert!(nobody.as_ref().is_err_and(|error| error.to_string().contains(&swarm)), "{nobody:?}");
@@ -200,9 +203,11 @@ pub async fn a_client_attaches_to_its_own_swarm_and_comes_back_to_it() {
         assert_eq!(client.attached().await.map(|robot| robot.0), Some(2));
         client.close().await;
     }
-    // It goes, and another one of its swarm is there by then, as is the stranger.
+    // It goes, and another one of its swarm comes when strangers have been tried for longer than a look takes.
     let client = Client::open(&swarm, &looks).await.unwrap();
     first.stop().await;
+    tokio::time::sleep(Duration::from_secs(8)).await;
+    assert_eq!(client.attached().await, None);
     let second = robot(3, &swarm).await;
     let came_back = async {
         while client.attached().await.map(|robot| robot.0) != Some(3) {
@@ -212,7 +217,7 @@ pub async fn a_client_attaches_to_its_own_swarm_and_comes_back_to_it() {
     tokio::time::timeout(PATIENCE, came_back).await.expect("it looks again");
     client.close().await;
     router.close().await.unwrap();
-    for robot in [stranger, second] {
+    for robot in strangers.into_iter().chain([second]) {
         robot.stop().await;
     }
 }

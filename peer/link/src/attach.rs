@@ -1,15 +1,15 @@
 //! How a client comes to one of its swarm's robots and to nobody else, and comes back when that is gone. In a sealed swarm it says things that not everybody may
 //! read, and believes what it hears.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::Keys;
-use tokio::sync::{Notify, mpsc};
+use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
-use tokio::time::{sleep, timeout};
+use tokio::time::{sleep, timeout, timeout_at};
 use zenoh::Session;
 use zenoh::config::WhatAmI;
 use zenoh::session::ZenohId;
@@ -27,20 +27,28 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// How often it is looked whether one was reached.
 const LOOK_AFTER: Duration = Duration::from_millis(20);
 
+/// How often it is looked whether the link still stands, and how long is waited after a look in vain.
+const STANDS: Duration = Duration::from_secs(1);
+const IN_VAIN: Duration = Duration::from_secs(5);
+
 /// A client has one link: how long that to a stranger may take to end, before another one is dialled.
 const ENDING: Duration = Duration::from_millis(300);
 
 /// How many answers to a call wait to be looked into; what is lost is said again.
 const MAX_ANSWERS: usize = 256;
 
-/// How long nobody answers before those are tried that are no robots of the swarm.
+/// How many endpoints of an answer are tried: each may take as long as a lease, and anybody may answer.
+const MAX_ENDPOINTS: usize = 4;
+
+/// How long those that are no robots of the swarm are left aside: one may answer.
 const QUIET: Duration = Duration::from_millis(300);
 
 /// How long a robot has to answer through a router that is none.
 const BEHIND: Duration = Duration::from_millis(500);
 
-/// How many of these are kept in mind.
-const MAX_ROUTERS: usize = 64;
+/// After this long a place is dialled again, and so many are kept in mind.
+const AGAIN: Duration = Duration::from_secs(1);
+const MAX_PLACES: usize = 1024;
 
 /// A session in client mode that is linked to robots of a swarm: of a sealed one to those on the roster, each with the key that it has there. Dropping it ends it.
 pub(crate) struct Attached {
@@ -62,9 +70,7 @@ impl Attached {
         let mut config = link.client()?;
         let is_named = reach::names_any(&config);
         if !is_named && link.scouting.is_none() {
-            return Err(LinkError::Open(
-                "neither an endpoint of a robot is named, nor is one looked for: name one with -e".to_owned(),
-            ));
+            return Err(unreached(keys, "neither is an endpoint named, nor is one looked for"));
         }
         let scouting = config.clone();
         // Zenoh would link to whoever is first to answer.
@@ -74,41 +80,29 @@ impl Attached {
             door: Arc::new(Door::new(credentials.roster().clone())),
             account: None,
         });
-        let gone = Arc::new(Notify::new());
-        let on_link = {
-            let gone = gone.clone();
-            move |_, stands: bool| {
-                if !stands {
-                    gone.notify_one();
-                }
-            }
-        };
-        let node = match Node::open(config, guard, None, on_link).await {
-            Err(LinkError::Start { cause, .. }) => return Err(unreached(keys, cause)),
+        let node = match Node::open(config, guard, None, |_, _| {}).await {
+            Err(LinkError::Start { cause, .. }) => return Err(unreached(keys, &cause)),
             opened => opened?,
         };
         // Whatever becomes of this attempt, the session ends with it.
         let mut attached = Self { node: Some(node.clone()), looking: None };
         let search = Search { node, keys: keys.clone(), credentials: link.credentials.clone(), scouting };
-        let found = match is_named {
+        if is_named {
             // Zenoh dials them, for as long as the session is open.
-            true => timeout(PATIENCE, search.is_linked()).await.map(Ok),
-            false => timeout(PATIENCE, search.look()).await,
-        };
-        if let Ok(found) = found {
-            found?;
-            attached.looking = (!is_named).then(|| tokio::spawn(search.stay(gone)));
+            if timeout(PATIENCE, search.is_linked()).await.is_ok() {
+                return Ok(attached);
+            }
+        } else if let Some(found) = search.look().await? {
+            attached.looking = Some(tokio::spawn(search.stay(found)));
             return Ok(attached);
         }
-        Err(unreached(
-            keys,
-            match search.node.refused() {
-                Some(refused) => format!(
-                    "{refused}; if it is a robot that was enrolled since, take the newest roster.json"
-                ),
-                None => "none answers".to_owned(),
-            },
-        ))
+        Err(match search.node.refused() {
+            Some(refused) => {
+                let newest = "if it is a robot that was enrolled since, take the newest roster.json";
+                unreached(keys, &format!("{refused}; {newest}"))
+            }
+            None => unreached(keys, "none answers"),
+        })
     }
 
     pub fn session(&self) -> &Session {
@@ -129,8 +123,8 @@ impl Attached {
     }
 }
 
-fn unreached(keys: &Keys, cause: String) -> LinkError {
-    LinkError::Unreached { swarm: keys.swarm().to_owned(), cause }
+fn unreached(keys: &Keys, cause: &str) -> LinkError {
+    LinkError::Unreached { swarm: keys.swarm().to_owned(), cause: cause.to_owned() }
 }
 
 /// Looks for a robot among those who answer. Anybody may answer, in anybody's name.
@@ -149,17 +143,17 @@ impl Search {
         }
     }
 
-    /// Looks again whenever the link is gone, for good.
-    async fn stay(self, gone: Arc<Notify>) {
+    /// Looks again whenever the link to the session that was found is gone, for good.
+    async fn stay(self, mut found: ZenohId) {
         loop {
-            gone.notified().await;
-            while !self.node.is_linked() {
-                // Whoever was dialled in vain is dialled again in the next look.
-                match timeout(PATIENCE, self.look()).await {
-                    Ok(Ok(())) | Err(_) => {}
-                    Ok(Err(error)) => {
+            sleep(STANDS).await;
+            while !self.node.is_linked_to(found) {
+                match self.look().await {
+                    Ok(Some(other)) => found = other,
+                    Ok(None) => sleep(IN_VAIN).await,
+                    Err(error) => {
                         tracing::debug!("looking for a robot: {error}");
-                        sleep(PATIENCE).await;
+                        sleep(IN_VAIN).await;
                     }
                 }
             }
@@ -167,49 +161,59 @@ impl Search {
     }
 
     /// Dials each that answers as a robot of the swarm would, until one is one. In an open swarm, where none does, a router of another kind will do,
-    /// if there are robots of the swarm behind it.
-    async fn look(&self) -> Result<(), LinkError> {
+    /// if there are robots of the swarm behind it. `None` when none is found in time.
+    ///
+    /// Not to be broken off: Zenoh dials nobody again whom it was dialling then, and a link to a stranger could be left.
+    async fn look(&self) -> Result<Option<ZenohId>, LinkError> {
         let (answer, mut answers) = mpsc::channel::<Place>(MAX_ANSWERS);
         let sealed = self.credentials.is_some();
         let _calling = zenoh::scout(WhatAmI::Router, self.scouting.clone())
             .callback(move |hello| {
-                let locators = hello.locators().iter().map(ToString::to_string);
-                let _ = answer.try_send((
-                    hello.zid(),
-                    locators.filter(|it| it.starts_with("tls/") == sealed).collect(),
-                ));
+                let endpoints = hello.locators().iter().map(ToString::to_string);
+                let endpoints = endpoints.filter(|it| it.starts_with("tls/") == sealed).take(MAX_ENDPOINTS);
+                let _ = answer.try_send((hello.zid(), endpoints.collect()));
             })
             .await
             .map_err(|error| LinkError::open(&*error))?;
-        let (mut dialled, mut routers) = (BTreeSet::new(), VecDeque::new());
-        loop {
-            let place = match timeout(QUIET, answers.recv()).await {
+        let began = Instant::now();
+        let (mut dialled, mut routers) = (BTreeMap::new(), VecDeque::new());
+        while began.elapsed() < PATIENCE {
+            let until = if routers.is_empty() { began + PATIENCE } else { began + QUIET };
+            let place = match timeout_at(until.into(), answers.recv()).await {
+                Ok(Some((_, endpoints))) if endpoints.is_empty() => continue,
                 Ok(Some(place)) if self.is_ours(place.0) => place,
                 Ok(Some(place)) => {
-                    if !sealed && routers.len() < MAX_ROUTERS && !routers.contains(&place) {
+                    if !sealed && routers.len() < MAX_PLACES && !routers.contains(&place) {
                         routers.push_back(place);
                     }
                     continue;
                 }
-                Ok(None) => return Err(LinkError::Open("the calls for robots have ended".to_owned())),
+                Ok(None) => return Err(unreached(&self.keys, "there is no network interface to call on")),
                 Err(_) => match routers.pop_front() {
                     Some(place) => place,
-                    None => continue,
+                    None => break,
                 },
             };
-            if place.1.is_empty() || dialled.contains(&place) {
+            if dialled.get(&place).is_some_and(|at: &Instant| at.elapsed() < AGAIN) {
                 continue;
             }
-            let stands = self.node.dial(place.0, &place.1).await;
-            if self.node.is_linked() && (self.is_ours(place.0) || self.hears_a_robot().await) {
-                return Ok(());
-            }
-            self.node.leave(place.0).await;
-            if stands {
+            let (id, endpoints) = &place;
+            let stands = self.node.dial(*id, endpoints).await;
+            if self.node.is_linked_to(*id) {
+                if self.is_ours(*id) || self.hears_a_robot().await {
+                    return Ok(Some(*id));
+                }
+                self.node.leave(*id).await;
+            } else if stands {
+                // It was hung up, which takes a moment.
                 sleep(ENDING).await;
             }
-            dialled.insert(place);
+            if dialled.len() >= MAX_PLACES {
+                dialled.clear();
+            }
+            dialled.insert(place, Instant::now());
         }
+        Ok(None)
     }
 
     /// Whether the session with that id says that it is a robot of the swarm.
@@ -235,8 +239,14 @@ impl Search {
 
 impl Drop for Attached {
     fn drop(&mut self) {
-        if let (Some(node), Ok(runtime)) = (self.end(), tokio::runtime::Handle::try_current()) {
-            runtime.spawn(async move { node.close().await });
+        let Some(node) = self.end() else { return };
+        match tokio::runtime::Handle::try_current() {
+            Ok(runtime) => drop(runtime.spawn(async move { node.close().await })),
+            // Who drops it elsewhere waits.
+            Err(_) => {
+                let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+                drop(runtime.map(|runtime| runtime.block_on(node.close())));
+            }
         }
     }
 }

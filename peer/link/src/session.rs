@@ -103,6 +103,11 @@ impl Node {
         !self.links.lock().is_empty()
     }
 
+    /// Whether it is linked to that session.
+    pub(super) fn is_linked_to(&self, id: ZenohId) -> bool {
+        self.links.lock().contains_key(&id)
+    }
+
     /// Why a link was ended last.
     pub(super) fn refused(&self) -> Option<Stranger> {
         self.links.refused.lock().unwrap_or_else(PoisonError::into_inner).clone()

@@ -79,21 +79,16 @@ impl Ways {
             let began = Instant::now();
             tokio::time::sleep(SETTLED).await;
             self.calm(began + LONGEST).await;
-            loop {
-                let new = std::mem::take(&mut self.lock().undeclared);
-                let (few, rest) = new.split_at(new.len().min(FEW));
-                if few.is_empty() {
-                    break;
-                }
+            let new = std::mem::take(&mut self.lock().undeclared);
+            for (i, few) in new.chunks(FEW).enumerate() {
                 for session in node.sessions() {
                     if let Err(error) = self.declare(&session, &keys, few).await {
                         // They are declared when this begins anew.
-                        self.lock().undeclared.extend_from_slice(&new);
+                        self.lock().undeclared.extend_from_slice(&new[i * FEW..]);
                         self.news.notify_one();
                         return Err(error);
                     }
                 }
-                self.lock().undeclared.extend_from_slice(rest);
                 tokio::time::sleep(PAUSE).await;
             }
         }

@@ -196,7 +196,7 @@ impl Writing {
             if let Some(error) = error {
                 tell(Told::Failed(error));
             }
-            // What came and went while the disk failed leaves nothing: what the file holds beyond what is known is removed when it is opened again.
+            // What came and went while the disk failed leaves nothing: the file never held it, or is rid of it when it is opened again.
             let known = &self.known;
             let changes = changes.into_iter().filter(|it| it.value.is_some() || known.contains_key(&it.key));
             // Whatever comes meanwhile can wait as well: the disk is not to be tried at every sample.
@@ -227,15 +227,15 @@ impl Writing {
         {
             return Ok(Done::Found(found));
         }
+        self.classifier = classifier.or(self.classifier.as_ref()).cloned();
+        if let Some(store) = &self.store {
+            store.write(changes, classifier.map(|classifier| &**classifier))?;
+        }
         for RecordChange { key, value } in changes {
             match value {
                 Some(value) => self.known.insert(key.clone(), value.clone()),
                 None => self.known.remove(key),
             };
-        }
-        self.classifier = classifier.or(self.classifier.as_ref()).cloned();
-        if let Some(store) = &self.store {
-            store.write(changes, classifier.map(|classifier| &**classifier))?;
         }
         Ok(Done::Wrote)
     }
