@@ -252,7 +252,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Whether the word changed nothing, and was not known before.
+    /// Whether nothing was learned of the round that the word is about, nor was it known before.
     #[must_use]
     pub fn is_refusal(self) -> bool {
         match self {

@@ -199,7 +199,7 @@ pub(super) fn answer(answer: &Answer, names: &Names) -> String {
     });
     let samples = match (&answer.to, answer.samples) {
         (Instruction::Retract { .. }, 0) => "its samples are no longer used".to_owned(),
-        (Instruction::Wrong { .. }, 0) if matches!(answer.outcome, Outcome::Learned | Outcome::Known) => {
+        (Instruction::Wrong { .. }, 0) if answer.outcome == Outcome::Learned => {
             "what was seen in it is kept until its gesture is said".to_owned()
         }
         (_, samples) => {

@@ -176,8 +176,11 @@ impl Lesson<'_> {
 
     /// Names a gesture, and has it shown as often as wished.
     async fn name(&mut self, label: String) -> Result<(), Failure> {
-        let named = self.tell(&Instruction::New { label: label.clone(), round: self.args.round }).await?;
+        let named = self.ask(&Instruction::New { label: label.clone(), round: self.args.round }).await?;
         let Some(class) = named.class else { return Err(named.outcome.describe().into()) };
+        if named.outcome.is_refusal() {
+            eprintln!("{} is named, but of that round: {}", show::quoted(&label), named.outcome.describe());
+        }
         for show in 1..=self.args.shows {
             if !self.args.json {
                 eprintln!(
@@ -220,8 +223,17 @@ impl Lesson<'_> {
         self.tell(&instruction).await.map(|_| ())
     }
 
-    /// Says it to the swarm, and prints the answer. A refusal is an error, in words.
+    /// Says it to the swarm, and prints the answer. A refusal is an error.
     async fn tell(&mut self, instruction: &Instruction) -> Result<Answer, Failure> {
+        let answer = self.ask(instruction).await?;
+        if answer.outcome.is_refusal() {
+            return Err(show::answer(&answer, &self.names).into());
+        }
+        Ok(answer)
+    }
+
+    /// Says it to the swarm, and prints the answer, unless it is a refusal in words.
+    async fn ask(&mut self, instruction: &Instruction) -> Result<Answer, Failure> {
         let timeout = self.args.timeout;
         // Also what nobody answers may have arrived.
         self.about.say(instruction);
@@ -230,12 +242,11 @@ impl Lesson<'_> {
         if answer.looks_like.is_some() && !self.args.json {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }
-        let words = show::answer(&answer, &self.names);
-        let refused = answer.outcome.is_refusal();
-        if self.args.json || !refused {
+        if self.args.json || !answer.outcome.is_refusal() {
+            let words = show::answer(&answer, &self.names);
             line(self.args.json, &json!({"event": "answer", "answer": answer}), &words)?;
         }
-        if refused { Err(words.into()) } else { Ok(answer) }
+        Ok(answer)
     }
 
     /// Has a round opened, and shows what is decided; says which it was.
