@@ -8,6 +8,8 @@ use super::Tally;
 pub const WINDOW: usize = 6;
 
 const SIZE: (u32, u32) = (960, 540);
+/// Height of the row that says which line is whose.
+const LEGEND: u32 = 24;
 const SINGLE: RGBColor = RGBColor(213, 94, 0);
 const SWARM: RGBColor = RGBColor(0, 114, 178);
 const WRONG: RGBColor = RGBColor(120, 120, 120);
@@ -31,8 +33,18 @@ fn draw(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, tally: &Tall
     let swarm: Vec<f64> = tally.history().iter().map(|round| if round.right { 100.0 } else { 0.0 }).collect();
     let wrong: Vec<f64> = tally.history().iter().map(|round| if round.wrong { 100.0 } else { 0.0 }).collect();
     let last = single.len().max(2) as f64;
-    let mut chart = ChartBuilder::on(area)
-        .caption(title, ("sans-serif", 22))
+    // Above the plot, as anywhere in it a line may be.
+    let (head, plot) = area.titled(title, ("sans-serif", 22))?.split_vertically(LEGEND);
+    let legend = [
+        (90, SINGLE, 3, "a single robot"),
+        (270, SWARM, 3, "the swarm"),
+        (420, WRONG, 1, "the swarm, wrong rather than undecided"),
+    ];
+    for (x, colour, width, name) in legend {
+        head.draw(&PathElement::new([(x, 14), (x + 26, 14)], colour.stroke_width(width)))?;
+        head.draw(&Text::new(name, (x + 34, 7), ("sans-serif", 16)))?;
+    }
+    let mut chart = ChartBuilder::on(&plot)
         .margin(14)
         .x_label_area_size(52)
         .y_label_area_size(64)
@@ -52,27 +64,12 @@ fn draw(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, tally: &Tall
         let mean_of = |n: usize| mean(&values[(n + 1).saturating_sub(WINDOW)..=n]);
         (0..values.len()).map(|n| ((n + 1) as f64, mean_of(n))).collect()
     };
-    for (values, colour, name) in [(&single, SINGLE, "a single robot"), (&swarm, SWARM, "the swarm")] {
+    for (values, colour) in [(&single, SINGLE), (&swarm, SWARM)] {
         let points = (1..).map(f64::from).zip(values.iter().copied());
         chart.draw_series(points.map(|point| Circle::new(point, 4, colour.mix(0.35).filled())))?;
-        chart
-            .draw_series(LineSeries::new(means(values), colour.stroke_width(3)))?
-            .label(name)
-            .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 26, y)], colour.stroke_width(3)));
+        chart.draw_series(LineSeries::new(means(values), colour.stroke_width(3)))?;
     }
-    chart
-        .draw_series(LineSeries::new(means(&wrong), WRONG.stroke_width(1)))?
-        .label("the swarm, wrong rather than undecided")
-        .legend(|(x, y)| PathElement::new(vec![(x, y), (x + 26, y)], WRONG.stroke_width(1)));
-    chart
-        .configure_series_labels()
-        // Where neither those who learn nor those who are seldom wrong draw a line.
-        .position(SeriesLabelPosition::Coordinate(500, 245))
-        .legend_area_size(34)
-        .background_style(WHITE)
-        .border_style(RGBColor(200, 200, 200))
-        .label_font(("sans-serif", 16))
-        .draw()?;
+    chart.draw_series(LineSeries::new(means(&wrong), WRONG.stroke_width(1)))?;
     area.present()
 }
 

@@ -41,6 +41,12 @@ pub enum Kind {
 const OWN: &str = "gestalt.";
 
 impl Kind {
+    /// Whether it is the recorder's own, and nothing that was said in the swarm.
+    #[must_use]
+    pub fn is_recorders(self) -> bool {
+        matches!(self, Self::Log | Self::Recorder)
+    }
+
     /// All of them.
     pub const ALL: [Self; 14] = [
         Self::Vote,

@@ -110,10 +110,12 @@ fn open(path: &Path) -> Result<BufReader<File>, Failure> {
 
 /// What the recording is, and what is wrong with it.
 fn tell(args: &Args, run: &Run, condition: &Condition) -> Result<(), Failure> {
+    // As the recorder counts them.
+    let of_swarm = run.messages.iter().filter(|(kind, _)| !kind.is_recorders()).map(|(_, count)| count);
     let words = format!(
         "{}: {}, {}, {}",
         args.file.display(),
-        counted(condition.messages as usize, "message"),
+        counted(of_swarm.sum::<u64>() as usize, "message"),
         counted(run.showings.len(), "round"),
         counted(run.robots().len(), "robot")
     );

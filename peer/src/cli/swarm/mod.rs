@@ -180,6 +180,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
         let recorded = match (swarm.recording, &args.record) {
             (Some(recording), Some(file)) => {
+                tokio::time::sleep(LAST_WORDS).await;
                 let ledger = recording.finish().await.map_err(Failure::from);
                 ledger.and_then(|ledger| record::report(args.json, file, &ledger))
             }
@@ -190,6 +191,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         shown.and(reported).and(recorded)
     })
 }
+
+/// How long what was said last may be on its way to the recorder.
+const LAST_WORDS: Duration = Duration::from_millis(500);
 
 /// A running swarm, and a client that hears it.
 struct Swarm {
