@@ -23,14 +23,16 @@ pub fn those_of_the_rules_of_fusion_are_what_is_printed() {
         let right = fields.iter().find(|field| field.ends_with(']')).expect("the share that is right");
         let time = fields.iter().find(|field| field.contains('±')).expect("the time to decide");
         let row = results.lines().find(|row| row.starts_with(&format!("| {title} |"))).expect("a row of it");
-        let right = right.replacen(" [", " % [", 1);
-        assert!(
-            row.contains(&format!("| {right} |")) && row.contains(&format!("| {time} ms |")),
-            "{line}\n{row}"
-        );
+        let (share, interval) = right.split_once(' ').expect("a share and its interval");
+        let other = 100.0 - share.parse::<f64>().expect("a share");
+        let printed = format!("| {title} | {share} % {interval} | {other:.1} % | {time} ms |");
+        assert!(row.starts_with(&printed), "{row} is printed as {printed}");
     }
     let single =
         printed.lines().find_map(|line| line.split_once("one robot is right in ")?.1.split_once(" ["));
     let (single, _) = single.expect("how often one robot is right");
     assert!(results.contains(&format!("one frame of one robot right in {single} % [")), "{single}");
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let rounded: f64 = single.parse().expect("a share");
+    assert!(readme.contains(&format!("one frame of one robot is right in {rounded:.0} %")), "{single}");
 }
