@@ -151,7 +151,8 @@ mod tests {
         let image = LabelledImage { path: "x.jpg".into(), class: ClassId(0), person: None };
         for k in 0..right + wrong {
             evaluation.record(ClassId(0), if k < right { &[1.0, 0.0] } else { &[0.0, 1.0] });
-            let sample = LabelledFeatures { features: vec![], class: ClassId(0), group: None };
+            let sample =
+                LabelledFeatures { features: vec![], class: ClassId(0), group: None, variations: Vec::new() };
             survey.seen.push((image.clone(), sample));
         }
         for _ in 0..missed {

@@ -23,7 +23,7 @@ use gestalt_vision::dataset::{Dataset, LabelledImage, Naming};
 use gestalt_vision::model::train_on_rendered;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
-use gestalt_vision::survey::{Lessons, Survey};
+use gestalt_vision::survey::{Survey, lessons};
 
 /// Train a classifier on labelled images: one folder per gesture. File names `sNNN_…` identify the subject, so that
 /// cross-validation and --test-share never put one subject on both sides. A folder `none` holds images without a gesture:
@@ -207,7 +207,7 @@ fn learn(
     }
 
     let started = Instant::now();
-    let trained = fit(args, vocabulary, &Lessons::of(&[&survey]))?;
+    let trained = fit(args, vocabulary, &lessons(&[&survey]))?;
     let seconds = started.elapsed().as_secs_f64();
 
     let origin = origin(args, &survey, &trained)?;
@@ -233,7 +233,7 @@ fn learn(
 ///
 /// C and γ are searched among the images themselves: among the variations as well it takes ten times as long, and what is
 /// found serves people who were held out no better.
-fn fit(args: &Args, vocabulary: &Vocabulary, lessons: &Lessons) -> Result<Trained, Failure> {
+fn fit(args: &Args, vocabulary: &Vocabulary, lessons: &[LabelledFeatures]) -> Result<Trained, Failure> {
     let learn = |samples: &[LabelledFeatures], options: &TrainOptions| {
         let bar = progress::bar("training", 0);
         let rng = &mut ChaCha8Rng::seed_from_u64(args.seed);
@@ -244,12 +244,14 @@ fn fit(args: &Args, vocabulary: &Vocabulary, lessons: &Lessons) -> Result<Traine
         bar.finish_and_clear();
         trained
     };
-    let found = learn(&lessons.images, &args.options())?;
-    if lessons.copies.is_empty() {
+    let images: Vec<LabelledFeatures> =
+        lessons.iter().map(|lesson| LabelledFeatures { variations: Vec::new(), ..lesson.clone() }).collect();
+    let found = learn(&images, &args.options())?;
+    if lessons.iter().all(|lesson| lesson.variations.is_empty()) {
         return Ok(found);
     }
     let options = TrainOptions { costs: vec![found.cost], gammas: vec![found.gamma], ..args.options() };
-    Ok(learn(&[&lessons.images[..], &lessons.copies[..]].concat(), &options)?)
+    Ok(learn(lessons, &options)?)
 }
 
 /// Makes the model that is embedded in the program: what `peer/vision/models/rendered.gestalt` holds.

@@ -36,6 +36,7 @@ pub fn learn(
             features,
             class: ClassId(shown.count.unwrap_or_default().into()),
             group: Some(if shown.origin == DRAWN { DRAWN + i % DRAWN_PARTS } else { shown.origin }),
+            variations: Vec::new(),
         })
         .collect();
     let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])?;

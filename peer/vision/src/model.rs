@@ -166,7 +166,12 @@ fn rendered_samples(
         let frame = frame?;
         if let Ok(observation) = perception.observe(&frame.image) {
             let (class, group) = (ClassId(frame.class.into()), Some(frame.group));
-            samples.push(LabelledFeatures { features: observation.features, class, group });
+            samples.push(LabelledFeatures {
+                features: observation.features,
+                class,
+                group,
+                variations: Vec::new(),
+            });
         }
         progress(done);
     }

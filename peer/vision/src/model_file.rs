@@ -274,6 +274,7 @@ mod tests {
             features: vec![f32::from(i % 2), f32::from(i) / 10.0],
             class: ClassId((i % 2).into()),
             group: None,
+            variations: Vec::new(),
         };
         let samples: Vec<LabelledFeatures> = (0..10).map(sample).collect();
         let vocabulary = Vocabulary::new(["fist", "palm"]).unwrap();

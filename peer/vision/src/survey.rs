@@ -15,10 +15,8 @@ use crate::variation::varied;
 /// What perception saw in some images.
 #[derive(Debug, Default)]
 pub struct Survey {
-    /// The images that show a hand, each with its features, gesture and person.
+    /// The images that show a hand, each with its features, gesture and person, and what was seen in variations of it.
     pub seen: Vec<(LabelledImage, LabelledFeatures)>,
-    /// What it saw in variations of them.
-    pub copies: Vec<(LabelledImage, LabelledFeatures)>,
     /// Images without a hand, or whose hand was not found.
     pub without_hand: Vec<Rejected>,
     /// Files that are no image: damaged, cut short, too large.
@@ -53,16 +51,16 @@ impl Survey {
         let mut survey = Self::default();
         for image in images {
             let rejected = |cause: String| Rejected { image: image.clone(), cause };
-            let labelled = |features: Vec<f32>| {
-                (image.clone(), LabelledFeatures { features, class: image.class, group: image.person })
-            };
             match read_image(&image.path) {
                 Ok(frame) => match perception.observe(&frame) {
                     Ok(observation) => {
-                        survey.seen.push(labelled(observation.features));
                         let varied = (0..copies).filter_map(|_| varied(&frame, &mut rng).ok());
                         let observed = varied.filter_map(|frame| perception.observe(&frame).ok());
-                        survey.copies.extend(observed.map(|observation| labelled(observation.features)));
+                        let variations = observed.map(|observation| observation.features).collect();
+                        let (features, class, group) = (observation.features, image.class, image.person);
+                        survey
+                            .seen
+                            .push((image.clone(), LabelledFeatures { features, class, group, variations }));
                     }
                     Err(error) => survey.without_hand.push(rejected(error.to_string())),
                 },
@@ -73,10 +71,16 @@ impl Survey {
         survey
     }
 
-    /// The labelled feature vectors of the images themselves.
+    /// The labelled feature vectors of the images, each with those of its variations.
     #[must_use]
     pub fn samples(&self) -> Vec<LabelledFeatures> {
         self.seen.iter().map(|(_, sample)| sample.clone()).collect()
+    }
+
+    /// How many variations of images were seen.
+    #[must_use]
+    pub fn variations(&self) -> usize {
+        self.seen.iter().map(|(_, sample)| sample.variations.len()).sum()
     }
 
     /// How many images could be read.
@@ -88,42 +92,28 @@ impl Survey {
     /// Takes in another survey.
     pub fn append(&mut self, mut other: Self) {
         self.seen.append(&mut other.seen);
-        self.copies.append(&mut other.copies);
         self.without_hand.append(&mut other.without_hand);
         self.unreadable.append(&mut other.unreadable);
     }
 }
 
-/// What is to be learned from some surveys. In cross-validation a person's samples stay together, and so do an image of
-/// nobody in particular and its variations.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Lessons {
-    /// Of the images themselves.
-    pub images: Vec<LabelledFeatures>,
-    /// Of their variations.
-    pub copies: Vec<LabelledFeatures>,
-}
-
-impl Lessons {
-    /// Those of several surveys together.
-    #[must_use]
-    pub fn of(surveys: &[&Survey]) -> Self {
-        let people = surveys.iter().flat_map(|survey| &survey.seen).filter_map(|(image, _)| image.person);
-        let next = people.max().map_or(0, |last| last.saturating_add(1));
-        let mut numbers: BTreeMap<&Path, u32> = BTreeMap::new();
-        for (image, _) in surveys.iter().flat_map(|survey| &survey.seen) {
-            let number = next.saturating_add(u32::try_from(numbers.len()).unwrap_or(u32::MAX));
-            numbers.entry(&image.path).or_insert(number);
-        }
-        let lesson = |(image, sample): &(LabelledImage, LabelledFeatures)| {
-            let group = image.person.or_else(|| numbers.get(image.path.as_path()).copied());
-            LabelledFeatures { group, ..sample.clone() }
-        };
-        Self {
-            images: surveys.iter().flat_map(|survey| &survey.seen).map(lesson).collect(),
-            copies: surveys.iter().flat_map(|survey| &survey.copies).map(lesson).collect(),
-        }
+/// What is to be learned from some surveys. In cross-validation a person's samples stay together, and an image of nobody in
+/// particular is a person of its own.
+#[must_use]
+pub fn lessons(surveys: &[&Survey]) -> Vec<LabelledFeatures> {
+    let seen = || surveys.iter().flat_map(|survey| &survey.seen);
+    let people = seen().filter_map(|(image, _)| image.person);
+    let next = people.max().map_or(0, |last| last.saturating_add(1));
+    let mut numbers: BTreeMap<&Path, u32> = BTreeMap::new();
+    for (image, _) in seen() {
+        let number = next.saturating_add(u32::try_from(numbers.len()).unwrap_or(u32::MAX));
+        numbers.entry(&image.path).or_insert(number);
     }
+    let lesson = |(image, sample): &(LabelledImage, LabelledFeatures)| {
+        let group = image.person.or_else(|| numbers.get(image.path.as_path()).copied());
+        LabelledFeatures { group, ..sample.clone() }
+    };
+    seen().map(lesson).collect()
 }
 
 /// How often a hand was reported where there is none.
@@ -180,16 +170,20 @@ mod tests {
         let mut look = |seed| Survey::with_copies(&images, &mut perception, 3, seed, || ());
         let survey = look(1);
         assert_eq!((survey.seen.len(), survey.without_hand.len(), survey.readable()), (2, 1, 3));
-        assert_eq!(survey.samples(), plain.samples());
-        assert!(plain.copies.is_empty() && survey.copies.len() > 3, "{} copies", survey.copies.len());
-        assert_eq!(survey.copies, look(1).copies);
-        assert_ne!(survey.copies, look(2).copies);
+        let features = |survey: &Survey| -> Vec<_> {
+            survey.seen.iter().map(|(_, sample)| sample.features.clone()).collect()
+        };
+        assert_eq!(features(&survey), features(&plain));
+        assert!(plain.variations() == 0 && survey.variations() > 3, "{} variations", survey.variations());
+        assert_eq!(survey.seen, look(1).seen);
+        assert_ne!(survey.seen, look(2).seen);
 
-        let lessons = Lessons::of(&[&survey]);
-        assert_eq!((lessons.images.len(), lessons.copies.len()), (2, survey.copies.len()));
-        let all: Vec<_> = lessons.images.iter().chain(&lessons.copies).collect();
-        let groups = |class| all.iter().filter(move |s| s.class == ClassId(class)).map(|s| s.group);
-        assert!(groups(2).all(|group| group == Some(0)) && groups(5).all(|group| group == Some(1)));
+        let lessons = lessons(&[&survey]);
+        let shown: Vec<_> = lessons.iter().map(|lesson| (lesson.class, lesson.group)).collect();
+        assert_eq!(shown, [(ClassId(2), Some(0)), (ClassId(5), Some(1))]);
+        assert!(
+            lessons.iter().zip(&survey.seen).all(|(lesson, seen)| lesson.variations == seen.1.variations)
+        );
     }
 
     #[test]

@@ -311,7 +311,12 @@ fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
         core::set_rng_seed(1).unwrap();
         let mut sample = |(image, picture): &(&LabelledImage, Mat)| {
             let features = perception.observe(&fault.apply(picture)).ok()?.features;
-            Some(LabelledFeatures { features, class: image.class, group: image.person })
+            Some(LabelledFeatures {
+                features,
+                class: image.class,
+                group: image.person,
+                variations: Vec::new(),
+            })
         };
         images.iter().map(|image| whom(image.0.person).then(|| sample(image))?).collect()
     };

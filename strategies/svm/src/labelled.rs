@@ -11,4 +11,7 @@ pub struct LabelledFeatures {
     pub class: ClassId,
     /// Who showed it, if known: cross-validation keeps a person's samples together.
     pub group: Option<u32>,
+    /// The raw features of variations of it, such as its picture mirrored. They are learned wherever it is and nowhere else,
+    /// and no score counts them. May be empty.
+    pub variations: Vec<Vec<f32>>,
 }

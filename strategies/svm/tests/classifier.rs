@@ -37,7 +37,12 @@ fn samples(count: usize, spread: f32, rng: &mut impl Rng) -> Vec<LabelledFeature
                 _ => [-2.0, 2.0, 0.0, 5.0, 100.0],
             };
             let features = centre.iter().map(|c| c + spread * normal(rng)).collect();
-            LabelledFeatures { features, class: ClassId(class as u32), group: Some((i / 12) as u32) }
+            LabelledFeatures {
+                features,
+                class: ClassId(class as u32),
+                group: Some((i / 12) as u32),
+                variations: Vec::new(),
+            }
         })
         .collect()
 }
@@ -149,6 +154,73 @@ fn options_out_of_range_are_refused() {
     }
 }
 
+/// Sixty samples of one person, of which no two have anything in common, and near copies of each beside it.
+fn samples_that_teach_nothing_of_each_other(rng: &mut ChaCha8Rng) -> Vec<LabelledFeatures> {
+    let sample = |i: usize| {
+        let features: Vec<f32> = (0..5).map(|_| normal(rng)).collect();
+        let mut near = || features.iter().map(|x| x + 0.01 * normal(rng)).collect();
+        let variations = vec![near(), near(), near()];
+        LabelledFeatures { features, class: ClassId((i % 3) as u32), group: Some(7), variations }
+    };
+    (0..60).map(sample).collect()
+}
+
+#[test]
+fn a_sample_is_not_judged_by_what_learned_a_variation_of_it() {
+    let mut rng = generator(1);
+    let lonely = samples_that_teach_nothing_of_each_other(&mut rng);
+    let narrow = TrainOptions { costs: vec![10.0], gammas: vec![10.0], ..TrainOptions::default() };
+    let learn = |samples: &[LabelledFeatures]| {
+        train("shape-1", &vocabulary(), samples, &narrow, &mut generator(1), |_| ()).unwrap()
+    };
+    let trained = learn(&lonely);
+    assert_eq!(trained.folding, Folding::BySample);
+    assert!((0.15..0.55).contains(&trained.accuracy), "chance is a third: {}", trained.accuracy);
+
+    // As if each variation were a picture of its own, it is told what it is to guess.
+    let mut apart = lonely.clone();
+    for sample in &lonely {
+        let alone = |features: &Vec<f32>| LabelledFeatures {
+            features: features.clone(),
+            variations: Vec::new(),
+            ..sample.clone()
+        };
+        apart.extend(sample.variations.iter().map(alone));
+    }
+    apart.iter_mut().for_each(|sample| sample.variations.clear());
+    assert!(learn(&apart).accuracy > 0.9);
+}
+
+#[test]
+fn variations_are_learned_and_never_scored() {
+    let mut rng = generator(2);
+    for people in [12, 240] {
+        let mut taught = samples(240, 0.3, &mut rng);
+        taught.iter_mut().enumerate().for_each(|(i, sample)| sample.group = Some((i / people) as u32));
+        let plain = trained(&taught, 2);
+        // Far from all samples, where nothing tells the classes apart.
+        for sample in &mut taught {
+            sample.variations = vec![(0..5).map(|k| 50.0 + k as f32 + normal(&mut rng)).collect(); 2];
+        }
+        let varied = trained(&taught, 2);
+        assert_eq!(varied.folding, if people == 12 { Folding::ByGroup } else { Folding::BySample });
+        assert!(varied.accuracy > 0.95, "{}", varied.accuracy);
+        assert!(varied.classifier.support_vectors() > plain.classifier.support_vectors());
+    }
+}
+
+#[test]
+fn a_variation_of_another_length_is_refused() {
+    let mut samples = samples(24, 0.3, &mut generator(3));
+    samples[4].variations = vec![vec![0.0; 5], vec![0.0; 4]];
+    let learn = |samples: &[LabelledFeatures]| {
+        train("shape-1", &vocabulary(), samples, &options(), &mut generator(3), |_| ())
+    };
+    assert_eq!(learn(&samples), Err(TrainError::Length { sample: 4, found: 4, expected: 5 }));
+    samples[4].variations[1] = vec![0.0, f32::NAN, 0.0, 0.0, 0.0];
+    assert_eq!(learn(&samples), Err(TrainError::NotFinite { sample: 4, component: 1 }));
+}
+
 #[test]
 fn two_samples_of_each_class_are_enough() {
     let mut rng = generator(6);
@@ -156,7 +228,7 @@ fn two_samples_of_each_class_are_enough() {
         .map(|i| {
             let mut features: Vec<f32> = (0..5).map(|_| 0.1 * normal(&mut rng)).collect();
             features[i % 3] += 1.0;
-            LabelledFeatures { features, class: ClassId((i % 3) as u32), group: None }
+            LabelledFeatures { features, class: ClassId((i % 3) as u32), group: None, variations: Vec::new() }
         })
         .collect();
     let classifier = trained(&few, 6).classifier;

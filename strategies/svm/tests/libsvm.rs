@@ -28,6 +28,7 @@ fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<LabelledFeat
                     features,
                     class: ClassId(class as u32),
                     group: Some(person),
+                    variations: Vec::new(),
                 });
             }
         }

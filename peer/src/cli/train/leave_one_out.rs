@@ -10,7 +10,7 @@ use super::super::{Failure, report};
 use super::{Args, fit, judge, look};
 use gestalt_vision::dataset::Dataset;
 use gestalt_vision::perception::Perception;
-use gestalt_vision::survey::{FalseAlarms, Lessons, Survey};
+use gestalt_vision::survey::{FalseAlarms, Survey, lessons};
 
 /// Scores each dataset by a model that is trained on the others. Gestures that the others do not show are left out.
 pub(super) fn compare(
@@ -33,11 +33,11 @@ pub(super) fn compare(
             continue;
         }
         let others = surveys.iter().enumerate().filter(|(other, _)| *other != left);
-        let lessons = Lessons::of(&others.map(|(_, survey)| survey).collect::<Vec<_>>());
-        let taught = Taught::by(&lessons.images, &set.vocabulary);
+        let lessons = lessons(&others.map(|(_, survey)| survey).collect::<Vec<_>>());
+        let taught = Taught::by(&lessons, &set.vocabulary);
         let vocabulary = Vocabulary::new(taught.labels(&set.vocabulary))
             .map_err(|error| format!("nothing to train on without {}: {error}", folder.display()))?;
-        let classifier = fit(args, &vocabulary, &taught.lessons(&lessons))?.classifier;
+        let classifier = fit(args, &vocabulary, &taught.samples(&lessons))?.classifier;
         let (known, unknown) = taught.survey(&surveys[left]);
         say_unknown(folder, unknown);
         let mut evaluation = Evaluation::new(classifier.vocabulary().classes());
@@ -74,10 +74,6 @@ impl Taught {
         labels.filter(|(_, class)| class.is_some()).map(|(label, _)| label.clone()).collect()
     }
 
-    fn lessons(&self, lessons: &Lessons) -> Lessons {
-        Lessons { images: self.samples(&lessons.images), copies: self.samples(&lessons.copies) }
-    }
-
     fn samples(&self, samples: &[LabelledFeatures]) -> Vec<LabelledFeatures> {
         let known = samples.iter().filter_map(|sample| Some((sample, self.0[sample.class.index()]?)));
         known.map(|(sample, class)| LabelledFeatures { class, ..sample.clone() }).collect()
@@ -108,7 +104,12 @@ mod tests {
 
     #[test]
     fn gestures_that_the_others_do_not_show_are_neither_learned_nor_judged() {
-        let sample = |class| LabelledFeatures { features: vec![], class: ClassId(class), group: None };
+        let sample = |class| LabelledFeatures {
+            features: vec![],
+            class: ClassId(class),
+            group: None,
+            variations: Vec::new(),
+        };
         let image = |class| LabelledImage { path: "x.jpg".into(), class: ClassId(class), person: None };
         let vocabulary = Vocabulary::new(["0", "1", "2", "3"]).unwrap();
         // One sample of "2" is too few, of "0" there is none.

@@ -48,7 +48,7 @@ impl Outcome<'_> {
             (Folding::ByGroup, false) => "by subject where known, else by image",
             (Folding::BySample, _) => "by image (subjects appear on both sides of the split)",
         };
-        let copies = match self.survey.copies.len() {
+        let copies = match self.survey.variations() {
             0 => String::new(),
             copies => format!(" and {copies} variations"),
         };
@@ -101,7 +101,7 @@ impl Outcome<'_> {
             "gamma": trained.gamma,
             "support_vectors": classifier.support_vectors(),
             "images": survey.seen.len(),
-            "variations": survey.copies.len(),
+            "variations": survey.variations(),
             "without_hand": survey.without_hand.len(),
             "unreadable": survey.unreadable.len(),
             "people": model.origin.people.len(),

@@ -1,5 +1,7 @@
 //! What nothing can be learned from, and the check for it.
 
+use std::iter;
+
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Vocabulary;
 use linfa_svm::SvmError;
@@ -16,7 +18,7 @@ pub enum TrainError {
     /// An option out of its range.
     #[error("training option out of range: {0}")]
     Option(&'static str),
-    /// A feature vector of another length than the first.
+    /// A feature vector, of a sample or of a variation, of another length than the first.
     #[error("sample {sample} has {found} features, the first has {expected}")]
     Length {
         /// Index of the sample.
@@ -95,12 +97,14 @@ pub(super) fn check_samples(vocabulary: &Vocabulary, samples: &[LabelledFeatures
     let mut counts = vec![0; vocabulary.classes()];
     let expected = samples.first().map_or(0, |first| first.features.len());
     for (index, sample) in samples.iter().enumerate() {
-        let found = sample.features.len();
-        if found != expected {
-            return Err(TrainError::Length { sample: index, found, expected });
-        }
-        if let Some(component) = sample.features.iter().position(|x| !x.is_finite()) {
-            return Err(TrainError::NotFinite { sample: index, component });
+        for features in iter::once(&sample.features).chain(&sample.variations) {
+            let found = features.len();
+            if found != expected {
+                return Err(TrainError::Length { sample: index, found, expected });
+            }
+            if let Some(component) = features.iter().position(|x| !x.is_finite()) {
+                return Err(TrainError::NotFinite { sample: index, component });
+            }
         }
         match counts.get_mut(sample.class.index()) {
             Some(count) => *count += 1,

@@ -85,6 +85,7 @@ mod tests {
             features: vec![0.0],
             class: ClassId((i % 3) as u32),
             group: groups(i),
+            variations: Vec::new(),
         };
         (0..60).map(sample).collect()
     }

@@ -11,9 +11,36 @@ use crate::feature_space::FeatureSpace;
 use crate::labelled::LabelledFeatures;
 use crate::machine::Machine;
 
+/// What is learned of a sample: itself, or one variation of it.
+#[derive(Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// Index of the sample.
+    pub sample: usize,
+    pub class: usize,
+    pub features: &'a [f32],
+}
+
+/// The samples in their order, then the variations of each.
+pub(super) fn rows(samples: &[LabelledFeatures]) -> Vec<Row<'_>> {
+    let numbered = || samples.iter().enumerate();
+    let row = |(sample, labelled): (usize, &LabelledFeatures), features| Row {
+        sample,
+        class: labelled.class.index(),
+        features,
+    };
+    let varied = numbered().flat_map(|of| of.1.variations.iter().map(move |features| (of, features)));
+    numbered()
+        .map(|of| row(of, &of.1.features))
+        .chain(varied.map(|(of, features)| row(of, features)))
+        .collect()
+}
+
 /// The samples, split and seen in the space of each fold.
-pub(super) struct Search<'a> {
-    samples: &'a [LabelledFeatures],
+pub(super) struct Search {
+    /// The class of each row.
+    truths: Vec<usize>,
+    /// How many of the rows are samples themselves: the first.
+    samples: usize,
     classes: usize,
     folds: Vec<Fold>,
     pub folding: Folding,
@@ -26,19 +53,22 @@ pub(super) struct Choice {
     pub held_out: HeldOut,
 }
 
-impl<'a> Search<'a> {
+impl Search {
     pub fn new(
         feature_set: &str,
-        samples: &'a [LabelledFeatures],
+        samples: &[LabelledFeatures],
+        rows: &[Row],
         classes: usize,
         options: &TrainOptions,
         rng: &mut impl Rng,
     ) -> Self {
         let (assignment, folding) = split(samples, classes, options.folds, rng);
         let folds = (0..options.folds).map(|fold| {
-            Fold::new(feature_set, samples, classes, options, rng, |index| assignment[index] != fold)
+            // A variation lies where its sample does: what is held out was learned in no disguise.
+            Fold::new(feature_set, rows, classes, options, rng, |row| assignment[row.sample] != fold)
         });
-        Self { samples, classes, folds: folds.collect(), folding }
+        let (folds, truths) = (folds.collect(), rows.iter().map(|row| row.class).collect());
+        Self { truths, samples: samples.len(), classes, folds, folding }
     }
 
     /// The pair with the least log loss. Calls `step` after each fold.
@@ -66,7 +96,7 @@ impl<'a> Search<'a> {
         step: &mut impl FnMut(),
         best: &mut Option<Choice>,
     ) -> Result<(), SvmError> {
-        let mut decisions = vec![Vec::new(); self.samples.len()];
+        let mut decisions = vec![Vec::new(); self.truths.len()];
         for fold in &self.folds {
             let machine = fold.fit(cost, gamma)?;
             for &index in &fold.held_out {
@@ -74,7 +104,7 @@ impl<'a> Search<'a> {
             }
             step();
         }
-        let held_out = HeldOut::new(&decisions, self.samples, self.classes);
+        let held_out = HeldOut::new(&decisions, &self.truths, self.samples, self.classes);
         let least = best.as_ref().map_or(f64::INFINITY, |best| best.held_out.log_loss);
         if held_out.log_loss < least {
             *best = Some(Choice { cost, gamma, held_out });
@@ -83,11 +113,11 @@ impl<'a> Search<'a> {
     }
 }
 
-/// A space fitted on some samples, and all samples as seen in it.
+/// A space fitted on some rows, and all rows as seen in it.
 pub(super) struct Fold {
     pub space: FeatureSpace,
     rows: Vec<Vec<f32>>,
-    /// By class, the samples it was fitted on.
+    /// By class, the rows it was fitted on.
     members: Vec<Vec<usize>>,
     /// The others.
     held_out: Vec<usize>,
@@ -98,29 +128,29 @@ pub(super) struct Fold {
 impl Fold {
     pub fn new(
         feature_set: &str,
-        samples: &[LabelledFeatures],
+        all: &[Row],
         classes: usize,
         options: &TrainOptions,
         rng: &mut impl Rng,
-        learns: impl Fn(usize) -> bool,
+        learns: impl Fn(&Row) -> bool,
     ) -> Self {
-        let learned = samples.iter().enumerate().filter(|(index, _)| learns(*index));
-        let features = learned.clone().map(|(_, sample)| sample.features.as_slice());
+        let learned = all.iter().enumerate().filter(|(_, row)| learns(row));
+        let features = learned.clone().map(|(_, row)| row.features);
         let space = FeatureSpace::fit(feature_set, features, options.scaling, options.components, rng);
-        let rows: Vec<Vec<f32>> = samples.iter().map(|sample| space.coordinates(&sample.features)).collect();
+        let rows: Vec<Vec<f32>> = all.iter().map(|row| space.coordinates(row.features)).collect();
         let mut members = vec![Vec::new(); classes];
         let (mut squares, mut count) = (0.0, 0.0);
-        for (index, sample) in learned {
-            members[sample.class.index()].push(index);
+        for (index, row) in learned {
+            members[row.class].push(index);
             // Rows are centred, so their squares sum up to the variance.
             squares += rows[index].iter().map(|x| f64::from(x * x)).sum::<f64>();
             count += 1.0;
         }
-        let held_out = (0..samples.len()).filter(|index| !learns(*index)).collect();
+        let held_out = (0..all.len()).filter(|index| !learns(&all[*index])).collect();
         Self { space, rows, members, held_out, gamma_unit: count / squares.max(f64::MIN_POSITIVE) }
     }
 
-    /// How many samples of each class it was fitted on.
+    /// How many rows of each class it was fitted on.
     pub fn counts(&self) -> Vec<u32> {
         self.members.iter().map(|members| members.len() as u32).collect()
     }
@@ -140,17 +170,17 @@ pub(super) struct HeldOut {
 }
 
 impl HeldOut {
-    fn new(decisions: &[Vec<f64>], samples: &[LabelledFeatures], classes: usize) -> Self {
-        let truths: Vec<usize> = samples.iter().map(|sample| sample.class.index()).collect();
-        let calibration = Calibration::fit(decisions, &truths, classes);
+    /// Of the decision values of all rows, of which the first `samples` count: variations are no pictures of the test.
+    fn new(decisions: &[Vec<f64>], truths: &[usize], samples: usize, classes: usize) -> Self {
+        let calibration = Calibration::fit(decisions, truths, classes);
         let (mut right, mut loss) = (0, 0.0);
-        for (decisions, truth) in decisions.iter().zip(truths) {
+        for (decisions, &truth) in decisions.iter().zip(truths).take(samples) {
             let p = calibration.probabilities(decisions, classes);
             let truth = p[truth];
             right += usize::from(p.iter().all(|other| *other <= truth));
             loss -= truth.max(1e-12).ln();
         }
-        let count = samples.len() as f64;
+        let count = samples as f64;
         Self { calibration, accuracy: right as f64 / count, log_loss: loss / count }
     }
 }

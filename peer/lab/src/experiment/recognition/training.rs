@@ -81,7 +81,12 @@ fn train_one(
         let perception = eyes.iter_mut().find(|(name, _)| *name == frame.camera);
         if let Some(Ok(seen)) = perception.map(|(_, perception)| perception.observe(&frame.image)) {
             let class = ClassId(frame.class.into());
-            samples.push(LabelledFeatures { features: seen.features, class, group: Some(frame.group) });
+            samples.push(LabelledFeatures {
+                features: seen.features,
+                class,
+                group: Some(frame.group),
+                variations: Vec::new(),
+            });
         }
         progress(n + 1);
     }
