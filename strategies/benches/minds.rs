@@ -1,16 +1,23 @@
 //! What a mind's work costs in swarms of any size: `cargo bench -p gestalt-strategies --bench minds`.
 //!
-//! Of a hundred robots all vote, of more a committee of 72: what is timed is the work at one input, and a whole round of all minds.
+//! Of a hundred robots all vote, of more a committee of 72: what is timed is the work at one input, and a whole round of all minds. And what one message of
+//! names costs a robot that holds a thousand samples.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
 use divan::{Bencher, black_box};
-use gestalt_protocol::{ClassId, Envelope, Message, RobotId, RoundId, Stamp, Vote};
-use gestalt_strategies::{
-    Classify, ClassifyError, Input, Life, Mind, MindConfig, Observation, Output, Vocabulary,
+use gestalt_protocol::{
+    ClassId, Envelope, Fate, InstructorId, Message, Naming, Namings, RobotId, RoundId, SampleId, Samples,
+    SharedSample, Stamp, Vector, Vote,
 };
+use gestalt_strategies::{
+    Classify, ClassifyError, Components, FeatureSpace, Input, LearningConfig, LearningSetup, Life, Mind,
+    MindConfig, Observation, Output, OwnRules, ScalingMethod, Vocabulary,
+};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
 
 const SIZES: [u32; 4] = [10, 100, 1_000, 10_000];
 const ROUND: RoundId = RoundId { counter: 1, opener: RobotId(1), life: 0 };
@@ -138,4 +145,58 @@ fn round_of_minds(bencher: Bencher, size: u32) {
         assert!(minds.iter().all(decided), "all hold what was shown");
         minds
     });
+}
+
+/// So many words, by which each gesture is the same as the next, at a robot that holds a thousand samples of them.
+#[divan::bench(args = [1, 16, 64, 256], max_time = 2)]
+fn names_in_one_message(bencher: Bencher, words: usize) {
+    let (rows, seed) = ([[0.0, 1.0], [1.0, 0.0], [0.5, 0.2]], ChaCha8Rng::seed_from_u64);
+    let features = rows.iter().map(|row| row.as_slice());
+    let space =
+        FeatureSpace::fit("bench", features, ScalingMethod::Common, Components::Count(1), &mut seed(1));
+    let space = Arc::new(space);
+    let by: InstructorId = "ana".parse().expect("a name");
+    let gesture = |n: usize| ClassId::named(&by, &n.to_string());
+    let from = |message, sequence| {
+        let stamp = Stamp { boot: 1, sequence };
+        Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None })
+    };
+    let taught = || {
+        let setup = LearningSetup {
+            config: LearningConfig::default(),
+            space: space.clone(),
+            vocabulary: vocabulary(),
+            rng: Box::new(seed(2)),
+            memory: None,
+            rules: OwnRules::default(),
+        };
+        let mind = Mind::new(RobotId(1), Life { boot: 1, nonce: 1 }, MindConfig::default());
+        let mut mind = mind.expect("it is valid").learning(setup).expect("it can learn");
+        for number in 1..=1000 {
+            let id = SampleId { author: RobotId(2), life: 1, number };
+            let (class, vector) =
+                (gesture(number as usize % words), Vector::F32(vec![number as f32 / 1000.0]));
+            let round = RoundId { life: number, ..ROUND };
+            let samples = vec![SharedSample { id, class, round, vector }];
+            mind.handle(ms(1), from(Message::Samples(Samples { space: space.id(), samples }), number));
+        }
+        let held = mind.training_set().map(|set| set.len());
+        assert_eq!(held, Some(1000), "a full set");
+        mind
+    };
+    let word = |n: usize| {
+        let fate = if n + 1 == words { Fate::InUse } else { Fate::Same(gesture(n + 1)) };
+        Naming {
+            by: by.clone(),
+            label: n.to_string(),
+            count: 1,
+            at: 1,
+            said_by: by.clone(),
+            fate,
+            said: None,
+        }
+    };
+    let message = Message::Namings(Namings { namings: (0..words).map(word).collect() });
+    let minds = || (taught(), from(message.clone(), 1001));
+    bencher.with_inputs(minds).bench_local_values(|(mut mind, message)| (mind.handle(ms(2), message), mind));
 }

@@ -1,6 +1,8 @@
 //! Gestures that instructors named while the swarm works: one latest word on each, so that what is heard twice, late or in another order comes to the
 //! same.
 
+mod merged;
+
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
@@ -63,14 +65,17 @@ impl NameBook {
     pub(crate) fn hear_by(&mut self, naming: &Naming, standing: Option<Standing>) -> NamingReceipt {
         let receipt = self.would_hear(naming, standing);
         if receipt == NamingReceipt::New {
-            self.put(naming, standing.unwrap_or(Standing::Overrules));
-            if self.namings.len() > MAX_NAMED
-                && let Some((.., last)) = places(self.all()).pop()
-            {
-                self.namings.remove(&last);
-            }
+            self.take_in(naming, standing);
         }
         receipt
+    }
+
+    /// Takes in a word that is [new](Self::would_hear). Gives the gesture that gives way to it, if one does.
+    pub(crate) fn take_in(&mut self, naming: &Naming, standing: Option<Standing>) -> Option<ClassId> {
+        self.put(naming, standing.unwrap_or(Standing::Overrules));
+        let (.., last) = (self.namings.len() > MAX_NAMED).then(|| places(self.all()).pop())??;
+        self.namings.remove(&last);
+        Some(last)
     }
 
     fn put(&mut self, naming: &Naming, standing: Standing) {
@@ -213,39 +218,12 @@ impl NameBook {
     }
 
     fn all_in_use(&self) -> impl Iterator<Item = Candidate<'_>> {
-        self.all().filter(|(.., gesture)| self.is_in_use(*gesture))
+        let now = self.all_stand_for();
+        self.all().filter(move |(.., gesture)| now.get(gesture) == Some(&Some(*gesture)))
     }
 
     fn is_in_use(&self, gesture: ClassId) -> bool {
         self.stands_for(gesture) == Some(gesture)
-    }
-
-    /// The gesture that one is by now: itself, or that which it was found to be the same as; `None` for one that is retired, or that nobody named.
-    /// Where gestures are said to be the same in a circle, it is the smallest of them.
-    #[must_use]
-    pub fn stands_for(&self, gesture: ClassId) -> Option<ClassId> {
-        let mut passed = Vec::new();
-        let mut at = gesture;
-        while at.is_named() {
-            if let Some(begin) = passed.iter().position(|known| *known == at) {
-                return passed[begin..].iter().min().copied();
-            }
-            match self.get(at)?.fate {
-                Fate::InUse => return Some(at),
-                Fate::Retired => return None,
-                Fate::Same(other) => {
-                    passed.push(at);
-                    at = other;
-                }
-            }
-        }
-        Some(at)
-    }
-
-    /// The gestures that were found to be the same as another, each with what it is by now.
-    pub(crate) fn merged(&self) -> impl Iterator<Item = (ClassId, ClassId)> + '_ {
-        let now = self.namings.keys().filter_map(|gesture| Some((*gesture, self.stands_for(*gesture)?)));
-        now.filter(|(gesture, now)| gesture != now)
     }
 
     /// The gesture that an instructor means by a label: `circle (ana)` is the one that ana named so, `circle` the instructor's own, or else the only one of
@@ -287,9 +265,10 @@ impl NameBook {
     /// same as another is called as that.
     #[must_use]
     pub fn titles(&self, listed: &[String]) -> BTreeMap<ClassId, String> {
+        let now = self.all_stand_for();
         let mut times: BTreeMap<&str, usize> = listed.iter().map(|label| (label.as_str(), 1)).collect();
-        for (_, said) in self.namings.iter().filter(|(gesture, _)| self.is_in_use(**gesture)) {
-            *times.entry(&said.naming.label).or_default() += 1;
+        for naming in now.iter().filter(|(of, now)| **now == Some(**of)).filter_map(|(of, _)| self.get(*of)) {
+            *times.entry(&naming.label).or_default() += 1;
         }
         let title = |naming: &Naming| match times.get(naming.label.as_str()) {
             Some(2..) => format!("{} ({})", naming.label, naming.by),
@@ -299,16 +278,17 @@ impl NameBook {
             Some(naming) => Some(title(naming)),
             None => listed.get(gesture.index()).cloned(),
         };
-        let all = self.namings.keys();
-        all.filter_map(|gesture| Some((*gesture, called(self.stands_for(*gesture).unwrap_or(*gesture))?)))
+        now.into_iter()
+            .filter_map(|(gesture, now)| Some((gesture, called(now.unwrap_or(gesture))?)))
             .collect()
     }
 
     /// The same, with what robots that know of more or of fewer names call each.
     #[must_use]
     pub fn called(&self, listed: &[String]) -> BTreeMap<ClassId, Called> {
+        let now = self.all_stand_for();
         let also = |gesture: ClassId| {
-            let namings = [Some(gesture), self.stands_for(gesture)].into_iter().flatten();
+            let namings = [Some(gesture), now.get(&gesture).copied().flatten()].into_iter().flatten();
             let namings = namings.filter_map(|gesture| self.get(gesture));
             namings.flat_map(|Naming { label, by, .. }| [label.clone(), format!("{label} ({by})")]).collect()
         };

@@ -1,6 +1,7 @@
 //! What becomes of samples by what instructors name, merge, retire and restore.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 
 use gestalt_protocol::{ClassId, MAX_CLASSES, NamedGesture, Naming};
 
@@ -12,6 +13,9 @@ use crate::believe::Standing;
 use crate::candidates::Candidates;
 use crate::names::{NameBook, NamingReceipt};
 use crate::sample::HeldSample;
+
+/// What samples of each class that is held are trained on as; `None`: on none.
+type TrainedAs = BTreeMap<ClassId, Option<ClassId>>;
 
 impl Learning {
     pub fn names(&self) -> &NameBook {
@@ -25,48 +29,85 @@ impl Learning {
 
     /// Takes in what was said of a gesture that was named, and trains by it.
     pub fn hear_naming(&mut self, naming: &Naming) -> NamingReceipt {
+        let mut heard = NamingReceipt::Known;
+        self.hear_namings([naming], |_, receipt| {
+            heard = receipt;
+            ControlFlow::Continue(())
+        });
+        heard
+    }
+
+    /// Takes in many words, until it is told by what came of one to take in no more, and trains by them: once for all, because what one of them makes of
+    /// all samples takes as long.
+    pub fn hear_namings<'a>(
+        &mut self,
+        namings: impl IntoIterator<Item = &'a Naming>,
+        mut came_of: impl FnMut(&'a Naming, NamingReceipt) -> ControlFlow<()>,
+    ) {
+        let mut before = None;
+        for naming in namings {
+            let (heard, standing) = self.would_hear_naming(naming);
+            if heard == NamingReceipt::New {
+                before.get_or_insert_with(|| self.all_trained_as());
+                let gone = self.names.take_in(naming, standing);
+                self.dirty.extend(gone.into_iter().chain([naming.gesture()]).map(Item::Naming));
+            }
+            if came_of(naming, heard).is_break() {
+                break;
+            }
+        }
+        if let Some(before) = before {
+            self.follow_names(before);
+        }
+    }
+
+    /// What would come of a word, and by which right it is said. Of one that is not new there may still be the first to keep.
+    fn would_hear_naming(&mut self, naming: &Naming) -> (NamingReceipt, Option<Standing>) {
         // Neighbours say all they know: mostly there is nothing to be done.
         let lacks_first = self.names.lacks_first(naming);
         if self.names.is_known(naming) && !lacks_first {
-            return NamingReceipt::Known;
+            return (NamingReceipt::Known, None);
         }
         let standing = self.standing_of_naming(naming);
         if standing == Some(Standing::Unproven) {
-            return NamingReceipt::Unproven;
+            return (NamingReceipt::Unproven, standing);
         }
         if lacks_first {
             self.names.keep_first(naming);
             self.dirty.insert(Item::Naming(naming.gesture()));
         }
-        let heard = self.names.would_hear(naming, standing);
-        if heard != NamingReceipt::New {
-            return heard;
-        }
-        let kept: Vec<ClassId> = self.names.iter().map(Naming::gesture).collect();
-        self.rename(|names| {
-            names.hear_by(naming, standing);
-        });
-        let gone = kept.into_iter().filter(|gesture| self.names.get(*gesture).is_none());
-        self.dirty.extend(gone.chain([naming.gesture()]).map(Item::Naming));
-        heard
+        (self.names.would_hear(naming, standing), standing)
     }
 
     /// Changes what is known of names, and trains by it.
     pub(super) fn rename(&mut self, change: impl FnOnce(&mut NameBook)) {
-        let classes: BTreeSet<ClassId> = self.classes_of_samples().collect();
-        let before: Vec<(ClassId, Option<ClassId>)> =
-            classes.into_iter().map(|class| (class, self.trained_as(class))).collect();
+        let before = self.all_trained_as();
         change(&mut self.names);
+        self.follow_names(before);
+    }
+
+    /// Trains by what is known of names now, where samples were trained on as that `before`.
+    fn follow_names(&mut self, before: TrainedAs) {
         self.gestures = self.all_gestures();
         self.judged.doubt();
         self.doubt_samples();
-        for (class, trained_as) in before {
-            if self.trained_as(class) != trained_as {
-                self.train_anew(class);
-            }
-        }
+        let now = self.all_trained_as();
+        let changed = now.iter().filter(|(class, now)| before.get(class) != Some(now));
+        let changed: BTreeSet<ClassId> = changed.map(|(class, _)| *class).collect();
+        self.train_anew(&changed);
         let rounds: Vec<_> = self.lessons.all_rounds().collect();
         rounds.into_iter().for_each(|round| self.apply_to_round(round));
+    }
+
+    /// What samples of each class are trained on as.
+    fn all_trained_as(&self) -> TrainedAs {
+        let now = self.names.all_stand_for();
+        let trained_as = |class: ClassId| {
+            let now = if class.is_named() { now.get(&class).copied()? } else { return Some(class) };
+            now.filter(|class| self.gestures.contains(*class))
+        };
+        let classes: BTreeSet<ClassId> = self.classes_of_samples().collect();
+        classes.into_iter().map(|class| (class, trained_as(class))).collect()
     }
 
     /// Puts a word into the memory that the rules would not let in.
@@ -99,7 +140,7 @@ impl Learning {
 
     /// What makes a new learner train on all that is held.
     pub fn training_anew(&self) -> Vec<TrainingChange> {
-        let changes = self.changes_for(|_| true).into_iter();
+        let changes = self.changes_for(|_| true).into_iter().map(|(_, change)| change);
         changes.filter(|change| matches!(change, TrainingChange::Insert { .. })).collect()
     }
 
@@ -147,19 +188,21 @@ impl Learning {
         in_use.collect()
     }
 
-    /// Trains on all samples of that class as what it now is.
-    fn train_anew(&mut self, class: ClassId) {
-        let changes = self.changes_for(|of| of == class);
-        self.training.extend(changes);
+    /// Trains on all samples of these classes as what they now are, class by class.
+    fn train_anew(&mut self, classes: &BTreeSet<ClassId>) {
+        let mut changes = self.changes_for(|of| classes.contains(&of));
+        changes.sort_by_key(|(class, _)| *class);
+        self.training.extend(changes.into_iter().map(|(_, change)| change));
     }
 
-    /// What makes a learner train on all samples of these classes as what they now are.
-    fn changes_for(&self, is_wanted: impl Fn(ClassId) -> bool) -> Vec<TrainingChange> {
+    /// What makes a learner train on all samples of these classes as what they now are, each with its class.
+    fn changes_for(&self, is_wanted: impl Fn(ClassId) -> bool) -> Vec<(ClassId, TrainingChange)> {
         let held = self.set.iter().filter(|sample| is_wanted(sample.class));
         let guessed = self.aside.iter().filter_map(|(number, aside)| {
-            let class = self.trained_as(aside.guess.filter(|class| is_wanted(*class))?);
-            Some(inserted_as(class, unresolved::training_key(number), &aside.vector, aside.round, None))
+            let guess = aside.guess.filter(|class| is_wanted(*class))?;
+            let (class, key) = (self.trained_as(guess), unresolved::training_key(number));
+            Some((guess, inserted_as(class, key, &aside.vector, aside.round, None)))
         });
-        held.map(|sample| self.change_for(sample)).chain(guessed).collect()
+        held.map(|sample| (sample.class, self.change_for(sample))).chain(guessed).collect()
     }
 }

@@ -1,5 +1,7 @@
 //! Gestures that instructors name while the swarm works: what a robot makes of such a word, and of what a neighbour heard.
 
+use std::ops::ControlFlow;
+
 use gestalt_protocol::{
     ClassId, Fate, Gesture, Instruction, InstructorId, MAX_LABEL, Naming, Namings, Outcome, RobotId, RoundId,
 };
@@ -50,22 +52,24 @@ impl Mind {
     pub(super) fn on_namings(&mut self, from: RobotId, namings: &Namings) {
         let Some(learning) = &mut self.learning else { return };
         let (mut news, mut unproven) = (false, Vec::new());
-        for naming in &namings.namings {
-            match learning.hear_naming(naming) {
+        learning.hear_namings(&namings.namings, |naming, receipt| {
+            match receipt {
                 NamingReceipt::New => news = true,
-                NamingReceipt::Unproven if unproven.len() == MAX_UNPROVEN => break,
+                NamingReceipt::Unproven if unproven.len() == MAX_UNPROVEN => return ControlFlow::Break(()),
                 NamingReceipt::Unproven => unproven.push(naming),
                 NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
             }
-        }
+            ControlFlow::Continue(())
+        });
         // A gesture can be the same as one that was named behind it.
-        for naming in unproven {
-            match learning.hear_naming(naming) {
+        learning.hear_namings(unproven, |_, receipt| {
+            match receipt {
                 NamingReceipt::New => news = true,
                 NamingReceipt::Unproven => self.rounds.note_refusal(Refusal::NamingUnproven),
                 NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
             }
-        }
+            ControlFlow::Continue(())
+        });
         if news {
             // Lessons may name what was not known.
             self.exchanges.forget_declined_lessons();

@@ -62,6 +62,23 @@ fn two_who_choose_one_label_name_two_gestures() {
     assert_eq!(book.titles(&[])[&bobs], "circle (bob)");
 }
 
+/// What a gesture is by now, as the words on it read.
+fn step_by_step(book: &NameBook, gesture: ClassId) -> Option<ClassId> {
+    let mut passed = vec![gesture];
+    loop {
+        let at = *passed.last()?;
+        match book.get(at).map(|naming| naming.fate) {
+            None => return (!at.is_named()).then_some(at),
+            Some(Fate::InUse) => return Some(at),
+            Some(Fate::Retired) => return None,
+            Some(Fate::Same(other)) => match passed.iter().position(|known| *known == other) {
+                Some(begin) => return passed[begin..].iter().min().copied(),
+                None => passed.push(other),
+            },
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn in_any_order_and_however_often_robots_come_to_the_same(
@@ -86,8 +103,11 @@ proptest! {
             said[middle..].iter().chain(&said[..middle]).rev().chain(&said).cloned().collect();
         let turned = book(&turned);
         prop_assert_eq!(forwards.digest(7), turned.digest(7));
+        let all = forwards.all_stand_for();
         for naming in forwards.iter() {
             let stands = forwards.stands_for(naming.gesture());
+            prop_assert_eq!(stands, step_by_step(&forwards, naming.gesture()));
+            prop_assert_eq!(all.get(&naming.gesture()), Some(&stands));
             prop_assert!(stands.is_none_or(|stands| forwards.stands_for(stands) == Some(stands)));
         }
         prop_assert_eq!(forwards, turned);

@@ -1,6 +1,6 @@
 //! Gestures that are named while the swarm works.
 
-use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, Naming};
+use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, MAX_NAMED, Naming, Namings};
 
 use super::*;
 use crate::names::NameBook;
@@ -245,4 +245,46 @@ fn names_that_cannot_be_taken_in_do_not_keep_robots_talking() {
     swarm.pass(Duration::from_secs(120));
     assert_ne!(swarm.names(0), swarm.names(1));
     swarm.check_rest();
+}
+
+#[test]
+fn as_many_words_as_one_message_brings_train_each_sample_once() {
+    let mut swarm = Swarm::new(2, config(4, 1.0), 67);
+    swarm.say("ana", new("circle"));
+    let round = swarm.show(2);
+    swarm.say("ana", Instruction::Was { round, class: called("circle") });
+    let by: InstructorId = "ana".parse().unwrap();
+    let word = |label: &str, count: u64, fate| {
+        let (by, said_by, label) = (by.clone(), by.clone(), label.to_owned());
+        Naming { by, label, count, at: count, said_by, fate, said: None }
+    };
+    let mut trained = |namings: Vec<Naming>, sequence| {
+        let (stamp, message) = (Stamp { boot: 1 << 20, sequence }, Message::Namings(Namings { namings }));
+        let envelope = Envelope { author: RobotId(9), stamp, message, signature: None };
+        let outputs = swarm.minds[0].handle(swarm.now, Input::Received(envelope));
+        let changes = outputs.into_iter().filter_map(|output| match output {
+            Output::Train(changes) => Some(changes),
+            _ => None,
+        });
+        let mut classes: BTreeMap<Option<ClassId>, usize> = BTreeMap::new();
+        for change in changes.flatten() {
+            *classes.entry(inserted(change).map(|(_, class)| class)).or_default() += 1;
+        }
+        classes
+    };
+    let first = 1 << 20;
+    // Retired and restored, by turns; the last word stands.
+    let turns = (0..MAX_NAMED as u64).map(|n| {
+        let fate = if n % 2 == 0 { Fate::InUse } else { Fate::Retired };
+        word("circle", first + n, fate)
+    });
+    assert_eq!(trained(turns.collect(), 1), [(None, 8)].into(), "four looks of each of two");
+    // The same as another, which is the same as another, and so on.
+    let chain = (1..MAX_NAMED).map(|n| {
+        let label = if n == 1 { "circle".to_owned() } else { n.to_string() };
+        let of = anas(&(n + 1).to_string());
+        word(&label, 2 * first, if n == MAX_NAMED - 1 { Fate::InUse } else { Fate::Same(of) })
+    });
+    let last = anas(&(MAX_NAMED - 1).to_string());
+    assert_eq!(trained(chain.collect(), 2), [(Some(last), 8)].into());
 }
