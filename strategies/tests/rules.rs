@@ -4,16 +4,18 @@ mod operations;
 mod plain;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{
-    Classify, ClassifyError, Forgetting, ForgettingRule, SampleReceipt, Selection, SelectionRule, SetChange,
-    TrainingSet, Vocabulary,
+    Classify, ClassifyError, Forgetting, ForgettingRule, HeldSample, HeldSamples, SampleReceipt, Selection,
+    SelectionRule, SetChange, TrainingSet, Vocabulary,
 };
 use operations::{ME, Operation, Store, as_is, generator, id, operations, round, rules, run, set};
 use plain::{PlainForgetting, PlainSelection};
 use proptest::prelude::*;
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
 proptest! {
@@ -159,6 +161,80 @@ fn fast_and_plain_pick_the_same_among_many() {
         let found = changes(set(1380, rules.0, rules.1));
         assert!(found == changes(TrainingSet::new(ME, 1380, plain.0, plain.1)), "{rules:?}");
         assert_eq!(found.iter().filter(|change| matches!(change, SetChange::Shared(..))).count(), 42);
+    }
+}
+
+/// A rule that notes how long what it keeps is when it is written down.
+#[derive(Debug)]
+struct Weighed<T>(T, Arc<AtomicUsize>);
+
+impl<T: std::fmt::Debug> Weighed<T> {
+    fn weigh(&self) {
+        self.1.store(format!("{:?}", self.0).len(), Ordering::Relaxed);
+    }
+}
+
+impl Forgetting for Weighed<Box<dyn Forgetting>> {
+    fn inserted(&mut self, sample: &HeldSample) {
+        self.0.inserted(sample);
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        self.0.removed(sample);
+        self.weigh();
+    }
+
+    fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
+        self.0.victim(samples, rng)
+    }
+}
+
+impl Selection for Weighed<Box<dyn Selection>> {
+    fn inserted(&mut self, sample: &HeldSample) {
+        self.0.inserted(sample);
+    }
+
+    fn removed(&mut self, sample: &HeldSample) {
+        self.0.removed(sample);
+        self.weigh();
+    }
+
+    fn select(
+        &mut self,
+        samples: &HeldSamples,
+        classifier: Option<&dyn Classify>,
+        rng: &mut dyn Rng,
+    ) -> Option<u64> {
+        self.0.select(samples, classifier, rng)
+    }
+}
+
+#[test]
+fn of_classes_of_which_no_sample_is_left_nothing_is_kept() {
+    let runs = SelectionRule::ALL.map(|rule| (rule, ForgettingRule::Fifo)).into_iter();
+    for (selection, forgetting) in runs.chain(ForgettingRule::ALL.map(|rule| (SelectionRule::Random, rule))) {
+        let [selects, forgets] = [(); 2].map(|()| Arc::<AtomicUsize>::default());
+        let rules: (Box<dyn Selection>, Box<dyn Forgetting>) = (
+            Box::new(Weighed(selection.build(), selects.clone())),
+            Box::new(Weighed(forgetting.build(), forgets.clone())),
+        );
+        let mut set = TrainingSet::new(ME, 12, rules.0, rules.1);
+        let mut rng = generator(5);
+        let weight = || selects.load(Ordering::Relaxed) + forgets.load(Ordering::Relaxed);
+        let mut early = 0;
+        for number in 1..=2000 {
+            // Somebody makes up a class for every three samples; one is shown here.
+            let class = ClassId((1 << 30) + number / 3);
+            set.receive(id(1, number), class, round(number), vec![1.0], &mut rng);
+            set.keep(class, round(number), vec![2.0], &mut rng);
+            if number.is_multiple_of(10) {
+                set.share(1, None, &as_is, &mut rng);
+            }
+            if number == 200 {
+                early = weight();
+            }
+        }
+        assert!(weight() < early + early / 2 + 200, "{selection} {forgetting}: {early} became {}", weight());
     }
 }
 

@@ -1,6 +1,7 @@
 //! An even sample of each class, with the classes as even as the stream allows.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::{Rng, RngExt};
@@ -15,7 +16,7 @@ use crate::sample::{HeldSample, HeldSamples, draw};
 ///   held, n have come.
 ///
 /// Small classes are kept whole, and full ones are even samples of what came of them. How many came of each class is
-/// counted from what the set is told: after a restart, from what is held. Cost: a step per class.
+/// counted from what the set is told: after a restart, from what is held; of a class of which no sample is left, anew. Cost: a step per class.
 #[derive(Clone, Debug, Default)]
 pub struct ClassBalancedReservoir {
     classes: BTreeMap<ClassId, Stream>,
@@ -26,19 +27,33 @@ pub struct ClassBalancedReservoir {
 #[derive(Clone, Copy, Debug, Default)]
 struct Stream {
     came: u64,
+    held: usize,
     full: bool,
 }
 
 impl Forgetting for ClassBalancedReservoir {
     fn inserted(&mut self, sample: &HeldSample) {
-        self.classes.entry(sample.class).or_default().came += 1;
+        let Stream { came, held, .. } = self.classes.entry(sample.class).or_default();
+        *came += 1;
+        *held += 1;
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if self.named.take_if(|named| *named == sample.key).is_none() {
-            let stream = self.classes.entry(sample.class).or_default();
-            stream.came = stream.came.saturating_sub(1);
+        let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
+        if let Entry::Occupied(mut stream) = self.classes.entry(sample.class) {
+            let Stream { came, held, .. } = stream.get_mut();
+            *came = came.saturating_sub(u64::from(is_retracted));
+            *held = held.saturating_sub(1);
+            if *held == 0 {
+                stream.remove();
+            }
         }
+    }
+
+    fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {
+        // The other way round a class of one sample would be forgotten.
+        self.inserted(after);
+        self.removed(before);
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
@@ -50,7 +65,7 @@ impl Forgetting for ClassBalancedReservoir {
             self.classes.entry(*class).or_default().full = true;
         }
 
-        let Stream { came, full } = self.classes.get(&newest.class).copied().unwrap_or_default();
+        let Stream { came, full, .. } = self.classes.get(&newest.class).copied().unwrap_or_default();
         let kin = held(newest.class);
         self.named = if !full || kin == 0 {
             let class = draw(&largest, rng)?;

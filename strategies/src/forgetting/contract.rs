@@ -10,7 +10,8 @@ use crate::sample::{HeldSample, HeldSamples};
 ///
 /// A rule is told of every change of the set, so that it can keep distances up to date instead of computing them
 /// anew each time; a rule that needs none of that only writes `victim`. What it picks may depend on what it was
-/// told of and on the generator handed in, and on nothing else.
+/// told of and on the generator handed in, and on nothing else. What it keeps of a class it drops with the last sample of
+/// that: who takes part in a swarm can make up classes without end.
 ///
 /// ```
 /// use gestalt_protocol::{ClassId, RobotId, RoundId};

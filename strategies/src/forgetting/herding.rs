@@ -1,6 +1,7 @@
 //! What can go without moving the mean away from that of all that came.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
@@ -10,7 +11,7 @@ use crate::geometry::{Cluster, ExactSum, narrow};
 use crate::sample::{HeldSample, HeldSamples};
 
 /// Of the class K with the most samples (ties at random)
-/// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that ever came, S the sum of the m held.
+/// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that came since there is one of K, S the sum of the m held.
 /// That is the x nearest to S − (m − 1) μ. Ties go to the oldest.
 ///
 /// Herding (Welling 2009; iCaRL, Rebuffi et al. 2017) turned round: exemplars are dropped instead of chosen, one at
@@ -37,11 +38,23 @@ impl Forgetting for HerdingForgetting {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let class = self.classes.entry(sample.class).or_default();
-        class.held.remove(sample);
-        if self.named.take_if(|named| *named == sample.key).is_none() {
-            class.came.subtract(&sample.vector);
+        let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
+        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
+            let Class { came, held } = class.get_mut();
+            held.remove(sample);
+            if is_retracted {
+                came.subtract(&sample.vector);
+            }
+            if held.is_empty() {
+                class.remove();
+            }
         }
+    }
+
+    fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {
+        // The other way round a class of one sample would be forgotten.
+        self.inserted(after);
+        self.removed(before);
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {

@@ -1,6 +1,7 @@
 //! What another sample says as well.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
@@ -33,8 +34,11 @@ impl Forgetting for Redundancy {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if let Some(class) = self.classes.get_mut(&sample.class) {
-            class.remove(sample.key);
+        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
+            class.get_mut().remove(sample.key);
+            if class.get().is_empty() {
+                class.remove();
+            }
         }
     }
 

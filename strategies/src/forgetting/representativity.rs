@@ -1,6 +1,7 @@
 //! What stands least for its class.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
@@ -24,7 +25,12 @@ impl Forgetting for RepresentativityForgetting {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        self.classes.entry(sample.class).or_default().remove(sample);
+        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
+            class.get_mut().remove(sample);
+            if class.get().is_empty() {
+                class.remove();
+            }
+        }
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {

@@ -24,6 +24,12 @@ impl Cluster {
         &self.sum
     }
 
+    /// Whether no sample is in.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points.keys().is_empty()
+    }
+
     /// Takes a sample in.
     pub fn insert(&mut self, sample: &HeldSample) {
         self.points.push(sample.key, &sample.vector);

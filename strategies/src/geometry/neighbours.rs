@@ -149,6 +149,12 @@ impl Neighbours {
         &self.seekers
     }
 
+    /// Whether there is neither a seeker nor a neighbour.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.seekers.keys().is_empty() && !self.has_neighbours()
+    }
+
     /// Whether there is a neighbour at all.
     #[must_use]
     pub fn has_neighbours(&self) -> bool {

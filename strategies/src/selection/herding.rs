@@ -1,6 +1,7 @@
 //! What keeps the mean of what was shared at the mean of what was seen.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -30,20 +31,24 @@ struct Own {
 
 impl Selection for HerdingSelection {
     fn inserted(&mut self, sample: &HeldSample) {
-        let own = self.classes.entry(sample.class).or_default();
+        let class = self.classes.entry(sample.class);
         match sample.part {
-            SetPart::Personal => own.personal.insert(sample),
-            SetPart::Shared => own.shared.add(&sample.vector),
+            SetPart::Personal => class.or_default().personal.insert(sample),
+            SetPart::Shared => class.or_default().shared.add(&sample.vector),
             SetPart::External => {}
         }
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let own = self.classes.entry(sample.class).or_default();
+        let Entry::Occupied(mut own) = self.classes.entry(sample.class) else { return };
+        let Own { personal, shared } = own.get_mut();
         match sample.part {
-            SetPart::Personal => own.personal.remove(sample),
-            SetPart::Shared => own.shared.subtract(&sample.vector),
+            SetPart::Personal => personal.remove(sample),
+            SetPart::Shared => shared.subtract(&sample.vector),
             SetPart::External => {}
+        }
+        if personal.is_empty() && shared.count() == 0.0 {
+            own.remove();
         }
     }
 

@@ -1,6 +1,7 @@
 //! What the swarm knows least.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -45,13 +46,17 @@ impl Selection for Novelty {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let class = self.classes.entry(sample.class).or_default();
+        let Entry::Occupied(mut class) = self.classes.entry(sample.class) else { return };
+        let Class { distances, personal } = class.get_mut();
         match sample.part {
             SetPart::Personal => {
-                class.distances.remove_seeker(sample.key);
-                class.personal.subtract(&sample.vector);
+                distances.remove_seeker(sample.key);
+                personal.subtract(&sample.vector);
             }
-            SetPart::Shared | SetPart::External => class.distances.remove_neighbour(sample.key),
+            SetPart::Shared | SetPart::External => distances.remove_neighbour(sample.key),
+        }
+        if distances.is_empty() {
+            class.remove();
         }
     }
 

@@ -1,6 +1,7 @@
 //! What stands best for all that was seen.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -29,8 +30,13 @@ impl Selection for RepresentativitySelection {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if sample.part == SetPart::Personal {
-            self.classes.entry(sample.class).or_default().remove(sample);
+        if sample.part == SetPart::Personal
+            && let Entry::Occupied(mut class) = self.classes.entry(sample.class)
+        {
+            class.get_mut().remove(sample);
+            if class.get().is_empty() {
+                class.remove();
+            }
         }
     }
 

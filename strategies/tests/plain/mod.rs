@@ -19,12 +19,14 @@ pub struct PlainForgetting {
     /// what came as something else at first.
     came: Vec<(f64, HeldSample)>,
     full: BTreeSet<ClassId>,
+    /// How many are held of each class: of one of which none is, all is forgotten.
+    held: BTreeMap<ClassId, usize>,
     victim: Option<u64>,
 }
 
 impl PlainForgetting {
     pub fn new(rule: ForgettingRule) -> Self {
-        Self { rule, came: Vec::new(), full: BTreeSet::new(), victim: None }
+        Self { rule, came: Vec::new(), full: BTreeSet::new(), held: BTreeMap::new(), victim: None }
     }
 }
 
@@ -85,12 +87,24 @@ impl Selection for PlainSelection {
 impl Forgetting for PlainForgetting {
     fn inserted(&mut self, sample: &HeldSample) {
         self.came.push((1.0, sample.clone()));
+        *self.held.entry(sample.class).or_default() += 1;
     }
 
     fn removed(&mut self, sample: &HeldSample) {
         if self.victim != Some(sample.key) {
             self.came.push((-1.0, sample.clone()));
         }
+        let held = self.held.entry(sample.class).or_default();
+        *held -= 1;
+        if *held == 0 {
+            self.came.retain(|(_, came)| came.class != sample.class);
+            self.full.remove(&sample.class);
+        }
+    }
+
+    fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {
+        self.inserted(after);
+        self.removed(before);
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
