@@ -76,6 +76,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         people += kept.iter().filter_map(|image| image.person).collect::<BTreeSet<u32>>().len();
         let (of_set, seen) = measure(&kept, &model.classifier, &mut perception)?;
         let alarms = FalseAlarms::count(&dataset.none, &mut perception);
+        report::unreadable(&alarms);
         scores.push(Score::new(folder, &of_set, &seen, alarms));
         evaluation.append(&of_set);
         survey.append(seen);

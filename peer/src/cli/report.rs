@@ -8,7 +8,7 @@ use serde_json::json;
 
 use gestalt_draw::confusion;
 use gestalt_vision::dataset::Ignored;
-use gestalt_vision::survey::{Rejected, Survey};
+use gestalt_vision::survey::{FalseAlarms, Rejected, Survey};
 
 /// The accuracy over all images that can be read: one whose hand is not found is not judged right.
 pub fn of_all(evaluation: &Evaluation, survey: &Survey) -> Option<Proportion> {
@@ -60,15 +60,27 @@ pub fn json(evaluation: &Evaluation, survey: &Survey, vocabulary: &Vocabulary) -
 /// Says on stderr which files could not be used.
 pub fn rejected(survey: &Survey) {
     let tell = |what: &str, rejected: &[Rejected]| {
-        for Rejected { image, cause } in rejected.iter().take(3) {
-            eprintln!("warning: {}: {cause}", image.path.display());
-        }
-        if rejected.len() > 3 {
-            eprintln!("warning: {} images in total {what}", rejected.len());
-        }
+        let causes = rejected.iter().map(|Rejected { image, cause }| (image.path.as_path(), cause.as_str()));
+        warn(what, &causes.collect::<Vec<_>>());
     };
     tell("could not be read", &survey.unreadable);
     tell("with no hand found", &survey.without_hand);
+}
+
+/// Says on stderr which images without a gesture could not be read.
+pub fn unreadable(alarms: &FalseAlarms) {
+    let causes = alarms.unreadable.iter().map(|(path, cause)| (path.as_path(), cause.as_str()));
+    warn("without a gesture could not be read", &causes.collect::<Vec<_>>());
+}
+
+/// Names the first files with the cause, and counts them.
+fn warn(what: &str, files: &[(&Path, &str)]) {
+    for (path, cause) in files.iter().take(3) {
+        eprintln!("warning: {}: {cause}", path.display());
+    }
+    if files.len() > 3 {
+        eprintln!("warning: {} images in total {what}", files.len());
+    }
 }
 
 /// Says on stderr which folders of a dataset were left out.

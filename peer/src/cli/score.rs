@@ -55,6 +55,7 @@ impl Score {
             "share_without_hand": self.missed(),
             "calibration_error": self.calibration_error,
             "images_without_gesture": self.alarms.images,
+            "unreadable_without_gesture": self.alarms.unreadable.len(),
             "false_alarms": self.false_alarms().map(report::proportion_json),
         })
     }
@@ -159,7 +160,12 @@ mod tests {
             survey.without_hand.push(Rejected { image: image.clone(), cause: String::new() });
         }
         let (alarms, images) = alarms;
-        Score::new(Path::new(name), &evaluation, &survey, FalseAlarms { alarms, images })
+        Score::new(
+            Path::new(name),
+            &evaluation,
+            &survey,
+            FalseAlarms { alarms, images, unreadable: Vec::new() },
+        )
     }
 
     #[test]

@@ -117,22 +117,30 @@ pub fn lessons(surveys: &[&Survey]) -> Vec<LabelledFeatures> {
 }
 
 /// How often a hand was reported where there is none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FalseAlarms {
     /// Images in which perception found a hand.
     pub alarms: u64,
     /// Images that could be read.
     pub images: u64,
+    /// Files that are no image, each with the cause.
+    pub unreadable: Vec<(PathBuf, String)>,
 }
 
 impl FalseAlarms {
     /// Looks at images without a gesture.
     pub fn count(images: &[PathBuf], perception: &mut Perception) -> Self {
-        let frames = images.iter().filter_map(|path| read_image(path).ok());
-        frames.fold(Self::default(), |Self { alarms, images }, frame| Self {
-            alarms: alarms + u64::from(perception.observe(&frame).is_ok()),
-            images: images + 1,
-        })
+        let mut found = Self::default();
+        for path in images {
+            match read_image(path) {
+                Ok(frame) => {
+                    found.alarms += u64::from(perception.observe(&frame).is_ok());
+                    found.images += 1;
+                }
+                Err(error) => found.unreadable.push((path.clone(), error.to_string())),
+            }
+        }
+        found
     }
 }
 
@@ -191,8 +199,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let shown = pictures(folder.path(), &[None, Some(4), None]);
         let mut paths: Vec<PathBuf> = shown.into_iter().map(|image| image.path).collect();
+        let damaged = folder.path().join("damaged.png");
+        std::fs::write(&damaged, "no image").unwrap();
+        paths.insert(1, damaged.clone());
         paths.push(folder.path().join("missing.png"));
         let mut perception = Perception::new(FeatureSet::Shape, HandConfig::default()).unwrap();
-        assert_eq!(FalseAlarms::count(&paths, &mut perception), FalseAlarms { alarms: 1, images: 3 });
+        let FalseAlarms { alarms, images, unreadable } = FalseAlarms::count(&paths, &mut perception);
+        assert_eq!((alarms, images), (1, 3));
+        let unreadable: Vec<PathBuf> = unreadable.into_iter().map(|(path, _)| path).collect();
+        assert_eq!(unreadable, [damaged, folder.path().join("missing.png")]);
     }
 }

@@ -231,7 +231,8 @@ fn learned_eyes_seldom_see_a_hand_where_none_is() {
     let unknown = |path: &PathBuf| !path.file_name().unwrap().to_string_lossy().starts_with("misc_");
     let pictures: Vec<PathBuf> = dataset.none.into_iter().filter(unknown).collect();
     let mut perception = Perception::new(model.features, HandConfig::default()).unwrap();
-    let FalseAlarms { alarms, images } = FalseAlarms::count(&pictures, &mut perception);
+    let FalseAlarms { alarms, images, unreadable } = FalseAlarms::count(&pictures, &mut perception);
+    assert!(unreadable.is_empty(), "{unreadable:?}");
     eprintln!("a hand in {alarms} of {images} pictures without one");
     assert!(images > 30 && alarms as f64 <= 0.1 * images as f64, "{alarms} of {images}");
 }

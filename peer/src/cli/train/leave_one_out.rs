@@ -27,6 +27,7 @@ pub(super) fn compare(
     let mut scores = Vec::new();
     for (left, (folder, set)) in args.dataset.iter().zip(sets).enumerate() {
         let alarms = FalseAlarms::count(&set.none, perception);
+        report::unreadable(&alarms);
         if set.images.is_empty() {
             // Nothing to judge; whether a hand is found does not depend on the model.
             scores.push(Score::new(folder, &Evaluation::new(1), &surveys[left], alarms));
