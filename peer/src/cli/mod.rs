@@ -316,9 +316,13 @@ fn say(report: &str) -> Result<(), Failure> {
     }
 }
 
+/// The longest duration of a command line: it is added to the clock, which has an end.
+const LONGEST: Duration = Duration::from_secs(366 * 24 * 60 * 60);
+
 /// Reads `500ms`, `2s`, `1m 30s`.
 fn duration(text: &str) -> Result<Duration, String> {
     match text.parse::<humantime_serde::re::humantime::Duration>() {
+        Ok(duration) if *duration > LONGEST => Err("must be at most a year".to_owned()),
         Ok(duration) if !duration.is_zero() => Ok(duration.into()),
         Ok(_) => Err("must be greater than 0".to_owned()),
         Err(error) => Err(format!("{error}; write a number with a unit, like 500ms or 2s")),
@@ -330,6 +334,18 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
+
+    #[test]
+    fn a_duration_has_an_end() {
+        assert_eq!(duration("1m 30s"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("366days"), Ok(LONGEST));
+        for (text, cause) in
+            [("367days", "a year"), ("500000000000years", "a year"), ("0s", "greater than 0")]
+        {
+            let error = duration(text).unwrap_err();
+            assert!(error.contains(cause), "{error}");
+        }
+    }
 
     /// The words of a line as a shell takes them apart; enough for examples.
     fn words(line: &str) -> Vec<String> {

@@ -311,6 +311,29 @@ mod tests {
     }
 
     #[test]
+    fn no_period_is_so_long_that_adding_it_up_overflows() {
+        type Field = fn(&mut RoundsConfig) -> &mut Duration;
+        let fields: [(&str, Field); 11] = [
+            ("lately", |config| &mut config.lately),
+            ("decorrelation", |config| &mut config.decorrelation),
+            ("patience", |config| &mut config.patience),
+            ("deadline", |config| &mut config.deadline),
+            ("refractory", |config| &mut config.refractory),
+            ("vote_interval", |config| &mut config.vote_interval),
+            ("vote_repeat", |config| &mut config.vote_repeat),
+            ("settle", |config| &mut config.settle),
+            ("takeover", |config| &mut config.takeover),
+            ("repair_busy", |config| &mut config.repair_busy),
+            ("repair_idle", |config| &mut config.repair_idle),
+        ];
+        for (name, field) in fields {
+            let mut config = RoundsConfig::default();
+            *field(&mut config) = Duration::MAX;
+            assert_eq!(config.validate(), Err(RoundsConfigError::TooLong(name)));
+        }
+    }
+
+    #[test]
     fn what_no_robot_can_work_with_is_named() {
         let default = RoundsConfig::default;
         let ms = Duration::from_millis;

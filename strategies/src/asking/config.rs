@@ -125,7 +125,9 @@ mod tests {
         for (config, field) in [
             (QuestionsConfig { rounds: 0, ..default() }, "rounds"),
             (QuestionsConfig { apart: Duration::MAX, ..default() }, "apart"),
+            (QuestionsConfig { after: Duration::MAX, ..default() }, "after"),
             (QuestionsConfig { gone: Duration::MAX, ..default() }, "gone"),
+            (QuestionsConfig { repeated: Duration::MAX, ..default() }, "repeated"),
             (QuestionsConfig { worth: f64::NAN, ..default() }, "worth"),
             (QuestionsConfig { disagreement: -1.0, ..default() }, "disagreement"),
             (QuestionsConfig { familiar: 0.0, ..default() }, "familiar"),

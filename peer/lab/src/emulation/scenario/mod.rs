@@ -184,6 +184,27 @@ mod tests {
     }
 
     #[test]
+    fn durations_that_cannot_be_added_up_are_refused_by_name() {
+        // A year is more than a day; the times of what happens reach to the end of the longest run.
+        let ages = "500000000000years";
+        for (key, more) in [
+            ("interval", format!("interval: '{ages}'")),
+            ("link.latency", format!("link: {{ latency: '{ages}' }}")),
+            ("link.jitter", format!("link: {{ jitter: '{ages}' }}")),
+            ("link.detection", format!("link: {{ detection: '{ages}' }}")),
+            ("churn.period", format!("churn: {{ from: '0s', until: '9s', period: '{ages}' }}")),
+            ("churn.from", format!("churn: {{ from: '{ages}', until: '9s', period: '1s' }}")),
+            ("churn.until", format!("churn: {{ from: '0s', until: '{ages}', period: '1s' }}")),
+            ("faults.at", format!("faults: [{{ at: '{ages}', event: {{ kill: 1 }} }}]")),
+            ("learning.after", format!("learning: {{ after: '{ages}' }}")),
+        ] {
+            let text = SMALL.replace("\"line\"", &format!("\"line\", {more}"));
+            let error = Scenario::parse(&text, "test").unwrap_err().to_string();
+            assert!(error.contains(key) && error.contains("choose"), "{key}: {error}");
+        }
+    }
+
+    #[test]
     fn every_shipped_scenario_can_be_run() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/emulation");
         let mut found = 0;

@@ -1,13 +1,22 @@
 //! Whether a scenario can be run.
 
+use std::time::Duration;
+
 use gestalt_protocol::{MAX_CLASSES, RobotId};
 
 use super::Scenario;
 use super::error::ScenarioError;
 use super::fault::Event;
+use super::link_model::LinkModel;
 
 /// The most robots: more do not fit into the memory of any machine that this runs on.
 const MOST: usize = 1_000_000;
+
+/// The most rounds.
+const MOST_ROUNDS: u32 = 100_000;
+
+/// The longest that anything may take: as many rounds of it can be added up.
+const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 
 impl Scenario {
     /// Whether the scenario can be run.
@@ -23,8 +32,15 @@ impl Scenario {
         if !(2..=MAX_CLASSES).contains(&self.classes) {
             return wrong("classes", format!("is {}: choose 2 to {MAX_CLASSES}", self.classes));
         }
-        if !(1..=100_000).contains(&self.rounds) {
-            return wrong("rounds", format!("is {}: choose 1 to 100000", self.rounds));
+        if !(1..=MOST_ROUNDS).contains(&self.rounds) {
+            return wrong("rounds", format!("is {}: choose 1 to {MOST_ROUNDS}", self.rounds));
+        }
+        if let Some((key, _)) = self.durations().into_iter().find(|(_, duration)| *duration > DAY) {
+            return wrong(key, "is longer than a day: choose a shorter duration".to_owned());
+        }
+        let end = DAY * MOST_ROUNDS;
+        if let Some((key, _)) = self.times().into_iter().find(|(_, time)| *time > end) {
+            return wrong(key, format!("is later than any run ends: choose at most {MOST_ROUNDS} days"));
         }
         if self.seeds == 0 {
             return wrong("seeds", "is 0: choose at least 1".to_owned());
@@ -93,5 +109,27 @@ impl Scenario {
             }
         }
         Ok(())
+    }
+
+    /// How long things take, by key.
+    fn durations(&self) -> Vec<(&'static str, Duration)> {
+        let LinkModel { latency, jitter, detection, .. } = self.link;
+        let mut durations = vec![
+            ("interval", self.interval),
+            ("link.latency", latency),
+            ("link.jitter", jitter),
+            ("link.detection", detection),
+        ];
+        durations.extend(self.churn.map(|churn| ("churn.period", churn.period)));
+        durations.extend(self.learning.as_ref().map(|teaching| ("learning.after", teaching.after)));
+        durations
+    }
+
+    /// When things happen, by key.
+    fn times(&self) -> Vec<(&'static str, Duration)> {
+        let faults = self.faults.iter().map(|fault| ("faults.at", fault.at));
+        let churn =
+            self.churn.iter().flat_map(|churn| [("churn.from", churn.from), ("churn.until", churn.until)]);
+        faults.chain(churn).collect()
     }
 }
