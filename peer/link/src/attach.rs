@@ -14,6 +14,7 @@ use zenoh::Session;
 use zenoh::config::WhatAmI;
 use zenoh::session::ZenohId;
 
+use crate::closing::Closing;
 use crate::config::LinkConfig;
 use crate::error::LinkError;
 use crate::identity::{robot_of, serves, swarm_checksum};
@@ -52,10 +53,10 @@ const MAX_PLACES: usize = 1024;
 
 /// A session in client mode that is linked to robots of a swarm: of a sealed one to those on the roster, each with the key that it has there. Dropping it ends it.
 pub(crate) struct Attached {
-    /// `None` once it is closed.
-    node: Option<Node>,
+    node: Node,
+    closing: Closing,
     /// Looks for a robot whenever there is no link to one, if none was named.
-    looking: Option<JoinHandle<()>>,
+    looking: Looking,
 }
 
 /// Where somebody says that a session is.
@@ -85,7 +86,7 @@ impl Attached {
             opened => opened?,
         };
         // Whatever becomes of this attempt, the session ends with it.
-        let mut attached = Self { node: Some(node.clone()), looking: None };
+        let mut attached = Self { node: node.clone(), closing: node.closing(), looking: Looking::default() };
         let search = Search { node, keys: keys.clone(), credentials: link.credentials.clone(), scouting };
         if is_named {
             // Zenoh dials them, for as long as the session is open.
@@ -93,7 +94,7 @@ impl Attached {
                 return Ok(attached);
             }
         } else if let Some(found) = search.look().await? {
-            attached.looking = Some(tokio::spawn(search.stay(found)));
+            attached.looking = Looking(Some(tokio::spawn(search.stay(found))));
             return Ok(attached);
         }
         Err(match search.node.refused() {
@@ -106,20 +107,25 @@ impl Attached {
     }
 
     pub fn session(&self) -> &Session {
-        self.node.as_ref().expect("it is closed once").session()
+        self.node.session()
     }
 
-    pub async fn close(mut self) {
-        if let Some(node) = self.end() {
-            node.close().await;
-        }
+    pub async fn close(self) {
+        drop(self.looking);
+        self.closing.forget();
+        self.node.close().await;
     }
+}
 
-    fn end(&mut self) -> Option<Node> {
-        if let Some(looking) = self.looking.take() {
+/// Ends with what it looks for.
+#[derive(Default)]
+struct Looking(Option<JoinHandle<()>>);
+
+impl Drop for Looking {
+    fn drop(&mut self) {
+        if let Some(looking) = &self.0 {
             looking.abort();
         }
-        self.node.take()
     }
 }
 
@@ -237,22 +243,8 @@ impl Search {
     }
 }
 
-impl Drop for Attached {
-    fn drop(&mut self) {
-        let Some(node) = self.end() else { return };
-        match tokio::runtime::Handle::try_current() {
-            Ok(runtime) => drop(runtime.spawn(async move { node.close().await })),
-            // Who drops it elsewhere waits.
-            Err(_) => {
-                let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-                drop(runtime.map(|runtime| runtime.block_on(node.close())));
-            }
-        }
-    }
-}
-
 impl fmt::Debug for Attached {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Attached").field(&self.node.as_ref().map(Node::id)).finish()
+        f.debug_tuple("Attached").field(&self.node.id()).finish()
     }
 }

@@ -18,6 +18,7 @@ mod cells;
 mod census;
 mod checks;
 mod client;
+mod closing;
 mod config;
 mod deafness;
 mod effector;

@@ -24,6 +24,7 @@ use zenoh_transport::{
 };
 
 use crate::account::Account;
+use crate::closing::Closing;
 use crate::error::{LinkError, reason};
 use crate::identity::robot_of;
 use crate::reach::{endpoints, names_any};
@@ -65,8 +66,11 @@ impl Node {
         let links = Arc::new(Links::new(guard, room, Box::new(on_link)));
         DynamicRuntime::from(runtime.clone()).new_handler(Arc::new(Handler(links.clone())));
         let session = zenoh::session::init(runtime.clone().into()).await.map_err(|e| LinkError::open(&*e))?;
+        // Whoever waits for it no longer leaves nothing open.
+        let node = Self { session, runtime: runtime.clone(), links, relay: Arc::default() };
+        let closing = node.closing();
         let started = runtime.start().await;
-        let node = Self { session, runtime, links, relay: Arc::default() };
+        closing.forget();
         if let Err(error) = started {
             // A client says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
             let listens = listen.is_empty() || !node.locators().is_empty();
@@ -163,6 +167,12 @@ impl Node {
                 tokio::spawn(end(link));
             }
         }
+    }
+
+    /// Closes it when that is dropped.
+    pub(super) fn closing(&self) -> Closing {
+        let node = self.clone();
+        Closing::new(move || async move { node.close().await })
     }
 
     pub(super) async fn close(&self) {
