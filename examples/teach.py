@@ -45,6 +45,9 @@ def main() -> None:
         questions = session.declare_subscriber(f"{prefix}/question")
         told = iter(given.gestures) if given.gestures is not None else None
         while True:
+            said = next(told, "") if told is not None else None
+            if said == "":
+                return
             # Half a second after a round began, a request to open is taken for an echo of the one before.
             time.sleep(1)
             session.put(feedback, json.dumps({"say": "open"}))
@@ -58,7 +61,7 @@ def main() -> None:
                 question = wait_for(questions, 2.5)
                 if question is not None and question["round"] == decision["round"]:
                     print(f"  the swarm asks: {question['ask']['kind']} {' or '.join(question['labels'])}", flush=True)
-            gesture = next(told, "") if told is not None else input("it was (empty to end): ")
+            gesture = said or input("it was (empty to end): ")
             if not gesture:
                 return
             # Gestures are named by label; a number in JSON would be a class.

@@ -274,10 +274,13 @@ impl Outcome {
             Self::NothingSeen => "noted, but nothing seen in that round is held",
             Self::UnknownRound => "no such round is known, or it is too long ago",
             Self::UnknownGesture => {
-                "there is no such gesture, or several: 'circle (ana)' is the one that ana named"
+                "there is no such gesture to do that with: a gesture of the list stays as it is, and of several of one label say whose is meant, \
+                 as 'LABEL (INSTRUCTOR)'"
             }
             Self::NoRoom => "no room for another gesture: retire one that is shown no more",
-            Self::NotLearning => "the robots are not set up to learn",
+            Self::NotLearning => {
+                "the robots are not set up to learn: learning.enabled in their configuration"
+            }
             Self::NotAllowed => {
                 "not allowed: ask whoever has the swarm's authority key for the role (gestalt trust roster shows who may do what, gestalt trust \
                  enrol --client gives it)"

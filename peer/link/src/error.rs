@@ -76,11 +76,28 @@ pub enum LinkError {
 
 /// What Zenoh says, without the places in its source that it says it at.
 pub(super) fn reason(cause: &(dyn std::error::Error + Send + Sync)) -> String {
-    let said = cause.to_string();
+    let mut said = cause.to_string();
+    // Endpoints come as their kind, written for programmers.
+    while let Some(kind) = said.find("Single(") {
+        said.replace_range(kind..kind + "Single(".len(), "");
+        if let Some(end) = said[kind..].find(')') {
+            said.remove(kind + end);
+        }
+    }
     let words = said.split(' ').collect::<Vec<_>>();
     let place = |i: usize| words.get(i).is_some_and(|word| word.contains(".rs:"));
-    let kept = (0..words.len()).filter(|&i| !(place(i) || words[i] == "at" && place(i + 1)));
-    kept.map(|i| words[i]).collect::<Vec<_>>().join(" ")
+    let is_left_out = |i: usize| place(i) || words[i] == "at" && place(i + 1);
+    let mut kept = String::new();
+    for (i, word) in words.iter().enumerate() {
+        if !is_left_out(i) {
+            kept += if kept.is_empty() { "" } else { " " };
+            kept += word;
+        } else if word.ends_with(']') {
+            // It closes what is kept.
+            kept.push(']');
+        }
+    }
+    kept
 }
 
 impl LinkError {
@@ -107,5 +124,9 @@ mod tests {
     fn zenohs_reason_comes_without_the_places_in_its_source() {
         let zenoh = std::io::Error::other("no route at /home/a/zenoh-1/src/lib.rs:62. at all at b/tcp.rs:3.");
         assert_eq!(reason(&zenoh), "no route at all");
+        let bound = std::io::Error::other("no port: [127.0.0.1:1: in use (os error 98) at /a/tcp.rs:140.]");
+        assert_eq!(reason(&bound), "no port: [127.0.0.1:1: in use (os error 98)]");
+        let dialled = std::io::Error::other("none of [Single(tcp/a:1), Single(tcp/b:1)]. Timeout!");
+        assert_eq!(reason(&dialled), "none of [tcp/a:1, tcp/b:1]. Timeout!");
     }
 }

@@ -60,12 +60,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     model.check_features(set.name(), set.length())?;
     let mut perception = Perception::new(set, HandConfig::default())?;
 
-    let (mut images, mut left_out, mut people) = (0, 0, 0);
+    let (mut images, mut left_out, mut people, mut ignored) = (0, 0, 0, false);
     let (mut evaluation, mut survey) = (Evaluation::new(vocabulary.classes()), Survey::default());
     let mut scores = Vec::new();
     for folder in &args.dataset {
         let dataset = Dataset::list_known(folder, naming(args.counts), vocabulary)?;
         report::ignored(folder, &dataset.ignored);
+        ignored |= !dataset.ignored.is_empty();
         let all = dataset.images.len();
         let kept = if args.include_training { dataset.images } else { unseen(dataset.images, &model.origin) };
         if kept.is_empty() && all > 0 {
@@ -80,6 +81,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scores.push(Score::new(folder, &of_set, &seen, alarms));
         evaluation.append(&of_set);
         survey.append(seen);
+    }
+    if images == 0 && left_out == 0 && ignored {
+        eprintln!(
+            "note: no picture shows a gesture that the model knows, which are {}: false alarms alone are counted; --model names another",
+            vocabulary.labels().join(", ")
+        );
     }
     report::rejected(&survey);
     if let Some(path) = &args.plot {

@@ -9,6 +9,7 @@ use super::config_args::ConfigArgs;
 use super::robot_args::{CameraArgs, IdentityArgs};
 use super::show::{self, Names, line};
 use super::{Failure, interrupted};
+use crate::config::SourceSection;
 use crate::stream::{Feed, Sender, SenderConfig, StreamEvent};
 
 /// Stream a camera to a fusion centre and print the swarm's decisions, until Ctrl-C or the end of the source
@@ -38,12 +39,17 @@ pub struct Args {
 /// Runs the verb.
 ///
 /// # Errors
-/// A robot without a camera, and what no waiting changes. A camera that is missing is waited for.
+/// A robot without a camera, and what no waiting changes. A camera that is missing is waited for, a file is not.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (config, link) =
         args.config.streaming([args.identity.settings(), args.camera.settings()?].concat())?;
     let (swarm, robot) = (config.swarm.0.clone(), config.robot.id);
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    if let SourceSection::Images(files) | SourceSection::Video(files) = &config.camera.source
+        && !files.path.exists()
+    {
+        return Err(format!("{} does not exist: check the path", files.path.display()).into());
+    }
     let feed = Feed::new(&config.camera, robot, clock).ok_or(
         "no camera source to stream: set camera.source (--source) to rendered, images, video or device",
     )?;

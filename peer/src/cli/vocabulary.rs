@@ -103,6 +103,15 @@ fn keep(book: &GestureBook, folder: &Path, people: u32, glove: Glove, seed: u64)
     /// Robots around a hand see it from as far aside as this.
     const BEARING_DEG: f64 = 45.0;
     let frames = TrainingFrames::new(Vec::new(), glove, BEARING_DEG, seed).showing(book.poses());
+    // Drawn again by the same seed, each picture would be there twice.
+    let is_kept = |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut kept| kept.next().is_some());
+    if let Some(kept) = book.gestures.iter().map(|it| folder.join(&it.name)).find(|it| is_kept(it)) {
+        return Err(format!(
+            "{} holds pictures already: choose another folder, or remove it",
+            kept.display()
+        )
+        .into());
+    }
     let wanted = people as usize * book.gestures.len();
     let shown = super::progress::bar("pictures", wanted);
     for frame in frames.take(wanted) {

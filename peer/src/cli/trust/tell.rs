@@ -33,7 +33,10 @@ impl Tell {
         if !self.connect.is_empty() {
             return self.now(authority, roster);
         }
-        eprintln!("if robots run, tell them: gestalt trust tell {}", folder.display());
+        eprintln!(
+            "robots that were enrolled before hold an older roster: once they run, gestalt trust tell {}",
+            folder.display()
+        );
         Ok(())
     }
 

@@ -65,7 +65,7 @@ fn mute(facts: &SwarmFacts) -> Option<Finding> {
 /// Who answers, and who is heard by whom.
 fn parts(facts: &SwarmFacts) -> Vec<Finding> {
     const WHY: &str = "each part decides for itself, and what is taught to one is not known to the other";
-    const FIX: &str = "link them: -e tcp/ADDRESS:PORT of a robot of the other part, on one robot; see that no firewall is between";
+    const FIX: &str = "link them: -e tcp/ADDRESS:PORT of a robot of the other part, on one robot; see that no firewall is between; in a sealed swarm see that all go by its newest roster (gestalt trust tell)";
     let mut found = Vec::new();
     let mut parts: Vec<BTreeSet<RobotId>> =
         facts.parts.iter().filter(|part| !part.is_empty()).map(|part| ids(part)).collect();
