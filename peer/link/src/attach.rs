@@ -97,13 +97,8 @@ impl Attached {
             attached.looking = Looking(Some(tokio::spawn(search.stay(found))));
             return Ok(attached);
         }
-        Err(match search.node.refused() {
-            Some(refused) => {
-                let newest = "if it is a robot that was enrolled since, take the newest roster.json";
-                unreached(keys, &format!("{refused}; {newest}"))
-            }
-            None => unreached(keys, "none answers"),
-        })
+        let refused = search.node.refused().map(|refused| refused.to_string());
+        Err(unreached(keys, refused.as_deref().unwrap_or("none answers")))
     }
 
     pub fn session(&self) -> &Session {

@@ -10,6 +10,7 @@
 //! ```
 
 mod account;
+mod admission;
 mod apprentice;
 mod attach;
 mod believer;

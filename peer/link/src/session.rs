@@ -9,7 +9,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
 use tokio::task::JoinHandle;
 use zenoh::Session;
 use zenoh::config::WhatAmI;
@@ -23,12 +22,13 @@ use zenoh_transport::{
     TransportMulticastEventHandler, TransportPeer, TransportPeerEventHandler,
 };
 
-use crate::account::Account;
 use crate::closing::Closing;
 use crate::error::{LinkError, reason};
 use crate::identity::robot_of;
 use crate::reach::{endpoints, names_any};
-use crate::tls::{Door, Knocks, Seat, Stranger, Visitor};
+use crate::tls::{Knocks, Seat, Stranger, Visitor};
+
+pub(crate) use crate::admission::{Guard, Room};
 
 /// The other end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -72,13 +72,16 @@ impl Node {
         let started = runtime.start().await;
         closing.forget();
         if let Err(error) = started {
-            // A client says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
-            let listens = listen.is_empty() || !node.locators().is_empty();
-            if node.runtime.whatami() == WhatAmI::Client && dials_nobody && listens {
+            let is_client = node.runtime.whatami() == WhatAmI::Client;
+            // It says that it was told of nobody to link to; it is dialled for later, and what it listens on stands by then.
+            if is_client && dials_nobody && (listen.is_empty() || !node.locators().is_empty()) {
                 return Ok(node);
             }
             node.close().await;
-            return Err(LinkError::Start { listen: listen.join(", "), cause: reason(&*error) });
+            // Of one that hung up whoever it reached, Zenoh says no more than that time has passed.
+            let refused = node.refused().filter(|_| is_client);
+            let cause = refused.map_or_else(|| reason(&*error), |refused| refused.to_string());
+            return Err(LinkError::Start { listen: listen.join(", "), cause });
         }
         Ok(node)
     }
@@ -193,25 +196,6 @@ async fn end(link: TransportUnicast) {
             tracing::debug!("ending a link: {error}");
         }
     }
-}
-
-/// Who guards the door of a robot of a sealed swarm, or looks at whom a client of one has dialled.
-pub(crate) struct Guard {
-    /// The checksum of the swarm's name.
-    pub swarm: u32,
-    pub door: Arc<Door>,
-    /// That of the robot. A client, which speaks to robots alone, has none.
-    pub account: Option<Arc<Account>>,
-}
-
-/// For how many robots that relay for nobody a relay has room.
-pub(crate) struct Room {
-    /// The robot that runs it, for which there always is.
-    pub of: RobotId,
-    /// The checksum of the swarm's name.
-    pub swarm: u32,
-    pub size: usize,
-    pub account: Arc<Account>,
 }
 
 /// How many of those who knock again are kept waiting at the same time: each takes a thread.

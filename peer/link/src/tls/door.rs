@@ -33,8 +33,8 @@ pub(crate) enum Stranger {
     #[error("a link with a certificate that is none of this swarm's: '{0}'")]
     OtherSwarm(String),
     #[error(
-        "a link of {0}, which is not on the roster here with this key: it was expelled or has a new key, or was enrolled since, and this roster is \
-         older (gestalt trust tell, where the authority's key is)"
+        "a link of {0}, which is not on the roster here with this key: it was expelled or has a new key, or was enrolled since: take the newest \
+         roster.json (gestalt trust tell, where the authority's key is, gives it to robots)"
     )]
     NotEnrolled(Bearer),
     #[error("a link of {0} that says it is another one: give each robot its own key, and an id of its own")]
