@@ -152,8 +152,7 @@ mod tests {
         let image = LabelledImage { path: "x.jpg".into(), class: ClassId(0), person: None };
         for k in 0..right + wrong {
             evaluation.record(ClassId(0), if k < right { &[1.0, 0.0] } else { &[0.0, 1.0] });
-            let sample =
-                LabelledFeatures { features: vec![], class: ClassId(0), group: None, variations: Vec::new() };
+            let sample = LabelledFeatures::new(vec![], ClassId(0), None);
             survey.seen.push((image.clone(), sample));
         }
         for _ in 0..missed {

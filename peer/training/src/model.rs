@@ -32,12 +32,7 @@ pub fn learn(
     let embeddings = embed(&inputs);
     let samples: Vec<LabelledFeatures> = (0..)
         .zip(counted.iter().zip(embeddings))
-        .map(|(i, ((_, shown), features))| LabelledFeatures {
-            features,
-            class: ClassId(shown.count.unwrap_or_default().into()),
-            group: Some(if shown.origin == DRAWN { DRAWN + i % DRAWN_PARTS } else { shown.origin }),
-            variations: Vec::new(),
-        })
+        .map(|(i, ((_, shown), features))| LabelledFeatures::new(features, ClassId(shown.count.unwrap_or_default().into()), Some(if shown.origin == DRAWN { DRAWN + i % DRAWN_PARTS } else { shown.origin })))
         .collect();
     let vocabulary = Vocabulary::new(["0", "1", "2", "3", "4", "5"])?;
     let options = TrainOptions {

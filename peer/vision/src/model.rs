@@ -166,12 +166,7 @@ fn rendered_samples(
         let frame = frame?;
         if let Ok(observation) = perception.observe(&frame.image) {
             let (class, group) = (ClassId(frame.class.into()), Some(frame.group));
-            samples.push(LabelledFeatures {
-                features: observation.features,
-                class,
-                group,
-                variations: Vec::new(),
-            });
+            samples.push(LabelledFeatures::new(observation.features, class, group));
         }
         progress(done);
     }

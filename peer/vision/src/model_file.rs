@@ -270,11 +270,8 @@ mod tests {
     use super::*;
 
     fn model() -> Model {
-        let sample = |i: u8| LabelledFeatures {
-            features: vec![f32::from(i % 2), f32::from(i) / 10.0],
-            class: ClassId((i % 2).into()),
-            group: None,
-            variations: Vec::new(),
+        let sample = |i: u8| {
+            LabelledFeatures::new(vec![f32::from(i % 2), f32::from(i) / 10.0], ClassId((i % 2).into()), None)
         };
         let samples: Vec<LabelledFeatures> = (0..10).map(sample).collect();
         let vocabulary = Vocabulary::new(["fist", "palm"]).unwrap();

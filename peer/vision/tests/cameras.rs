@@ -47,12 +47,7 @@ fn samples(
     let sample = |frame: &LabelledFrame| {
         let observation = eyes.observe(&frame.image).ok()?;
         let class = ClassId(frame.class.into());
-        Some(LabelledFeatures {
-            features: observation.features,
-            class,
-            group: Some(frame.group),
-            variations: Vec::new(),
-        })
+        Some(LabelledFeatures::new(observation.features, class, Some(frame.group)))
     };
     frames.iter().map(sample).collect()
 }
@@ -233,12 +228,7 @@ fn a_room_known_empty_does_no_harm() {
         let sample = |(camera, frame, room, gesture): &(CameraModel, Mat, Mat, u8)| {
             let room = with_room.then_some(room);
             let features = eyes(LayerConfig::ALL, camera).observe_before(frame, room).ok()?.features;
-            Some(LabelledFeatures {
-                features,
-                class: ClassId((*gesture).into()),
-                group: None,
-                variations: Vec::new(),
-            })
+            Some(LabelledFeatures::new(features, ClassId((*gesture).into()), None))
         };
         named(&classifier, &scenes.iter().map(sample).collect::<Vec<_>>())
     };

@@ -312,12 +312,7 @@ fn cost_of_faults(set: FeatureSet) -> Vec<(Fault, f64)> {
         core::set_rng_seed(1).unwrap();
         let mut sample = |(image, picture): &(&LabelledImage, Mat)| {
             let features = perception.observe(&fault.apply(picture)).ok()?.features;
-            Some(LabelledFeatures {
-                features,
-                class: image.class,
-                group: image.person,
-                variations: Vec::new(),
-            })
+            Some(LabelledFeatures::new(features, image.class, image.person))
         };
         images.iter().map(|image| whom(image.0.person).then(|| sample(image))?).collect()
     };

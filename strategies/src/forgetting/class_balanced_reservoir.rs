@@ -1,13 +1,12 @@
 //! An even sample of each class, with the classes as even as the stream allows.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::{Rng, RngExt};
 
 use super::contract::Forgetting;
-use crate::sample::{HeldSample, HeldSamples, draw};
+use crate::sample::{HeldSample, HeldSamples, draw, take_out};
 
 /// Class-balancing reservoir sampling (Chrysakis & Moens, "Online continual learning from imbalanced data", ICML
 /// 2020). A class that is or once was the largest of a full set is *full*. The newest sample, of class c,
@@ -40,14 +39,11 @@ impl Forgetting for ClassBalancedReservoir {
 
     fn removed(&mut self, sample: &HeldSample) {
         let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
-        if let Entry::Occupied(mut stream) = self.classes.entry(sample.class) {
-            let Stream { came, held, .. } = stream.get_mut();
+        take_out(&mut self.classes, sample.class, |Stream { came, held, .. }| {
             *came = came.saturating_sub(u64::from(is_retracted));
             *held = held.saturating_sub(1);
-            if *held == 0 {
-                stream.remove();
-            }
-        }
+            *held == 0
+        });
     }
 
     fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {

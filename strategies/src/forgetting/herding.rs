@@ -1,14 +1,13 @@
 //! What can go without moving the mean away from that of all that came.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
 use super::contract::Forgetting;
 use crate::geometry::{Cluster, ExactSum, narrow};
-use crate::sample::{HeldSample, HeldSamples};
+use crate::sample::{HeldSample, HeldSamples, take_out};
 
 /// Of the class K with the most samples (ties at random)
 /// arg min over x of ‖μ − (S − x) / (m − 1)‖: μ the mean of all samples of K that came since there is one of K, S the sum of the m held.
@@ -39,16 +38,13 @@ impl Forgetting for HerdingForgetting {
 
     fn removed(&mut self, sample: &HeldSample) {
         let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
-        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
-            let Class { came, held } = class.get_mut();
+        take_out(&mut self.classes, sample.class, |Class { came, held }| {
             held.remove(sample);
             if is_retracted {
                 came.subtract(&sample.vector);
             }
-            if held.is_empty() {
-                class.remove();
-            }
-        }
+            held.is_empty()
+        });
     }
 
     fn replaced(&mut self, before: &HeldSample, after: &HeldSample) {

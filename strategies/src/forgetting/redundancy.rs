@@ -1,14 +1,13 @@
 //! What another sample says as well.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
 use super::contract::Forgetting;
 use crate::geometry::Neighbours;
-use crate::sample::{HeldSample, HeldSamples, draw};
+use crate::sample::{HeldSample, HeldSamples, draw, take_out};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg min over x of min over x' ≠ x in K of ‖x − x'‖. The two of the closest pair tie: one of them goes at random.
@@ -34,12 +33,10 @@ impl Forgetting for Redundancy {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
-            class.get_mut().remove(sample.key);
-            if class.get().is_empty() {
-                class.remove();
-            }
-        }
+        take_out(&mut self.classes, sample.class, |class| {
+            class.remove(sample.key);
+            class.is_empty()
+        });
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {

@@ -1,14 +1,13 @@
 //! What stands least for its class.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use rand::Rng;
 
 use super::contract::Forgetting;
 use crate::geometry::Cluster;
-use crate::sample::{HeldSample, HeldSamples};
+use crate::sample::{HeldSample, HeldSamples, take_out};
 
 /// Of the class K with the most samples (ties at random), personal, shared and external alike,
 /// arg max over x of ‖x − f_K‖, f_K the centroid of all samples of K. Ties go to the oldest.
@@ -25,12 +24,10 @@ impl Forgetting for RepresentativityForgetting {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if let Entry::Occupied(mut class) = self.classes.entry(sample.class) {
-            class.get_mut().remove(sample);
-            if class.get().is_empty() {
-                class.remove();
-            }
-        }
+        take_out(&mut self.classes, sample.class, |class| {
+            class.remove(sample);
+            class.is_empty()
+        });
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {

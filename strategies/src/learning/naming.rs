@@ -102,12 +102,9 @@ impl Learning {
     /// What samples of each class are trained on as.
     fn all_trained_as(&self) -> TrainedAs {
         let now = self.names.all_stand_for();
-        let trained_as = |class: ClassId| {
-            let now = if class.is_named() { now.get(&class).copied()? } else { return Some(class) };
-            now.filter(|class| self.gestures.contains(*class))
-        };
+        let stands_for = |class| now.get(&class).copied().flatten();
         let classes: BTreeSet<ClassId> = self.classes_of_samples().collect();
-        classes.into_iter().map(|class| (class, trained_as(class))).collect()
+        classes.into_iter().map(|class| (class, self.trained_by(class, stands_for))).collect()
     }
 
     /// Puts a word into the memory that the rules would not let in.
@@ -119,8 +116,17 @@ impl Learning {
 
     /// The gesture that a sample of that class is trained on as; `None` where it is on none: nobody named it that this robot heard, or it is retired.
     pub(super) fn trained_as(&self, class: ClassId) -> Option<ClassId> {
+        self.trained_by(class, |class| self.names.stands_for(class))
+    }
+
+    /// The same, by what a gesture that was named stands for.
+    fn trained_by(
+        &self,
+        class: ClassId,
+        stands_for: impl FnOnce(ClassId) -> Option<ClassId>,
+    ) -> Option<ClassId> {
         if class.is_named() {
-            self.names.stands_for(class).filter(|class| self.gestures.contains(*class))
+            stands_for(class).filter(|class| self.gestures.contains(*class))
         } else {
             Some(class)
         }

@@ -231,8 +231,7 @@ impl Learning {
     /// Whether anything that was seen in that round is kept, be it until its name is known.
     pub fn has_seen(&self, round: RoundId) -> bool {
         let names: BTreeSet<RoundId> = self.recent.names(round).collect();
-        let aside = self.aside.iter().map(|(_, sample)| sample.round);
-        self.set.iter().map(|sample| sample.round).chain(aside).any(|round| names.contains(&round))
+        self.held_of(round) > 0 || self.aside.iter().any(|(_, sample)| names.contains(&sample.round))
     }
 
     pub fn vocabulary(&self) -> &Vocabulary {

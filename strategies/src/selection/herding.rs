@@ -1,7 +1,6 @@
 //! What keeps the mean of what was shared at the mean of what was seen.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -9,7 +8,7 @@ use rand::Rng;
 
 use super::contract::Selection;
 use crate::geometry::{Cluster, ExactSum, narrow};
-use crate::sample::{HeldSample, HeldSamples, SetPart};
+use crate::sample::{HeldSample, HeldSamples, SetPart, take_out};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖μ − (S + x) / (k + 1)‖: μ the mean of the own samples of K (personal and
@@ -40,16 +39,14 @@ impl Selection for HerdingSelection {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let Entry::Occupied(mut own) = self.classes.entry(sample.class) else { return };
-        let Own { personal, shared } = own.get_mut();
-        match sample.part {
-            SetPart::Personal => personal.remove(sample),
-            SetPart::Shared => shared.subtract(&sample.vector),
-            SetPart::External => {}
-        }
-        if personal.is_empty() && shared.count() == 0.0 {
-            own.remove();
-        }
+        take_out(&mut self.classes, sample.class, |Own { personal, shared }| {
+            match sample.part {
+                SetPart::Personal => personal.remove(sample),
+                SetPart::Shared => shared.subtract(&sample.vector),
+                SetPart::External => {}
+            }
+            personal.is_empty() && shared.count() == 0.0
+        });
     }
 
     fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {

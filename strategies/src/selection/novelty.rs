@@ -1,7 +1,6 @@
 //! What the swarm knows least.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -9,7 +8,7 @@ use rand::Rng;
 
 use super::contract::Selection;
 use crate::geometry::{ExactSum, Neighbours, narrow};
-use crate::sample::{HeldSample, HeldSamples, SetPart};
+use crate::sample::{HeldSample, HeldSamples, SetPart, take_out};
 
 /// A class K at random among those with personal samples, then
 /// arg max over x personal in K of min over x' in K, shared or external, of ‖x − x'‖: the farthest from its nearest
@@ -46,18 +45,16 @@ impl Selection for Novelty {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let Entry::Occupied(mut class) = self.classes.entry(sample.class) else { return };
-        let Class { distances, personal } = class.get_mut();
-        match sample.part {
-            SetPart::Personal => {
-                distances.remove_seeker(sample.key);
-                personal.subtract(&sample.vector);
+        take_out(&mut self.classes, sample.class, |Class { distances, personal }| {
+            match sample.part {
+                SetPart::Personal => {
+                    distances.remove_seeker(sample.key);
+                    personal.subtract(&sample.vector);
+                }
+                SetPart::Shared | SetPart::External => distances.remove_neighbour(sample.key),
             }
-            SetPart::Shared | SetPart::External => distances.remove_neighbour(sample.key),
-        }
-        if distances.is_empty() {
-            class.remove();
-        }
+            distances.is_empty()
+        });
     }
 
     fn select(&mut self, samples: &HeldSamples, _: Option<&dyn Classify>, rng: &mut dyn Rng) -> Option<u64> {

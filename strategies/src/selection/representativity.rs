@@ -1,7 +1,6 @@
 //! What stands best for all that was seen.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use gestalt_protocol::ClassId;
 use gestalt_rounds::Classify;
@@ -9,7 +8,7 @@ use rand::Rng;
 
 use super::contract::Selection;
 use crate::geometry::Cluster;
-use crate::sample::{HeldSample, HeldSamples, SetPart};
+use crate::sample::{HeldSample, HeldSamples, SetPart, take_out};
 
 /// A class K at random among those with personal samples, then
 /// arg min over x personal in K of ‖x − f_K‖, f_K the centroid of the personal samples of K. Ties go to the oldest.
@@ -30,13 +29,11 @@ impl Selection for RepresentativitySelection {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if sample.part == SetPart::Personal
-            && let Entry::Occupied(mut class) = self.classes.entry(sample.class)
-        {
-            class.get_mut().remove(sample);
-            if class.get().is_empty() {
-                class.remove();
-            }
+        if sample.part == SetPart::Personal {
+            take_out(&mut self.classes, sample.class, |class| {
+                class.remove(sample);
+                class.is_empty()
+            });
         }
     }
 

@@ -23,12 +23,7 @@ fn samples(length: usize) -> Vec<LabelledFeatures> {
         .map(|i| {
             let class = i % CLASSES;
             let features = centres[class].iter().map(|c| c + rng.random_range(-4.0..4.0)).collect();
-            LabelledFeatures {
-                features,
-                class: ClassId(class as u32),
-                group: Some((i / CLASSES) as u32),
-                variations: Vec::new(),
-            }
+            LabelledFeatures::new(features, ClassId(class as u32), Some((i / CLASSES) as u32))
         })
         .collect()
 }

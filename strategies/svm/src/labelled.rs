@@ -15,3 +15,11 @@ pub struct LabelledFeatures {
     /// and no score counts them. May be empty.
     pub variations: Vec<Vec<f32>>,
 }
+
+impl LabelledFeatures {
+    /// One without variations.
+    #[must_use]
+    pub fn new(features: Vec<f32>, class: ClassId, group: Option<u32>) -> Self {
+        Self { features, class, group, variations: Vec::new() }
+    }
+}

@@ -37,12 +37,7 @@ fn samples(count: usize, spread: f32, rng: &mut impl Rng) -> Vec<LabelledFeature
                 _ => [-2.0, 2.0, 0.0, 5.0, 100.0],
             };
             let features = centre.iter().map(|c| c + spread * normal(rng)).collect();
-            LabelledFeatures {
-                features,
-                class: ClassId(class as u32),
-                group: Some((i / 12) as u32),
-                variations: Vec::new(),
-            }
+            LabelledFeatures::new(features, ClassId(class as u32), Some((i / 12) as u32))
         })
         .collect()
 }
@@ -228,7 +223,7 @@ fn two_samples_of_each_class_are_enough() {
         .map(|i| {
             let mut features: Vec<f32> = (0..5).map(|_| 0.1 * normal(&mut rng)).collect();
             features[i % 3] += 1.0;
-            LabelledFeatures { features, class: ClassId((i % 3) as u32), group: None, variations: Vec::new() }
+            LabelledFeatures::new(features, ClassId((i % 3) as u32), None)
         })
         .collect();
     let classifier = trained(&few, 6).classifier;

@@ -499,7 +499,7 @@ fn wide_samples(noise: f32, count: usize, seed: u64) -> Vec<LabelledFeatures> {
     let mut rng = generator(seed);
     let sample = |i: usize| {
         let features = centres[i % 6].iter().map(|c| c + noise * normal(&mut rng)).collect();
-        LabelledFeatures { features, class: ClassId((i % 6) as u32), group: None, variations: Vec::new() }
+        LabelledFeatures::new(features, ClassId((i % 6) as u32), None)
     };
     (0..count).map(sample).collect()
 }

@@ -24,12 +24,7 @@ fn samples(people: std::ops::Range<u32>, rng: &mut impl Rng) -> Vec<LabelledFeat
                 let mut features: Vec<f32> = shift.iter().map(|shift| shift + 0.4 * normal()).collect();
                 features[0] += angle.cos();
                 features[1] += angle.sin();
-                samples.push(LabelledFeatures {
-                    features,
-                    class: ClassId(class as u32),
-                    group: Some(person),
-                    variations: Vec::new(),
-                });
+                samples.push(LabelledFeatures::new(features, ClassId(class as u32), Some(person)));
             }
         }
     }

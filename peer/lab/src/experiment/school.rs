@@ -209,12 +209,7 @@ fn rendered(
         let frame = frame?;
         let class = vocabulary.class(&frame.class.to_string());
         if let (Ok(seen), Some(class)) = (perception.observe(&frame.image), class) {
-            samples.push(LabelledFeatures {
-                features: seen.features,
-                class,
-                group: Some(frame.group),
-                variations: Vec::new(),
-            });
+            samples.push(LabelledFeatures::new(seen.features, class, Some(frame.group)));
         }
     }
     if samples.len() < 2 {

@@ -105,12 +105,7 @@ mod tests {
 
     #[test]
     fn gestures_that_the_others_do_not_show_are_neither_learned_nor_judged() {
-        let sample = |class| LabelledFeatures {
-            features: vec![],
-            class: ClassId(class),
-            group: None,
-            variations: Vec::new(),
-        };
+        let sample = |class| LabelledFeatures::new(vec![], ClassId(class), None);
         let image = |class| LabelledImage { path: "x.jpg".into(), class: ClassId(class), person: None };
         let vocabulary = Vocabulary::new(["0", "1", "2", "3"]).unwrap();
         // One sample of "2" is too few, of "0" there is none.

@@ -81,12 +81,7 @@ mod tests {
     use super::*;
 
     fn samples(groups: impl Fn(usize) -> Option<u32>) -> Vec<LabelledFeatures> {
-        let sample = |i: usize| LabelledFeatures {
-            features: vec![0.0],
-            class: ClassId((i % 3) as u32),
-            group: groups(i),
-            variations: Vec::new(),
-        };
+        let sample = |i: usize| LabelledFeatures::new(vec![0.0], ClassId((i % 3) as u32), groups(i));
         (0..60).map(sample).collect()
     }
 

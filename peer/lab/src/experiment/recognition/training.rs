@@ -81,12 +81,7 @@ fn train_one(
         let perception = eyes.iter_mut().find(|(name, _)| *name == frame.camera);
         if let Some(Ok(seen)) = perception.map(|(_, perception)| perception.observe(&frame.image)) {
             let class = ClassId(frame.class.into());
-            samples.push(LabelledFeatures {
-                features: seen.features,
-                class,
-                group: Some(frame.group),
-                variations: Vec::new(),
-            });
+            samples.push(LabelledFeatures::new(seen.features, class, Some(frame.group)));
         }
         progress(n + 1);
     }
