@@ -149,13 +149,13 @@ impl Search {
         loop {
             sleep(STANDS).await;
             while !self.node.is_linked_to(found) {
-                match self.look().await {
-                    Ok(Some(other)) => found = other,
-                    Ok(None) => sleep(IN_VAIN).await,
-                    Err(error) => {
-                        tracing::debug!("looking for a robot: {error}");
-                        sleep(IN_VAIN).await;
-                    }
+                let looked = self.look().await.unwrap_or_else(|error| {
+                    tracing::debug!("looking for a robot: {error}");
+                    None
+                });
+                match looked {
+                    Some(other) => found = other,
+                    None => sleep(IN_VAIN).await,
                 }
             }
         }
@@ -171,7 +171,7 @@ impl Search {
         let _calling = zenoh::scout(WhatAmI::Router, self.scouting.clone())
             .callback(move |hello| {
                 let endpoints = hello.locators().iter().map(ToString::to_string);
-                let endpoints = endpoints.filter(|it| it.starts_with("tls/") == sealed).take(MAX_ENDPOINTS);
+                let endpoints = endpoints.filter(|it| reach::is_tls(it) == sealed).take(MAX_ENDPOINTS);
                 let _ = answer.try_send((hello.zid(), endpoints.collect()));
             })
             .await

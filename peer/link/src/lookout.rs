@@ -11,6 +11,7 @@ use zenoh::session::ZenohId;
 use crate::account::Account;
 use crate::identity::{is_of_life, robot_of, swarm_checksum};
 use crate::inbox::Inbox;
+use crate::reach::is_tls;
 use crate::sightings::{Place, Sightings};
 
 /// How long answers to a call are waited for.
@@ -107,7 +108,7 @@ impl Lookout {
     /// Where a robot is dialled: in a sealed swarm by TLS alone.
     pub fn reachable(&self, mut locators: Vec<String>) -> Vec<String> {
         let sealed = self.inbox.is_sealed();
-        locators.retain(|locator| locator.starts_with("tls/") == sealed);
+        locators.retain(|locator| is_tls(locator) == sealed);
         locators
     }
 

@@ -48,7 +48,7 @@ fn reach(endpoint: &str) -> Reach {
     }
 }
 
-fn is_tls(endpoint: &str) -> bool {
+pub(crate) fn is_tls(endpoint: &str) -> bool {
     endpoint.starts_with("tls/")
 }
 

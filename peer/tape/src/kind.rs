@@ -41,12 +41,6 @@ pub enum Kind {
 const OWN: &str = "gestalt.";
 
 impl Kind {
-    /// Whether it is the recorder's own, and nothing that was said in the swarm.
-    #[must_use]
-    pub fn is_recorders(self) -> bool {
-        matches!(self, Self::Log | Self::Recorder)
-    }
-
     /// All of them.
     pub const ALL: [Self; 14] = [
         Self::Vote,
@@ -64,6 +58,12 @@ impl Kind {
         Self::Log,
         Self::Recorder,
     ];
+
+    /// Whether it is the recorder's own, and nothing that was said in the swarm.
+    #[must_use]
+    pub fn is_recorders(self) -> bool {
+        matches!(self, Self::Log | Self::Recorder)
+    }
 
     /// The kind of what is said under that key; `None` for what is not recorded.
     #[must_use]

@@ -20,7 +20,7 @@ impl Line {
     /// What a recorded message says; `None` for what is the recorder's own, and for pictures, which wait for nobody's answer.
     #[must_use]
     pub fn of(recorded: &Recorded<'_>) -> Option<Self> {
-        if matches!(recorded.kind, Kind::Frame | Kind::Unreadable | Kind::Log | Kind::Recorder) {
+        if recorded.kind.is_recorders() || matches!(recorded.kind, Kind::Frame | Kind::Unreadable) {
             return None;
         }
         let topic = recorded.keys()?.parse(recorded.channel.strip_prefix('/')?)?;

@@ -127,7 +127,7 @@ impl Entry {
         };
         let of_swarm =
             topics.iter().filter_map(|topic| Some((Kind::of(topic)?, format!("/{}", keys.key(topic)))));
-        let own = [Kind::Log, Kind::Recorder].into_iter().filter(|_| robot.is_none());
+        let own = Kind::ALL.into_iter().filter(|kind| kind.is_recorders() && robot.is_none());
         of_swarm.chain(own.map(|kind| (kind, beside(keys, kind.name())))).collect()
     }
 

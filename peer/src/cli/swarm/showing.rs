@@ -2,7 +2,7 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use gestalt_protocol::{Announcement, ClassId, Decision, Gesture, Instruction, InstructorId};
+use gestalt_protocol::{Announcement, ClassId, Decision, Gesture, Instruction, InstructorId, RoundId};
 use serde_json::json;
 
 use super::super::Failure;
@@ -132,7 +132,7 @@ impl<'a> Showing<'a> {
         }
         let was = Instruction::Was { round: decision.round, class: Gesture::Class(truth) };
         if self.args.learn.is_some() {
-            self.teach(&was).await?;
+            self.teach(decision.round, &was).await?;
         } else if self.args.record.is_some() {
             // Nobody learns it, but the recording says what was shown.
             self.swarm.client.instruct(&INSTRUCTOR.parse()?, &was).await?;
@@ -141,12 +141,12 @@ impl<'a> Showing<'a> {
     }
 
     /// Says what the gesture was, and waits until that is learned.
-    async fn teach(&self, was: &Instruction) -> Result<(), Failure> {
+    async fn teach(&self, round: RoundId, was: &Instruction) -> Result<(), Failure> {
         const PATIENCE: Duration = Duration::from_secs(10);
         let instructor: InstructorId = INSTRUCTOR.parse()?;
         let answer = self.swarm.client.teach(&instructor, was, PATIENCE).await?;
-        let round = || was.round().map_or(0, |round| round.counter);
-        let answer = answer.ok_or_else(|| format!("no robot answered the feedback on round {}", round()))?;
+        let answer =
+            answer.ok_or_else(|| format!("no robot answered the feedback on round {}", round.counter))?;
         let words = format!("  feedback: {}", answer.outcome.describe());
         line(self.args.json, &json!({"event": "taught", "answer": answer}), &words)
     }
