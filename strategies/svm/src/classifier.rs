@@ -12,7 +12,7 @@ use gestalt_protocol::ClassId;
 use gestalt_rounds::{Classify, ClassifyError, Judgement, Observation, Vocabulary};
 
 use crate::calibration::Calibration;
-use crate::familiarity::Familiarity;
+use crate::familiarity::{Familiarity, Unfamiliar};
 use crate::feature_space::FeatureSpace;
 use crate::head::{Blend, Head, Shown};
 use crate::machine::Machine;
@@ -24,7 +24,7 @@ use crate::panel::{Certified, Votes};
 /// .42, .19, .13, .04 at squared distances of .0035, .01, .035, .15, .3, .6, 1.2 variances; exp(−d² / .17) fits that.
 const REPEATS: f64 = 0.17;
 
-/// How much less likely a gesture that is not on the list is shown than one that is, to a robot that was taught all of them.
+/// How much less likely something is shown that is not on the list than a gesture that is, to a robot that was taught all of them.
 const RARE: f64 = 0.05;
 
 /// A trained classifier. [`Learner`](crate::Learner) and `train` make one, [`Classifier::decode`] reads one.
@@ -179,14 +179,17 @@ impl Classifier {
 
     /// The probability of each gesture that it has not met.
     ///
-    /// With as many gestures met as not as the vocabulary has, all as likely beforehand, and r = P(x | unknown) / P(x | one met): r / (met + r · unmet).
+    /// All gestures of the list being as likely beforehand, and r = P(x | one that it has not met) / P(x | one met): r / (met + r · unmet).
     /// What is unknown is another gesture or, by these odds, no hand: one or the other, so their odds add up.
     fn of_unknown(&self, coordinates: &[f32], few: Option<(&Blend, &[f64])>, no_hand: f64) -> f64 {
         let (classes, met) = (self.learned.len(), self.met().count());
         let margin = few.and_then(|(blend, logs)| blend.margin(logs));
-        let log_ratio = self.familiarity.as_ref().map_or(0.0, |known| known.log_ratio(coordinates, margin));
-        // Who was taught all there is to the list is seldom shown what is not on it; no hand at all is seen as often as before.
-        let ratio = log_ratio.exp() * if met == classes { RARE } else { 1.0 } + no_hand;
+        let familiarity = self.familiarity.as_ref();
+        let unfamiliar = familiarity.map_or(Unfamiliar::default(), |known| known.judge(coordinates, margin));
+        // What is on the list and was not taught is shown as often as what was; who was taught all of it is seldom shown what is not on it. No hand at all is
+        // seen as often as before.
+        let log = if met < classes { unfamiliar.gesture } else { RARE.ln() + unfamiliar.any };
+        let ratio = log.exp() + no_hand;
         ratio / (met as f64 + ratio * (classes - met).max(usize::from(met == 0)) as f64)
     }
 

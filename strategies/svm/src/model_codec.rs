@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::calibration::Calibration;
 use crate::classifier::Classifier;
-use crate::familiarity::Familiarity;
+use crate::familiarity::{ByMargin, Familiarity};
 use crate::feature_space::FeatureSpace;
 use crate::head::{Blend, Few};
 use crate::machine::{MAX_COORDINATE, Machine, pairs};
@@ -16,8 +16,10 @@ use crate::machine::{MAX_COORDINATE, Machine, pairs};
 /// Longest encoding that is read, in bytes.
 pub const MAX_MODEL: usize = 64 * 1024 * 1024;
 /// The layout below; another layout gets another number.
-const VERSION: u8 = 5;
-/// The layout before, without a head for few showings: it is read too, and written where there is none.
+const VERSION: u8 = 6;
+/// The layout before, which did not tell other gestures from what lies between gestures: it is read too.
+const BETWEEN: u8 = 5;
+/// The one before that, without a head for few showings: it is read too, and written where there is none.
 const WITHOUT_HEAD: u8 = 4;
 /// The one before that, which had no familiarity either.
 const BEFORE: u8 = 3;
@@ -52,13 +54,21 @@ struct Parts {
 /// What follows them since layout 4.
 type Since = Option<Familiarity>;
 
-/// What follows in layout 5. The discriminant itself follows from the familiarity.
+/// What follows since layout 5. The discriminant itself follows from the familiarity.
 #[derive(Serialize, Deserialize)]
 struct FewParts {
     sharpness: f64,
     shares: Vec<f64>,
-    /// The weight of the margin in the odds of unknown.
-    margin: f64,
+    by_margin: ByMargin,
+}
+
+/// The same in layout 5: sharpness, shares, and the weight of the margin.
+type FewPartsBetween = (f64, Vec<f64>, f64);
+
+impl From<FewPartsBetween> for FewParts {
+    fn from((sharpness, shares, weight): FewPartsBetween) -> Self {
+        Self { sharpness, shares, by_margin: ByMargin { weight, of_gesture: None } }
+    }
 }
 
 impl Classifier {
@@ -75,8 +85,9 @@ impl Classifier {
         let since: &Since = &self.familiarity;
         let encoded = match &self.blend {
             Some(Blend { few: Few::Discriminant(discriminant), shares }) => {
-                let margin = self.familiarity.as_ref().map_or(0.0, |familiarity| familiarity.margin);
-                let few = FewParts { sharpness: discriminant.sharpness(), shares: shares.clone(), margin };
+                let familiarity = self.familiarity.as_ref();
+                let by_margin = familiarity.map_or(ByMargin::default(), |familiarity| familiarity.by_margin);
+                let few = FewParts { sharpness: discriminant.sharpness(), shares: shares.clone(), by_margin };
                 postcard::to_extend(&(parts, since, few), vec![VERSION])
             }
             Some(Blend { few: Few::Own(_), .. }) | None => {
@@ -99,6 +110,8 @@ impl Classifier {
         let ((parts, familiarity, few), rest) = match version {
             VERSION => postcard::take_from_bytes::<(Parts, Since, FewParts)>(body)
                 .map(|((parts, since, few), rest)| ((parts, since, Some(few)), rest)),
+            BETWEEN => postcard::take_from_bytes::<(Parts, Since, FewPartsBetween)>(body)
+                .map(|((parts, since, few), rest)| ((parts, since, Some(few.into())), rest)),
             WITHOUT_HEAD => postcard::take_from_bytes::<(Parts, Since)>(body)
                 .map(|((parts, since), rest)| ((parts, since, None), rest)),
             BEFORE => {
@@ -126,15 +139,14 @@ impl Classifier {
 
 impl Classifier {
     fn with_few(mut self, few: FewParts) -> Result<Self, &'static str> {
-        let FewParts { sharpness, shares, margin } = few;
+        let FewParts { sharpness, shares, by_margin } = few;
         let familiarity = self.familiarity.as_mut().ok_or("a head for few showings of no class")?;
-        familiarity.margin = margin;
+        familiarity.by_margin = by_margin;
         let familiarity = self.familiarity.as_ref().ok_or("a head for few showings of no class")?;
         if shares.len() != self.calibration.sigmoids.len()
             || !shares.iter().all(|share| (0.0..=1.0).contains(share))
             || !(0.01..=100.0).contains(&sharpness)
-            || margin.is_nan()
-            || margin.abs() > 1e6
+            || !by_margin.check()
         {
             return Err("a head for few showings of other pairs");
         }

@@ -119,6 +119,21 @@ fn gestures_never_met_are_as_likely_as_unknown_and_less_so_the_more_is_known() {
 }
 
 #[test]
+fn the_layout_before_is_read_and_says_the_same_of_what_was_taught() {
+    let space = space();
+    let samples = samples(&space, 80, &mut generator(2));
+    let now = taught(&space, &samples).learn().unwrap();
+    let mut before = now.encode();
+    // Without the weights of other gestures, and that there are some.
+    before.truncate(before.len() - 33);
+    before[0] = 5;
+    let read = Classifier::decode(&before).unwrap();
+    let raw = features(0, &mut generator(3));
+    assert_eq!(read.judge(&raw).unwrap(), now.judge(&raw).unwrap(), "all are taught");
+    assert_eq!(Classifier::decode(&read.encode()).unwrap(), read, "written as it is now");
+}
+
+#[test]
 fn samples_of_one_showing_tell_no_more_than_one_of_what_is_unknown() {
     let space = space();
     let samples = samples(&space, 16, &mut generator(2));

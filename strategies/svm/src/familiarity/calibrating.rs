@@ -39,34 +39,53 @@ fn terms(score: Score) -> [f64; TERMS] {
     [1.0, score.distance.clamp(-5.0, 5.0), score.lead.unwrap_or(NO_LEAD), margin]
 }
 
-/// The weights that tell what was left out as unknown, or lies between gestures, from what was left out as known, and how far they may be believed either way: −ln P for what
-/// is unknown to look known at all, after so many showings that might have, and the other way round.
-///
+/// How distances are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Calibrated {
+    /// The weights that tell what was left out as unknown, or lies between gestures, from what was left out as known.
+    pub any: [f64; TERMS],
+    /// Those that tell what was left out as unknown alone.
+    pub gesture: [f64; TERMS],
+    /// How far they may be believed either way: −ln P for what is unknown to look known at all, after so many showings that might have, and the other way round.
+    pub bounds: [f64; 2],
+}
+
+impl Calibrated {
+    /// By what was left out as known and as unknown; and by what lies between gestures, where there are margins.
+    pub fn by(known: &[(Score, f64)], unknown: &[(Score, f64)], between: Option<&Scores>) -> Self {
+        let known = &*[known, &[EXPECTED]].concat();
+        let bounds = [(1.0 + total(unknown)).ln(), (1.0 + total(known)).ln()];
+        let by_margin = between.is_some();
+        let gesture = calibrate(known, unknown, &[], by_margin);
+        let any = between.map_or(gesture, |between| calibrate(known, unknown, between, by_margin));
+        Self { any, gesture, bounds }
+    }
+}
+
+fn total(scores: &[(Score, f64)]) -> f64 {
+    scores.iter().map(|(_, weight)| weight).sum()
+}
+
 /// Logistic regression with both sides weighing alike, so that its logit is a likelihood ratio; Newton's method.
-pub(super) fn calibrate(
+fn calibrate(
     known: &[(Score, f64)],
     unknown: &[(Score, f64)],
-    between: Option<Scores>,
-) -> ([f64; TERMS], [f64; 2]) {
-    let total = |scores: &[(Score, f64)]| scores.iter().map(|(_, weight)| weight).sum::<f64>();
-    let known = &*[known, &[EXPECTED]].concat();
-    let (of_known, of_unknown) = (total(known), total(unknown));
-    let bounds = [(1.0 + of_unknown).ln(), (1.0 + of_known).ln()];
+    between: &[(Score, f64)],
+    by_margin: bool,
+) -> [f64; TERMS] {
+    let (of_known, of_unknown, of_between) = (total(known), total(unknown), total(between));
     let each = of_known.min(of_unknown).min(MOST);
-    let by_margin = between.is_some();
     let (prior, spread) = if by_margin { (PRIOR_WITH_MARGIN, SPREAD_WITH_MARGIN) } else { (PRIOR, SPREAD) };
     let mut weights = prior;
     if each <= 0.0 {
-        return (weights, bounds);
+        return weights;
     }
-    let between = between.unwrap_or_default();
-    let of_between = total(&between);
     // Other gestures weigh twice as much as what is none.
     let (gestures, none) = if of_between > 0.0 { (each / 1.5, each / 3.0) } else { (each, 0.0) };
     let sides = [
         (known, 0.0, each / of_known),
         (unknown, 1.0, gestures / of_unknown),
-        (between.as_slice(), 1.0, none / f64::max(of_between, 1e-9)),
+        (between, 1.0, none / f64::max(of_between, 1e-9)),
     ];
     // Where there is no margin it has no weight.
     let terms_used = if by_margin { TERMS } else { TERMS - 1 };
@@ -99,7 +118,7 @@ pub(super) fn calibrate(
             break;
         }
     }
-    (weights, bounds)
+    weights
 }
 
 /// Solves equations of a positive definite matrix, by Gauss.

@@ -2,7 +2,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::head::Shown;
+use crate::head::{Head, Shown, margin_of};
 
 const WIDTH: usize = 12;
 
@@ -25,6 +25,10 @@ impl World {
     }
 
     fn taught(&self, classes: usize, showings: usize, rng: &mut impl Rng) -> Option<Familiarity> {
+        Some(Familiarity::of(&self.scatter(classes, showings, rng)?, None))
+    }
+
+    fn scatter(&self, classes: usize, showings: usize, rng: &mut impl Rng) -> Option<Scatter> {
         let mut seen: Vec<(usize, u64, Vec<f32>)> = Vec::new();
         for showing in 0..showings {
             for class in 0..classes {
@@ -37,7 +41,7 @@ impl World {
             .iter()
             .map(|(class, showing, vector)| Shown { class: *class, showing: *showing, vector })
             .collect();
-        Familiarity::learn(&shown, &[1.0; WIDTH])
+        Scatter::of(&shown, &[1.0; WIDTH])
     }
 }
 
@@ -69,7 +73,7 @@ fn what_was_never_taught_is_told_from_what_was_and_the_ratio_means_what_it_says(
         let taught = world.taught(5, 6, &mut rng).unwrap();
         for _ in 0..20 {
             for class in 0..8 {
-                let ratio = taught.log_ratio(&world.showing(class, 1, &mut rng)[0], None);
+                let ratio = taught.judge(&world.showing(class, 1, &mut rng)[0], None).any;
                 if class < 5 { known.push(ratio) } else { unknown.push(ratio) }
             }
         }
@@ -86,12 +90,34 @@ fn what_was_never_taught_is_told_from_what_was_and_the_ratio_means_what_it_says(
 }
 
 #[test]
+fn what_lies_between_gestures_makes_no_taught_one_look_like_another() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    // Five of eight gestures were taught: the logarithms of taught and of untaught ones, by what is unknown at all and by another gesture.
+    let mut means = [[0.0; 2]; 2];
+    for _ in 0..12 {
+        let world = World::new(8, &mut rng);
+        let scatter = world.scatter(5, 3, &mut rng).unwrap();
+        let plain = scatter.discriminant(5).sharpened(1.0);
+        let familiarity = Familiarity::of(&scatter, Some(&plain));
+        for class in 0..8 {
+            let view = world.showing(class, 1, &mut rng).remove(0);
+            let Unfamiliar { any, gesture } = familiarity.judge(&view, margin_of(&plain.logs(&view)));
+            let (of, count) = if class < 5 { (0, 60.0) } else { (1, 36.0) };
+            means[of][0] += any / count;
+            means[of][1] += gesture / count;
+        }
+    }
+    let [taught, untaught] = means;
+    assert!(taught[1] < taught[0] - 0.3 && taught[1] < -0.5 && untaught[1] > 0.5, "{means:?}");
+}
+
+#[test]
 fn who_knows_little_says_little() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let world = World::new(4, &mut rng);
     let of = |classes, showings, rng: &mut ChaCha8Rng| {
         let taught = world.taught(classes, showings, rng).unwrap();
-        let ratios = (0..40).map(|n| taught.log_ratio(&world.showing(n % 4, 1, rng)[0], None));
+        let ratios = (0..40).map(|n| taught.judge(&world.showing(n % 4, 1, rng)[0], None).any);
         ratios.fold((0.0_f64, 0.0_f64), |(low, high), ratio| (low.min(ratio), high.max(ratio)))
     };
     let most = 2.0_f64.ln() + 1e-12;
@@ -121,7 +147,7 @@ fn samples_of_one_showing_count_once() {
     };
     let (one, ten) = (shown(1), shown(10));
     let view = &world.showing(1, 1, &mut rng)[0];
-    assert!((one.log_ratio(view, None) - ten.log_ratio(view, None)).abs() < 1e-4);
+    assert!((one.judge(view, None).any - ten.judge(view, None).any).abs() < 1e-4);
 }
 
 #[test]
@@ -135,7 +161,7 @@ fn nothing_to_learn_from_is_nothing_and_a_wide_space_is_no_trouble() {
         .map(|(n, vector)| Shown { class: n % 2, showing: n as u64, vector })
         .collect();
     let taught = Familiarity::learn(&shown, &[1.0; 300]).unwrap();
-    assert!(taught.check(2, 300) && taught.log_ratio(&wide[0], None).is_finite());
+    assert!(taught.check(2, 300) && taught.judge(&wide[0], None).any.is_finite());
     let flat = Familiarity::learn(&shown, &[0.0; 300]).unwrap();
-    assert!(flat.check(2, 300) && flat.log_ratio(&wide[0], None).is_finite());
+    assert!(flat.check(2, 300) && flat.judge(&wide[0], None).any.is_finite());
 }
