@@ -42,7 +42,11 @@ def main() -> None:
 
     config = zenoh.Config.from_file(str(args.folder / "zenoh.json5"))
     config.insert_json5("connect/endpoints", json.dumps([args.connect]))
-    with zenoh.open(config) as session:
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise SystemExit(f"no robot answers at {args.connect}: {error}") from None
+    with session:
         key_expr = f"gestalt/{roster['swarm']}/instructor/{name}"
         answers = session.declare_subscriber(f"{key_expr}/answer", lambda sample: print(sample.payload.to_string()))
         session.put(f"{key_expr}/word", word, attachment=attachment(key, roster, name, word, count),

@@ -27,7 +27,11 @@ def main() -> None:
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([given.connect]))
 
-    with zenoh.open(config) as session:
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise SystemExit(f"no robot answers at {given.connect}: {error}") from None
+    with session:
         decisions = session.declare_subscriber(f"gestalt/{given.swarm}/decision")
         seen = 0
         while given.count == 0 or seen < given.count:

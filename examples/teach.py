@@ -39,7 +39,11 @@ def main() -> None:
     prefix = f"gestalt/{given.swarm}"
     feedback = f"{prefix}/instructor/{given.name}/feedback"
 
-    with zenoh.open(config) as session:
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise SystemExit(f"no robot answers at {given.connect}: {error}") from None
+    with session:
         decisions = session.declare_subscriber(f"{prefix}/decision")
         answers = session.declare_subscriber(f"{prefix}/instructor/{given.name}/answer")
         questions = session.declare_subscriber(f"{prefix}/question")

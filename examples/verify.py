@@ -597,9 +597,16 @@ def follows(decision: dict, given: argparse.Namespace) -> str:
     return f"class {gesture}, p = {of_class:.3f}, by {part}"
 
 
+def of_line(text: bytes) -> bytes:
+    """What a line of `gestalt watch --json` says of a decision; any other text as it is."""
+    begin, end = b'{"decision":', b',"event":"decision"}'
+    line = text.strip()
+    return line[len(begin):-len(end)] if line.startswith(begin) and line.endswith(end) else text
+
+
 def prove(decision: bytes, roster: bytes, given: argparse.Namespace) -> str:
     """What is proven by the decision that is written there; raises why none is."""
-    decision, roster = DECISION(document(decision, LONGEST)), ROSTER(document(roster, LONGEST_ROSTER))
+    decision, roster = DECISION(document(of_line(decision), LONGEST)), ROSTER(document(roster, LONGEST_ROSTER))
     swarm, certificate = members(roster), decision["certificate"]
 
     def signed(by: int, said: bytes, signature: str, what: str) -> None:
@@ -617,7 +624,7 @@ def prove(decision: bytes, roster: bytes, given: argparse.Namespace) -> str:
 
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON; - for standard input")
+    arguments.add_argument("decision", help="what stood on gestalt/<swarm>/decision, JSON, or a line of gestalt watch --json with it; - for standard input")
     arguments.add_argument("--roster", required=True, help="the swarm's roster.json")
     arguments.add_argument("--rule", default="correlated_pool", choices=list(filter(None, RULES)))
     arguments.add_argument("--alpha", type=float, help="by default that of the rule: 0.05 for the pools, 0.5 for the others")

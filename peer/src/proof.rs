@@ -49,12 +49,17 @@ pub enum Unproven {
     Follows,
 }
 
-/// Reads a decision that is to be proven: each of its fields, once, and nothing beside them. A robot passes over what it does not know, for a later release
+/// How `gestalt watch --json` begins and ends a line of a decision.
+const LINE: [&[u8]; 2] = [b"{\"decision\":", b",\"event\":\"decision\"}"];
+
+/// Reads a decision that is to be proven, or a line of `gestalt watch --json` with one: each of its fields, once, and nothing beside them. A robot passes over what it does not know, for a later release
 /// may say more; but whoever is shown a file that was proven, and reads it by other means, is to find nothing in it that nobody proved.
 ///
 /// # Errors
 /// [`Unproven::Decision`] and [`Unproven::Spelling`].
 pub fn read(json: &[u8]) -> Result<Announcement, Unproven> {
+    let of_line = json.trim_ascii().strip_prefix(LINE[0]).and_then(|rest| rest.strip_suffix(LINE[1]));
+    let json = of_line.unwrap_or(json);
     let announcement: Announcement = decode_json(json)?;
     let written = serde_json::to_value(&announcement).ok().zip(serde_json::from_slice(json).ok());
     written

@@ -135,6 +135,7 @@ fn main() -> std::process::ExitCode {
         [Waits] liar::who_says_two_things_is_known_to_all_and_counts_no_more.await,
         [Works] stranger::a_decision_is_proven_by_two_programs_and_no_other_is,
         [Works] proofs::what_robots_decide_both_programs_prove_as_it_was_published,
+        [Works] proofs::a_line_of_watch_is_its_decision_to_both_programs,
         [Works] proofs::what_a_member_makes_of_a_decision_both_programs_judge_alike,
         [Works] proofs::a_file_in_other_words_both_programs_judge_alike,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,

@@ -115,6 +115,23 @@ pub fn what_robots_decide_both_programs_prove_as_it_was_published() {
     }
 }
 
+pub fn a_line_of_watch_is_its_decision_to_both_programs() {
+    let rounds = rounds(1);
+    let announced = decided(1, &rounds);
+    let file = File::new(&announced, &rounds);
+    let line = json!({"event": "decision", "decision": &announced}).to_string();
+    let of = |text: String| File { decision: text.into_bytes(), ..file.clone() };
+    let spoilt = [
+        line.replacen("decision", "decisioN", 1),
+        line.replace("\"event\":\"decision\"", "\"event\":\"question\""),
+        line.replace("\"event\":", "\"seen\":7,\"event\":"),
+        format!("{{\"decision\":{line},\"event\":\"decision\"}}"),
+    ];
+    let files: Vec<File> = [line.clone(), line + "\n"].into_iter().chain(spoilt).map(of).collect();
+    let proven: Vec<bool> = alike(&files).into_iter().map(|(proven, _)| proven).collect();
+    assert_eq!(proven, [true, true, false, false, false, false]);
+}
+
 /// The same announcement, as member 2 signs it after it was changed.
 fn signed_anew(announced: &Announcement, change: impl Fn(&mut Announcement)) -> Announcement {
     let mut changed = announced.clone();

@@ -18,7 +18,7 @@ use crate::proof;
   gestalt verify decision.json --roster keys/roster.json
   gestalt verify - --roster keys/roster.json --config robot.json5")]
 pub struct Args {
-    /// Decision, JSON, as robots publish it on `gestalt/<swarm>/decision`; `-` for standard input
+    /// Decision, JSON, as robots publish it on `gestalt/<swarm>/decision`, or a line of `gestalt watch --json` with one; `-` for standard input
     decision: PathBuf,
     /// Roster of the swarm, as `gestalt trust` writes it
     #[arg(long, value_name = "FILE")]
