@@ -19,7 +19,7 @@ pub enum RecordingError {
     #[error("{0} is there already, and no recording is ever overwritten: choose another name")]
     Exists(PathBuf),
     /// The file cannot be made.
-    #[error("cannot write {path}: {cause}")]
+    #[error("cannot write {path}: {cause}: its folder must be there, with room, and yours to write to")]
     Create {
         /// Which file.
         path: PathBuf,

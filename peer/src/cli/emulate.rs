@@ -68,7 +68,9 @@ pub enum EmulateError {
     #[error("{} is an experiment: give --out DIR for its results", .0.display())]
     NoOut(PathBuf),
     /// The trace cannot be written.
-    #[error("cannot write the trace {path}: {source}")]
+    #[error(
+        "cannot write the trace {path}: {source}: its folder must be there, with room, and yours to write to"
+    )]
     Trace {
         /// Where to.
         path: String,

@@ -78,7 +78,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         None => RobotModel::rendered()?.features,
     };
     let model = args.camera.properties();
-    let unwritable = |cause| format!("cannot write {}: {cause}", args.out.display());
+    let unwritable = |cause| {
+        format!(
+            "cannot write {}: {cause}: its folder must be there, with room, and yours to write to",
+            args.out.display()
+        )
+    };
     let file = std::fs::File::create(&args.out).map_err(unwritable)?;
     let mut file = std::io::BufWriter::new(file);
     file.write_all(heading(features).as_bytes()).map_err(unwritable)?;

@@ -166,7 +166,9 @@ impl Asked<'_> {
             let judgement = self.0.judge_seen(seen).unwrap();
             let met =
                 judgement.probabilities.iter().zip(self.0.learned()).filter(|(_, learned)| **learned > 0);
-            f64::from(u8::from(met.map(|(p, _)| *p).any(|p| p >= 0.9)))
+            // What was never taught is one more gesture beside those of the list.
+            let all = 1.0 + judgement.unknown.unwrap();
+            f64::from(u8::from(met.map(|(p, _)| *p).any(|p| p >= 0.9 * all)))
         };
         mean(&seen.flatten().map(is_known).collect::<Vec<_>>())
     }
@@ -214,9 +216,9 @@ fn auroc(known: &[f64], unknown: &[f64]) -> (f64, f64) {
 struct Told {
     others: Vec<f64>,
     one_of_six: Vec<f64>,
-    /// Of the five that were taught meanwhile, and of the one that was not, the part that is said to be known with .9 and more.
-    taught_known: Vec<f64>,
-    untaught_known: Vec<f64>,
+    /// Of the five that were taught meanwhile, of the one that was not, of what is taken for hands and of people who sign, the part that is said to be known
+    /// with .9 and more.
+    known: [Vec<f64>; 4],
     things: Vec<f64>,
     nothing: Vec<f64>,
     signing: Vec<f64>,
@@ -240,7 +242,7 @@ fn what_was_never_taught_is_told_from_what_was() {
         eprintln!("of {} pictures {what} {taken} are taken for a hand", seen.len());
     }
     eprintln!(
-        "pictures a gesture and set | left out | judged by | other gestures | one of six | its taught, and untaught, known | taken for hands | pictures without a hand | people who sign"
+        "pictures a gesture and set | left out | judged by | other gestures | one of six | known meanwhile: taught, untaught, taken for hands, signing | taken for hands | pictures without a hand | people who sign"
     );
     for each in [2, 10, PICTURES] {
         for by in [By::Robots, By::Features, By::Softmax] {
@@ -261,43 +263,43 @@ fn what_was_never_taught_is_told_from_what_was() {
                 // In the sets that show a gesture too seldom nothing is to be seen.
                 let classes =
                     (0..TAUGHT.len()).filter(|class| left_out.of_class(*class).iter().flatten().count() > 5);
-                let (mut one_of_six, mut taught_known, mut untaught_known) = (vec![], vec![], vec![]);
+                let (mut one_of_six, mut meanwhile) = (vec![], [const { vec![] }; 4]);
                 for class in classes {
                     let classifier = taught(rest(), &space, each, Some(class));
                     let asked = Asked(&classifier, by);
                     let of_class = asked.hands(left_out.of_class(class).iter());
                     one_of_six.push(auroc(&asked.hands(known(Some(class))), &of_class).0);
-                    taught_known.push(asked.known(known(Some(class))));
-                    untaught_known.push(asked.known(left_out.of_class(class).iter()));
+                    meanwhile[0].push(asked.known(known(Some(class))));
+                    meanwhile[1].push(asked.known(left_out.of_class(class).iter()));
+                    meanwhile[2].push(asked.known(nothing.iter()));
+                    meanwhile[3].push(asked.known(signing.iter()));
                 }
+                let meanwhile = meanwhile.map(|known| mean(&known));
                 let shown = |(a, half): (f64, f64)| format!("{a:.3} ± {half:.3}");
                 eprintln!(
-                    "{each:>3} | {:<12} | {by:?} | {} | {:.3} | {:.3}, {:.3} | {} | {} | {}",
+                    "{each:>3} | {:<12} | {by:?} | {} | {:.3} | {meanwhile:.3?} | {} | {} | {}",
                     left_out.name,
                     shown(others),
                     mean(&one_of_six),
-                    mean(&taught_known),
-                    mean(&untaught_known),
                     shown(things),
                     shown(empty),
                     shown(signs)
                 );
                 told.others.push(others.0);
                 told.one_of_six.push(mean(&one_of_six));
-                told.taught_known.push(mean(&taught_known));
-                told.untaught_known.push(mean(&untaught_known));
+                told.known.iter_mut().zip(meanwhile).for_each(|(known, of_set)| known.push(of_set));
                 told.things.push(things.0);
                 told.nothing.push(empty.0);
                 told.signing.push(signs.0);
             }
-            let Told { others, one_of_six, taught_known, untaught_known, things, nothing, signing } = &told;
+            let Told { others, one_of_six, known, things, nothing, signing } = &told;
             let means = [others, one_of_six, things, nothing, signing].map(|told| mean(told));
-            let known = [taught_known, untaught_known].map(|told| mean(told));
+            let known = known.each_ref().map(|known| mean(known));
             eprintln!("{each:>3} | mean         | {by:?} | {means:.3?}, known {known:.3?}");
             if each == PICTURES && by == By::Robots {
                 let least = [0.65, 0.90, 0.80, 0.92, 0.87];
                 assert!(means.iter().zip(least).all(|(mean, least)| *mean >= least), "{means:?}");
-                assert!(known[0] >= 0.6 && known[1] <= 0.05, "{known:?}");
+                assert!(known[0] >= 0.5 && known[1] <= 0.03, "{known:?}");
             }
         }
     }

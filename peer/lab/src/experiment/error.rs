@@ -56,7 +56,7 @@ pub enum ExperimentError {
         source: io::Error,
     },
     /// A file that cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {source}: its folder must be there, with room, and yours to write to", path.display())]
     Write {
         /// Which.
         path: PathBuf,
