@@ -282,6 +282,23 @@ impl LessonBook {
         leading(&words).iter().any(|(name, _)| *name == instructor)
     }
 
+    /// Whether a word of that standing, by that instructor, comes after one that counts: who may not overrule says what was shown where nobody else has. Asked
+    /// when it is said, for what is said of when that was is its instructor's own.
+    #[must_use]
+    pub fn is_preceded(
+        &self,
+        names: impl IntoIterator<Item = RoundId>,
+        instructor: &InstructorId,
+        standing: Standing,
+    ) -> bool {
+        let words = self.by_instructor(names);
+        let first = leading(&words);
+        let goes_before = |(name, said): &(&InstructorId, &Said)| {
+            *name != instructor && said.is_proven() && said.standing >= standing
+        };
+        standing < Standing::Overrules && !first.is_empty() && first.iter().all(goes_before)
+    }
+
     /// The latest word of each instructor on a round that has several names.
     fn by_instructor(&self, names: impl IntoIterator<Item = RoundId>) -> BTreeMap<&InstructorId, &Said> {
         let mut words: BTreeMap<&InstructorId, &Said> = BTreeMap::new();

@@ -34,11 +34,10 @@ impl Inbox {
             return Err(Refusal::Unsaid);
         }
         let mut words = sealed.words.lock().unwrap_or_else(PoisonError::into_inner);
-        let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
         let vouched = words.vouch(&by, payload(sample, MAX_WORD)?.into_owned());
         let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
         let said = Instructed { by, at: vouched.count, instruction, said: Some(signed) };
-        if !allowed {
+        if !roles.permit(&said.instruction) {
             return self.queue(Input::Disallowed(said), sample);
         }
         let mut state = self.lock();
@@ -115,7 +114,7 @@ impl Inbox {
         let attachment = attachment.map(|it| it.to_bytes());
         let heeded = self.judged(|judge, now| judge.word(now, &by, &word, attachment.as_deref()));
         let (heading, roles) = heeded.ok_or(Refusal::Kind)??;
-        let allowed = self.judged(|judge, _| judge.permits(&by, roles, &instruction)).unwrap_or(false);
+        let allowed = roles.permit(&instruction);
         let attachment = attachment.unwrap_or_default().into_owned();
         let signed = SignedWord { word: word.into_owned(), attachment };
         let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };

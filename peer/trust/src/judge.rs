@@ -12,7 +12,6 @@ use crate::budget::Budget;
 use crate::distrust::Distrust;
 use crate::docket::Docket;
 use crate::evidence::{Evidence, EvidenceError, Lie, Refutes};
-use crate::precedence::Precedence;
 use crate::roles::Roles;
 use crate::roster::Roster;
 use crate::roster_error::RosterError;
@@ -33,7 +32,6 @@ pub struct Judge<S: Scheme = Ed25519> {
     of_samples: Verifier<S>,
     of_words: Attention<S>,
     of_answers: Answers<S>,
-    precedence: Precedence,
     witness: Witness,
     refutes: Refutes,
     docket: Docket,
@@ -49,7 +47,6 @@ impl<S: Scheme> Judge<S> {
             of_samples: Verifier::new(roster, OF_SAMPLES),
             of_words: Attention::default(),
             of_answers: Answers::default(),
-            precedence: Precedence::default(),
             refutes,
             docket: Docket::default(),
         }
@@ -113,12 +110,6 @@ impl<S: Scheme> Judge<S> {
             return Err(Distrust::Convicted);
         }
         self.of_answers.check(now, self.verifier.roster(), robot, to, answer, attachment)
-    }
-
-    /// Whether somebody with these roles may say that.
-    pub fn permits(&mut self, by: &InstructorId, roles: Roles, said: &Instruction) -> bool {
-        let instructors = &self.verifier.roster().members().instructors;
-        self.precedence.permits(by, roles, said, |name| instructors.contains_key(name))
     }
 
     /// The key of a member that is believed.

@@ -75,7 +75,6 @@ mod key_file;
 mod membership;
 #[cfg(any(test, feature = "memoised"))]
 mod memoised;
-mod precedence;
 mod public_key;
 mod request;
 mod roles;
@@ -106,7 +105,6 @@ pub use key_file::KeyFileError;
 pub use membership::{Instructor, MAX_INSTRUCTORS, Membership, ROSTER_DOMAIN};
 #[cfg(feature = "memoised")]
 pub use memoised::Memoised;
-pub use precedence::Precedence;
 pub use public_key::PublicKey;
 pub use request::{Applicant, REQUEST_DOMAIN, Request, RequestError};
 pub use roles::{Role, RoleError, Roles};

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use gestalt_protocol::Instruction;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 use serde::ser::Serializer;
 use serde::{Deserialize, Serialize};
@@ -80,6 +81,13 @@ impl Roles {
     #[must_use]
     pub fn has(self, role: Role) -> bool {
         self.0 & role.bit() != 0
+    }
+
+    /// Whether who has them may say that. Who may not overrule says what was shown only where nobody else has: that is for those to see to who hold what was
+    /// said.
+    #[must_use]
+    pub fn permit(self, said: &Instruction) -> bool {
+        self.has(if *said == Instruction::Open { Role::Open } else { Role::Teach })
     }
 
     /// They, in their order.

@@ -99,14 +99,6 @@ fn what_is_as_long_as_it_may_be_is_read() {
     assert_eq!(gestalt_trust::statement::heading(&statement).unwrap_err(), too_long);
 }
 
-#[test]
-fn a_word_needs_its_role() {
-    let mut judge = Judge::new(roster(1), |_| false);
-    let ada = "ada".parse().unwrap();
-    assert!(judge.permits(&ada, Roles::up_to(Role::Open), &Instruction::Open));
-    assert!(!judge.permits(&ada, Roles::NONE, &Instruction::Open));
-}
-
 /// Members whose roster has so many bytes of JSON: mostly the keys of robots that were expelled.
 fn of_length(length: usize) -> Membership {
     let mut members = Membership { swarm: "d".to_owned(), epoch: 1, ..Membership::default() };

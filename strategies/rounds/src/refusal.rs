@@ -51,11 +51,13 @@ pub enum Refusal {
     HaveTooOften,
     /// A round could not be opened: the counters are used up.
     CountersUsedUp,
+    /// What its instructor may not say, or not where somebody else has.
+    WordNotAllowed,
 }
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 25] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -80,6 +82,7 @@ impl Refusal {
         Self::DecisionTooOften,
         Self::HaveTooOften,
         Self::CountersUsedUp,
+        Self::WordNotAllowed,
     ];
 
     /// The cause in words, as the status names its counter.
@@ -110,6 +113,7 @@ impl Refusal {
             Self::DecisionTooOften => "refused_decision_too_often",
             Self::HaveTooOften => "refused_have_too_often",
             Self::CountersUsedUp => "refused_counters_used_up",
+            Self::WordNotAllowed => "refused_word_not_allowed",
         }
     }
 }

@@ -45,6 +45,14 @@ impl Learning {
         self.lessons.is_heeded(self.recent.names(round), instructor)
     }
 
+    /// Whether what an instructor says now of a round comes after what somebody else said of it who goes before.
+    pub fn is_preceded(&self, round: RoundId, by: &InstructorId, said: Option<&SignedWord>) -> bool {
+        let Some(believer) = &self.believer else { return false };
+        let standing = said.and_then(|said| believer.believe(by, said));
+        let standing = standing.map_or(Standing::Unproven, |(_, standing)| standing);
+        self.lessons.is_preceded(self.recent.names(round), by, standing)
+    }
+
     /// The count of what is said next of a round, where instructors sign none.
     pub fn next_count(&self, round: RoundId) -> u64 {
         self.lessons.highest_count(self.recent.names(round)).saturating_add(1)

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use gestalt_protocol::RoundId;
 
-/// How many rounds are remembered: feedback that comes later than that labels nothing new.
+/// How many rounds are remembered, those in which something was seen before others: feedback that comes later than that labels nothing new.
 const MAX_ROUNDS: usize = 32;
 
 /// How many names of one round are remembered: that under which it became known, under which it is looked at, and the smallest.
@@ -42,7 +42,11 @@ impl RecentRounds {
             unlabelled: Vec::new(),
         });
         if self.0.len() > MAX_ROUNDS {
-            self.0.pop_front();
+            // Anybody can say that there was a round; what was seen in one is this robot's own.
+            let before = self.0.iter().take(MAX_ROUNDS);
+            let unseen = before.enumerate().find(|(_, known)| known.looks == 0);
+            let dropped = unseen.map_or(0, |(n, _)| n);
+            self.0.remove(dropped);
         }
         true
     }
@@ -130,5 +134,25 @@ mod tests {
         assert!(!recent.merge(id(1000), id(8000)), "of those beyond, the smallest are remembered");
         assert_eq!((recent.0.len(), recent.names(id(1000)).count()), (1, MAX_NAMES));
         assert_eq!(recent.take_unlabelled(id(1000)).len(), 3000);
+    }
+
+    #[test]
+    fn a_round_in_which_something_was_seen_outlives_those_that_others_speak_of() {
+        let id = |counter| RoundId { counter, opener: RobotId(1), life: 0 };
+        let mut recent = RecentRounds::default();
+        recent.enter(id(1));
+        assert!(recent.look(Duration::ZERO, id(2), vec![1.0], 1, Duration::ZERO));
+        for counter in 3..200 {
+            recent.enter(id(counter));
+        }
+        assert_eq!((recent.0.len(), recent.newest()), (MAX_ROUNDS, Some(id(199))));
+        assert!(!recent.contains(id(1)));
+        assert_eq!(recent.take_unlabelled(id(2)).len(), 1);
+        // Of those in which something was seen the oldest is forgotten.
+        for counter in 200..300 {
+            recent.look(Duration::ZERO, id(counter), vec![1.0], 1, Duration::ZERO);
+        }
+        recent.enter(id(300));
+        assert!(!recent.contains(id(2)) && recent.contains(id(299)) && recent.contains(id(300)));
     }
 }

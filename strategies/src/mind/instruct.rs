@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_protocol::{Answer, ClassId, Gesture, Instruction, InstructorId, Lesson, Outcome, RobotId, Word};
-use gestalt_rounds::Input as AboutRounds;
+use gestalt_rounds::{Input as AboutRounds, Refusal};
 
 use super::answers::Waiting;
 use super::input::Instructed;
@@ -26,16 +26,32 @@ impl Mind {
         if instructed.said.is_none() && !self.answers.is_news(&instructed) {
             return AboutRounds::Tick;
         }
-        let (outcome, named) = match self.name(&instructed) {
-            Some((outcome @ (Outcome::Learned | Outcome::Known), Some(gesture))) => {
-                (self.shown_as(&instructed, gesture).unwrap_or(outcome), Some(gesture))
-            }
-            Some((outcome, gesture)) => (outcome, gesture),
-            None => (self.learn_from(&instructed, &instructed.instruction), None),
-        };
+        if self.is_preceded(&instructed) {
+            return self.on_disallowed(now, instructed);
+        }
+        let (outcome, named) = self.heed(&instructed);
         self.share();
         self.prepare_answer(now, instructed, outcome, named);
         AboutRounds::Tick
+    }
+
+    /// Whether somebody else has said of that round what goes before it. What one said oneself anybody takes back.
+    fn is_preceded(&self, instructed: &Instructed) -> bool {
+        let Instructed { by, instruction, said, .. } = instructed;
+        let round = instruction.round().filter(|_| !matches!(instruction, Instruction::Retract { .. }));
+        let learning = self.learning.as_ref();
+        learning.zip(round).is_some_and(|(learning, round)| learning.is_preceded(round, by, said.as_ref()))
+    }
+
+    /// Names or teaches what it says: what became of it, and which gesture was named.
+    fn heed(&mut self, instructed: &Instructed) -> (Outcome, Option<ClassId>) {
+        match self.name(instructed) {
+            Some((outcome @ (Outcome::Learned | Outcome::Known), Some(gesture))) => {
+                (self.shown_as(instructed, gesture).unwrap_or(outcome), Some(gesture))
+            }
+            Some((outcome, gesture)) => (outcome, gesture),
+            None => (self.learn_from(instructed, &instructed.instruction), None),
+        }
     }
 
     /// Who may teach is known anew.
@@ -51,6 +67,7 @@ impl Mind {
 
     /// One robot says so for all, as it does of a word that is heeded.
     pub(super) fn on_disallowed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
+        self.rounds.note_refusal(Refusal::WordNotAllowed);
         self.prepare_answer(now, instructed, Outcome::NotAllowed, None);
         AboutRounds::Tick
     }

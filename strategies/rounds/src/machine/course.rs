@@ -35,17 +35,23 @@ impl Rounds {
         self.join(id, effects);
     }
 
+    /// When the newest round began that this robot took part in, or in which something was decided. That others came to nothing in another is anybody's word, and keeps
+    /// nobody from opening one.
+    fn last_showing(&self) -> Option<Duration> {
+        let decided = self.round.as_ref().filter(|round| round.has_decided());
+        decided.map(|round| round.since).max(self.took_part)
+    }
+
     /// Until when a request to open a round may be a copy of the one for the newest round.
     fn refractory_until(&self) -> Duration {
-        self.round.as_ref().map_or(Duration::ZERO, |round| round.since + self.config.refractory)
+        self.last_showing().map_or(Duration::ZERO, |since| since + self.config.refractory)
     }
 
     /// When a round is to be opened for the gesture shown; never for one that has had its round, and not before the
     /// round of an earlier gesture is over.
     pub(super) fn showing(&self) -> Option<Duration> {
         let began = self.shown?;
-        let round = self.round.as_ref();
-        let waits = round.is_none_or(|round| !round.open && round.since < began);
+        let waits = !self.is_open() && self.last_showing().is_none_or(|since| since < began);
         waits.then(|| self.refractory_until())
     }
 
@@ -148,6 +154,7 @@ impl Rounds {
         self.stop_looking(effects);
         self.highest = self.highest.max(Some(id.counter));
         self.electorate.forget(self.now, self.config.lately, &self.alive);
+        self.took_part = self.last_showing();
         let before = self.round.take().filter(|before| before.id.counter == id.counter);
         match &before {
             Some(before) if before.has_decided() => self.past.extend(before.names()),
@@ -163,6 +170,9 @@ impl Rounds {
             round.agreement.note_restart(self.me);
         }
         let open = round.open;
+        if open {
+            self.took_part = Some(self.now);
+        }
         self.past.extend(taught);
         self.past.remove(&id);
         self.round = Some(round);

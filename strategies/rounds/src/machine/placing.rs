@@ -64,7 +64,8 @@ impl Rounds {
     ) -> Result<Ordering, Refusal> {
         let (first, began) = self.began;
         let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
-        if u64::from(id.counter) > u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived {
+        let bound = u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived;
+        if u64::from(id.counter) > bound && !self.most_are_beyond(bound, (id, decided), from) {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
         }
@@ -106,6 +107,16 @@ impl Rounds {
         }
         let beyond = |counter: &&u32| **counter > known.saturating_add(LEAP);
         self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
+    }
+
+    /// Whether a majority is beyond the bound on counts: by a decision for a gesture, or by votes. Robots that started at other times have other bounds, and one robot
+    /// can take each of them to its own, a little at a time: most go on together.
+    fn most_are_beyond(&mut self, bound: u64, (id, decided): (RoundId, Option<bool>), from: RobotId) -> bool {
+        if decided.is_none() && self.known(from).is_some() {
+            self.far_ahead.insert(from, id.counter);
+        }
+        let beyond = self.far_ahead.values().filter(|counter| u64::from(**counter) > bound).count();
+        decided == Some(true) || beyond >= self.config.holders(self.electorate.count()).max(2) as usize
     }
 
     /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted. One that began before this robot

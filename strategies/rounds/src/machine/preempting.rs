@@ -1,11 +1,11 @@
-//! Which newer rounds may end the one that is open.
+//! Which newer rounds may end the one that is open, or take the place of one that is over.
 
 use gestalt_protocol::{HeldVote, RobotId, RoundId};
 
 use super::rounds::{Effects, Rounds};
 
 impl Rounds {
-    /// Whether that newer round, which is not the open one by another name, would end this before it had its time, if others take part in it. `from`: whose
+    /// Whether that newer round, which is not the open one by another name, would end this before it had its time, if others take part in it; or would be a further one of those that come to nothing by one robot's word. `from`: whose
     /// vote brings it, or who says what was `decided` in it.
     ///
     /// Robots are behind, and a newer round takes them along; but whoever may vote could begin one round after the other. So the votes of the open
@@ -18,20 +18,31 @@ impl Rounds {
         effects: &mut Effects<'_>,
     ) -> bool {
         let Some(round) = &self.round else { return false };
+        if round.id > id || self.config.refractory.is_zero() {
+            return false;
+        }
+        // That nothing was decided is anybody's word.
+        if decided == Some(false) {
+            if !round.open {
+                // What is held gives way to it.
+                let known = self.known(from);
+                return self.compare(id, decided).is_gt() && !self.preempted.take(self.now, known);
+            }
+            // Nobody looks in a round that is over: what is shown now would have none. But who opened the open one under a count that was used opens another.
+            if !self.is_displaced_by(id) {
+                return true;
+            }
+        }
         let begun = round.open && round.ballot.len() > 1;
-        if !begun || round.id > id || self.config.refractory.is_zero() {
+        if !begun {
             return false;
         }
         if self.now < round.since + self.config.refractory {
             return true;
         }
-        match decided {
-            // A decision of others is the word of many.
-            Some(true) => return false,
-            // That nothing was decided is anybody's, and nobody looks in a round that is over: what is shown now would have none. But who opened the
-            // open one under a count that was used opens another.
-            Some(false) if !self.is_displaced_by(id) => return true,
-            Some(false) | None => {}
+        // A decision of others is the word of many.
+        if decided == Some(true) {
+            return false;
         }
         if self.concludes_now(effects) {
             return true;

@@ -118,6 +118,8 @@ pub struct Rounds {
     pub(super) now: Duration,
     /// The newest round known.
     pub(super) round: Option<Round>,
+    /// When the last one before it began that this robot took part in or that was decided, or it itself if this robot took part in it.
+    pub(super) took_part: Option<Duration>,
     /// The names of earlier rounds under its count in which this robot held a gesture, or of which an instructor spoke: names of this one they never become.
     pub(super) past: BTreeSet<RoundId>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
@@ -184,6 +186,7 @@ impl Rounds {
             stamp: Stamp { boot: life.boot, sequence: 0 },
             now: Duration::ZERO,
             round: None,
+            took_part: None,
             past: BTreeSet::new(),
             far_ahead: BTreeMap::new(),
             highest: None,

@@ -70,6 +70,21 @@ pub const ALL: &[Attack] = &[
         play: |seed| beside(&Plan::sealed().liars(1), seed, nothing_was_decided, within_a_second),
     },
     Attack {
+        number: "A7",
+        what: "an enrolled robot says of one newer round after the other that nothing was decided in it, before each gesture, and before the instructor says which it was",
+        tier: Tier::T4,
+        setting: Setting::Sealed,
+        expected: "each gesture is decided, at most 1 s later, and samples have the class that was said of what they show",
+        counted: Counted::Some(&["refused_round_too_soon"]),
+        gap: None,
+        play: |seed| {
+            let judge = |peace: &Swarm, war: &Swarm| {
+                within_a_second(peace, war).and_then(|()| names_apart(peace, war))
+            };
+            beside(&Plan::sealed().liars(1), seed, nothing_before_and_after, judge)
+        },
+    },
+    Attack {
         number: "A7 · 7",
         what: "an enrolled robot begins another round under the count of one that was taught, and calls it by that one's name",
         tier: Tier::T4,
@@ -213,25 +228,49 @@ fn one_after_the_other(swarm: &mut Swarm) {
     }
 }
 
-fn nothing_was_decided(swarm: &mut Swarm) {
+/// An enrolled robot, which was in that round alone, gives that nothing was decided in it.
+fn came_to_nothing(swarm: &mut Swarm, sequence: u32, round: RoundId) {
     let liar = swarm.liar();
+    let own = forged::said(liar, Stamp { boot: 1, sequence }, forged::null_vote(round));
+    let own = forged::held(forged::signed(own, &key(liar), &swarm.id()));
+    let mut decision = forged::decision(round, vec![own], liar);
+    let certificate = &mut decision.certificate;
+    (certificate.probabilities, certificate.elapsed_ms) = (Vec::new(), u32::MAX);
+    decision.class = None;
+    swarm.give(liar, Some(decision), Vec::new());
+}
+
+fn nothing_was_decided(swarm: &mut Swarm) {
     for class in [1, 2] {
         let began = swarm.now();
         swarm.begin(class);
         for n in 0..25 {
             swarm.pass(100 * MS);
             let counter = swarm.round().counter + n % 2;
-            let round = RoundId { counter, opener: RobotId(u32::MAX), life: 9 };
-            let own =
-                forged::said(liar, Stamp { boot: 1, sequence: 100 * class + n }, forged::null_vote(round));
-            let own = forged::held(forged::signed(own, &key(liar), &swarm.id()));
-            let mut decision = forged::decision(round, vec![own], liar);
-            let certificate = &mut decision.certificate;
-            (certificate.probabilities, certificate.elapsed_ms) = (Vec::new(), u32::MAX);
-            decision.class = None;
-            swarm.give(liar, Some(decision), Vec::new());
+            came_to_nothing(swarm, 100 * class + n, RoundId { counter, opener: RobotId(u32::MAX), life: 9 });
         }
         swarm.end(began);
+        swarm.pass(6000 * MS);
+    }
+}
+
+fn nothing_before_and_after(swarm: &mut Swarm) {
+    let mut sequence = 0;
+    let mut fire = |swarm: &mut Swarm, times: u32| {
+        for _ in 0..times {
+            swarm.pass(260 * MS);
+            sequence += 1;
+            let counter = swarm.mind(1).round().map_or(1, |round| round.counter + 1);
+            came_to_nothing(swarm, sequence, RoundId { counter, opener: RobotId(u32::MAX), life: 9 });
+        }
+        // Until all have heard it.
+        swarm.pass(20 * MS);
+    };
+    for class in [1, 2] {
+        fire(swarm, 4);
+        let round = swarm.show(class);
+        fire(swarm, 40);
+        swarm.teach(round, class);
         swarm.pass(6000 * MS);
     }
 }

@@ -266,15 +266,13 @@ impl Port {
         within(&parcel.bytes, MAX_WORD)?;
         let instruction: Instruction = json(&parcel.bytes)?;
         let (heading, roles) = judge.word(now, &by, &parcel.bytes, parcel.attachment.as_deref())?;
-        let allowed = judge.permits(&by, roles, &instruction);
+        let allowed = roles.permit(&instruction);
         let attachment = parcel.attachment.clone().unwrap_or_default();
         let signed = SignedWord { word: parcel.bytes.clone(), attachment };
         let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
         if allowed {
             return Ok(Some(Input::Instructed(said)));
         }
-        // It is answered, which names it to whoever said it.
-        *self.refused.entry("refused_word_not_allowed".to_owned()).or_default() += 1;
         Ok(Some(Input::Disallowed(said)))
     }
 

@@ -114,3 +114,72 @@ fn a_round_opens_whatever_was_said_of_rounds_to_come() {
         assert_eq!((mind.round(), mind.is_open()), (Some(round(counter, 7)), true));
     }
 }
+
+/// One robot gives that the round of that count came to nothing.
+fn came_to_nothing(counter: u32, by: u32) -> Input {
+    gives(by, undecided(round(counter, by), by))
+}
+
+fn among_others(config: RoundsConfig) -> Rounds {
+    let mut mind = mind_with(7, config);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4, 66]))));
+    mind
+}
+
+#[test]
+fn who_asks_for_a_round_has_it_whatever_came_to_nothing_elsewhere() {
+    let mut mind = among_others(adding_up());
+    mind.handle(ms(1000), came_to_nothing(1, 66));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 66)), false));
+    mind.handle(ms(1001), Input::Open);
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(2, 7)), true));
+}
+
+#[test]
+fn a_gesture_has_its_round_whatever_came_to_nothing_while_the_hand_moved() {
+    let mut mind = among_others(adding_up());
+    mind.handle(ms(1300), came_to_nothing(1, 66));
+    mind.handle(ms(1400), Input::Shown(ms(1000)));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(2, 7)), true));
+    // What was decided elsewhere was this gesture.
+    let mut mind = among_others(adding_up());
+    mind.handle(ms(1300), gives(3, decision(1, Some(0), 3, 3)));
+    mind.handle(ms(1400), Input::Shown(ms(1000)));
+    live(&mut mind, ms(3000));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 1)), false));
+}
+
+#[test]
+fn a_request_is_taken_for_a_copy_of_the_one_before_whatever_came_to_nothing_in_between() {
+    let mut mind = among_others(RoundsConfig { settle: ms(0), ..adding_up() });
+    mind.handle(ms(1000), Input::Open);
+    mind.handle(ms(1010), gives(3, decision(1, Some(0), 3, 3)));
+    mind.handle(ms(1020), came_to_nothing(2, 66));
+    mind.handle(ms(1499), Input::Open);
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(2, 66)), false));
+    mind.handle(ms(1500), Input::Open);
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(3, 7)), true));
+}
+
+#[test]
+fn what_is_held_gives_way_to_nothing_once_a_deadline() {
+    let mut mind = among_others(adding_up());
+    mind.handle(ms(1000), gives(3, decision(1, Some(0), 3, 3)));
+    for counter in 2..12 {
+        mind.handle(ms(1000 + 300 * u64::from(counter)), came_to_nothing(counter, 66));
+    }
+    let counted = mind.refusals().count(Refusal::TooSoon) + mind.refusals().count(Refusal::DecisionTooOften);
+    assert_eq!((mind.round(), counted), (Some(round(2, 66)), 9));
+    // Another robot is heard.
+    mind.handle(ms(4800), came_to_nothing(12, 4));
+    assert_eq!(mind.round(), Some(round(12, 4)));
+}
+
+#[test]
+fn a_round_that_has_just_been_opened_does_not_end_for_one_that_came_to_nothing() {
+    let mut mind = among_others(adding_up());
+    mind.handle(ms(1000), Input::Open);
+    mind.handle(ms(1001), came_to_nothing(2, 66));
+    assert_eq!((mind.round(), mind.is_open()), (Some(round(1, 7)), true));
+    assert_eq!(mind.refusals().count(Refusal::TooSoon), 1);
+}

@@ -111,6 +111,23 @@ fn counters_run_ahead_no_faster_than_gestures_can_be_shown() {
 }
 
 #[test]
+fn whoever_started_later_goes_beyond_its_bound_with_most_others() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([3, 4]))));
+    let ahead = 1 << 24;
+    mind.handle(ms(0), votes(3, 1, null(ahead)));
+    mind.handle(ms(0), votes(4, 1, null(ahead)));
+    assert_eq!(mind.round().unwrap().counter, ahead);
+    live(&mut mind, ms(5900));
+    let (beyond, before) = (ahead + 2 * 6 + 50, mind.refusals().count(Refusal::FarAhead));
+    for (at, robot, taken) in [(6000, 3, ahead), (6001, 3, ahead), (6002, 66, ahead), (6003, 4, beyond)] {
+        mind.handle(ms(at), votes(robot, u32::try_from(at).unwrap(), null(beyond)));
+        assert_eq!(mind.round().unwrap().counter, taken, "{at}");
+    }
+    assert_eq!(mind.refusals().count(Refusal::FarAhead), before + 3);
+}
+
+#[test]
 fn one_robot_takes_nobody_far_ahead_and_two_do() {
     for liars in [0, 1] {
         let mut mind = mind_with(7, RoundsConfig { liars, ..adding_up() });
