@@ -77,7 +77,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut feed = Feed::open(args)?;
     let judge = Judge::new(features, args.gesture != NONE)?;
     let album = Album::open(&args.out, &args.gesture, args.person)?;
-    let mut session = Session { args, judge, album, kept: 0, refused: BTreeMap::new() };
+    let mut session = Session { args, judge, album, kept: 0, refused: BTreeMap::new(), in_a_row: ("", 0) };
     super::runtime()?.block_on(async {
         let mut interrupted = pin!(interrupted());
         tokio::select! {
@@ -161,6 +161,8 @@ struct Session<'a> {
     album: Album,
     kept: u32,
     refused: BTreeMap<&'static str, u32>,
+    /// Why the last picture was not kept, and how many in a row were not for that.
+    in_a_row: (&'static str, u32),
 }
 
 impl Session<'_> {
@@ -186,6 +188,7 @@ impl Session<'_> {
                 None => {
                     let file = self.album.keep(&encode_jpeg(&frame.image, QUALITY)?)?;
                     self.kept += 1;
+                    self.in_a_row = ("", 0);
                     (since, in_vain) = (Instant::now(), 0);
                     self.say_kept(&file)?;
                 }
@@ -222,11 +225,16 @@ impl Session<'_> {
 
     fn refuse(&mut self, word: &'static str, why: &str) -> Result<(), Failure> {
         *self.refused.entry(word).or_default() += 1;
-        line(
-            self.args.json,
-            &json!({"event": "not_kept", "cause": word, "why": why}),
-            &format!("not kept: {why}"),
-        )
+        let before = if self.in_a_row.0 == word { self.in_a_row.1 } else { 0 };
+        self.in_a_row = (word, before + 1);
+        let words = match before + 1 {
+            1 => format!("not kept: {why}"),
+            many if many.is_power_of_two() => format!("not kept: {why} ({many} in a row)"),
+            // Whoever reads along has read it.
+            _ if !self.args.json => return Ok(()),
+            _ => String::new(),
+        };
+        line(self.args.json, &json!({"event": "not_kept", "cause": word, "why": why}), &words)
     }
 
     fn sum_up(&self, features: FeatureSet) -> Result<(), Failure> {

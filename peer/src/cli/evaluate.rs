@@ -11,9 +11,9 @@ use super::train::{measure, naming};
 use super::{Failure, report, say};
 use crate::config::ModelSection;
 use gestalt_draw::confusion;
-use gestalt_vision::dataset::{Dataset, LabelledImage, joined};
+use gestalt_vision::dataset::{Dataset, joined};
 use gestalt_vision::model;
-use gestalt_vision::model_file::{Model, Origin};
+use gestalt_vision::model_file::Model;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::survey::{FalseAlarms, Survey};
 
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         report::ignored(folder, &dataset.ignored);
         ignored |= !dataset.ignored.is_empty();
         let all = dataset.images.len();
-        let kept = if args.include_training { dataset.images } else { unseen(dataset.images, &model.origin) };
+        let kept = if args.include_training { dataset.images } else { model.origin.unseen(dataset.images) };
         if kept.is_empty() && all > 0 {
             return Err(trained_on(folder).into());
         }
@@ -134,45 +134,4 @@ fn trained_on(folder: &Path) -> String {
          --include-training to measure its training accuracy",
         folder.display()
     )
-}
-
-/// The images that the model has not been trained on. Of everyone who shows one of those, all images are left out.
-fn unseen(images: Vec<LabelledImage>, origin: &Origin) -> Vec<LabelledImage> {
-    let known_image = |image: &LabelledImage| {
-        // A file that cannot be read is reported when it is looked at.
-        image.fingerprint().is_ok_and(|print| origin.images.binary_search(&print).is_ok())
-    };
-    let known: Vec<bool> = images.iter().map(known_image).collect();
-    let seen = images.iter().zip(&known).filter(|(_, known)| **known);
-    let people: BTreeSet<u32> = seen.filter_map(|(image, _)| image.person).collect();
-    let known_person = |image: &LabelledImage| image.person.is_some_and(|person| people.contains(&person));
-    let kept = images.into_iter().zip(known).filter(|(image, known)| !known && !known_person(image));
-    kept.map(|(image, _)| image).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-
-    #[test]
-    fn people_trained_on_are_left_out_where_the_numbers_mean_the_same() {
-        let folder = tempfile::tempdir().unwrap();
-        for file in ["0/s001_a.jpg", "0/s001_b.jpg", "0/s002_a.jpg", "1/x.jpg"] {
-            fs::create_dir_all(folder.path().join(file).parent().unwrap()).unwrap();
-            fs::write(folder.path().join(file), file).unwrap();
-        }
-        let images = Dataset::list(folder.path(), None).unwrap().images;
-        let names = |images: Vec<LabelledImage>| -> Vec<String> {
-            images.iter().map(|i| i.path.file_name().unwrap().to_str().unwrap().to_owned()).collect()
-        };
-        // Trained on s001_a of this very dataset: the other picture of person 1 is no test either.
-        let origin = |prints: Vec<u64>| Origin { people: vec![2], images: prints, ..Origin::default() };
-        // Trained with another dataset, whose people are numbered through with these.
-        let seen = origin(vec![images[0].fingerprint().unwrap()]);
-        assert_eq!(names(unseen(images.clone(), &seen)), ["s002_a.jpg", "x.jpg"]);
-        // Trained on another dataset, whose person 1 is somebody else.
-        assert_eq!(unseen(images.clone(), &origin(vec![7])), images);
-    }
 }

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use self::outcome::Outcome;
 use super::show::line;
 use super::{Failure, progress, report, say, score};
-use gestalt_vision::dataset::{Dataset, LabelledImage, Naming};
+use gestalt_vision::dataset::{Dataset, LabelledImage, Naming, leave_out_copies};
 use gestalt_vision::model::train_on_rendered;
 use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
@@ -157,7 +157,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Model::check_writable(out)?;
     }
     let labels = args.classes.as_ref().map(|labels| labels.0.as_slice());
-    let sets = Dataset::list_several(&args.dataset, args.naming(), labels)?;
+    let mut sets = Dataset::list_several(&args.dataset, args.naming(), labels)?;
+    let copies = leave_out_copies(&mut sets);
+    if copies > 0 {
+        eprintln!(
+            "note: left out {copies} copies of other pictures: one is not learned from and measured on"
+        );
+    }
     for (folder, set) in args.dataset.iter().zip(&sets) {
         report::ignored(folder, &set.ignored);
     }

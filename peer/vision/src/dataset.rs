@@ -6,6 +6,7 @@
 //! DIR/none/office.jpg         no gesture: for counting false alarms
 //! ```
 
+mod copies;
 mod folders;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use thiserror::Error;
 
 use folders::{Folders, MAX_IMAGES, in_order};
 
+pub use copies::leave_out_copies;
 pub use folders::{Ignored, NONE, Naming, has_image_name};
 
 /// A folder that is no dataset.

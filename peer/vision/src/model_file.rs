@@ -5,6 +5,7 @@
 //! ```
 //! Numbers are little-endian.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -13,6 +14,8 @@ use gestalt_strategies::{Classifier, MAX_MODEL, ModelError};
 use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
 use thiserror::Error;
+
+use crate::dataset::LabelledImage;
 
 const MAGIC: &[u8; 8] = b"GESTALT\n";
 /// The layout of the file; another layout gets another number.
@@ -113,6 +116,24 @@ pub struct Origin {
     pub cost: f64,
     /// The chosen γ, in units of 1 / (total variance of the reduced samples).
     pub gamma: f64,
+}
+
+impl Origin {
+    /// Those of these images that it was not shown. Of everyone who shows one of those that it was, all images are left out.
+    #[must_use]
+    pub fn unseen(&self, images: Vec<LabelledImage>) -> Vec<LabelledImage> {
+        let known_image = |image: &LabelledImage| {
+            // A file that cannot be read is reported when it is looked at.
+            image.fingerprint().is_ok_and(|print| self.images.binary_search(&print).is_ok())
+        };
+        let known: Vec<bool> = images.iter().map(known_image).collect();
+        let seen = images.iter().zip(&known).filter(|(_, known)| **known);
+        let people: BTreeSet<u32> = seen.filter_map(|(image, _)| image.person).collect();
+        let known_person =
+            |image: &LabelledImage| image.person.is_some_and(|person| people.contains(&person));
+        let kept = images.into_iter().zip(known).filter(|(image, known)| !known && !known_person(image));
+        kept.map(|(image, _)| image).collect()
+    }
 }
 
 /// A classifier and its origin.
@@ -268,6 +289,7 @@ mod tests {
     use rand_chacha::rand_core::SeedableRng;
 
     use super::*;
+    use crate::dataset::Dataset;
 
     fn model() -> Model {
         let sample = |i: u8| {
@@ -344,5 +366,25 @@ mod tests {
         assert!(model.check_features("toy-1", 2).is_ok());
         let error = model.check_features("hog-1", 1764).unwrap_err().to_string();
         assert!(error.contains("'toy-1'") && error.contains("1764 of 'hog-1'"), "{error}");
+    }
+
+    #[test]
+    fn people_trained_on_are_left_out_where_the_numbers_mean_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        for file in ["0/s001_a.jpg", "0/s001_b.jpg", "0/s002_a.jpg", "1/x.jpg"] {
+            fs::create_dir_all(folder.path().join(file).parent().unwrap()).unwrap();
+            fs::write(folder.path().join(file), file).unwrap();
+        }
+        let images = Dataset::list(folder.path(), None).unwrap().images;
+        let names = |images: Vec<LabelledImage>| -> Vec<String> {
+            images.iter().map(|i| i.path.file_name().unwrap().to_str().unwrap().to_owned()).collect()
+        };
+        // Trained on s001_a of this very dataset: the other picture of person 1 is no test either.
+        let origin = |prints: Vec<u64>| Origin { people: vec![2], images: prints, ..Origin::default() };
+        // Trained with another dataset, whose people are numbered through with these.
+        let seen = origin(vec![images[0].fingerprint().unwrap()]);
+        assert_eq!(names(seen.unseen(images.clone())), ["s002_a.jpg", "x.jpg"]);
+        // Trained on another dataset, whose person 1 is somebody else.
+        assert_eq!(origin(vec![7]).unseen(images.clone()), images);
     }
 }

@@ -125,7 +125,9 @@ impl Sight {
     /// Takes in a frame that is of size `whole`, or was before it was reduced to what is enough; then it shows what moves, and no hand.
     pub fn take_reduced(&mut self, frame: &Frame, whole: Size, judge: bool) -> Taken {
         let mut trouble = self.adapt_to(frame.at, whole);
-        let reduced = self.reduce(&frame.image, whole);
+        // Learned eyes look at the frame itself.
+        let is_read = self.detector.is_some() || judge && self.features != FeatureSet::Embedding;
+        let reduced = is_read && self.reduce(&frame.image, whole);
         let change = self.detector.as_mut().map(|detector| match reduced {
             true => detector.watch_reduced(&self.reduction.image, whole, frame.at),
             false => detector.watch(&frame.image, frame.at),

@@ -9,16 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::pool::Pool;
 use super::setting::Moments;
+use super::split::Split;
 use crate::emulation::Observer;
-
-/// The moments of a run: which are shown to be learned from, and which are only to be judged.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Split {
-    /// Taught moments before and after the drift, by class.
-    pub taught: [Vec<Vec<usize>>; 2],
-    /// Held-out moments before and after the drift.
-    pub held_out: [Vec<usize>; 2],
-}
 
 /// Sees, at each frame, a moment of the gesture shown.
 #[derive(Clone, Debug)]

@@ -26,6 +26,7 @@ mod results;
 mod runner;
 mod school;
 mod setting;
+mod split;
 mod standing;
 mod summary;
 #[cfg(test)]

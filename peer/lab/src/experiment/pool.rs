@@ -18,7 +18,8 @@ use super::replace::replace;
 use super::setting::Drift;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::dataset::Dataset;
-use gestalt_vision::perception::{HandConfig, Perception};
+use gestalt_vision::model::{self, ModelError};
+use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{EmulatedView, RenderedSource, Scene, Source, read_image};
 use gestalt_vision::vocabulary::HandPose;
@@ -190,7 +191,17 @@ fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, 
     let fingers: Vec<String> = (0..6).map(|n: u8| n.to_string()).collect();
     // Counts of fingers where there are any, as of the rendered hands; else whatever there is.
     let counts: Vec<String> = fingers.into_iter().filter(|label| folder.join(label).is_dir()).collect();
-    let dataset = Dataset::list(folder, (counts.len() > 1).then_some(&counts[..]))?;
+    let mut dataset = Dataset::list(folder, (counts.len() > 1).then_some(&counts[..]))?;
+    if hands.features == FeatureSet::Embedding {
+        // What the eyes were made with is no test of what they see.
+        dataset.images = model::hands().map_err(ModelError::from)?.origin.unseen(dataset.images);
+        if dataset.images.is_empty() {
+            return Err(ExperimentError::Setting(format!(
+                "the learned eyes were made with {}, or with its people: take pictures that they have not seen",
+                folder.display()
+            )));
+        }
+    }
     let people: BTreeSet<u32> = dataset.people();
     let middle = people.iter().nth(people.len() / 2).copied();
     let mut takes = Vec::new();

@@ -60,6 +60,7 @@ pub fn conduct_by(
     seeds: Option<u32>,
     progress: impl Fn(Progress) + Sync,
 ) -> Result<String, ExperimentError> {
+    materials.check()?;
     let experiment = Experiment::parse(text, origin)?;
     let cells = experiment.cells()?;
     let rules = cells.iter().map(|cell| rules_of(cell, rules)).collect::<Result<Vec<_>, _>>()?;

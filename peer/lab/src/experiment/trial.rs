@@ -12,9 +12,10 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::error::ExperimentError;
-use super::eyes::{PoolEyes, Split};
-use super::pool::{Moment, Pool};
+use super::eyes::PoolEyes;
+use super::pool::Pool;
 use super::setting::{Drift, Setting};
+use super::split::Split;
 use super::standing::Standing;
 use crate::emulation::{Emulation, Observer, Rules, School, Trace, likeliest};
 use crate::threads::Crew;
@@ -22,9 +23,6 @@ use crate::threads::Crew;
 /// The most robots of which all are examined after each round, and how many are of more: all who are train for it.
 pub(super) const ALL_EXAMINED: usize = 100;
 pub(super) const EXAMINED: usize = 32;
-
-/// The most held-out moments that are judged after each round.
-const JUDGED: usize = 60;
 
 /// A robot's evidence is bounded to this, as in a vote.
 const CLIP: f64 = 6.0;
@@ -44,7 +42,7 @@ pub fn run(
 ) -> Result<Vec<Standing>, ExperimentError> {
     let scenario = setting.scenario(pool.gestures.len())?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let split = Arc::new(split(pool, &mut rng)?);
+    let split = Arc::new(Split::draw(&pool.gestures, &pool.moments, &mut rng)?);
     let places = places(pool.places, setting.robots, &mut rng);
     let drift_after = (setting.drift != Drift::None).then_some(setting.rounds / 2);
     let eyes = |place: &usize| -> Box<dyn Observer> {
@@ -109,50 +107,6 @@ fn examined(robots: usize, seed: u64) -> Vec<usize> {
         all.sort_unstable();
     }
     all
-}
-
-/// Draws half of the people to be held out; of a gesture that fewer than four show, half of the moments.
-fn split(pool: &Pool, rng: &mut ChaCha8Rng) -> Result<Split, ExperimentError> {
-    let mut split = Split::default();
-    for after in [false, true] {
-        let moments = || pool.moments.iter().enumerate().filter(|(_, moment)| moment.after == after);
-        let mut people: Vec<u32> = moments().filter_map(|(_, moment)| moment.person).collect();
-        people.sort_unstable();
-        people.dedup();
-        people.shuffle(rng);
-        let by_person = people.len() >= 8;
-        let held_out_people = &people[..people.len() / 2];
-        let mut held_out: Vec<Vec<usize>> = Vec::new();
-        for class in 0..pool.gestures.len() {
-            let of_class: Vec<(usize, &Moment)> =
-                moments().filter(|(_, moment)| moment.class.index() == class).collect();
-            let (held, taught): (Vec<usize>, Vec<usize>) = if by_person {
-                let is_held = |moment: &Moment| moment.person.is_some_and(|p| held_out_people.contains(&p));
-                let (held, taught): (Vec<_>, Vec<_>) =
-                    of_class.into_iter().partition(|(_, moment)| is_held(moment));
-                (held.into_iter().map(|(n, _)| n).collect(), taught.into_iter().map(|(n, _)| n).collect())
-            } else {
-                let mut all: Vec<usize> = of_class.into_iter().map(|(n, _)| n).collect();
-                all.shuffle(rng);
-                let half = all.len() / 2;
-                (all[..half].to_vec(), all[half..].to_vec())
-            };
-            if (held.is_empty() || taught.is_empty()) && moments().next().is_some() {
-                return Err(ExperimentError::Setting(format!(
-                    "too few hands show '{}' to teach with some and to judge others: take more",
-                    pool.gestures[class]
-                )));
-            }
-            split.taught[usize::from(after)].push(taught);
-            held_out.push(held);
-        }
-        let each = JUDGED / pool.gestures.len().max(1);
-        for mut class in held_out {
-            class.shuffle(rng);
-            split.held_out[usize::from(after)].extend(class.into_iter().take(each.max(1)));
-        }
-    }
-    Ok(split)
 }
 
 /// What is right, and the features and coordinates from each place.

@@ -170,6 +170,32 @@ fn a_copy_of_an_image_has_its_fingerprint() {
 }
 
 #[test]
+fn of_copies_one_is_left_in_whose_person_is_known() {
+    let [one, other] = [
+        dataset(&["a/x.jpg", "a/y.jpg", "b/s001_x.jpg", "b/s002_x.jpg"]),
+        dataset(&["a/s001_z.jpg", "b/x.jpg"]),
+    ];
+    for copy in
+        [one.path().join("a/x.jpg"), one.path().join("b/s002_x.jpg"), other.path().join("a/s001_z.jpg")]
+    {
+        fs::write(copy, "hand").unwrap();
+    }
+    fs::write(one.path().join("a/y.jpg"), "another hand").unwrap();
+    fs::write(other.path().join("b/x.jpg"), "another hand").unwrap();
+    let folders = [&one, &other].map(|folder| folder.path().to_owned());
+    let mut sets = Dataset::list_several(&folders, Naming::Names, None).unwrap();
+    assert_eq!(leave_out_copies(&mut sets), 3);
+    let left = |set: &Dataset| -> Vec<String> {
+        set.images
+            .iter()
+            .map(|image| image.path.file_name().unwrap().to_string_lossy().into_owned())
+            .collect()
+    };
+    assert_eq!([left(&sets[0]), left(&sets[1])], [vec!["y.jpg", "s001_x.jpg", "s002_x.jpg"], vec![]]);
+    assert_eq!(leave_out_copies(&mut sets), 0);
+}
+
+#[test]
 fn a_share_of_the_people_is_drawn_by_the_seed() {
     let names: Vec<String> =
         (0..10).flat_map(|i| [format!("a/s{i}_1.jpg"), format!("b/s{i}_1.jpg")]).collect();

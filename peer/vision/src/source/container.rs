@@ -25,7 +25,13 @@ pub enum PictureError {
         /// In millions of pixels.
         limit: f64,
     },
+    /// A progressive JPEG of more scans than allowed; it was not decoded. Each goes through all of the picture, and may be a few bytes.
+    #[error("a JPEG of more than {MOST_SCANS} scans: write it anew, `jpegtran` does")]
+    TooManyScans,
 }
+
+/// The most scans of a JPEG that is decoded: encoders write about ten.
+pub(super) const MOST_SCANS: usize = 100;
 
 /// A whole file's claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +92,7 @@ fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
     const START_OF_SCAN: u8 = 0xda;
     const END_OF_IMAGE: u8 = 0xd9;
     const APPLICATION_1: u8 = 0xe1;
-    let (mut claim, mut may_be_turned) = (None, false);
+    let (mut claim, mut may_be_turned, mut scans) = (None, false, 0);
     loop {
         // A marker is 0xff, any number of times, and a code.
         let Some(fill) = rest.iter().position(|byte| *byte != 0xff) else {
@@ -119,6 +125,10 @@ fn inspect_jpeg(mut rest: &[u8]) -> Result<Claim, PictureError> {
         }
         rest = &rest[length..];
         if marker == START_OF_SCAN {
+            scans += 1;
+            if scans > MOST_SCANS {
+                return Err(PictureError::TooManyScans);
+            }
             rest = &rest[end_of_scan(rest).ok_or(PictureError::Truncated)?..];
         }
     }
@@ -164,6 +174,20 @@ mod tests {
         let mut jpeg = encoded(".jpg", 40, 30);
         jpeg.splice(2..2, *b"\xff\xe1\x00\x08Exif\0\0");
         assert_eq!(inspect(&jpeg), Ok(Claim { width: 40, height: 30, plain_jpeg: false }));
+    }
+
+    #[test]
+    fn scans_are_counted_before_each_costs_a_pass() {
+        use opencv::imgcodecs::{IMWRITE_JPEG_PROGRESSIVE, imencode};
+        let picture = Mat::new_rows_cols_with_default(30, 40, CV_8UC3, Scalar::all(90.0)).unwrap();
+        let mut bytes = Vector::new();
+        imencode(".jpg", &picture, &mut bytes, &vec![IMWRITE_JPEG_PROGRESSIVE, 1].into()).unwrap();
+        let mut progressive: Vec<u8> = bytes.iter().collect();
+        assert!(inspect(&progressive).is_ok());
+        let last = progressive.windows(2).rposition(|marker| marker == [0xff, 0xda]).unwrap();
+        let scan = progressive[last..progressive.len() - 2].to_vec();
+        progressive.splice(last..last, scan.repeat(MOST_SCANS));
+        assert_eq!(inspect(&progressive), Err(PictureError::TooManyScans));
     }
 
     /// Decoders read the first size of a JPEG, pass over markers that have no segment, and over chunks of a PNG that they do not know.

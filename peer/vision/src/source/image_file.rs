@@ -7,7 +7,7 @@ use std::path::Path;
 use opencv::core::Mat;
 
 use super::SourceError;
-use super::container::{PictureError, inspect};
+use super::container::{MOST_SCANS, PictureError, inspect};
 use super::picture::decode;
 
 /// The largest image that is decoded, in millions of pixels.
@@ -31,6 +31,11 @@ pub fn read_image(path: &Path) -> Result<Mat, SourceError> {
             path: path.into(),
             size: format!("{width}×{height} pixels"),
             limit: format!("{MAX_MEGAPIXELS} megapixels"),
+        }),
+        Err(PictureError::TooManyScans) => Err(SourceError::TooLarge {
+            path: path.into(),
+            size: format!("more than {MOST_SCANS} scans"),
+            limit: "what any encoder writes".to_owned(),
         }),
     }
 }
