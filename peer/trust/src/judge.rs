@@ -3,8 +3,7 @@
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Batches, Decision, Envelope, Give, HeldBatch, Instruction, InstructorId, Message, RobotId,
-    Signature,
+    Announcement, Batches, Decision, Envelope, Give, HeldBatch, InstructorId, Message, RobotId, Signature,
 };
 
 use crate::answer::Answers;

@@ -4,12 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Batches, ClassId, DecodeError, Envelope, FeatureSpaceId, HeldBatch, Instruction, MAX_MESSAGE, Message,
-    RobotId, RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
+    Batches, ClassId, DecodeError, Envelope, FeatureSpaceId, HeldBatch, MAX_MESSAGE, Message, RobotId,
+    RoundId, SampleId, Samples, SharedSample, Stamp, Vector, VocabularyId, Vote,
 };
-use gestalt_trust::{
-    Distrust, Identity, Judge, MAX_ROSTER, Membership, Role, Roles, Roster, RosterError, statement,
-};
+use gestalt_trust::{Distrust, Identity, Judge, MAX_ROSTER, Membership, Roster, RosterError, statement};
 
 const NOW: Duration = Duration::from_secs(1000);
 const ROUND: RoundId = RoundId { counter: 3, opener: RobotId(1), life: 77 };

@@ -445,7 +445,7 @@ fn who_was_first_to_say_what_was_shown_is_overruled_by_nobody_who_may_not() {
     let mut swarm = Swarm::sealed(51);
     swarm.believe(TEACHERS);
     let round = swarm.show(1);
-    let mut say = |swarm: &mut Swarm, who: &str, count, instruction| {
+    let say = |swarm: &mut Swarm, who: &str, count, instruction| {
         (0..3).for_each(|i| swarm.hear(i, who, count, &instruction));
         swarm.pass(Duration::from_secs(10));
         (swarm.outcome(count), swarm.lessons(), swarm.of_class(3)[0] + swarm.of_class(4)[0])
