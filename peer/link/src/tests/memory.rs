@@ -25,11 +25,11 @@ async fn teach(watched: &Watched, name: &str, round: RoundId, class: u32) {
     client.close().await;
 }
 
-fn samples(robot: &Robot) -> usize {
-    robot
-        .status()
-        .learning
-        .map_or(0, |learning| [learning.personal, learning.shared, learning.external].iter().flatten().sum())
+fn samples(status: &gestalt_protocol::Status) -> usize {
+    let all = |learning: &gestalt_protocol::LearningStatus| {
+        [&learning.personal, &learning.shared, &learning.external].into_iter().flatten().sum()
+    };
+    status.learning.as_ref().map_or(0, all)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -56,7 +56,7 @@ async fn a_memory_that_comes_late_is_taken_up() {
     let mut robot = swarm(&name, 1, with_memory(&name, &disk.join("memory"))).await.pop().unwrap();
     let taught = robot.decide(0).await.round;
     teach(&robot, &name, taught, 1).await;
-    let learned = samples(&robot.robot);
+    let learned = samples(&robot.robot.status());
     assert!(learned > 0);
     robot.stop().await;
     // The disk is not mounted when the robot starts again.
@@ -74,7 +74,7 @@ async fn a_memory_that_comes_late_is_taken_up() {
     let boot = robot.robot.status().boot;
     fs::rename(&unmounted, &disk).unwrap();
     robot.status("it is taken up", |status| status.counters.contains_key("memory_taken_up")).await;
-    assert!(samples(&robot.robot) >= learned, "what it knew is back");
+    robot.status("what it knew is back", |status| samples(status) >= learned).await;
     assert!(robot.robot.status().boot > boot, "what it said meanwhile was said under another number");
     // And what it hears now is remembered: a correction of what it was taught before.
     teach(&robot, &name, taught, 0).await;
