@@ -83,19 +83,21 @@ impl Photos {
         let lines: Vec<_> = HANDS.lines().filter(kept).collect();
         let hands = lines.par_iter().map(|line| photo(sets, cache, line)).collect::<Result<Vec<_>, _>>()?;
         let hands = hands.into_iter().flatten().collect();
+        let mut files: Vec<PathBuf> = lines.iter().map(|line| sets.picture(path_of(line))).collect();
         let mut faces = Vec::new();
         for line in FACES.lines().filter(kept) {
             let fields: Vec<&str> = line.split(',').collect();
             let [_, _, x, y, w, h] = numbers(&fields[1..])
                 .and_then(|n| n.try_into().ok())
                 .ok_or_else(|| Damaged(line.to_owned()))?;
-            let picture = read(&sets.picture(fields[0]))?;
+            let file = sets.picture(fields[0]);
+            let picture = read(&file)?;
+            files.push(file);
             // 96 pixels, the face in the middle 75.
             let scale = 75.0 / f32::max(w, h);
             let map = Affine::similar((x + w / 2.0, y + h / 2.0), (48.0, 50.0), 0.0, scale, 1.0, 1.0);
             faces.push(picture.warp(&map, 96, 96, Outside::Nearest).to_pyramid());
         }
-        let mut files: Vec<PathBuf> = lines.iter().map(|line| sets.picture(path_of(line))).collect();
         let mut empty = Vec::new();
         for set in &there {
             let folder = sets.picture(&set.name);
