@@ -5,12 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_link::{Client, Heard, LinkError, News, Overheard};
-use gestalt_protocol::{RobotId, Topic};
+use gestalt_protocol::{MAX_ROBOTS, RobotId, Topic};
 use gestalt_tape::foxglove::Level;
 use gestalt_tape::{Intake, Passing};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::MissedTickBehavior;
+
+use crate::view::clipped;
 
 /// How often robots are asked how they are.
 const ASK: Duration = Duration::from_secs(5);
@@ -161,11 +163,15 @@ impl Listener {
         // A closed session ends the news too.
         let Ok(statuses) = self.client.statuses(ANSWER).await else { return };
         for status in statuses {
-            if let Some(error) = status.errors.last()
-                && errors.insert(status.robot, error.what.clone()).as_ref() != Some(&error.what)
+            let error = status.errors.last().map(|error| clipped(&error.what));
+            if let Some(error) = error
+                && errors.insert(status.robot, error.clone()).as_ref() != Some(&error)
             {
-                let words = format!("robot {}: {}", status.robot, error.what);
+                let words = format!("robot {}: {error}", status.robot);
                 self.intake.say(self.clock.now(), Level::Error, words);
+            }
+            if errors.len() > MAX_ROBOTS {
+                errors.pop_last();
             }
             let Ok(payload) = serde_json::to_vec(&status) else { continue };
             let (topic, at) = (Topic::Status(status.robot), self.clock.now());

@@ -4,7 +4,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, Answer, DecodeError, Instruction, InstructorId, Keys, RobotId, Status, Topic, decode_json,
+    Announcement, Answer, DecodeError, Instruction, InstructorId, Keys, MAX_ROBOTS, RobotId, Status, Topic,
+    decode_json,
 };
 use gestalt_trust::{Roster, Speaker, WordHeading, word};
 use serde::de::DeserializeOwned;
@@ -24,6 +25,9 @@ use super::{LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
 const MAX_WAITING: usize = 1024;
+
+/// The most bytes of answers to one question that are read.
+const MAX_ANSWERS: usize = 64 << 20;
 
 /// A session in client mode, attached to any one robot; it attaches again when that robot goes and comes back.
 #[derive(Debug)]
@@ -137,12 +141,15 @@ impl Client {
             .timeout(patience)
             .await
             .map_err(|error| LinkError::open(&*error))?;
-        let mut answers = Vec::new();
-        while let Ok(reply) = replies.recv_async().await {
+        let (mut answers, mut room) = (Vec::new(), MAX_ANSWERS);
+        while answers.len() < MAX_ROBOTS
+            && let Ok(reply) = replies.recv_async().await
+        {
             // An error is a robot that left meanwhile; what is no answer is another program's on the same key.
-            if let Ok(sample) = reply.result()
-                && let Ok(answer) = decode_json(&sample.payload().to_bytes())
-            {
+            let Ok(sample) = reply.result() else { continue };
+            let Some(left) = room.checked_sub(sample.payload().len()) else { break };
+            if let Ok(answer) = decode_json(&sample.payload().to_bytes()) {
+                room = left;
                 answers.push(answer);
             }
         }

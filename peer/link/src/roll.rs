@@ -34,6 +34,7 @@ pub(crate) struct Roll {
     account: Arc<Account>,
     file: Option<PathBuf>,
     held: Mutex<Held>,
+    first: u64,
     usual: Allowance,
     long: Allowance,
     news: Notify,
@@ -78,7 +79,8 @@ impl Roll {
         file: Option<PathBuf>,
         account: Arc<Account>,
     ) -> Self {
-        account.set("roster_epoch", roster.members().epoch);
+        let first = roster.members().epoch;
+        account.set("roster_epoch", first);
         let door = Arc::new(Door::new(roster.clone()));
         Self {
             me,
@@ -87,6 +89,7 @@ impl Roll {
             account,
             file,
             held: Mutex::new(Held::new(roster)),
+            first,
             usual: Allowance::new(),
             long: Allowance::new(),
             news: Notify::new(),
@@ -166,6 +169,11 @@ impl Roll {
     pub fn newest(&self) -> (u64, Arc<str>) {
         let held = self.held();
         (held.roster.members().epoch, held.json.clone())
+    }
+
+    /// The epoch of the roster that this robot started with.
+    pub fn first(&self) -> u64 {
+        self.first
     }
 
     /// Writes the roster held to its file: a robot that starts again must not go back to an older one. Says whether it is there now.

@@ -39,18 +39,19 @@ pub(crate) async fn keep_roll(
     inbox: Arc<Inbox>,
 ) -> Result<(), String> {
     let mut told: BTreeMap<ZenohId, Told> = BTreeMap::new();
-    let first = roll.newest().0;
+    // A newer one may have come before this began.
+    let first = roll.first();
     let (mut kept, mut followed) = (first, first);
     let mut evidence = Vec::new();
     loop {
         let (epoch, json) = roll.newest();
-        // First what must not be lost, whoever is at the other end of links.
-        if epoch != kept && roll.keep().await {
-            kept = epoch;
-        }
+        // Links end whatever becomes of the disk.
         if epoch != followed {
             node.look_through();
             followed = epoch;
+        }
+        if epoch != kept && roll.keep().await {
+            kept = epoch;
         }
         evidence.extend(inbox.unkept());
         if !evidence.is_empty() && roll.keep_evidence(evidence.clone()).await {

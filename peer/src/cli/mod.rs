@@ -253,11 +253,16 @@ async fn next_decision(
 async fn interrupted() {
     match signals() {
         Ok(mut signals) => {
-            signals.next().await;
+            let (asked, is_asked) = tokio::sync::oneshot::channel();
+            // Beside whoever is to end: a reader of its output that reads no more may hold that up.
             tokio::spawn(async move {
+                signals.next().await;
+                // Who needed it no more has ended already.
+                let _ = asked.send(());
                 signals.next().await;
                 std::process::exit(130);
             });
+            let _ = is_asked.await;
         }
         Err(error) => {
             tracing::warn!("cannot listen for Ctrl-C: {error}");

@@ -214,7 +214,10 @@ impl RobotView {
 
 /// A status with nothing in it that is long, or no number: whoever has the robot's id can write one.
 fn bounded(mut status: Status) -> Status {
-    for text in [&mut status.name, &mut status.model, &mut status.camera.source, &mut status.camera.trouble] {
+    // Nobody reads these here, and they may be any JSON.
+    status.rounds.clear();
+    let Status { name, model, session, camera, .. } = &mut status;
+    for text in [name, model, session, &mut camera.source, &mut camera.trouble] {
         *text = clipped(text);
     }
     let number = |number: &mut f32| *number = finite(f64::from(*number)) as f32;
@@ -225,7 +228,11 @@ fn bounded(mut status: Status) -> Status {
         number(probability);
     }
     if let Some(learning) = &mut status.learning {
-        learning.memory = clipped(&learning.memory);
+        for text in [&mut learning.memory, &mut learning.space, &mut learning.common] {
+            *text = clipped(text);
+        }
+        learning.named.truncate(gestalt_protocol::MAX_CLASSES);
+        learning.named.iter_mut().for_each(|named| named.label = clipped(&named.label));
         learning.doubted.truncate(MAX_DOUBTED);
         for classes in [&mut learning.personal, &mut learning.shared, &mut learning.external] {
             classes.truncate(gestalt_protocol::MAX_CLASSES);

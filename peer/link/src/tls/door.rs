@@ -85,7 +85,8 @@ impl Door {
     /// Whether to let it in, and as whom.
     pub fn admit(&self, visitor: &Visitor) -> Result<Seat, Stranger> {
         let Some(text) = &visitor.name else {
-            return if visitor.is_local && visitor.is_client {
+            // Zenoh links one of a name: who takes a robot's would keep that out.
+            return if visitor.is_local && visitor.is_client && visitor.robot.is_none() {
                 Ok(Seat::Local)
             } else {
                 Err(Stranger::Plain)
@@ -167,6 +168,7 @@ mod tests {
         assert_eq!(door.admit(&client(true)), Ok(Seat::Local));
         assert_eq!(door.admit(&client(false)), Err(Stranger::Plain));
         assert_eq!(door.admit(&Visitor { is_client: false, ..client(true) }), Err(Stranger::Plain));
+        assert_eq!(door.admit(&Visitor { robot: Some(RobotId(7)), ..client(true) }), Err(Stranger::Plain));
 
         let refused = |visitor: Visitor| door.admit(&visitor).unwrap_err().name();
         assert_eq!(refused(visitor(robot(8), 8, Some(8))), "not_enrolled");

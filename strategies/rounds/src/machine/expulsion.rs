@@ -14,6 +14,8 @@ impl Rounds {
         let stays = |robot: &RobotId| !self.guests.contains(robot) && !robots.contains(robot);
         let alive = self.alive.iter().filter(stays).collect();
         self.electorate.expel(robots);
+        self.waiting.retain(|robot, _| !robots.contains(robot));
+        self.far_ahead.retain(|robot, _| !robots.contains(robot));
         self.on_alive(Arc::new(alive));
         self.wanted.take_if(|wanted| robots.contains(&wanted.holder));
         self.heard_pool.take_if(|(author, _)| robots.contains(author));

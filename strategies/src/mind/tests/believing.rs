@@ -30,36 +30,36 @@ fn signed(who: &str, count: u64, instruction: &Instruction) -> SignedWord {
     SignedWord { word: serde_json::to_vec(instruction).unwrap(), attachment }
 }
 
-fn was(round: RoundId, class: u32) -> Instruction {
+pub(super) fn was(round: RoundId, class: u32) -> Instruction {
     Instruction::Was { round, class: Gesture::Class(ClassId(class)) }
 }
 
 impl Swarm {
-    fn sealed(seed: u64) -> Self {
+    pub(super) fn sealed(seed: u64) -> Self {
         let mut swarm = Self::new(3, config(3, 1.0), seed);
         swarm.believe(BOTH);
         swarm
     }
 
-    fn believe(&mut self, roll: &'static [(&'static str, Standing)]) {
+    pub(super) fn believe(&mut self, roll: &'static [(&'static str, Standing)]) {
         let believer: Arc<dyn Believe> = Arc::new(Roll(roll));
         (0..self.minds.len()).for_each(|i| self.input(i, Input::Believe(believer.clone())));
         self.believer = Some(believer);
     }
 
     /// One robot hears that word itself.
-    fn hear(&mut self, i: usize, who: &str, count: u64, instruction: &Instruction) {
+    pub(super) fn hear(&mut self, i: usize, who: &str, count: u64, instruction: &Instruction) {
         let said = Some(signed(who, count, instruction));
         let (by, instruction) = (who.parse().unwrap(), instruction.clone());
         self.input(i, Input::Instructed(Instructed { by, at: count, instruction, said }));
     }
 
-    fn of_class(&self, class: u32) -> Vec<usize> {
+    pub(super) fn of_class(&self, class: u32) -> Vec<usize> {
         let count = |mind: &Mind| mind.training_set().unwrap().class_count(ClassId(class));
         self.minds.iter().map(count).collect()
     }
 
-    fn lessons(&self) -> Vec<usize> {
+    pub(super) fn lessons(&self) -> Vec<usize> {
         self.minds.iter().map(|mind| mind.learned().unwrap().lessons).collect()
     }
 
@@ -435,53 +435,4 @@ fn nobody_means_a_gesture_that_nobody_named() {
     swarm.input(1, Input::Received(Envelope { author: RobotId(2), stamp, message, signature: None }));
     swarm.pass(Duration::from_secs(10));
     assert_eq!((swarm.of_class(bobs.0), swarm.of_class(adas.0)), (labels, vec![0, 0, 0]));
-}
-
-const TEACHERS: &[(&str, Standing)] =
-    &[("bob", Standing::Teaches), ("cyn", Standing::Teaches), ("guest", Standing::Vouched)];
-
-#[test]
-fn who_was_first_to_say_what_was_shown_is_overruled_by_nobody_who_may_not() {
-    let mut swarm = Swarm::sealed(51);
-    swarm.believe(TEACHERS);
-    let round = swarm.show(1);
-    let say = |swarm: &mut Swarm, who: &str, count, instruction| {
-        (0..3).for_each(|i| swarm.hear(i, who, count, &instruction));
-        swarm.pass(Duration::from_secs(10));
-        (swarm.outcome(count), swarm.lessons(), swarm.of_class(3)[0] + swarm.of_class(4)[0])
-    };
-    assert_eq!(say(&mut swarm, "guest", 700, was(round, 3)), (Outcome::Learned, vec![1; 3], 9));
-    assert_eq!(say(&mut swarm, "bob", 710, was(round, 4)).0, Outcome::Learned, "a key goes before none");
-    assert_eq!(swarm.of_class(4), [9; 3]);
-    // However little it says that it had said before.
-    for (who, count) in [("cyn", 600), ("cyn", 720), ("guest", 721)] {
-        assert_eq!(say(&mut swarm, who, count, was(round, 3)).0, Outcome::NotAllowed, "{who}");
-        assert_eq!(swarm.of_class(4), [9; 3]);
-    }
-    let new = Instruction::New { label: "circle".to_owned(), round: Some(round) };
-    assert_eq!(say(&mut swarm, "cyn", 722, new).0, Outcome::NotAllowed);
-    assert!(swarm.minds[0].learned().unwrap().named.is_empty(), "it changed nothing");
-    assert_eq!(say(&mut swarm, "bob", 730, was(round, 2)).0, Outcome::Learned, "its own word it may mend");
-    assert_eq!(say(&mut swarm, "bob", 740, Instruction::Retract { round }).0, Outcome::Learned);
-    assert_eq!(say(&mut swarm, "cyn", 750, was(round, 3)).0, Outcome::Learned);
-    swarm.check();
-}
-
-#[test]
-fn a_word_that_taught_nothing_or_may_be_said_no_more_keeps_nobody_from_teaching() {
-    let mut swarm = Swarm::sealed(52);
-    swarm.believe(TEACHERS);
-    let round = swarm.show(1);
-    swarm.hear(0, "bob", 700, &was(round, 77));
-    swarm.hear(0, "bob", 701, &was(RoundId { counter: 900, ..round }, 3));
-    swarm.pass(Duration::from_secs(10));
-    assert_eq!([swarm.outcome(700), swarm.outcome(701)], [Outcome::UnknownGesture, Outcome::UnknownRound]);
-    swarm.hear(0, "cyn", 710, &was(round, 3));
-    swarm.pass(Duration::from_secs(10));
-    assert_eq!((swarm.outcome(710), swarm.of_class(3)), (Outcome::Learned, vec![9; 3]));
-    // It lost its role, or its key.
-    swarm.believe(&[("bob", Standing::Teaches)]);
-    swarm.hear(0, "bob", 720, &was(round, 4));
-    swarm.pass(Duration::from_secs(10));
-    assert_eq!((swarm.outcome(720), swarm.of_class(4)), (Outcome::Learned, vec![9; 3]));
 }

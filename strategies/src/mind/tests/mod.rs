@@ -5,6 +5,7 @@ mod believing;
 mod feedback;
 mod knowledge;
 mod naming;
+mod preceding;
 mod refusing;
 mod repeating;
 mod rest;

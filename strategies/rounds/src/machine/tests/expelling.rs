@@ -54,3 +54,18 @@ fn nobody_waits_for_who_is_expelled() {
     mind.handle(ms(2), Input::Expelled(robots([3])));
     assert_eq!(mind.held().and_then(|held| held.class), Some(ClassId(0)));
 }
+
+#[test]
+fn what_one_who_is_expelled_said_of_the_next_round_is_not_heard_when_its_time_comes() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 2, 3]))));
+    // A neighbour stays one until its link has ended.
+    mind.handle(ms(0), Input::Neighbours(robots([3])));
+    mind.handle(ms(1), votes(1, 1, vote(1, 0, SURE)));
+    mind.handle(ms(2), votes(2, 1, vote(1, 0, SURE)));
+    mind.handle(ms(3), votes(3, 1, Vote { round: round(2, 3), ..vote(2, 1, SURE) }));
+    assert_eq!((mind.round(), mind.waiting.len()), (Some(round(1, 1)), 1));
+    mind.handle(ms(4), Input::Expelled(robots([3])));
+    live(&mut mind, ms(3000));
+    assert_eq!(mind.round(), Some(round(1, 1)));
+}
