@@ -51,6 +51,7 @@ mod web;
 mod without_eyes;
 
 use std::io::{self, IsTerminal, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
@@ -316,9 +317,20 @@ impl Signals {
 fn say(report: &str) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(report.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+            UNREAD.store(true, Ordering::Relaxed);
+            Ok(())
+        }
+        said => Ok(said?),
     }
+}
+
+/// Whether the reader of stdout has gone.
+static UNREAD: AtomicBool = AtomicBool::new(false);
+
+/// Whether nobody reads what is said any more: who does nothing but say it ends then.
+fn is_unread() -> bool {
+    UNREAD.load(Ordering::Relaxed)
 }
 
 /// The longest duration of a command line: it is added to the clock, which has an end.

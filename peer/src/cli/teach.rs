@@ -6,7 +6,9 @@ use std::io::BufRead;
 use std::pin::pin;
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{Answer, Ask, ClassId, Gesture, Instruction, InstructorId, Question, RoundId};
+use gestalt_protocol::{
+    Answer, Ask, ClassId, Gesture, Instruction, InstructorId, MAX_LABEL, Question, RoundId,
+};
 use serde_json::json;
 use tokio::sync::mpsc;
 
@@ -176,6 +178,11 @@ impl Lesson<'_> {
 
     /// Names a gesture, and has it shown as often as wished.
     async fn name(&mut self, label: String) -> Result<(), Failure> {
+        if !(1..=MAX_LABEL).contains(&label.len()) || label.chars().any(char::is_control) {
+            return Err(
+                format!("a gesture's name has 1 to {MAX_LABEL} bytes, and no control characters").into()
+            );
+        }
         let named = self.ask(&Instruction::New { label: label.clone(), round: self.args.round }).await?;
         let Some(class) = named.class else { return Err(named.outcome.describe().into()) };
         if named.outcome.is_refusal() {

@@ -124,6 +124,9 @@ async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Re
             // What each robot holds is in the decision's own message already.
             Some(Event::Answered(_)) | None => {}
         }
+        if super::is_unread() {
+            break;
+        }
         next = news.next().await;
     }
     Ok(())
@@ -144,6 +147,9 @@ async fn robots(as_json: bool, client: &Client) -> Result<(), Failure> {
     loop {
         seconds.tick().await;
         let statuses = client.statuses(super::ANSWER).await?;
+        if super::is_unread() {
+            return Ok(());
+        }
         if as_json {
             line(true, &json!({"event": "robots", "robots": statuses}), "")?;
             continue;

@@ -61,8 +61,11 @@ impl Document {
     /// # Errors
     /// [`ConfigError::Syntax`].
     pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        let root = json5::from_str(text)
-            .map_err(|cause| ConfigError::Syntax { origin: origin.to_owned(), cause: cause.to_string() })?;
+        let wrong = |cause: String| ConfigError::Syntax { origin: origin.to_owned(), cause };
+        if is_too_deep(text) {
+            return Err(wrong(format!("brackets within brackets, more than {DEEPEST} deep")));
+        }
+        let root = json5::from_str(text).map_err(|cause| wrong(cause.to_string()))?;
         Ok(Self { root })
     }
 
@@ -209,6 +212,22 @@ fn with_example(mut cause: String) -> String {
     cause
 }
 
+/// How deep brackets may lie within each other: the parser has a stack that ends.
+const DEEPEST: usize = 100;
+
+/// Whether brackets are open so deep, as if none stood in text.
+fn is_too_deep(text: &str) -> bool {
+    let mut deep = 0_usize;
+    text.bytes().any(|byte| {
+        match byte {
+            b'{' | b'[' => deep += 1,
+            b'}' | b']' => deep = deep.saturating_sub(1),
+            _ => {}
+        }
+        deep > DEEPEST
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -228,6 +247,15 @@ mod tests {
             let changed = document("{rounds: {alpha: 0.1, quorum: 2}}", &[change]).unwrap();
             assert_eq!(changed, document("{rounds: {alpha: 0.2, quorum: 2}}", &[]).unwrap());
         }
+    }
+
+    #[test]
+    fn brackets_without_end_are_an_error() {
+        for deep in ["{a:", "["] {
+            let refused = document(&deep.repeat(100_000), &[]).unwrap_err().to_string();
+            assert!(refused.contains("more than 100 deep"), "{refused}");
+        }
+        assert!(document("{zenoh: {a: [[[[{}]]]]}}", &[]).is_ok());
     }
 
     #[test]

@@ -218,17 +218,15 @@ impl Model {
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
 
-        let written = NamedTempFile::new_in(folder(path)).and_then(|mut file| {
+        let replaced = || {
+            let mut file = NamedTempFile::new_in(folder(path))?;
             file.write_all(&bytes)?;
             file.as_file().sync_all()?;
             allow_reading(file.as_file())?;
-            file.persist(path).map_err(|error| error.error)
-        });
-        written.map(drop).map_err(|source| ModelFileError::Io {
-            action: "write",
-            path: path.to_owned(),
-            source,
-        })
+            file.persist(path).map(drop).map_err(|error| error.error)
+        };
+        let written = if is_special(path) { fs::write(path, &bytes) } else { replaced() };
+        written.map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
     }
 
     /// Finds out whether [`Self::write`] can succeed, before the work of training is done.
@@ -239,6 +237,9 @@ impl Model {
         let failed = |source| ModelFileError::Io { action: "write", path: path.to_owned(), source };
         if path.is_dir() {
             return Err(failed(io::Error::other("it is a folder")));
+        }
+        if is_special(path) {
+            return Ok(());
         }
         NamedTempFile::new_in(folder(path)).map(drop).map_err(failed)
     }
@@ -262,6 +263,11 @@ impl Model {
 
 fn little_endian(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
+/// Whether a device, a pipe or a link is there: that is written to, not replaced.
+fn is_special(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|there| !there.is_file())
 }
 
 /// The folder a file is in: a rename within one folder is atomic.
@@ -358,6 +364,20 @@ mod tests {
             assert!(matches!(Model::check_writable(path), Err(ModelFileError::Io { action: "write", .. })));
             assert!(matches!(model().write(path), Err(ModelFileError::Io { action: "write", .. })));
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_written_through() {
+        let folder = tempfile::tempdir().unwrap();
+        let [target, link] = ["target", "link"].map(|name| folder.path().join(name));
+        model().write(&target).unwrap();
+        fs::write(&target, "old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        Model::check_writable(&link).unwrap();
+        model().write(&link).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(Model::read(&target).unwrap(), model());
     }
 
     #[test]
