@@ -102,21 +102,28 @@ impl Rounds {
         if self.electorate.count() <= 2 {
             return true;
         }
-        if self.known(from).is_some() {
-            self.far_ahead.insert(from, id.counter);
-        }
-        let beyond = |counter: &&u32| **counter > known.saturating_add(LEAP);
-        self.far_ahead.values().filter(beyond).count() > self.config.liars.max(1) as usize
+        self.note_far_ahead(id, from);
+        self.robots_beyond(known.saturating_add(LEAP).into()) > self.config.liars.max(1) as usize
     }
 
     /// Whether a majority is beyond the bound on counts: by a decision for a gesture, or by votes. Robots that started at other times have other bounds, and one robot
     /// can take each of them to its own, a little at a time: most go on together.
     fn most_are_beyond(&mut self, bound: u64, (id, decided): (RoundId, Option<bool>), from: RobotId) -> bool {
-        if decided.is_none() && self.known(from).is_some() {
+        if decided.is_none() {
+            self.note_far_ahead(id, from);
+        }
+        let most = self.config.holders(self.electorate.count()).max(2) as usize;
+        decided == Some(true) || self.robots_beyond(bound) >= most
+    }
+
+    fn note_far_ahead(&mut self, id: RoundId, from: RobotId) {
+        if self.known(from).is_some() {
             self.far_ahead.insert(from, id.counter);
         }
-        let beyond = self.far_ahead.values().filter(|counter| u64::from(**counter) > bound).count();
-        decided == Some(true) || beyond >= self.config.holders(self.electorate.count()).max(2) as usize
+    }
+
+    fn robots_beyond(&self, counter: u64) -> usize {
+        self.far_ahead.values().filter(|ahead| u64::from(**ahead) > counter).count()
     }
 
     /// Whether a decision can be of the round known here, opened at the same time: not if it took longer than that has lasted. One that began before this robot
