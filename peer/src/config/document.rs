@@ -34,7 +34,7 @@ impl FromStr for Override {
             return Err(refuse("the key is a path of names separated by dots, for example rounds.deadline"));
         }
         // What is neither JSON5 nor meant to be is a string without its quotes: mode:client, rounds.deadline:8s.
-        let value = json5::from_str(value).or_else(|cause| {
+        let value = json(value).or_else(|cause| {
             if value.is_empty() || value.starts_with(['{', '[', '"', '\'']) {
                 Err(refuse(&format!("the value is not JSON5: {cause}")))
             } else {
@@ -61,11 +61,7 @@ impl Document {
     /// # Errors
     /// [`ConfigError::Syntax`].
     pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        let wrong = |cause: String| ConfigError::Syntax { origin: origin.to_owned(), cause };
-        if is_too_deep(text) {
-            return Err(wrong(format!("brackets within brackets, more than {DEEPEST} deep")));
-        }
-        let root = json5::from_str(text).map_err(|cause| wrong(cause.to_string()))?;
+        let root = json(text).map_err(|cause| ConfigError::Syntax { origin: origin.to_owned(), cause })?;
         Ok(Self { root })
     }
 
@@ -215,6 +211,14 @@ fn with_example(mut cause: String) -> String {
 /// How deep brackets may lie within each other: the parser has a stack that ends.
 const DEEPEST: usize = 100;
 
+/// Reads JSON5; says why it is none.
+fn json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    if is_too_deep(text) {
+        return Err(format!("brackets within brackets, more than {DEEPEST} deep"));
+    }
+    json5::from_str(text).map_err(|cause| cause.to_string())
+}
+
 /// Whether brackets are open so deep, as if none stood in text.
 fn is_too_deep(text: &str) -> bool {
     let mut deep = 0_usize;
@@ -254,6 +258,9 @@ mod tests {
         for deep in ["{a:", "["] {
             let refused = document(&deep.repeat(100_000), &[]).unwrap_err().to_string();
             assert!(refused.contains("more than 100 deep"), "{refused}");
+            let change = format!("zenoh.a:{}", deep.repeat(100_000));
+            let refused = change.parse::<Override>().unwrap_err().to_string();
+            assert!(refused.contains("more than 100 deep"));
         }
         assert!(document("{zenoh: {a: [[[[{}]]]]}}", &[]).is_ok());
     }

@@ -261,8 +261,11 @@ impl Dataset {
     }
 }
 
-/// Two names of one folder are one dataset.
-fn each_once(folders: &[PathBuf]) -> Result<(), DatasetError> {
+/// That no two of these are names of one folder.
+///
+/// # Errors
+/// [`DatasetError::Twice`], and [`DatasetError::Io`] for what is not there.
+pub fn each_once(folders: &[PathBuf]) -> Result<(), DatasetError> {
     let mut seen = BTreeSet::new();
     for folder in folders {
         let place =

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use gestalt_vision::dataset::each_once;
 use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
@@ -19,16 +20,10 @@ impl Materials {
     /// That what robots see was not taught to the model that they start from.
     ///
     /// # Errors
-    /// [`ExperimentError::Setting`] where both are one folder.
+    /// [`ExperimentError::Dataset`] where both are one folder, or one is not there.
     pub fn check(&self) -> Result<(), ExperimentError> {
-        let [dataset, start] =
-            [&self.dataset, &self.start].map(|folder| folder.as_ref()?.canonicalize().ok());
-        if dataset.is_some() && dataset == start {
-            return Err(ExperimentError::Setting(
-                "--dataset and --start-dataset are one folder: robots would be judged on what their model has learned; take two".to_owned(),
-            ));
-        }
-        Ok(())
+        let folders: Vec<PathBuf> = [&self.dataset, &self.start].into_iter().flatten().cloned().collect();
+        Ok(each_once(&folders)?)
     }
 }
 
