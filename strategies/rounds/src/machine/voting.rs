@@ -96,7 +96,10 @@ impl Rounds {
         };
         // Who has lived through few rounds, or does not learn, would be surer than all others, and the surest decision is the one that all hold.
         let heard = heard.filter(|heard| found.is_none_or(|found| found.rounds < heard.rounds));
-        let learned = heard.or(found);
+        // Nobody goes by what is only repeated: when who found it is expelled, nothing of it is left.
+        let own_rounds = found.map_or(0, |found| found.rounds);
+        let repeated = heard.map(|heard| Pool { rounds: own_rounds, ..heard });
+        let learned = repeated.or(found);
         let fitted = learned.and_then(|pool| self.fusion.with(pool));
         let rule = fitted.as_deref().unwrap_or(&*self.fusion);
         round.conclude(self.now, &view, rule, &self.config);

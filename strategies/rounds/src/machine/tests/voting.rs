@@ -176,7 +176,8 @@ fn who_found_less_than_others_of_how_alike_robots_are_goes_by_what_they_found() 
         (said.class, said.certificate.pool)
     };
     for own in [None, Some(Pool::PRIOR), Some(Pool { rounds: 5, ..Pool::PRIOR })] {
-        assert_eq!(told(0, own, clearly.clone()), (None, Some(FOUND)), "{own:?}");
+        let repeated = Pool { rounds: own.map_or(0, |own| own.rounds), ..FOUND };
+        assert_eq!(told(0, own, clearly.clone()), (None, Some(repeated)), "{own:?}");
     }
     // Of its own it has as much as they; and where some may lie it hears nobody.
     let own = Pool { rounds: 64, ..Pool::PRIOR };
@@ -188,6 +189,14 @@ fn who_found_less_than_others_of_how_alike_robots_are_goes_by_what_they_found() 
     mind.handle_with(ms(9000), gives(1, by(&config, clearly.clone())), &mut Found(None));
     mind.handle_with(ms(9500), Input::Expelled(robots([clearly.author.0])), &mut Found(None));
     assert_eq!(comes_to(&mut mind, &mut Found(None), (2, 10_000), faint).certificate.pool, Some(Pool::PRIOR));
+    // Nor by what others repeat of that.
+    let mut mind = start(8, 0);
+    mind.handle_with(ms(9000), gives(1, by(&config, clearly.clone())), &mut Found(None));
+    let repeated = comes_to(&mut mind, &mut Found(None), (2, 10_000), clear);
+    assert_eq!((repeated.author, repeated.certificate.pool.unwrap().temperature), (RobotId(8), 1.56));
+    let mut mind = start(7, 0);
+    mind.handle_with(ms(19_000), gives(2, by(&config, repeated)), &mut Found(None));
+    assert_eq!(comes_to(&mut mind, &mut Found(None), (3, 20_000), faint).certificate.pool, Some(Pool::PRIOR));
     // What another believed beforehand is nothing that it found.
     let unfounded = comes_to(&mut start(1, 0), &mut Found(None), (1, 0), clear);
     assert_eq!(told(0, None, unfounded).1, Some(Pool::PRIOR));
