@@ -29,7 +29,10 @@ def main() -> None:
     parser.add_argument("word", help='such as {"say": "open"}')
     parser.add_argument("--connect", default="tls/127.0.0.1:7447", help="endpoint of a robot")
     args = parser.parse_args()
-    json.loads(args.word)
+    try:
+        said = json.loads(args.word)
+    except ValueError as error:
+        parser.error(f"the word is no JSON: {error}; write it as '{{\"say\": \"open\"}}'")
     name = args.folder.resolve().name.removeprefix("client-")
     roster = json.loads((args.folder / "roster.json").read_text())
     secret = bytes.fromhex((args.folder / f"client-{name}.key").read_text().strip())
@@ -48,7 +51,13 @@ def main() -> None:
         raise SystemExit(f"no robot answers at {args.connect}: {error}") from None
     with session:
         key_expr = f"gestalt/{roster['swarm']}/instructor/{name}"
-        answers = session.declare_subscriber(f"{key_expr}/answer", lambda sample: print(sample.payload.to_string()))
+
+        def on_answer(sample) -> None:
+            # Another word of the same client may be answered meanwhile. To open a round is not answered: the decision is.
+            if json.loads(sample.payload.to_string())["to"] == said:
+                print(sample.payload.to_string(), flush=True)
+
+        answers = session.declare_subscriber(f"{key_expr}/answer", on_answer)
         session.put(f"{key_expr}/word", word, attachment=attachment(key, roster, name, word, count),
                     encoding=zenoh.Encoding.APPLICATION_JSON)
         time.sleep(3)

@@ -3,7 +3,8 @@
     sudo apt install python3-rospy python3-std-msgs && pip install eclipse-zenoh
     python3 ros1.py _connect:=tcp/127.0.0.1:7447 _swarm:=gestalt
 
-Publishes ~gesture (latched) and ~decision; takes the words open, right, wrong and "was three" on ~say.
+Publishes ~gesture (latched) and ~decision; takes the words open, right, wrong, undo and "was three" on ~say.
+What they mean is in ros_words.py, beside it.
 """
 
 import json
@@ -11,6 +12,8 @@ import json
 import rospy
 import zenoh
 from std_msgs.msg import String
+
+from ros_words import instruction
 
 
 def main():
@@ -21,25 +24,28 @@ def main():
     config.insert_json5("connect/endpoints", json.dumps([rospy.get_param("~connect", "tcp/127.0.0.1:7447")]))
     gesture = rospy.Publisher("~gesture", String, queue_size=1, latch=True)
     decision = rospy.Publisher("~decision", String, queue_size=10)
-    last = {}
+    # The last decision, and the round of which something was said last.
+    decided = spoken = None
     with zenoh.open(config) as swarm:
 
         def on_decision(sample):
+            nonlocal decided
             text = sample.payload.to_string()
-            last.update(json.loads(text))
+            heard = json.loads(text)
+            # All that is needed of it, or nothing: what lacks it is no decision.
+            decided = {field: heard[field] for field in ("round", "class", "label")}
             decision.publish(text)
-            if last["label"] is not None:
-                gesture.publish(last["label"])
+            if decided["label"] is not None:
+                gesture.publish(decided["label"])
 
         def on_word(message):
-            word, *rest = message.data.split()
-            say = {"say": word}
-            if word != "open":
-                if not last:
-                    return rospy.logwarn("no round has been decided yet: say 'open'")
-                say["round"] = last["round"]
-                say.update({"class": rest[0]} if word == "was" and rest else {"of": last["class"]})
-            swarm.put(f"gestalt/{name}/instructor/ros/feedback", json.dumps(say))
+            nonlocal spoken
+            try:
+                word = instruction(message.data, decided, spoken)
+            except ValueError as refused:
+                return rospy.logwarn(str(refused))
+            spoken = word.get("round", spoken)
+            swarm.put(f"gestalt/{name}/instructor/ros/feedback", json.dumps(word))
 
         subscriber = swarm.declare_subscriber(f"gestalt/{name}/decision", on_decision)
         rospy.Subscriber("~say", String, on_word)

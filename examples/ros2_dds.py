@@ -3,7 +3,8 @@
     pip install eclipse-zenoh
     python3 ros2_dds.py --connect tcp/127.0.0.1:7447 --swarm gestalt
 
-Publishes /gestalt/gesture (latched) and /gestalt/decision; takes the words open, right, wrong and "was three" on /gestalt/say.
+Publishes /gestalt/gesture (latched) and /gestalt/decision; takes the words open, right, wrong, undo and "was three" on /gestalt/say.
+What they mean is in ros_words.py, beside it.
 """
 
 import argparse
@@ -14,6 +15,8 @@ import zenoh
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+
+from ros_words import instruction
 
 
 def main():
@@ -29,25 +32,28 @@ def main():
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     gesture = node.create_publisher(String, "~/gesture", latched)
     decision = node.create_publisher(String, "~/decision", 10)
-    last = {}
+    # The last decision, and the round of which something was said last.
+    decided = spoken = None
     with zenoh.open(config) as swarm:
 
         def on_decision(sample):
+            nonlocal decided
             text = sample.payload.to_string()
-            last.update(json.loads(text))
+            heard = json.loads(text)
+            # All that is needed of it, or nothing: what lacks it is no decision.
+            decided = {field: heard[field] for field in ("round", "class", "label")}
             decision.publish(String(data=text))
-            if last["label"] is not None:
-                gesture.publish(String(data=last["label"]))
+            if decided["label"] is not None:
+                gesture.publish(String(data=decided["label"]))
 
         def on_word(message):
-            word, *rest = message.data.split()
-            say = {"say": word}
-            if word != "open":
-                if not last:
-                    return node.get_logger().warning("no round has been decided yet: say 'open'")
-                say["round"] = last["round"]
-                say |= {"class": rest[0]} if word == "was" and rest else {"of": last["class"]}
-            swarm.put(f"gestalt/{options.swarm}/instructor/ros/feedback", json.dumps(say))
+            nonlocal spoken
+            try:
+                word = instruction(message.data, decided, spoken)
+            except ValueError as refused:
+                return node.get_logger().warning(str(refused))
+            spoken = word.get("round", spoken)
+            swarm.put(f"gestalt/{options.swarm}/instructor/ros/feedback", json.dumps(word))
 
         subscriber = swarm.declare_subscriber(f"gestalt/{options.swarm}/decision", on_decision)
         node.create_subscription(String, "~/say", on_word, 10)

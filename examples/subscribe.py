@@ -46,7 +46,8 @@ def main() -> None:
                 print(text, flush=True)
                 continue
             decision = json.loads(text)
-            what = decision["label"] if decision["class"] is not None else "no decision"
+            # Null where nothing was decided; the label also where whoever says it has another vocabulary.
+            what = "no decision" if decision["class"] is None else decision["label"] or f"class {decision['class']}"
             robots = len(decision["certificate"]["votes"])
             print(
                 f"round {decision['round']['counter']}: {what}"

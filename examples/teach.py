@@ -7,21 +7,37 @@
 Teaching is a put of JSON on `gestalt/<swarm>/instructor/<name>/feedback`; answers come on `…/<name>/answer`.
 """
 import argparse
+import collections
 import json
 import time
 
 import zenoh
 
 
-def wait_for(subscriber, patience: float):
-    """The next message as JSON, or None when the time is up."""
+def waiting(subscriber):
+    """The messages that have come, as JSON, one by one."""
+    while (sample := subscriber.try_recv()) is not None:
+        yield json.loads(sample.payload.to_string())
+
+
+def wait_for(subscriber, patience: float, is_it):
+    """The first message that is the one, as JSON, or None when the time is up."""
     end = time.monotonic() + patience
     while time.monotonic() < end:
-        sample = subscriber.try_recv()
-        if sample is not None:
-            return json.loads(sample.payload.to_string())
-        time.sleep(0.02)
+        message = next(waiting(subscriber), None)
+        if message is None:
+            time.sleep(0.02)
+        elif is_it(message):
+            return message
     return None
+
+
+def named(decision: dict) -> str:
+    """The gesture that was decided."""
+    if decision["class"] is None:
+        return "no decision"
+    # Whoever says it may have another vocabulary, and no label for it.
+    return decision["label"] or f"class {decision['class']}"
 
 
 def main() -> None:
@@ -44,9 +60,14 @@ def main() -> None:
     except zenoh.ZError as error:
         raise SystemExit(f"no robot answers at {given.connect}: {error}") from None
     with session:
-        decisions = session.declare_subscriber(f"{prefix}/decision")
-        answers = session.declare_subscriber(f"{prefix}/instructor/{given.name}/answer")
-        questions = session.declare_subscriber(f"{prefix}/question")
+        # While a person thinks nobody reads: a ring forgets the oldest then, where Zenoh's own queue would hold up its session.
+        def ring(key: str):
+            return session.declare_subscriber(key, zenoh.handlers.RingChannel(64))
+
+        decisions = ring(f"{prefix}/decision")
+        answers = ring(f"{prefix}/instructor/{given.name}/answer")
+        questions = ring(f"{prefix}/question")
+        known = collections.deque(maxlen=256)
         told = iter(given.gestures) if given.gestures is not None else None
         while True:
             said = next(told, "") if told is not None else None
@@ -54,23 +75,28 @@ def main() -> None:
                 return
             # Half a second after a round began, a request to open is taken for an echo of the one before.
             time.sleep(1)
+            # What others had decided meanwhile is not what the next word is about.
+            known.extend(other["round"] for other in waiting(decisions))
             session.put(feedback, json.dumps({"say": "open"}))
-            decision = wait_for(decisions, 15)
+            decision = wait_for(decisions, 15, lambda decided: decided["round"] not in known)
             if decision is None:
                 print("no decision: is a robot alive?")
                 return
-            print(f"round {decision['round']['counter']}: {decision['label'] or 'no decision'}", flush=True)
+            known.append(decision["round"])
+            print(f"round {decision['round']['counter']}: {named(decision)}", flush=True)
             if told is None:
                 # The swarm asks a second after a round that is worth it; any word on the round answers.
-                question = wait_for(questions, 2.5)
-                if question is not None and question["round"] == decision["round"]:
+                question = wait_for(questions, 2.5, lambda asked: asked["round"] == decision["round"])
+                if question is not None:
                     print(f"  the swarm asks: {question['ask']['kind']} {' or '.join(question['labels'])}", flush=True)
-            gesture = said or input("it was (empty to end): ")
+            gesture = said or input("it was (empty to end): ").strip()
             if not gesture:
                 return
             # Gestures are named by label; a number in JSON would be a class.
-            session.put(feedback, json.dumps({"say": "was", "round": decision["round"], "class": gesture}))
-            answer = wait_for(answers, 10)
+            word = {"say": "was", "round": decision["round"], "class": gesture}
+            session.put(feedback, json.dumps(word))
+            # Others may say something under the same name: the answer names its word.
+            answer = wait_for(answers, 10, lambda answer: answer["to"] == word)
             print("no answer" if answer is None else f"  {answer['outcome']}, {answer['samples']} samples of it", flush=True)
 
 

@@ -31,6 +31,7 @@ mod page;
 mod partition;
 mod pause;
 mod proofs;
+mod python_examples;
 mod recording;
 mod restarts;
 mod ring;
@@ -99,6 +100,7 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::a_pipe_whose_writers_come_and_go_is_streamed_while_there_is_one.await,
         [Waits] stream::pictures_that_appear_late_and_bad_ones_among_them_are_streamed.await,
         [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
+        [Waits] stream::of_two_cameras_that_stream_as_one_robot_the_later_is_looked_at.await,
         [Waits] paced::a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_frames_count.await,
         [Waits] paced::a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_waiting.await,
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
@@ -108,6 +110,8 @@ fn main() -> std::process::ExitCode {
         [Works] ros::a_robot_sees_through_a_camera_that_a_ros_driver_owns.await,
         [Waits, Rospy] ros_examples::rospy_echoes_a_decision.await,
         [Waits, Rclpy] ros_examples::rclpy_over_dds_echoes_a_decision.await,
+        [Works] ros_examples::words_of_ros_mean_what_they_mean_to_the_program,
+        [Waits, Zenoh] python_examples::a_word_from_python_is_about_the_round_that_was_opened_for_it.await,
         [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
         [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
         [Waits] trouble::a_robot_with_anothers_id_is_reported_and_the_swarm_goes_on.await,

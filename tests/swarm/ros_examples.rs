@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::ClassId;
+use gestalt_desk::Word;
+use gestalt_protocol::{ClassId, RobotId, RoundId};
 use gestalt_tests::{Process, Watched, config, start, unique};
 use gestalt_trials::{Need, python};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Prints what it hears as a line of JSON each, and says `open` until it has heard a decision.
+/// Prints what it hears as a line of JSON each, and says `open` until it has heard a decision; before it what is no word.
 const ECHO_ROS1: &str = r#"
 import json, rospy
 from std_msgs.msg import String
@@ -21,14 +22,16 @@ heard = []
 def hears(topic):
     def on(message):
         heard.append(topic)
-        print(json.dumps({"topic": topic, "data": message.data}), flush=True)
+        # Each topic has a thread: one write a line, so that no line breaks into another.
+        print(json.dumps({"topic": topic, "data": message.data}) + "\n", end="", flush=True)
     rospy.Subscriber("/gestalt/" + topic, String, on)
 hears("decision")
 hears("gesture")
-say = rospy.Publisher("/gestalt/say", String, queue_size=1)
+say = rospy.Publisher("/gestalt/say", String, queue_size=10)
 while not rospy.is_shutdown():
     if "decision" not in heard:
-        say.publish("open")
+        for word in ["", "was", "right", "open"]:
+            say.publish(word)
     rospy.sleep(2)
 "#;
 
@@ -47,7 +50,11 @@ def hears(topic, qos):
 hears("decision", 10)
 hears("gesture", QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
 say = node.create_publisher(String, "/gestalt/say", 10)
-node.create_timer(2.0, lambda: "decision" in heard or say.publish(String(data="open")))
+def ask():
+    if "decision" not in heard:
+        for word in ["", "was", "right", "open"]:
+            say.publish(String(data=word))
+node.create_timer(2.0, ask)
 rclpy.spin(node)
 "#;
 
@@ -93,6 +100,86 @@ fn is_echoed(echo: &Process) {
     assert_eq!((decision["label"].as_str(), gesture.as_str()), (Some("2"), "2"), "{decision}");
 }
 
+/// Prints what each word comes to, as a line of JSON each: a message, or why it is none. Its arguments are the examples' folder and the words.
+const READ: &str = r#"
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ros_words import instruction
+for case in json.loads(sys.argv[2]):
+    try:
+        print(json.dumps(instruction(*case)))
+    except ValueError as refused:
+        print(json.dumps(str(refused)))
+"#;
+
+/// What the examples make of words, each of a text, the last decision, and the round last spoken of.
+fn read(cases: &Value) -> Vec<Value> {
+    let python = python(&["json"]).expect("a Python");
+    let ran = Command::new(python)
+        .args(["-B", "-c", READ])
+        .arg(example(""))
+        .arg(cases.to_string())
+        .output()
+        .unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    String::from_utf8(ran.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+pub fn words_of_ros_mean_what_they_mean_to_the_program() {
+    let [before, last] = [4, 5].map(|counter| RoundId { counter, opener: RobotId(2), life: 1_067_057_607 });
+    let decided = |class: Option<u32>| json!({"round": last, "class": class, "label": null});
+    let texts = [
+        "open",
+        " was  three ",
+        "was big circle",
+        "was circle (ana)",
+        "was 3",
+        "right",
+        "wrong",
+        "undo",
+        "retract",
+        "",
+        "  ",
+        "was",
+        "right now",
+        "undo it",
+        "dance",
+    ];
+    let cases: Vec<Value> = texts.iter().map(|text| json!([text, decided(Some(3)), null])).collect();
+    for (text, came_to) in texts.iter().zip(read(&json!(cases))) {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let meant = Word::read(&words).ok().map(|word| match word {
+            Word::Open => json!({"say": "open"}),
+            word => json!(word.about(last, Some(ClassId(3))).unwrap().expect("a word about a round")),
+        });
+        let is_refusal = came_to.as_str().is_some_and(|why| why.contains("say open, was GESTURE, right"));
+        assert!(
+            meant.as_ref().map_or(is_refusal, |meant| *meant == came_to),
+            "'{text}': {came_to}, not {meant:?}"
+        );
+    }
+
+    let cases = json!([
+        ["open", null, null],
+        ["was three", null, null],
+        ["undo", null, null],
+        ["right", decided(None), null],
+        ["wrong", decided(None), null],
+        ["undo", decided(None), before],
+        ["was three", decided(None), before],
+    ]);
+    let [open, early, nothing, right, wrong, undo, was] = &read(&cases)[..] else { panic!("one line each") };
+    assert_eq!(*open, json!({"say": "open"}));
+    for refused in [early, nothing] {
+        assert!(refused.as_str().is_some_and(|why| why.contains("say 'open'")), "{refused}");
+    }
+    for refused in [right, wrong] {
+        assert!(refused.as_str().is_some_and(|why| why.contains("say 'was GESTURE'")), "{refused}");
+    }
+    assert_eq!(*undo, json!({"say": "retract", "round": before}), "of what was said last");
+    assert_eq!(*was, json!({"say": "was", "round": last, "class": "three"}));
+}
+
 pub async fn rospy_echoes_a_decision() {
     let python = python(Need::ROSPY).expect("the trial needs it");
     let swarm = unique("rospy");
@@ -102,7 +189,7 @@ pub async fn rospy_echoes_a_decision() {
     let ros = |program: &str| {
         let mut command = Command::new(program);
         command.env("ROS_MASTER_URI", format!("http://127.0.0.1:{port}"));
-        command.env("ROS_IP", "127.0.0.1").env("ROS_HOME", home.path());
+        command.env("ROS_IP", "127.0.0.1").env("ROS_HOME", home.path()).env("PYTHONDONTWRITEBYTECODE", "1");
         command
     };
     let _master = Program::start(ros("rosmaster").args(["--core", "-p", &port.to_string()]));
@@ -131,6 +218,7 @@ pub async fn rclpy_over_dds_echoes_a_decision() {
         let mut command = Command::new(&python);
         // No ROS system on this machine is likely to be in it.
         command.env("ROS_DOMAIN_ID", "97").env_remove("RMW_IMPLEMENTATION");
+        command.env("PYTHONDONTWRITEBYTECODE", "1");
         command
     };
     let connect = robots[0].robot.locators()[0].clone();

@@ -106,6 +106,40 @@ pub async fn one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second()
     robot.stop().await;
 }
 
+pub async fn of_two_cameras_that_stream_as_one_robot_the_later_is_looked_at() {
+    let hands = Hands::new(2);
+    let swarm = unique("two");
+    let robot = Robot::start(config(1, &swarm, &[])).await.unwrap();
+    let (arrived, mut nonces) = tokio::sync::mpsc::unbounded_channel();
+    let _gate = robot
+        .receive_frames(None, move |frame| {
+            let _ = arrived.send(frame.header.nonce);
+        })
+        .await
+        .unwrap();
+    // Nobody answers: each sends a frame a second.
+    let stream = || tokio::spawn(parrot(7, &swarm, robot.locators(), &hands.images()).run(|_| {}));
+    let earlier = stream();
+    let first = nonces.recv().await.unwrap();
+    let later = stream();
+    let latest = loop {
+        let nonce = nonces.recv().await.unwrap();
+        if nonce != first {
+            break nonce;
+        }
+    };
+    let refused = || robot.status().counters.get("refused_frame_two_senders").copied().unwrap_or(0);
+    wait_for("refusal", || (refused() >= 2).then_some(())).await;
+    let mut heard = Vec::new();
+    while let Ok(nonce) = nonces.try_recv() {
+        heard.push(nonce);
+    }
+    assert!(!heard.is_empty() && heard.iter().all(|nonce| *nonce == latest), "{heard:?} after {latest}");
+    earlier.abort();
+    later.abort();
+    robot.stop().await;
+}
+
 pub async fn a_peer_looks_through_a_camera_that_is_elsewhere() {
     let hands = Hands::new(4);
     let swarm = unique("elsewhere");

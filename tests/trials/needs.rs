@@ -30,6 +30,8 @@ pub enum Need {
     Rospy,
     /// ROS 2 for Python, and Zenoh for Python.
     Rclpy,
+    /// Zenoh for Python alone (eclipse-zenoh).
+    Zenoh,
     /// The accessibility checker axe-core, which judges a page in a browser: see [`axe`].
     Axe,
     /// What reads metrics: Python's `prometheus_client`, by its own parser of OpenMetrics, and Prometheus' `promtool`.
@@ -56,8 +58,10 @@ impl Need {
     pub const ROSPY: &[&str] = &["rospy", "std_msgs", "zenoh"];
     /// What rclpy's examples import.
     pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
+    /// What all other examples of clients import.
+    pub const ZENOH: &[&str] = &["zenoh"];
 
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::Namespaces,
         Self::Queues,
         Self::Mount,
@@ -69,6 +73,7 @@ impl Need {
         Self::Debian,
         Self::Rospy,
         Self::Rclpy,
+        Self::Zenoh,
         Self::Axe,
         Self::Prometheus,
         Self::Websockets,
@@ -89,6 +94,7 @@ impl Need {
             Self::Debian => "debian",
             Self::Rospy => "rospy",
             Self::Rclpy => "rclpy",
+            Self::Zenoh => "zenoh",
             Self::Axe => "axe",
             Self::Prometheus => "prometheus",
             Self::Websockets => "websockets",
@@ -134,6 +140,7 @@ impl Need {
             Self::Rospy if done("rosmaster", &["--help"]) => imports(Self::ROSPY),
             Self::Rospy => Err("needs rosmaster (python3-rosmaster)".to_owned()),
             Self::Rclpy => imports(Self::RCLPY),
+            Self::Zenoh => imports(Self::ZENOH),
             Self::Axe if !done("chromium", &["--version"]) => Err("needs a browser (chromium)".to_owned()),
             Self::Axe if axe().is_some_and(|file| file.is_file()) => Ok(()),
             Self::Axe => {
