@@ -80,6 +80,7 @@ impl Recording {
             ErrorKind::AlreadyExists => RecordingError::Exists(file.to_owned()),
             _ => RecordingError::Create { path: file.to_owned(), cause },
         })?;
+        let begun = Begun(file);
         let mut about = BTreeMap::from([
             (SWARM.to_owned(), swarm.to_owned()),
             ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
@@ -95,6 +96,7 @@ impl Recording {
                 missing: "nothing was heard yet".to_owned(),
             })?;
         let tap = Tap::open(Arc::new(client), frames, recorder.intake().clone()).await?;
+        begun.keep();
         Ok(Self { file: file.to_owned(), recorder, tap })
     }
 
@@ -130,5 +132,35 @@ impl Recording {
                 Err(RecordingError::Disk { path, cause, written, missing })
             }
         }
+    }
+}
+
+/// A new file that goes again where no recording begins in it: it would keep the next one from its name.
+struct Begun<'a>(&'a Path);
+
+impl Begun<'_> {
+    fn keep(self) {
+        std::mem::forget(self);
+    }
+}
+
+impl Drop for Begun<'_> {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_that_does_not_begin_leaves_its_name_free() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.mcap");
+        let begin = || Disk::create(&file).map(|_| Begun(&file));
+        drop(begin().unwrap());
+        begin().unwrap().keep();
+        assert!(file.exists() && begin().is_err());
     }
 }

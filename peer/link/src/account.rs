@@ -152,6 +152,10 @@ pub(super) enum Refusal {
     Roster(#[from] RosterError),
     #[error("the first of a camera, which has not heard yet what it is asked")]
     First,
+    #[error(
+        "two cameras stream as this robot, and the one that was started last is looked at: stop one, or give each an id of its own"
+    )]
+    TwoSenders,
     #[error("more of it than is looked into: it comes again")]
     TooOften,
     #[error("nobody but those on this robot's own computer say anything without a signature")]
@@ -180,6 +184,7 @@ impl Refusal {
             Self::Roster(RosterError::TooFast) => "too_often",
             Self::Roster(_) => "malformed",
             Self::First => "unasked",
+            Self::TwoSenders => "two_senders",
             Self::TooOften => "too_often",
             Self::Unsaid => "unsigned",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),

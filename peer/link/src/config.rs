@@ -298,6 +298,7 @@ impl LinkConfig {
             "transport/link/tx/keep_alive": keep_alives,
         });
         for (path, value) in [first, &rest].into_iter().filter_map(Value::as_object).flatten() {
+            reach::check_named(path, value)?;
             config
                 .insert_json5(path, &value.to_string())
                 .map_err(|error| LinkError::config(path, &*error))?;
@@ -324,6 +325,7 @@ impl LinkConfig {
 
 /// Sets what `value` mentions and leaves its siblings as they are.
 fn merge(config: &mut zenoh::Config, path: &str, value: &Value) -> Result<(), LinkError> {
+    reach::check_named(path, value)?;
     let Value::Object(children) = value else {
         return config
             .insert_json5(path, &value.to_string())

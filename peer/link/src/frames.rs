@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use gestalt_protocol::{
     DecodeError, FrameChallenge, FrameHeader, FrameProof, FrameTaken, ImageEncoding, Keys, MAX_FRAME,
-    RobotId, RoundId, Topic,
+    MAX_ROBOTS, RobotId, RoundId, Topic,
 };
 use gestalt_trust::{Distrust, Ed25519, FrameClaim, FrameGuard, FrameSigner};
 use thiserror::Error;
@@ -21,6 +21,7 @@ use zenoh::{Session, Wait};
 use super::account::{Account, Refusal};
 use super::identity::fresh_nonce;
 use super::inbox::Inbox;
+use super::senders::Senders;
 use super::{Client, LinkError, Robot};
 
 /// Whose frames answered no challenge is told the present one at once, but no more often than so: whoever makes frames up gets no more for it.
@@ -67,6 +68,15 @@ struct Cameras {
     guard: FrameGuard,
     asked: BTreeMap<RobotId, FrameChallenge>,
     told: BTreeMap<RobotId, Instant>,
+    senders: BTreeMap<RobotId, Senders>,
+}
+
+impl Cameras {
+    /// Whether nothing was started later that streams as that robot.
+    fn is_of_latest_sender(&mut self, frame: &FrameArrival) -> bool {
+        let has_room = self.senders.len() < MAX_ROBOTS || self.senders.contains_key(&frame.robot);
+        !has_room || self.senders.entry(frame.robot).or_default().is_latest(frame.header.nonce)
+    }
 }
 
 impl Robot {
@@ -97,7 +107,7 @@ impl Robot {
             .session
             .declare_subscriber(key)
             .allowed_origin(Locality::Remote)
-            .callback(move |sample| match at_desk.look_at(&sample) {
+            .callback(move |sample| match at_desk.admit(&sample) {
                 Ok(arrival) => {
                     at_desk.account.received("frame", sample.payload().len());
                     on_frame(arrival);
@@ -175,8 +185,14 @@ impl Desk {
         Some(asked)
     }
 
+    /// The frame, if it is to be looked at.
+    fn admit(&self, sample: &Sample) -> Result<FrameArrival, Refusal> {
+        let arrival = self.believed(sample)?;
+        if self.cameras().is_of_latest_sender(&arrival) { Ok(arrival) } else { Err(Refusal::TwoSenders) }
+    }
+
     /// The frame, if it is one, and its robot's.
-    fn look_at(&self, sample: &Sample) -> Result<FrameArrival, Refusal> {
+    fn believed(&self, sample: &Sample) -> Result<FrameArrival, Refusal> {
         let (arrival, proof) = read(&self.keys, sample)?;
         let trusted = self
             .inbox

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use gestalt_protocol::{Decision, RobotId, Status};
 use gestalt_strategies::{Classify, Input, Voter};
+use gestalt_trust::Identity;
 use tokio::sync::{broadcast, mpsc};
 
 use crate::account::Account;
@@ -29,6 +30,8 @@ pub struct GuestConfig {
     pub name: String,
     /// Grows at every start of this robot, so that what it says outranks what it said before.
     pub boot: u32,
+    /// Its key in a sealed swarm; `None` in an open one.
+    pub identity: Option<Arc<Identity>>,
 }
 
 impl Robot {
@@ -46,20 +49,18 @@ impl Robot {
     /// [`LinkError::Guest`] when this robot has a guest of that id, or that id itself; [`LinkError::Seal`] when the roster does not have
     /// it with the key that is here; [`LinkError::Open`] when the session is closed.
     pub async fn guest(&self, config: GuestConfig) -> Result<Self, LinkError> {
-        let GuestConfig { id, name, boot } = config;
+        let GuestConfig { id, name, boot, identity } = config;
         let host = self.account.lock().robot;
         if id == host || !self.guests.come(id) {
             return Err(LinkError::Guest(id));
         }
         let departure = Departure { guest: id, guests: self.guests.clone(), host: self.commands.downgrade() };
         let mut voter = Voter::new(id, boot, self.rounds.clone())?;
-        if let Some(seal) = self.seal.as_deref() {
-            let not_enrolled = || LinkError::Seal(SealError::NotEnrolled(id));
-            let signer = seal.signer_of(id).ok_or_else(not_enrolled)?;
-            if !self.inbox.enrols(id, Some(seal)) {
-                return Err(not_enrolled());
-            }
-            voter = voter.signed_by(signer);
+        let seal =
+            self.seal.as_deref().zip(identity).map(|(seal, identity)| Arc::new(seal.of_guest(identity)));
+        if self.seal.is_some() {
+            let own = seal.as_deref().filter(|own| self.inbox.enrols(id, Some(own)));
+            voter = voter.signed_by(own.ok_or(SealError::NotEnrolled(id))?.signer());
         }
         let Status { vocabulary, rounds, .. } = self.account.lock().clone();
         let status = Status {
@@ -89,7 +90,7 @@ impl Robot {
             classifier: Arc::clone(&classifier),
             departure,
             sight: Sight::new(supervisor.clone()),
-            seal: self.seal.clone(),
+            seal: seal.clone(),
             inbox: self.inbox.clone(),
         };
         let (host_events, host_ended) = (self.events.subscribe(), self.supervisor.ended());
@@ -110,7 +111,7 @@ impl Robot {
             rounds: self.rounds.clone(),
             lost_links: self.lost_links.clone(),
             guests: Arc::default(),
-            seal: self.seal.clone(),
+            seal,
         })
     }
 }

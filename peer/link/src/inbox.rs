@@ -20,20 +20,17 @@ use zenoh::session::ZenohId;
 use super::account::{Account, Refusal};
 use super::checks::Checks;
 use super::roll::Roll;
+use super::waiting::Waiting;
 use super::ways::Ways;
 use super::words::{Vouched, Words};
-
-/// The most messages that wait for the mind, votes apart, and the most bytes that they came in.
-pub(super) const MAX_QUEUE: usize = 8192;
-const MAX_QUEUED_BYTES: usize = 64 * 1024 * 1024;
 
 /// How many of its own latest votes a robot recognises when they come back to it.
 const OWN_VOTES: usize = 64;
 
 /// Everything that arrives, checked, until the mind's task takes it.
 ///
-/// Votes wait in a ring of one per robot: the latest replaces the earlier. Everything else waits in a queue that
-/// loses nothing short of its bound; what exceeds it is refused and counted, and repair brings it again.
+/// Votes wait in a ring of one per robot: the latest replaces the earlier. Everything else waits in a queue, and
+/// what that refuses is counted.
 pub(super) struct Inbox {
     pub(super) me: RobotId,
     pub(super) swarm: u32,
@@ -64,9 +61,7 @@ pub(super) struct Sealed {
 #[derive(Debug, Default)]
 pub(super) struct State {
     pub(super) votes: BTreeMap<RobotId, Envelope>,
-    pub(super) queue: VecDeque<Input>,
-    /// In how many bytes those came.
-    queued_bytes: usize,
+    pub(super) waiting: Waiting,
     own_votes: VecDeque<u32>,
     pub(super) links: BTreeMap<ZenohId, RobotId>,
     /// Those of them that relay for others.
@@ -83,7 +78,7 @@ pub(super) struct State {
 impl State {
     /// Whether there is nothing to take.
     fn is_empty(&self) -> bool {
-        !self.alive_changed && !self.links_changed && self.queue.is_empty() && self.votes.is_empty()
+        !self.alive_changed && !self.links_changed && self.waiting.is_empty() && self.votes.is_empty()
     }
 }
 
@@ -167,15 +162,14 @@ impl Inbox {
         }
         let mut state = self.lock();
         let state = &mut *state;
-        let mut inputs = Vec::with_capacity(state.queue.len() + state.votes.len() + 2);
+        let mut inputs = Vec::new();
         if std::mem::take(&mut state.alive_changed) {
             inputs.push(Input::Alive(Arc::new(state.alive.clone())));
         }
         if std::mem::take(&mut state.links_changed) {
             inputs.push(Input::Neighbours(state.links.values().copied().collect()));
         }
-        inputs.extend(state.queue.drain(..));
-        state.queued_bytes = 0;
+        inputs.extend(state.waiting.take());
         inputs.extend(std::mem::take(&mut state.votes).into_values().map(Input::Received));
         inputs
     }
@@ -195,13 +189,14 @@ impl Inbox {
             return;
         }
         let key = sample.key_expr().as_str();
+        let expulsions = self.lock().waiting.expulsions();
         let (kind, taken) = match self.keys.parse(key) {
-            Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample)),
-            Some(Topic::Sample(id)) => ("sample", self.on_shared(id, sample)),
-            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample)),
-            Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(id, sample)),
-            Some(Topic::Decision) => ("decision", self.on_decision(sample)),
-            Some(Topic::Question) => ("question", self.on_question(sample)),
+            Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample, expulsions)),
+            Some(Topic::Sample(id)) => ("sample", self.on_shared(id, sample, expulsions)),
+            Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample, expulsions)),
+            Some(Topic::RobotDecision(id)) => ("robot_decision", self.on_holding(id, sample, expulsions)),
+            Some(Topic::Decision) => ("decision", self.on_decision(sample, expulsions)),
+            Some(Topic::Question) => ("question", self.on_question(sample, expulsions)),
             Some(Topic::Evidence) => ("evidence", self.on_evidence(sample)),
             Some(Topic::Feedback(by)) => ("feedback", self.on_feedback(by, sample)),
             Some(Topic::Word(by)) => ("word", self.on_word(by, sample)),
@@ -232,7 +227,7 @@ impl Inbox {
             && self.chance.lock().unwrap_or_else(PoisonError::into_inner).random::<f64>() < self.loss
     }
 
-    fn on_vote(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+    fn on_vote(&self, id: RobotId, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let bytes = payload(sample, MAX_MESSAGE)?;
         let envelope = Envelope::decode(&bytes)?;
         if envelope.author != id {
@@ -242,11 +237,10 @@ impl Inbox {
             return Err(Refusal::Kind);
         }
         let _under_way = self.is_sealed().then(|| self.checks.begin(&self.ready));
-        let epoch = self.epoch();
         self.believe(&envelope)?;
         let mut state = self.lock();
         // It may have been expelled, or given another key, while its vote was checked. It repeats what it may still say.
-        if self.is_stranger(id) || self.epoch() != epoch {
+        if state.waiting.expulsions() != expulsions {
             return Err(Refusal::Distrust(Distrust::Expelled));
         }
         if id == self.me {
@@ -264,7 +258,7 @@ impl Inbox {
         Ok(())
     }
 
-    fn on_shared(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+    fn on_shared(&self, id: RobotId, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
         if envelope.author != id {
             return Err(Refusal::Author);
@@ -274,14 +268,14 @@ impl Inbox {
             Message::Samples(_) if id == self.me => Ok(()),
             Message::Samples(samples) if samples.are_by(id) => {
                 self.believe(&envelope)?;
-                self.queue(Input::Received(envelope), sample)
+                self.queue(Input::Received(envelope), sample, expulsions)
             }
             Message::Samples(_) => Err(Refusal::Author),
             _ => Err(Refusal::Kind),
         }
     }
 
-    fn on_repair(&self, sample: &Sample) -> Result<(), Refusal> {
+    fn on_repair(&self, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let bytes = payload(sample, MAX_MESSAGE)?;
         let mut envelope = Envelope::decode(&bytes)?;
         if envelope.author == self.me {
@@ -311,14 +305,14 @@ impl Inbox {
             let (key, bytes) = (sample.key_expr().as_str(), sample.payload().len());
             self.account.refused("repair", key, bytes, &Refusal::Distrust(distrust));
         }
-        self.queue(Input::Received(envelope), sample)
+        self.queue(Input::Received(envelope), sample, expulsions)
     }
 
-    fn on_decision(&self, sample: &Sample) -> Result<(), Refusal> {
+    fn on_decision(&self, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
         announcement.decision.check()?;
         self.judged(|judge, now| judge.announcement(now, &announcement)).unwrap_or(Ok(()))?;
-        self.queue(Input::Announced(announcement), sample)
+        self.queue(Input::Announced(announcement), sample, expulsions)
     }
 
     fn on_evidence(&self, sample: &Sample) -> Result<(), Refusal> {
@@ -337,7 +331,7 @@ impl Inbox {
         self.judged(|judge, _| judge.unkept()).unwrap_or_default()
     }
 
-    fn on_holding(&self, id: RobotId, sample: &Sample) -> Result<(), Refusal> {
+    fn on_holding(&self, id: RobotId, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let envelope = Envelope::decode(&payload(sample, MAX_MESSAGE)?)?;
         if envelope.author != id {
             return Err(Refusal::Author);
@@ -346,7 +340,7 @@ impl Inbox {
             Message::Holding(_) => {
                 self.believe(&envelope)?;
                 // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
-                if id == self.me { Ok(()) } else { self.queue(Input::Received(envelope), sample) }
+                if id == self.me { Ok(()) } else { self.queue(Input::Received(envelope), sample, expulsions) }
             }
             _ => Err(Refusal::Kind),
         }
@@ -359,25 +353,25 @@ impl Inbox {
         }
         let said = sample.timestamp().map(|time| time.get_time().as_u64());
         let at = said.unwrap_or_else(|| unsaid_time(SystemTime::now(), &sample.payload().to_bytes()));
-        self.queue(Input::Instructed(Instructed { by, at, instruction, said: None }), sample)
+        self.queue_word(Input::Instructed(Instructed { by, at, instruction, said: None }), sample)
     }
 
-    /// Hands over what this robot's own threads have done. Never refused: they do one thing at a time.
+    /// Hands over what this robot's own threads have done.
     pub(super) fn deliver(&self, input: Input) {
-        self.lock().queue.push_back(input);
+        self.lock().waiting.deliver(input);
         self.ready.notify_one();
     }
 
-    /// What came in a message waits for the mind.
-    pub(super) fn queue(&self, input: Input, sample: &Sample) -> Result<(), Refusal> {
+    /// What came in a message, and was checked when robots had been expelled that often, waits for the mind.
+    pub(super) fn queue(&self, input: Input, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
+        self.lock().waiting.add(input, sample.payload().len(), expulsions)
+    }
+
+    /// What somebody says once waits for the mind, which looks again at who may say it.
+    pub(super) fn queue_word(&self, input: Input, sample: &Sample) -> Result<(), Refusal> {
         let mut state = self.lock();
-        let bytes = state.queued_bytes + sample.payload().len();
-        if state.queue.len() >= MAX_QUEUE || bytes > MAX_QUEUED_BYTES {
-            return Err(Refusal::Full);
-        }
-        state.queued_bytes = bytes;
-        state.queue.push_back(input);
-        Ok(())
+        let expulsions = state.waiting.expulsions();
+        state.waiting.add(input, sample.payload().len(), expulsions)
     }
 
     /// A robot's liveliness token came or went.

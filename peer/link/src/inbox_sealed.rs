@@ -13,7 +13,7 @@ use zenoh::sample::Sample;
 
 use crate::account::Refusal;
 use crate::believer::Believer;
-use crate::inbox::{Inbox, MAX_QUEUE, payload};
+use crate::inbox::{Inbox, payload};
 use crate::seal::Seal;
 use crate::words::Vouched;
 
@@ -38,14 +38,14 @@ impl Inbox {
         let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
         let said = Instructed { by, at: vouched.count, instruction, said: Some(signed) };
         if !roles.permit(&said.instruction) {
-            return self.queue(Input::Disallowed(said), sample);
+            return self.queue_word(Input::Disallowed(said), sample);
         }
         let mut state = self.lock();
-        if state.queue.len() >= MAX_QUEUE || state.vouched.len() >= MAX_VOUCHED {
+        if state.waiting.is_full() || state.vouched.len() >= MAX_VOUCHED {
             return Err(Refusal::Full);
         }
         state.vouched.push(vouched);
-        state.queue.push_back(Input::Instructed(said));
+        state.waiting.deliver(Input::Instructed(said));
         Ok(())
     }
 
@@ -104,7 +104,7 @@ impl Inbox {
             sample.attachment().filter(|it| it.len() <= Signature::LENGTH).map(|it| it.to_bytes());
         self.judged(|judge, now| judge.answer(now, answer.robot, &to, &json, attachment.as_deref()))
             .unwrap_or(Ok(()))?;
-        self.queue(Input::Answered(to, answer.at, answer.robot), sample)
+        self.queue_word(Input::Answered(to, answer.at, answer.robot), sample)
     }
 
     pub(super) fn on_word(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
@@ -118,7 +118,7 @@ impl Inbox {
         let attachment = attachment.unwrap_or_default().into_owned();
         let signed = SignedWord { word: word.into_owned(), attachment };
         let said = Instructed { by, at: heading.count, instruction, said: Some(signed) };
-        self.queue(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) }, sample)
+        self.queue_word(if allowed { Input::Instructed(said) } else { Input::Disallowed(said) }, sample)
     }
 
     /// Whether that robot is a member that is believed, with the key that it has here; in an open swarm, where there is no seal, always.
@@ -126,14 +126,9 @@ impl Inbox {
         let Some(seal) = seal else { return true };
         let has_key = |judge: &mut Judge, _| {
             let held = judge.roster().members().robots.get(&robot);
-            held == Some(&seal.key_of(robot)) && judge.is_member(robot)
+            held == Some(&seal.identity.public_key()) && judge.is_member(robot)
         };
         self.judged(has_key) == Some(true)
-    }
-
-    /// The epoch of the roster that it goes by.
-    pub(super) fn epoch(&self) -> Option<u64> {
-        self.judged(|judge, _| judge.roster().members().epoch)
     }
 
     /// Who knows by the roster of today whose words count.
@@ -211,8 +206,7 @@ impl Inbox {
         state.alive.retain(left);
         state.alive_changed = true;
         // Before anything that it may be asked to believe from now on.
-        state.queue.push_back(Input::Expelled(gone));
-        state.queue.extend(believer.map(Input::Believe));
+        state.waiting.expel([Input::Expelled(gone)].into_iter().chain(believer.map(Input::Believe)));
         drop(state);
         // Who is new was refused until now, its token too.
         self.unrest.notify_one();

@@ -1,5 +1,7 @@
 //! What happens in a swarm, as a client hears it.
 
+mod newest;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -11,6 +13,8 @@ use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
 use zenoh::Session;
 use zenoh::sample::{Sample, SampleKind};
+
+use newest::Newest;
 
 /// How many news may wait for a slow reader before it misses some.
 const MAX_WAITING: usize = 1024;
@@ -34,7 +38,8 @@ pub enum Heard {
 /// Everything that happens in a swarm, from the moment of asking on.
 #[derive(Debug)]
 pub struct News {
-    heard: broadcast::Receiver<Heard>,
+    /// Each with how often the swarm had begun anew by then: its turn.
+    heard: broadcast::Receiver<(Heard, u32)>,
     known: Arc<Mutex<Known>>,
 }
 
@@ -43,7 +48,24 @@ pub struct News {
 struct Known {
     alive: BTreeSet<RobotId>,
     held: BTreeMap<RobotId, Holding>,
-    newest: Option<u32>,
+    newest: Newest,
+}
+
+impl Known {
+    /// Takes in what a decision, or a robot's word on what it holds, says. Says in which turn of the swarm.
+    fn take_in(&mut self, heard: &Heard) -> u32 {
+        match heard {
+            Heard::Decided(announcement) => return self.newest.decide(announcement.decision.round),
+            Heard::Held(robot, holding) => {
+                if self.held.len() < MAX_ROBOTS || self.held.contains_key(robot) {
+                    self.held.insert(*robot, holding.clone());
+                }
+                self.newest.hold(holding.round);
+            }
+            Heard::Asked(_) | Heard::Came(_) | Heard::Left(_) => {}
+        }
+        self.newest.turn()
+    }
 }
 
 impl News {
@@ -56,6 +78,10 @@ impl News {
 
     /// The next thing that happens; `None` once the session has ended.
     pub async fn next(&mut self) -> Option<Heard> {
+        self.receive().await.map(|(heard, _)| heard)
+    }
+
+    async fn receive(&mut self) -> Option<(Heard, u32)> {
         loop {
             match self.heard.recv().await {
                 Ok(heard) => return Some(heard),
@@ -65,11 +91,17 @@ impl News {
         }
     }
 
-    /// The decision of the first round to end after round `before`; `None` once the session has ended.
+    /// The decision of the first round to end after round `before`, or of the first in a swarm that starts again meanwhile and counts from one;
+    /// `None` once the session has ended.
     pub async fn decision_after(&mut self, before: Option<u32>) -> Option<Announcement> {
+        let turn = self.known().newest.turn();
         loop {
-            match self.next().await? {
-                Heard::Decided(it) if Some(it.decision.round.counter) > before => return Some(it),
+            match self.receive().await? {
+                (Heard::Decided(it), now)
+                    if now > turn || now == turn && Some(it.decision.round.counter) > before =>
+                {
+                    return Some(it);
+                }
                 _ => {}
             }
         }
@@ -78,7 +110,20 @@ impl News {
     /// The counter of the newest round heard of.
     #[must_use]
     pub fn newest(&self) -> Option<u32> {
-        self.known().newest
+        self.known().newest.counter()
+    }
+
+    /// Whether that round, of which a decision was heard, is the newest of those, or one that merges with it.
+    #[must_use]
+    pub fn is_newest(&self, round: RoundId) -> bool {
+        self.known().newest.decided().is_some_and(|newest| {
+            newest.counter == round.counter && (newest.opener != round.opener || newest.life == round.life)
+        })
+    }
+
+    /// Takes in a round that is known to be decided, though nothing was heard of it.
+    pub fn know(&self, round: RoundId) {
+        self.known().newest.decide(round);
     }
 
     /// The decisions that robots hold for a round, as far as they have said so.
@@ -99,7 +144,7 @@ impl News {
 struct Listener {
     keys: Keys,
     known: Arc<Mutex<Known>>,
-    news: broadcast::Sender<Heard>,
+    news: broadcast::Sender<(Heard, u32)>,
 }
 
 impl Listener {
@@ -137,21 +182,14 @@ impl Listener {
             Ok(heard) => heard,
             Err(error) => return tracing::warn!("{}: {error}", sample.key_expr()),
         };
+        self.tell(heard);
+    }
+
+    fn tell(&self, heard: Heard) {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let round = match &heard {
-            Heard::Decided(announcement) => Some(announcement.decision.round.counter),
-            Heard::Held(robot, holding) => {
-                if known.held.len() < MAX_ROBOTS || known.held.contains_key(robot) {
-                    known.held.insert(*robot, holding.clone());
-                }
-                Some(holding.round.counter)
-            }
-            Heard::Asked(_) | Heard::Came(_) | Heard::Left(_) => None,
-        };
-        known.newest = known.newest.max(round);
-        drop(known);
-        // An error says that nobody reads, which is the reader's own business.
-        let _ = self.news.send(heard);
+        let turn = known.take_in(&heard);
+        // In the order in which it was taken in. An error says that nobody reads, which is the reader's own business.
+        let _ = self.news.send((heard, turn));
     }
 
     fn on_liveliness(&self, sample: &Sample) {
@@ -164,7 +202,7 @@ impl Listener {
         };
         drop(known);
         if let Some(heard) = heard {
-            let _ = self.news.send(heard);
+            self.tell(heard);
         }
     }
 }
@@ -181,5 +219,52 @@ fn held(robot: RobotId, bytes: &[u8]) -> Result<Holding, DecodeError> {
     match Envelope::decode(bytes)? {
         Envelope { author, message: Message::Holding(holding), .. } if author == robot => Ok(holding),
         _ => Err(DecodeError::Impossible("another message than its robot's own word on what it holds")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{Certificate, Decision, Stamp};
+    use serde_json::json;
+
+    use super::*;
+
+    fn decided(counter: u32, life: u32) -> Heard {
+        let certificate: Certificate = serde_json::from_value(json!({
+            "vocabulary": 1, "rule": "majority", "probabilities": [], "votes": [], "others": [],
+            "robots": 1, "quorum": 1, "elapsed_ms": 1
+        }))
+        .unwrap();
+        let round = RoundId { counter, opener: RobotId(1), life };
+        let decision =
+            Decision { round, class: None, confidence: 1.0, author: RobotId(1), is_final: true, certificate };
+        let stamp = Stamp::default();
+        Heard::Decided(Announcement { decision, label: None, announcer: RobotId(1), stamp, signature: None })
+    }
+
+    fn news() -> (Listener, News) {
+        let (news, heard) = broadcast::channel(MAX_WAITING);
+        let known = Arc::new(Mutex::new(Known::default()));
+        let keys = Keys::new("demo").unwrap();
+        (Listener { keys, known: known.clone(), news }, News { heard, known })
+    }
+
+    #[tokio::test]
+    async fn the_next_decision_of_a_swarm_that_starts_again_is_waited_for() {
+        let (listener, mut news) = news();
+        listener.tell(decided(5, 7));
+        let before = news.newest();
+        let later = async {
+            tokio::task::yield_now().await;
+            [decided(5, 7), decided(4, 7), decided(1, 8)].into_iter().for_each(|heard| listener.tell(heard));
+        };
+        let (next, ()) = tokio::join!(news.decision_after(before), later);
+        assert_eq!(next.unwrap().decision.round.counter, 1);
+        // What was not read before is not what comes next.
+        let before = news.newest();
+        listener.tell(decided(5, 7));
+        listener.tell(decided(2, 8));
+        assert_eq!(news.decision_after(before).await.unwrap().decision.round.counter, 2);
+        assert!(news.is_newest(RoundId { counter: 2, opener: RobotId(1), life: 8 }));
     }
 }

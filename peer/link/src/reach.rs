@@ -31,6 +31,29 @@ pub(crate) fn endpoints(config: &zenoh::Config, key: &str) -> Vec<String> {
     serde_json::from_str(&text).map(texts).unwrap_or_default()
 }
 
+/// Refuses what is set at a key of endpoints where it says no protocol: of that, Zenoh says no more than that it could not be read.
+pub(crate) fn check_named(key: &str, value: &Value) -> Result<(), LinkError> {
+    if !matches!(key, "listen/endpoints" | "connect/endpoints") {
+        return Ok(());
+    }
+    let is_protocol =
+        |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
+    match value {
+        Value::String(endpoint) if !endpoint.split_once('/').is_some_and(|(name, _)| is_protocol(name)) => {
+            let address = endpoint.rsplit('/').next().unwrap_or_default();
+            Err(LinkError::Config {
+                key: format!("zenoh.{}", key.replace('/', ".")),
+                cause: format!(
+                    "{endpoint:?} names no protocol: write tcp/{address}, or tls/{address} where the swarm is sealed"
+                ),
+            })
+        }
+        Value::Array(all) => all.iter().try_for_each(|value| check_named(key, value)),
+        Value::Object(by_mode) => by_mode.values().try_for_each(|value| check_named(key, value)),
+        _ => Ok(()),
+    }
+}
+
 fn reach(endpoint: &str) -> Reach {
     let address = endpoint.split_once('/').map_or("", |(_, address)| address);
     let address = address.split(['#', '?']).next().unwrap_or_default();
@@ -112,7 +135,10 @@ pub(crate) fn check_client(config: &zenoh::Config) -> Result<(), LinkError> {
 
 #[cfg(test)]
 mod tests {
+    use gestalt_protocol::RobotId;
+
     use super::*;
+    use crate::LinkConfig;
 
     fn config(listen: &[&str], connect: &[&str]) -> zenoh::Config {
         let mut config = zenoh::Config::default();
@@ -142,6 +168,26 @@ mod tests {
             assert!(refused.contains(far) && refused.contains("trust.insecure"), "{refused}");
             assert!(check_open(&config(&[far], &[]), true).is_ok());
         }
+    }
+
+    #[test]
+    fn an_endpoint_names_its_protocol() {
+        let named = serde_json::json!(["tcp/127.0.0.1:7447", "unixsock-stream//tmp/x", "tls/[::]:0#a=1"]);
+        assert!(check_named("connect/endpoints", &named).is_ok());
+        assert!(check_named("mode", &serde_json::json!("router")).is_ok());
+        let bare = "127.0.0.1:7447".to_owned();
+        for value in [serde_json::json!(bare), serde_json::json!({"router": [[bare]], "peer": named})] {
+            let zenoh = serde_json::json!({"listen": {"endpoints": value}}).as_object().unwrap().clone();
+            let of_zenoh = LinkConfig { zenoh, ..LinkConfig::default() };
+            for link in [of_zenoh, LinkConfig { listen: vec![bare.clone()], ..LinkConfig::default() }] {
+                let refused = link.to_zenoh(RobotId(7), "demo", 1).unwrap_err().to_string();
+                assert!(refused.starts_with("zenoh.listen.endpoints: "), "{refused}");
+                assert!(refused.contains("write tcp/127.0.0.1:7447"), "{refused}");
+            }
+        }
+        let link = LinkConfig { connect: vec!["http://10.0.0.5:7447".to_owned()], ..LinkConfig::default() };
+        let refused = link.client().unwrap_err().to_string();
+        assert!(refused.contains("tcp/10.0.0.5:7447"), "{refused}");
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! The newest roster of a sealed swarm that a robot knows.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_trust::{Evidence, Judge, PublicKey, Roles, Roster, RosterError};
-use tokio::sync::Notify;
+use tokio::sync::watch;
 
 use crate::account::Account;
 use crate::tls::Door;
@@ -37,7 +38,7 @@ pub(crate) struct Roll {
     first: u64,
     usual: Allowance,
     long: Allowance,
-    news: Notify,
+    news: watch::Sender<()>,
 }
 
 /// The work done in one span.
@@ -80,6 +81,7 @@ impl Roll {
         account: Arc<Account>,
     ) -> Self {
         let first = roster.members().epoch;
+        account.set("roster_checksum", roster.checksum().into());
         account.set("roster_epoch", first);
         let door = Arc::new(Door::new(roster.clone()));
         Self {
@@ -92,7 +94,7 @@ impl Roll {
             first,
             usual: Allowance::new(),
             long: Allowance::new(),
-            news: Notify::new(),
+            news: watch::Sender::new(()),
         }
     }
 
@@ -133,6 +135,7 @@ impl Roll {
         let members = next.members();
         let gone = before.iter().filter(|(robot, key)| members.robots.get(robot) != Some(key));
         let gone = gone.map(|(robot, _)| *robot).collect();
+        self.account.set("roster_checksum", next.checksum().into());
         self.account.set("roster_epoch", members.epoch);
         if members.robots.get(&self.me) != Some(&self.key) {
             self.account.count("expelled");
@@ -144,7 +147,7 @@ impl Roll {
         }
         self.door.follow(next.clone());
         *self.held() = Held::new(next);
-        self.news.notify_one();
+        self.news.send_replace(());
         Ok(Some(gone))
     }
 
@@ -157,12 +160,12 @@ impl Roll {
 
     /// A link to a robot has come, or evidence that is to be kept.
     pub fn meet(&self) {
-        self.news.notify_one();
+        self.news.send_replace(());
     }
 
-    /// Waits until there is a newer roster, or somebody to tell of it.
-    pub async fn news(&self) {
-        self.news.notified().await;
+    /// Changes when there is a newer roster, somebody to tell of it, or evidence that is to be kept.
+    pub fn news(&self) -> watch::Receiver<()> {
+        self.news.subscribe()
     }
 
     /// The epoch of the roster held, and its JSON.
@@ -198,11 +201,20 @@ impl Roll {
     /// The evidence that was kept before.
     pub fn kept_evidence(&self) -> Vec<Evidence> {
         let Some(folder) = self.convicted() else { return Vec::new() };
-        Evidence::kept_in(&folder).unwrap_or_else(|error| {
-            let folder = folder.display();
-            self.account.error(&format!("who was convicted before is not known: {folder}: {error}"));
-            Vec::new()
-        })
+        let unknown = |path: &Path, error: &io::Error| {
+            self.account
+                .error(&format!("who was convicted before is not known: {}: {error}", path.display()));
+        };
+        match Evidence::kept_in(&folder) {
+            Ok((kept, unread)) => {
+                unread.iter().for_each(|(path, error)| unknown(path, error));
+                kept
+            }
+            Err(error) => {
+                unknown(&folder, &error);
+                Vec::new()
+            }
+        }
     }
 
     fn convicted(&self) -> Option<PathBuf> {

@@ -30,7 +30,7 @@ const TOLD_LATER: u32 = 6;
 /// How long after what could not be written it is tried again.
 const RETRY: Duration = Duration::from_secs(5);
 
-/// Acts on every new roster, and tells neighbours of it. Never returns.
+/// Acts on every new roster, keeps it, and tells neighbours of it. Never returns.
 pub(crate) async fn keep_roll(
     roll: Arc<Roll>,
     account: Arc<Account>,
@@ -38,18 +38,18 @@ pub(crate) async fn keep_roll(
     keys: Keys,
     inbox: Arc<Inbox>,
 ) -> Result<(), String> {
-    let mut told: BTreeMap<ZenohId, Told> = BTreeMap::new();
-    // A newer one may have come before this began.
-    let first = roll.first();
-    let (mut kept, mut followed) = (first, first);
+    // A disk that hangs keeps no link up, and no neighbour from hearing of it.
+    tokio::join!(keep(&roll, &inbox), follow(&roll, &account, &node, &keys, &inbox));
+    Ok(())
+}
+
+/// Writes every new roster, and what convicts somebody.
+async fn keep(roll: &Roll, inbox: &Inbox) {
+    let mut news = roll.news();
+    let mut kept = roll.first();
     let mut evidence = Vec::new();
     loop {
-        let (epoch, json) = roll.newest();
-        // Links end whatever becomes of the disk.
-        if epoch != followed {
-            node.look_through();
-            followed = epoch;
-        }
+        let epoch = roll.newest().0;
         if epoch != kept && roll.keep().await {
             kept = epoch;
         }
@@ -57,9 +57,29 @@ pub(crate) async fn keep_roll(
         if !evidence.is_empty() && roll.keep_evidence(evidence.clone()).await {
             evidence.clear();
         }
+        tokio::select! {
+            _ = news.changed() => {}
+            () = tokio::time::sleep(RETRY), if epoch != kept || !evidence.is_empty() => {}
+        }
+    }
+}
+
+/// Looks through the links when there is a new roster, and tells neighbours of it.
+async fn follow(roll: &Roll, account: &Account, node: &Node, keys: &Keys, inbox: &Inbox) {
+    let mut news = roll.news();
+    let mut told: BTreeMap<ZenohId, Told> = BTreeMap::new();
+    // A newer one may have come before this began.
+    let first = roll.first();
+    let mut followed = first;
+    loop {
+        let (epoch, json) = roll.newest();
+        if epoch != followed {
+            node.look_through();
+            followed = epoch;
+        }
         let links = inbox.links();
         told.retain(|id, _| links.contains_key(id));
-        let mut next = (epoch != kept || !evidence.is_empty()).then(|| Instant::now() + RETRY);
+        let mut next: Option<Instant> = None;
         for (id, robot) in links {
             let told = told.entry(id).or_insert_with(|| Told::new(epoch));
             if told.epoch != epoch {
@@ -70,14 +90,14 @@ pub(crate) async fn keep_roll(
                 let later = (told.times + 1).saturating_sub(TOLD);
                 told.next = Instant::now() + AGAIN * 2_u32.pow(later);
                 told.times += 1;
-                tell(&account, &node, keys.key(&Topic::RosterFor(robot)), json.clone()).await;
+                tell(account, node, keys.key(&Topic::RosterFor(robot)), json.clone()).await;
             }
             if told.times < times {
                 next = Some(next.map_or(told.next, |next| next.min(told.next)));
             }
         }
         tokio::select! {
-            () = roll.news() => {}
+            _ = news.changed() => {}
             () = tokio::time::sleep_until(next.unwrap_or_else(Instant::now)), if next.is_some() => {}
         }
     }

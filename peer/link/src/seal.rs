@@ -1,12 +1,11 @@
 //! A sealed swarm: its robots show each other certificates, sign what they say, and believe those of each other alone.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use gestalt_protocol::{RobotId, Signature};
 use gestalt_strategies::Sign;
-use gestalt_trust::{Identity, PublicKey, Roster, SwarmId, statement};
+use gestalt_trust::{Identity, Roster, SwarmId, statement};
 use thiserror::Error;
 
 use crate::tls::{Bearer, Certificate, CertificateError, Credentials};
@@ -23,8 +22,6 @@ pub struct Seal {
     pub roster: Roster,
     /// The file that a newer roster is kept in; `None`: it is asked for anew at every start.
     pub roster_file: Option<PathBuf>,
-    /// The keys of robots that are looked for here, and vote through this one.
-    pub guests: BTreeMap<RobotId, Arc<Identity>>,
 }
 
 /// A seal that does not fit the robot.
@@ -64,7 +61,7 @@ impl Seal {
     ) -> Result<Self, CertificateError> {
         let (swarm, key) = (&roster.members().swarm, identity.public_key());
         let certificate = Certificate::issue(authority, swarm, Bearer::Robot(robot), &key)?;
-        Ok(Self { identity, certificate, roster, roster_file: None, guests: BTreeMap::new() })
+        Ok(Self { identity, certificate, roster, roster_file: None })
     }
 
     /// What the robot shows to be let in.
@@ -80,32 +77,20 @@ impl Seal {
         if members.swarm != swarm {
             return Err(SealError::OtherSwarm { roster: members.swarm.clone(), robot: swarm.to_owned() });
         }
-        let guests = self.guests.iter().map(|(robot, identity)| (*robot, identity));
-        for (robot, identity) in guests.chain([(me, &self.identity)]) {
-            if members.robots.get(&robot) != Some(&identity.public_key()) {
-                return Err(SealError::NotEnrolled(robot));
-            }
+        match members.robots.get(&me) == Some(&self.identity.public_key()) {
+            true => Ok(()),
+            false => Err(SealError::NotEnrolled(me)),
         }
-        Ok(())
     }
 
     /// Who signs for this robot.
     pub(crate) fn signer(&self) -> Arc<dyn Sign> {
-        self.signer_with(&self.identity)
+        Arc::new(Signer { identity: self.identity.clone(), swarm: self.roster.swarm_id() })
     }
 
-    /// Who signs for a robot that votes through this one, if its key is here.
-    pub(crate) fn signer_of(&self, guest: RobotId) -> Option<Arc<dyn Sign>> {
-        Some(self.signer_with(self.guests.get(&guest)?))
-    }
-
-    /// The key that this robot has, or one that votes through it.
-    pub(crate) fn key_of(&self, robot: RobotId) -> PublicKey {
-        self.guests.get(&robot).unwrap_or(&self.identity).public_key()
-    }
-
-    fn signer_with(&self, identity: &Arc<Identity>) -> Arc<dyn Sign> {
-        Arc::new(Signer { identity: identity.clone(), swarm: self.roster.swarm_id() })
+    /// That of a robot with this key that votes through this one.
+    pub(crate) fn of_guest(&self, identity: Arc<Identity>) -> Self {
+        Self { identity, ..self.clone() }
     }
 }
 

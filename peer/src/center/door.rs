@@ -162,7 +162,11 @@ impl Door {
         // Grows from one admission to the next, also when the centre was killed between them.
         let boot = self.config.trust.boot(id, SystemTime::now());
         match self.config.center.fuse {
-            Fuse::Central => self.robot.guest(GuestConfig { id, name, boot }).await,
+            Fuse::Central => {
+                // Read now: it may have been enrolled, or given another key, while the centre runs.
+                let identity = self.config.trust.identity(id)?;
+                self.robot.guest(GuestConfig { id, name, boot, identity }).await
+            }
             Fuse::Swarm => {
                 let locators = self.robot.locators();
                 let here = loopback(self.config.trust.keys.is_some()).trim_end_matches('0');

@@ -96,7 +96,7 @@ impl Center {
                 vocabulary: Some(model.classifier.vocabulary().clone()),
                 learning: None,
                 nonce: fresh_nonce(),
-                seal: config.trust.seal_with_guests(config.robot.id)?,
+                seal: config.trust.seal(config.robot.id)?,
             })
             .await?,
         );

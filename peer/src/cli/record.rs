@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::config_args::ConfigArgs;
 use super::show::{counted, line};
+use super::watch::nobody;
 use super::{Failure, interrupted};
 use crate::recording::{Recording, RecordingPlan};
 
@@ -51,7 +52,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// Runs the verb.
 ///
 /// # Errors
-/// When no robot is reached, the file is there already, or the disk takes no more.
+/// When no robot is reached or heard of, the file is there already, or the disk takes no more.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (swarm, link) = args.config.client()?;
     // Without a file or a flag that says so, the rounds of the swarm's robots are not known here.
@@ -82,8 +83,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         }
         let ledger = recording.finish().await?;
-        report(args.json, &args.file, &ledger)
+        report(args.json, &args.file, &ledger)?;
+        check_heard(&ledger, &swarm, link.credentials.is_some())
     })
+}
+
+/// Whether anybody was heard of: robots say that they are there, though nothing happens.
+fn check_heard(ledger: &Ledger, swarm: &str, is_sealed: bool) -> Result<(), Failure> {
+    if Ledger::total(&ledger.received) == 0 { Err(nobody(swarm, is_sealed).into()) } else { Ok(()) }
 }
 
 fn decisions(ledger: &Ledger) -> u64 {
@@ -101,4 +108,20 @@ pub(super) fn report(as_json: bool, file: &Path, ledger: &Ledger) -> Result<(), 
         ledger.missing().unwrap_or_else(|| "nothing was lost".to_owned())
     );
     line(as_json, &json!({"event": "recorded", "file": file, "ledger": ledger}), &words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_of_nothing_is_an_error_that_says_why() {
+        let mut ledger = Ledger::default();
+        let of =
+            |ledger: &Ledger, is_sealed| check_heard(ledger, "demo", is_sealed).map_err(|no| no.to_string());
+        assert!(of(&ledger, false).is_err_and(|no| no.contains("\"demo\"") && !no.contains("roster")));
+        assert!(of(&ledger, true).is_err_and(|no| no.contains("not on the roster any more")));
+        ledger.received.insert(Kind::Decision, 1);
+        assert_eq!(of(&ledger, true), Ok(()));
+    }
 }

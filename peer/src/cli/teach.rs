@@ -7,7 +7,7 @@ use std::pin::pin;
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::{
-    Answer, Ask, ClassId, Gesture, Instruction, InstructorId, MAX_LABEL, Question, RoundId,
+    Answer, Ask, ClassId, Decision, Gesture, Instruction, InstructorId, MAX_LABEL, Question, RoundId,
 };
 use serde_json::json;
 use tokio::sync::mpsc;
@@ -86,6 +86,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let client = Client::open(&swarm, &link).await?;
         let news = client.news().await?;
         let last = client.last_decision(super::ANSWER).await?;
+        if let Some(last) = &last {
+            news.know(last.decision.round);
+        }
         let about = About::new(args.round, last.as_ref().map(|last| &last.decision));
         let mut lesson = Lesson { args, client, news, about, names: Names::default() };
         let said = match (word, book) {
@@ -131,7 +134,7 @@ impl Lesson<'_> {
                         continue;
                     }
                     Some(Heard::Decided(decided)) => {
-                        self.about.hear(&decided.decision);
+                        self.hear(&decided.decision);
                         continue;
                     }
                     Some(_) => continue,
@@ -203,6 +206,10 @@ impl Lesson<'_> {
         Ok(())
     }
 
+    fn hear(&mut self, decision: &Decision) {
+        self.about.hear(decision, self.news.is_newest(decision.round));
+    }
+
     fn hear_question(&mut self, question: Question) -> Result<(), Failure> {
         if !self.about.ask(Instant::now(), &question) {
             return Ok(());
@@ -258,13 +265,13 @@ impl Lesson<'_> {
 
     /// Has a round opened, and shows what is decided; says which it was.
     async fn open(&mut self) -> Result<RoundId, Failure> {
-        let before = self.news.newest().max(self.about.last().map(|(round, _)| round.counter));
+        let before = self.news.newest();
         let (instructor, timeout) = (&self.args.instructor, self.args.timeout);
         let decided = super::open_round(&self.client, &mut self.news, instructor, before, timeout).await?;
         let decided = decided.ok_or_else(|| {
             format!("no decision within {timeout:?}: is a robot running? (gestalt watch --status)")
         })?;
-        self.about.hear(&decided.decision);
+        self.hear(&decided.decision);
         if !self.args.json && !self.names.cover(&decided.decision) {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }

@@ -55,13 +55,14 @@ pub struct Args {
 /// Runs the verb.
 ///
 /// # Errors
-/// When no robot is reached, or the session breaks.
+/// When no robot is reached, none gives its status, or the session breaks.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let (swarm, link) = args.config.client()?;
     super::runtime()?.block_on(async {
         let client = Client::open(&swarm, &link).await?;
+        let nobody = nobody(&swarm, link.credentials.is_some());
         if args.status {
-            statuses(args.json, &swarm, &client).await?;
+            statuses(args.json, &nobody, &client).await?;
         } else if args.robots {
             tokio::select! {
                 () = interrupted() => {}
@@ -73,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let foxglove = args.foxglove.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}
-                watched = watch(args, &swarm, &client, &mut news) => watched?,
+                watched = watch(args, &nobody, &client, &mut news) => watched?,
             }
             if let Some(page) = page {
                 page.close().await;
@@ -87,14 +88,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     })
 }
 
-async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Result<(), Failure> {
+async fn watch(args: &Args, nobody: &str, client: &Client, news: &mut News) -> Result<(), Failure> {
     let (mut view, began) = (View::default(), Instant::now());
     let mut names = Names::default();
     let mut decisions = 0;
     let mut next = match tokio::time::timeout(SILENCE, news.next()).await {
         Ok(heard) => heard,
         Err(_) => {
-            hint_at_nobody(swarm);
+            eprintln!("{nobody}");
             news.next().await
         }
     };
@@ -132,11 +133,17 @@ async fn watch(args: &Args, swarm: &str, client: &Client, news: &mut News) -> Re
     Ok(())
 }
 
-/// Says on the error stream that there may be nobody to watch: a swarm of another name is as silent as one that is off.
-fn hint_at_nobody(swarm: &str) {
-    eprintln!(
-        "no robot of the swarm \"{swarm}\" is heard of: {NOBODY_ANSWERS}; 'gestalt doctor' looks for it"
-    );
+/// Why there may be nobody to hear of: a swarm of another name is as silent as one that is off, and so is one that lets nobody in.
+pub(super) fn nobody(swarm: &str, is_sealed: bool) -> String {
+    let off_the_roster = match is_sealed {
+        true => {
+            "; or this client is not on the roster any more: gestalt trust roster says who is, where its authority is"
+        }
+        false => "",
+    };
+    format!(
+        "no robot of the swarm \"{swarm}\" is heard of: {NOBODY_ANSWERS}{off_the_roster}; 'gestalt doctor' looks for it"
+    )
 }
 
 /// Shows how all robots are, again and again.
@@ -161,10 +168,10 @@ async fn robots(as_json: bool, client: &Client) -> Result<(), Failure> {
     }
 }
 
-async fn statuses(as_json: bool, swarm: &str, client: &Client) -> Result<(), Failure> {
+async fn statuses(as_json: bool, nobody: &str, client: &Client) -> Result<(), Failure> {
     let statuses = client.statuses(super::ANSWER).await?;
     if statuses.is_empty() {
-        hint_at_nobody(swarm);
+        return Err(nobody.into());
     }
     for (status, camera) in statuses.iter().zip(table(&statuses, false)) {
         let state = match (status.round, status.open) {

@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::ConfigError;
+use super::finite::Finite;
 
 /// A configuration file's tree of values.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,8 +62,11 @@ impl Document {
     /// # Errors
     /// [`ConfigError::Syntax`].
     pub fn parse(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        let root = json(text).map_err(|cause| ConfigError::Syntax { origin: origin.to_owned(), cause })?;
-        Ok(Self { root })
+        let refuse = |cause| ConfigError::Syntax { origin: origin.to_owned(), cause };
+        match json(text).map_err(refuse)? {
+            Value::Object(root) => Ok(Self { root }),
+            other => Err(refuse(format!("{other} is no object: write {{section: {{key: value}}}}"))),
+        }
     }
 
     /// Applies one `--cfg`. A path whose first name is not one of the robot's own sections (`ours`) but a key of Zenoh is
@@ -212,11 +216,11 @@ fn with_example(mut cause: String) -> String {
 const DEEPEST: usize = 100;
 
 /// Reads JSON5; says why it is none.
-fn json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+fn json(text: &str) -> Result<Value, String> {
     if is_too_deep(text) {
         return Err(format!("brackets within brackets, more than {DEEPEST} deep"));
     }
-    json5::from_str(text).map_err(|cause| cause.to_string())
+    json5::from_str(text).map(|Finite(value)| value).map_err(|cause| cause.to_string())
 }
 
 /// Whether brackets are open so deep, as if none stood in text.
@@ -263,6 +267,21 @@ mod tests {
             assert!(refused.contains("more than 100 deep"));
         }
         assert!(document("{zenoh: {a: [[[[{}]]]]}}", &[]).is_ok());
+    }
+
+    #[test]
+    fn what_is_no_number_is_not_taken_for_nothing() {
+        for odd in ["NaN", "Infinity", "-Infinity", "1e999"] {
+            for text in [format!("{{\n trust: {{keys: {odd}}}}}"), format!("{{\n a: [{odd}]}}")] {
+                let refused = document(&text, &[]).unwrap_err().to_string();
+                assert!(refused.contains("write a number, or null at line 2"), "{refused}");
+            }
+        }
+        let whole =
+            "{a: [1, -2, 0.5, 'x', null, true, {b: {}}], a: 1, c: [1, -2, 0.5, 'x', null, true, {b: {}}]}";
+        let plain: Value = serde_json::json!({"a": 1, "c": [1, -2, 0.5, "x", null, true, {"b": {}}]});
+        assert_eq!(Value::Object(document(whole, &[]).unwrap().root), plain);
+        assert!(document("[1]", &[]).unwrap_err().to_string().contains("no object"));
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod center;
 pub mod check;
 mod document;
 mod error;
+mod finite;
 mod learning;
 mod links;
 mod ros;

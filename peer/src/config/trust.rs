@@ -1,6 +1,5 @@
 //! Whom a robot believes, as its configuration file says it.
 
-use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,7 +59,7 @@ impl TrustSection {
         let key = key_file(folder, robot);
         let identity = Arc::new(Identity::read(&key).map_err(wrong)?);
         let certificate = Certificate::read(&certificate_file(&key)).map_err(wrong)?;
-        Ok(Some(Seal { identity, certificate, roster, roster_file: Some(file), guests: BTreeMap::new() }))
+        Ok(Some(Seal { identity, certificate, roster, roster_file: Some(file) }))
     }
 
     /// The number of a start of this robot that happens now: see [`boot_number`] and, where it has a key, [`counted_boot`].
@@ -72,26 +71,13 @@ impl TrustSection {
         }
     }
 
-    /// As [`TrustSection::seal`] for a robot through which others vote: with the keys of all others that are in the folder. One that was given another key elsewhere cannot vote
-    /// through this robot until its key is here; it keeps nobody else out.
+    /// The key of a robot that votes through another; `None` in an open swarm.
     ///
     /// # Errors
-    /// As [`TrustSection::seal`].
-    pub fn seal_with_guests(&self, robot: RobotId) -> Result<Option<Seal>, LinkError> {
-        let (Some(mut seal), Some(folder)) = (self.seal(robot)?, &self.keys) else { return Ok(None) };
-        let others: Vec<RobotId> =
-            seal.roster.members().robots.keys().copied().filter(|id| *id != robot).collect();
-        for guest in others {
-            let file = key_file(folder, guest);
-            if !file.exists() {
-                continue;
-            }
-            let identity = Identity::read(&file).map_err(wrong)?;
-            if seal.roster.members().robots.get(&guest) == Some(&identity.public_key()) {
-                seal.guests.insert(guest, Arc::new(identity));
-            }
-        }
-        Ok(Some(seal))
+    /// [`LinkError::Config`] when it is not in the folder, or cannot be read.
+    pub fn identity(&self, robot: RobotId) -> Result<Option<Arc<Identity>>, LinkError> {
+        let Some(folder) = &self.keys else { return Ok(None) };
+        Ok(Some(Arc::new(Identity::read(&key_file(folder, robot)).map_err(wrong)?)))
     }
 
     /// What signs the frames of a robot whose camera is here, and whose mind elsewhere; `None` in an open swarm.

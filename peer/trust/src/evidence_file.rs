@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gestalt_protocol::RobotId;
 
@@ -28,30 +28,46 @@ impl Evidence {
     }
 
     /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What cannot be read as evidence is passed over, and what it
-    /// proves today is found by [`Evidence::check`]: nothing against whoever has a new key.
+    /// proves today is found by [`Evidence::check`]: nothing against whoever has a new key. What the system does not let be read is passed over too,
+    /// and named, with its reason.
     ///
     /// # Errors
-    /// Those of the file system.
-    pub fn kept_in(folder: &Path) -> io::Result<Vec<Self>> {
+    /// Those of the file system, where the folder cannot be read.
+    pub fn kept_in(folder: &Path) -> io::Result<(Vec<Self>, Vec<(PathBuf, io::Error)>)> {
         let entries = match fs::read_dir(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((Vec::new(), Vec::new())),
             entries => entries?,
         };
         let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
         paths.retain(|path| path.extension().is_some_and(|extension| extension == EXTENSION));
         paths.sort();
-        let (mut kept, mut bytes) = (Vec::new(), 0);
+        let (mut kept, mut unread, mut bytes) = (Vec::new(), Vec::new(), 0);
         for path in paths {
-            let mut read = Vec::new();
-            File::open(path)?.take(TOO_LONG).read_to_end(&mut read)?;
+            let read = match read(&path) {
+                Ok(read) => read,
+                Err(error) => {
+                    unread.push((path, error));
+                    continue;
+                }
+            };
             bytes += read.len();
             if bytes > KEPT_BYTES {
                 break;
             }
             kept.extend(Self::decode(&read));
         }
-        Ok(kept)
+        Ok((kept, unread))
     }
+}
+
+/// As much of a file as may be evidence. A pipe would keep whoever opens it waiting.
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is no file"));
+    }
+    let mut read = Vec::new();
+    File::open(path)?.take(TOO_LONG).read_to_end(&mut read)?;
+    Ok(read)
 }
 
 #[cfg(test)]
@@ -73,11 +89,17 @@ mod tests {
         found.into_iter().flatten().next().expect("two things")
     }
 
+    fn kept_in(folder: &Path) -> Vec<Evidence> {
+        let (kept, unread) = Evidence::kept_in(folder).unwrap();
+        assert!(unread.is_empty(), "{unread:?}");
+        kept
+    }
+
     #[test]
     fn who_starts_again_knows_who_lied() {
         let folder = tempfile::tempdir().unwrap();
         let place = folder.path().join("convicted");
-        assert_eq!(Evidence::kept_in(&place).unwrap(), [], "nobody was yet");
+        assert_eq!(kept_in(&place), [], "nobody was yet");
         let mut before = Judge::new(roster(5), |_| false);
         for robot in [1, 2] {
             before.evidence(Duration::ZERO, evidence(robot)).unwrap();
@@ -94,7 +116,7 @@ mod tests {
 
         let again = |roster| {
             let mut judge = Judge::new(roster, |_| false);
-            for evidence in Evidence::kept_in(&place).unwrap() {
+            for evidence in kept_in(&place) {
                 // It proves nothing against a new key.
                 let _ = judge.evidence(Duration::ZERO, evidence);
             }
@@ -119,7 +141,7 @@ mod tests {
                 writer.join().unwrap().unwrap();
             }
         });
-        assert_eq!(Evidence::kept_in(place).unwrap(), std::slice::from_ref(evidence));
+        assert_eq!(kept_in(place), std::slice::from_ref(evidence));
         assert_eq!(fs::read_dir(place).unwrap().count(), 1, "nothing is left beside it");
     }
 
@@ -132,7 +154,7 @@ mod tests {
         fs::write(folder.path().join("robot-2.evidence"), vec![2; Evidence::MAX_LENGTH + 9]).unwrap();
         // Left by a power cut.
         fs::write(folder.path().join("robot-3.evidence.77-0.new"), &whole).unwrap();
-        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [evidence(1)]);
+        assert_eq!(kept_in(folder.path()), [evidence(1)]);
         for name in ["robot-0.evidence", "robot-2.evidence"] {
             fs::remove_file(folder.path().join(name)).unwrap();
         }
@@ -142,13 +164,20 @@ mod tests {
         let room = KEPT_BYTES - whole.len();
         (0..room / Evidence::MAX_LENGTH).for_each(|n| before(&n.to_string(), Evidence::MAX_LENGTH));
         before("rest", room % Evidence::MAX_LENGTH);
-        assert_eq!(
-            Evidence::kept_in(folder.path()).unwrap(),
-            [evidence(1)],
-            "16 MiB, with what comes before it"
-        );
+        assert_eq!(kept_in(folder.path()), [evidence(1)], "16 MiB, with what comes before it");
         before("rest", room % Evidence::MAX_LENGTH + 1);
-        assert_eq!(Evidence::kept_in(folder.path()).unwrap(), [], "one byte more");
+        assert_eq!(kept_in(folder.path()), [], "one byte more");
         assert!(Evidence::kept_in(&folder.path().join("robot-1.evidence")).is_err(), "no folder");
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_named_and_takes_no_other_evidence_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let unreadable = folder.path().join("robot-0.evidence");
+        fs::create_dir(&unreadable).unwrap();
+        evidence(1).keep(folder.path(), RobotId(1)).unwrap();
+        let (kept, unread) = Evidence::kept_in(folder.path()).unwrap();
+        assert_eq!(kept, [evidence(1)]);
+        assert_eq!(unread.into_iter().map(|(path, _)| path).collect::<Vec<_>>(), [unreadable]);
     }
 }

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{RobotId, Signature};
+use sha2::{Digest, Sha256};
 
 use crate::distrust::Distrust;
 use crate::document::Document;
@@ -172,6 +173,13 @@ impl<S: Scheme> Roster<S> {
         self.swarm
     }
 
+    /// Tells rosters of one epoch apart in a robot's status: the first 32 bits of the SHA-256 of what is signed.
+    #[must_use]
+    pub fn checksum(&self) -> u32 {
+        let [a, b, c, d, ..]: [u8; 32] = Sha256::digest(self.members.signed_bytes(&self.authority)).into();
+        u32::from_be_bytes([a, b, c, d])
+    }
+
     /// Whether it is of the same swarm, under the same authority, and of a higher epoch: a swarm never goes back.
     #[must_use]
     pub fn newer_than(&self, held: &Self) -> bool {
@@ -248,6 +256,16 @@ mod tests {
         assert_eq!(Roster::parse(json.as_bytes()).unwrap(), roster);
         assert!(json.contains(&format!("\"2\": \"{}\"", robot(2).public_key())), "{json}");
         assert!(json.starts_with("{\n  \"swarm\": \"demo\",\n  \"authority\": "), "{json}");
+    }
+
+    #[test]
+    fn rosters_of_one_epoch_are_told_apart() {
+        let mut other = members(3);
+        other.expelled.insert(RobotId(2), other.robots.remove(&RobotId(2)).unwrap());
+        let other = other.sign(&authority()).unwrap().checksum();
+        let read = Roster::<Ed25519>::parse(roster(3).to_json().as_bytes()).unwrap();
+        assert_eq!(read.checksum(), roster(3).checksum());
+        assert!(other != roster(3).checksum() && roster(4).checksum() != roster(3).checksum());
     }
 
     #[test]

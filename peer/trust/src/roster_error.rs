@@ -104,7 +104,9 @@ pub enum RosterError {
         epoch: u64,
     },
     /// The file could not be read or written.
-    #[error("{path}: the roster could not be {verb}: check the path and whose file it is")]
+    #[error(
+        "{path}: the roster could not be {verb}: {source}: check the path, whose file it is, and the room on the disk"
+    )]
     File {
         /// The file.
         path: PathBuf,

@@ -134,6 +134,7 @@ mod tests {
         assert!(matches!(error, RosterError::File { verb: "read", .. }), "{error}");
         let error = roster(1).write(&folder.path().join("no/roster.json")).unwrap_err();
         assert!(matches!(error, RosterError::File { verb: "written", .. }), "{error}");
+        assert!(error.to_string().contains("No such file"), "the system's reason: {error}");
         fs::write(&missing, vec![b' '; MAX_ROSTER + 1]).unwrap();
         let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
         assert!(matches!(error, RosterError::TooLong { .. }), "{error}");

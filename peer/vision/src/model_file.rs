@@ -5,6 +5,8 @@
 //! ```
 //! Numbers are little-endian.
 
+mod place;
+
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -16,6 +18,7 @@ use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use crate::dataset::LabelledImage;
+use place::{folder, is_stream, target};
 
 const MAGIC: &[u8; 8] = b"GESTALT\n";
 /// The layout of the file; another layout gets another number.
@@ -204,7 +207,7 @@ impl Model {
     }
 
     /// Writes the model: to a temporary file beside `path`, which then takes its name, so that no reader ever
-    /// sees half a model and an older one survives a failure.
+    /// sees half a model and an older one survives a failure. A link stays, and what it leads to is replaced.
     ///
     /// # Errors
     /// [`ModelFileError::Io`]; nothing has changed then.
@@ -219,13 +222,14 @@ impl Model {
         bytes.extend(body);
 
         let replaced = || {
-            let mut file = NamedTempFile::new_in(folder(path))?;
+            let path = target(path)?;
+            let mut file = NamedTempFile::new_in(folder(&path))?;
             file.write_all(&bytes)?;
             file.as_file().sync_all()?;
             allow_reading(file.as_file())?;
             file.persist(path).map(drop).map_err(|error| error.error)
         };
-        let written = if is_special(path) { fs::write(path, &bytes) } else { replaced() };
+        let written = if is_stream(path) { fs::write(path, &bytes) } else { replaced() };
         written.map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
     }
 
@@ -238,10 +242,10 @@ impl Model {
         if path.is_dir() {
             return Err(failed(io::Error::other("it is a folder")));
         }
-        if is_special(path) {
+        if is_stream(path) {
             return Ok(());
         }
-        NamedTempFile::new_in(folder(path)).map(drop).map_err(failed)
+        target(path).and_then(|path| NamedTempFile::new_in(folder(&path))).map(drop).map_err(failed)
     }
 
     /// Checks that the model takes what perception gives.
@@ -263,16 +267,6 @@ impl Model {
 
 fn little_endian(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
-}
-
-/// Whether a device, a pipe or a link is there: that is written to, not replaced.
-fn is_special(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok_and(|there| !there.is_file())
-}
-
-/// The folder a file is in: a rename within one folder is atomic.
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// A temporary file is its owner's alone; a model is for whoever runs a robot.
@@ -368,16 +362,28 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_is_written_through() {
+    fn what_a_link_leads_to_is_replaced_whole() {
+        use std::os::unix::fs::{MetadataExt, symlink};
+
         let folder = tempfile::tempdir().unwrap();
-        let [target, link] = ["target", "link"].map(|name| folder.path().join(name));
-        model().write(&target).unwrap();
-        fs::write(&target, "old").unwrap();
-        std::os::unix::fs::symlink(&target, &link).unwrap();
+        let [old, kept, link, lost] = ["old", "kept", "link", "lost"].map(|name| folder.path().join(name));
+        fs::write(&old, "old").unwrap();
+        // Who reads the old one meanwhile reads on in it.
+        fs::hard_link(&old, &kept).unwrap();
+        symlink("old", &link).unwrap();
         Model::check_writable(&link).unwrap();
         model().write(&link).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!(Model::read(&target).unwrap(), model());
+        assert_eq!(Model::read(&old).unwrap(), model());
+        assert_eq!(fs::read(&kept).unwrap(), b"old");
+        assert_ne!(fs::metadata(&old).unwrap().ino(), fs::metadata(&kept).unwrap().ino());
+        symlink("missing/hands.model", &lost).unwrap();
+        assert!(matches!(Model::check_writable(&lost), Err(ModelFileError::Io { action: "write", .. })));
+        assert!(model().write(&lost).is_err());
+        fs::create_dir(folder.path().join("missing")).unwrap();
+        Model::check_writable(&lost).unwrap();
+        model().write(&lost).unwrap();
+        assert_eq!(Model::read(&lost).unwrap(), model());
     }
 
     #[test]

@@ -280,6 +280,10 @@ impl View {
 
     fn on_decided(&mut self, announcement: Announcement) -> Option<Event> {
         let decision = &announcement.decision;
+        if !self.rounds.is_decided(decision.round) && self.begins_anew(decision.round) {
+            self.rounds.forget_after(decision.round.counter);
+            self.latest = None;
+        }
         let (is_first, is_new) = self.rounds.decide(decision, announcement.label.as_deref());
         if is_first {
             self.tally.count_decision(decision);
@@ -290,6 +294,18 @@ impl View {
         is_new.then(|| Event::Decided(Box::new(announcement)))
     }
 
+    /// Whether a round before the latest is of a swarm that started again, and counts from one: whoever is there knows of none as late as the latest.
+    fn begins_anew(&self, round: RoundId) -> bool {
+        let Some(latest) = self.latest.as_ref().map(|latest| latest.decision.round) else { return false };
+        let is_another_start = (round.opener, round.life) != (latest.opener, latest.life);
+        let mut known =
+            self.present().filter_map(|(_, robot)| robot.status()).map(|status| status.round).peekable();
+        round < latest
+            && is_another_start
+            && known.peek().is_some()
+            && known.all(|known| known < Some(latest))
+    }
+
     fn on_held(&mut self, now: Duration, id: RobotId, holding: Holding) -> Option<Event> {
         self.robot(id, now)?.hold(&holding);
         None
@@ -297,8 +313,9 @@ impl View {
 
     fn on_question(&mut self, now: Duration, question: Question) -> Option<Event> {
         // Robots ask about their newest round alone.
-        let is_old =
+        let is_earlier =
             self.latest.as_ref().is_some_and(|latest| question.round.counter < latest.decision.round.counter);
+        let is_old = is_earlier && !self.begins_anew(question.round);
         if is_old || !self.asked.ask(now, question.clone()) {
             return None;
         }

@@ -146,8 +146,13 @@ impl Robot {
         now.saturating_sub(self.heard) > SILENT
     }
 
+    /// Its own account of itself, once it gave one.
+    pub fn status(&self) -> Option<&Status> {
+        self.told.as_ref().map(|told| &told.status)
+    }
+
     pub fn newest_round(&self) -> Option<u32> {
-        self.told.as_ref()?.status.round.map(|round| round.counter)
+        self.status()?.round.map(|round| round.counter)
     }
 
     pub fn vocabulary(&self) -> Option<&Vocabulary> {

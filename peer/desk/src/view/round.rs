@@ -127,6 +127,11 @@ impl Rounds {
         }
     }
 
+    /// Whether a decision of that round was heard, and is remembered.
+    pub fn is_decided(&self, id: RoundId) -> bool {
+        self.0.get(&id).is_some_and(|round| round.ended.is_some())
+    }
+
     /// The gestures that a round was decided among.
     pub fn vocabulary(&self, id: RoundId) -> Option<VocabularyId> {
         self.0.get(&id)?.ended.as_ref().map(|ended| ended.vocabulary)

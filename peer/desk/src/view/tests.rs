@@ -214,6 +214,42 @@ fn a_round_that_no_robot_comes_near_does_not_stay_the_newest() {
 }
 
 #[test]
+fn a_swarm_that_starts_again_is_followed_though_it_counts_from_one() {
+    let again = |counter| {
+        let mut decided = decided(counter, Some(1), &[1]);
+        decided.decision.round.life = 8;
+        decided
+    };
+    let at = |round| Status { round, boot: 2, ..status(1) };
+    let latest = |view: &View| view.latest().map(|latest| latest.decision.round);
+    for before in [1, 5, MAX_ROUNDS as u32 + 9] {
+        let mut view =
+            after([Input::Came(RobotId(1)), reported(Status { round: Some(round(before)), ..status(1) })]);
+        for counter in 1..=before {
+            view.hear(NOW, decision(decided(counter, Some(2), &[2])));
+        }
+        assert_eq!(
+            view.hear(NOW, decision(decided(before, Some(2), &[2]))),
+            None,
+            "an old one again is no news"
+        );
+        let mut late = again(before.saturating_sub(1));
+        late.decision.round.life = 6;
+        view.hear(NOW, decision(late));
+        assert_eq!(latest(&view), Some(round(before)), "nor is one of before");
+        view.hear(NOW, Input::Left(RobotId(1)));
+        view.hear(NOW, Input::Came(RobotId(1)));
+        view.hear(NOW, reported(at(None)));
+        view.hear(NOW, reported(at(Some(RoundId { life: 0, ..round(1) }))));
+        let mut first = again(1);
+        first.decision.round.life = 0;
+        assert!(view.hear(NOW, decision(first.clone())).is_some());
+        assert_eq!(latest(&view), Some(first.decision.round));
+        assert_eq!(view.rounds().last().map(|round| round.round.counter), Some(1), "the strip ends with it");
+    }
+}
+
+#[test]
 fn nothing_grows_without_bound_whoever_speaks() {
     let long = "x".repeat(100_000);
     let mut view = View::default();

@@ -97,15 +97,19 @@ async fn a_guest_that_is_expelled_or_has_another_key_counts_no_more() {
     for after in [None, Some(9)] {
         let swarm = unique();
         let roster = with_guest(&swarm, 1, Some(8));
-        let mut seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(2))).unwrap();
-        seal.guests.insert(RobotId(7), Arc::new(key(8)));
+        let seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(2))).unwrap();
         let config = config(1, &swarm, &[]);
         let link = LinkConfig { listen: vec!["tls/127.0.0.1:0".to_owned()], ..config.link };
         let host = start(RobotConfig { link, seal: Some(seal), ..config }).await;
         // The round waits for what the host sees.
         host.looking.abort();
-        let as_guest = || GuestConfig { id: RobotId(7), name: "guest".to_owned(), boot: 1 };
-        let guest = host.robot.guest(as_guest()).await.unwrap();
+        let with_key = |number| GuestConfig {
+            id: RobotId(7),
+            name: "guest".to_owned(),
+            boot: 1,
+            identity: Some(Arc::new(key(number))),
+        };
+        let guest = host.robot.guest(with_key(8)).await.unwrap();
         guest.learned(Arc::new(Fixed::default()), "fixed");
         host.status("it is there", |status| status.alive.contains(&RobotId(7))).await;
         host.robot.open_round();
@@ -128,7 +132,10 @@ async fn a_guest_that_is_expelled_or_has_another_key_counts_no_more() {
             sleep(Duration::from_millis(200)).await;
         }
         assert!(!guest.is_enrolled());
-        assert!(host.robot.guest(as_guest()).await.is_err(), "it comes back");
+        assert!(host.robot.guest(with_key(8)).await.is_err(), "it comes back");
+        let by_roster = host.robot.guest(with_key(9)).await;
+        assert_eq!(by_roster.is_ok(), after == Some(9), "it comes with its new key");
+        drop(by_roster);
         sleep(Duration::from_millis(1500)).await;
         let mut events = host.robot.events();
         let end = Instant::now() + PATIENCE;
@@ -148,4 +155,38 @@ async fn a_guest_that_is_expelled_or_has_another_key_counts_no_more() {
         authority.close().await.unwrap();
         host.stop().await;
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn a_disk_that_hangs_keeps_no_neighbour_from_a_newer_roster() {
+    let (swarm, folder) = (unique(), tempfile::tempdir().unwrap());
+    // Whoever reads it waits until somebody writes.
+    let pipe = folder.path().join("roster.json");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let roster = with_guest(&swarm, 1, Some(8));
+    let sealed = |id: u32, identity: u8, connect: &[String], file| {
+        let seal = Seal::issue(&key(100), roster.clone(), RobotId(id), Arc::new(key(identity))).unwrap();
+        let seal = Some(Seal { roster_file: file, ..seal });
+        let config = config(id, &swarm, connect);
+        let link = LinkConfig { listen: vec!["tls/127.0.0.1:0".to_owned()], ..config.link };
+        start(RobotConfig { link, seal, ..config })
+    };
+    let hanging = sealed(1, 2, &[], Some(pipe.clone())).await;
+    let neighbour = sealed(7, 8, hanging.robot.locators(), None).await;
+    neighbour.status("it is linked", |status| status.alive.contains(&RobotId(1))).await;
+    let authority = session(&swarm, &roster, &hanging.robot).await;
+    let (to_one, next) =
+        (Keys::new(&swarm).unwrap().key(&Topic::RosterFor(RobotId(1))), with_guest(&swarm, 2, Some(8)));
+    let epoch = |watched: &Watched| watched.robot.status().counters.get("roster_epoch").copied();
+    let end = Instant::now() + PATIENCE;
+    while epoch(&neighbour) != Some(2) {
+        assert!(Instant::now() < end, "it is not told: {:?} goes by it", epoch(&hanging));
+        authority.put(&to_one, next.to_json()).await.unwrap();
+        sleep(Duration::from_millis(200)).await;
+    }
+    // The reader goes on, and finds nothing.
+    std::fs::OpenOptions::new().read(true).write(true).open(&pipe).unwrap();
+    authority.close().await.unwrap();
+    neighbour.stop().await;
+    hanging.stop().await;
 }

@@ -47,15 +47,22 @@ impl About {
         Self { is_named: named.is_some(), last, is_final, newest, ..Self::default() }
     }
 
-    /// The swarm decided, whoever had it look: words are about what a person has just seen. What comes late of an earlier round, or again and less sure, is no news.
-    pub fn hear(&mut self, decision: &Decision) {
-        self.newest = self.newest.max(Some(decision.round.counter));
+    /// The swarm decided, whoever had it look: words are about what a person has just seen. What comes late of another round than the newest, or
+    /// again and less sure, is no news.
+    pub fn hear(&mut self, decision: &Decision, is_newest: bool) {
+        if !is_newest {
+            return;
+        }
+        let round = decision.round;
+        self.newest = Some(round.counter);
         let news = self.last.is_none_or(|(known, _)| {
-            let (heard, known) = (decision.round.counter, known.counter);
-            heard > known || heard == known && (decision.is_final || !self.is_final)
+            // Rounds of one counter merge, unless who opened both started again between them.
+            let is_same =
+                known.counter == round.counter && (known.opener != round.opener || known.life == round.life);
+            !is_same || decision.is_final || !self.is_final
         });
         if news && !self.is_named {
-            (self.last, self.is_final) = (Some((decision.round, decision.class)), decision.is_final);
+            (self.last, self.is_final) = (Some((round, decision.class)), decision.is_final);
         }
     }
 
@@ -162,19 +169,37 @@ mod tests {
     #[test]
     fn words_are_about_the_newest_round_unless_one_was_named() {
         let mut about = About::new(None, Some(&decided(5, 3, true)));
-        about.hear(&decided(6, 4, false));
+        about.hear(&decided(6, 4, false), true);
         assert_eq!(about.of(&Word::Wrong), Some((round(6), Some(ClassId(4)))), "whoever opened it");
-        about.hear(&decided(6, 3, true));
-        about.hear(&decided(6, 4, false));
-        about.hear(&decided(5, 1, true));
+        about.hear(&decided(6, 3, true), true);
+        about.hear(&decided(6, 4, false), true);
+        about.hear(&decided(5, 1, true), false);
         assert_eq!(about.last(), Some((round(6), Some(ClassId(3)))), "the final one, and none before it");
         let mut named = About::new(Some(round(5)), Some(&decided(6, 4, true)));
-        named.hear(&decided(7, 4, true));
+        named.hear(&decided(7, 4, true), true);
         assert_eq!(named.last(), Some((round(5), None)));
         let mut none = About::new(None, None);
         assert_eq!(none.of(&Word::Undo), None);
-        none.hear(&decided(1, 2, true));
+        none.hear(&decided(1, 2, true), true);
         assert_eq!(none.of(&Word::Undo), Some((round(1), Some(ClassId(2)))));
+    }
+
+    #[test]
+    fn words_are_about_the_rounds_of_a_swarm_that_started_again() {
+        let again = |counter, is_final| {
+            let mut decided = decided(counter, 4, is_final);
+            decided.round.life = 8;
+            decided
+        };
+        for before in [1, 5] {
+            let mut about = About::new(None, Some(&decided(before, 3, true)));
+            about.hear(&again(1, false), true);
+            about.hear(&decided(before, 3, true), false);
+            about.hear(&again(1, true), true);
+            assert_eq!(about.last(), Some((again(1, true).round, Some(ClassId(4)))));
+            let asked = Question { round: again(1, true).round, ..question(1, ["a", "b"]) };
+            assert!(about.ask(Instant::now(), &asked));
+        }
     }
 
     #[test]
@@ -184,7 +209,7 @@ mod tests {
         about.say(&was(5));
         // A question about another round is answered, and another round is decided.
         about.say(&was(8));
-        about.hear(&decided(9, 1, true));
+        about.hear(&decided(9, 1, true), true);
         about.say(&Instruction::Retire { class: Gesture::Class(ClassId(1)) });
         let (of, decided) = about.of(&Word::Undo).unwrap();
         assert_eq!(Word::Undo.about(of, decided), Ok(Some(Instruction::Retract { round: round(8) })));

@@ -1,11 +1,13 @@
 //! Tells a swarm that runs of its next roster, and waits until its robots go by it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 use gestalt_link::{Client, Credentials, LinkConfig, Scouting};
 use gestalt_protocol::{RobotId, Status};
 use gestalt_trust::Roster;
+use thiserror::Error;
 
 use super::super::{Failure, show};
 use super::folder::Authority;
@@ -64,25 +66,58 @@ impl Tell {
     }
 }
 
+/// Robots that will never go by the roster they are told. They go on as before.
+#[derive(Debug, PartialEq, Error)]
+enum Refused {
+    #[error(
+        "robots {} go by epoch {held}, and refused epoch {told}: nothing was changed there. This folder is an older copy: do it again in the one \
+         with the newest roster",
+        show::robots(robots)
+    )]
+    Older { robots: BTreeSet<RobotId>, held: u64, told: u64 },
+    #[error(
+        "robots {} go by another roster of epoch {told}, and refused this one: nothing was changed there. This folder and another were changed \
+         apart: do it again in the one whose roster they go by, and use that alone",
+        show::robots(robots)
+    )]
+    Contradicts { robots: BTreeSet<RobotId>, told: u64 },
+}
+
+/// Which of its robots go by that roster, and which do not yet. Who is no member any more need not agree.
+fn judge(statuses: &[Status], roster: &Roster) -> Result<(BTreeSet<RobotId>, BTreeSet<RobotId>), Refused> {
+    let told = roster.members().epoch;
+    let members = statuses.iter().filter(|status| roster.members().robots.contains_key(&status.robot));
+    let held = members.map(|status| {
+        let counter = |name| status.counters.get(name).copied();
+        (status.robot, counter("roster_epoch"), counter("roster_checksum"))
+    });
+    let held: Vec<_> = held.collect();
+    if let Some(newest) = held.iter().filter_map(|(_, epoch, _)| *epoch).max().filter(|epoch| *epoch > told) {
+        let robots = held.iter().filter(|(_, epoch, _)| *epoch > Some(told)).map(|(robot, ..)| *robot);
+        return Err(Refused::Older { robots: robots.collect(), held: newest, told });
+    }
+    // Robots of earlier releases report no checksum.
+    let is_other = |sum: Option<u64>| sum.is_some_and(|sum| sum != u64::from(roster.checksum()));
+    let others = held.iter().filter(|(_, epoch, sum)| *epoch == Some(told) && is_other(*sum));
+    let robots: BTreeSet<RobotId> = others.map(|(robot, ..)| *robot).collect();
+    if !robots.is_empty() {
+        return Err(Refused::Contradicts { robots, told });
+    }
+    let (done, left): (Vec<_>, Vec<_>) = held.into_iter().partition(|(_, epoch, _)| *epoch == Some(told));
+    let robots = |of: Vec<(RobotId, _, _)>| of.into_iter().map(|(robot, ..)| robot).collect();
+    Ok((robots(done), robots(left)))
+}
+
 async fn told(client: &Client, roster: &Roster) -> Result<(), Failure> {
     let (began, epoch) = (Instant::now(), roster.members().epoch);
     loop {
         client.tell_roster(roster).await?;
         tokio::time::sleep(AGAIN).await;
-        let mut statuses = client.statuses(super::super::ANSWER).await?;
-        // Who is no member any more need not agree.
-        statuses.retain(|status| roster.members().robots.contains_key(&status.robot));
-        let (done, left): (Vec<&Status>, Vec<&Status>) = statuses
-            .iter()
-            .partition(|status| status.counters.get("roster_epoch").is_some_and(|held| *held >= epoch));
-        let robots = |of: &[&Status]| {
-            let ids: std::collections::BTreeSet<RobotId> = of.iter().map(|status| status.robot).collect();
-            show::robots(&ids)
-        };
+        let (done, left) = judge(&client.statuses(super::super::ANSWER).await?, roster)?;
         if left.is_empty() && !done.is_empty() {
             return super::say(&format!(
                 "epoch {epoch} is gone by at robots {} after {:.1} s",
-                robots(&done),
+                show::robots(&done),
                 began.elapsed().as_secs_f64()
             ));
         }
@@ -91,10 +126,51 @@ async fn told(client: &Client, roster: &Roster) -> Result<(), Failure> {
                 true => "the roster is written, but no robot answered: is one running there? `gestalt trust tell` says it again".to_owned(),
                 false => format!(
                     "the roster is written, but robots {} do not go by it yet: they are told by their neighbours as soon as they can be reached",
-                    robots(&left)
+                    show::robots(&left)
                 ),
             }
             .into());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_trust::{Identity, Membership};
+
+    use super::*;
+
+    fn roster(robots: &[u32]) -> Roster {
+        let key = |number: u32| Identity::<gestalt_trust::Ed25519>::from_bytes(&[number as u8; 32]);
+        let robots = robots.iter().map(|robot| (RobotId(*robot), key(*robot).public_key())).collect();
+        let members = Membership { swarm: "demo".to_owned(), epoch: 4, robots, ..Membership::default() };
+        members.sign(&key(100)).unwrap()
+    }
+
+    fn status(robot: u32, epoch: u64, checksum: Option<u32>) -> Status {
+        let mut status = Status::new(RobotId(robot), "demo".to_owned(), 1);
+        status.counters.insert("roster_epoch".to_owned(), epoch);
+        status.counters.extend(checksum.map(|sum| ("roster_checksum".to_owned(), sum.into())));
+        status
+    }
+
+    fn set(robots: &[u32]) -> BTreeSet<RobotId> {
+        robots.iter().copied().map(RobotId).collect()
+    }
+
+    #[test]
+    fn robots_that_refused_a_roster_do_not_go_by_it() {
+        let told = roster(&[1, 2]);
+        let sum = Some(told.checksum());
+        let of = |first, second| judge(&[first, second, status(3, 9, None)], &told);
+        assert_eq!(of(status(1, 4, sum), status(2, 3, Some(7))), Ok((set(&[1]), set(&[2]))));
+        assert_eq!(of(status(1, 4, sum), status(2, 4, None)), Ok((set(&[1, 2]), set(&[]))));
+        let newer = of(status(1, 4, sum), status(2, 5, Some(7)));
+        assert_eq!(newer, Err(Refused::Older { robots: set(&[2]), held: 5, told: 4 }));
+        let words = newer.unwrap_err().to_string();
+        assert!(words.contains("robots 2 go by epoch 5") && words.contains("older copy"), "{words}");
+        let other = Some(roster(&[1, 2, 3]).checksum());
+        let contradicts = of(status(1, 4, other), status(2, 4, other));
+        assert_eq!(contradicts, Err(Refused::Contradicts { robots: set(&[1, 2]), told: 4 }));
     }
 }
