@@ -243,7 +243,8 @@ pub enum Outcome {
     UnknownRound,
     /// There is no such gesture, or several of that label: `circle (ana)` says whose is meant.
     UnknownGesture,
-    /// As many gestures are known as can be told apart, or it has no label of 1 to 64 bytes: retire one that is shown no more.
+    /// As many gestures are known as can be told apart: retire one that is shown no more. Or it can have no such label: of 1 to 64 bytes, that does not end as
+    /// `circle (ana)` does.
     NoRoom,
     /// The robots have no memory for samples: learning is not configured.
     NotLearning,
@@ -277,7 +278,10 @@ impl Outcome {
                 "there is no such gesture to do that with: a gesture of the list stays as it is, and of several of one label say whose is meant, \
                  as 'LABEL (INSTRUCTOR)'"
             }
-            Self::NoRoom => "no room for another gesture: retire one that is shown no more",
+            Self::NoRoom => {
+                "no room for another gesture: retire one that is shown no more; or no label for one: choose 1 to 64 bytes that do not end in \
+                 '(INSTRUCTOR)'"
+            }
             Self::NotLearning => {
                 "the robots are not set up to learn: learning.enabled in their configuration"
             }

@@ -226,23 +226,29 @@ impl NameBook {
         self.stands_for(gesture) == Some(gesture)
     }
 
-    /// The gesture that an instructor means by a label: `circle (ana)` is the one that ana named so, `circle` the instructor's own, or else the only one of
-    /// that label that is in use.
+    /// The gesture that an instructor means by a label: `circle (ana)` is the one that ana named circle, `circle` the instructor's own, or else the
+    /// only one of that label that is in use.
     #[must_use]
     pub fn find(&self, label: &str, by: &InstructorId) -> Option<ClassId> {
-        let own = ClassId::named(by, label);
-        if self.namings.contains_key(&own) {
-            return Some(own);
+        let theirs = of_somebody(label).map(|(label, whose)| ClassId::named(&whose, label));
+        let mut first = [theirs, Some(ClassId::named(by, label))].into_iter().flatten();
+        if let Some(known) = first.find(|gesture| self.namings.contains_key(gesture)) {
+            return Some(known);
         }
-        let whose = label.strip_suffix(')').and_then(|label| label.rsplit_once(" ("));
-        if let Some((label, whose)) = whose
-            && let Ok(whose) = whose.parse()
-        {
-            let theirs = ClassId::named(&whose, label);
-            if self.namings.contains_key(&theirs) {
-                return Some(theirs);
-            }
-        }
+        self.only_in_use(label)
+    }
+
+    /// The gesture that an instructor means who says that it was shown: what is retired is not, where there is another of that label that is in use.
+    #[must_use]
+    pub fn find_shown(&self, label: &str, by: &InstructorId) -> Option<ClassId> {
+        let found = self.find(label, by);
+        found
+            .filter(|gesture| self.stands_for(*gesture).is_some())
+            .or_else(|| self.only_in_use(label))
+            .or(found)
+    }
+
+    fn only_in_use(&self, label: &str) -> Option<ClassId> {
         let of_label = self.namings.iter().filter(|(_, said)| said.naming.label == label);
         let mut of_label = of_label.map(|(gesture, _)| *gesture).filter(|gesture| self.is_in_use(*gesture));
         let only = of_label.next();
@@ -252,26 +258,25 @@ impl NameBook {
     /// Whether an instructor can have meant that gesture by a label that is not of the list: whichever of those that bear it. One that nobody named was meant
     /// by nobody.
     pub(crate) fn can_mean(&self, label: &str, by: &InstructorId, gesture: ClassId) -> bool {
-        let theirs = |label: &str| {
-            let (label, whose) = label.strip_suffix(')')?.rsplit_once(" (")?;
-            Some(ClassId::named(&whose.parse().ok()?, label))
-        };
+        let theirs = of_somebody(label).map(|(label, whose)| ClassId::named(&whose, label));
         self.get(gesture).is_some_and(|naming| {
-            ClassId::named(by, label) == gesture || theirs(label) == Some(gesture) || naming.label == label
+            ClassId::named(by, label) == gesture || theirs == Some(gesture) || naming.label == label
         })
     }
 
-    /// What each gesture is called: by its label, and where another in use, or of the list, has the same, by who named it too. One that is the
-    /// same as another is called as that.
+    /// What each gesture is called: by its label, and where another in use, or of the list, has the same, or can be called so, by who named it too.
+    /// One that is the same as another is called as that.
     #[must_use]
     pub fn titles(&self, listed: &[String]) -> BTreeMap<ClassId, String> {
         let now = self.all_stand_for();
-        let mut times: BTreeMap<&str, usize> = listed.iter().map(|label| (label.as_str(), 1)).collect();
+        let mut times: BTreeMap<String, usize> = listed.iter().map(|label| (label.clone(), 1)).collect();
         for naming in now.iter().filter(|(of, now)| **now == Some(**of)).filter_map(|(of, _)| self.get(*of)) {
-            *times.entry(&naming.label).or_default() += 1;
+            for title in [naming.label.clone(), with_namer(naming)] {
+                *times.entry(title).or_default() += 1;
+            }
         }
         let title = |naming: &Naming| match times.get(naming.label.as_str()) {
-            Some(2..) => format!("{} ({})", naming.label, naming.by),
+            Some(2..) => with_namer(naming),
             _ => naming.label.clone(),
         };
         let called = |gesture: ClassId| match self.get(gesture) {
@@ -290,7 +295,7 @@ impl NameBook {
         let also = |gesture: ClassId| {
             let namings = [Some(gesture), now.get(&gesture).copied().flatten()].into_iter().flatten();
             let namings = namings.filter_map(|gesture| self.get(gesture));
-            namings.flat_map(|Naming { label, by, .. }| [label.clone(), format!("{label} ({by})")]).collect()
+            namings.flat_map(|naming| [naming.label.clone(), with_namer(naming)]).collect()
         };
         let titles = self.titles(listed).into_iter();
         titles.map(|(gesture, title)| (gesture, Called { title, also: also(gesture) })).collect()
@@ -322,6 +327,18 @@ impl NameBook {
         }
         sip.finish()
     }
+}
+
+/// A gesture's label, and who named it.
+fn with_namer(Naming { label, by, .. }: &Naming) -> String {
+    format!("{label} ({by})")
+}
+
+/// Whose gesture is meant by `circle (ana)`, and by which label; `None` where a label says nothing of who named it. Nobody names a gesture so, for it
+/// would be called as another's can be.
+pub(crate) fn of_somebody(label: &str) -> Option<(&str, InstructorId)> {
+    let (label, whose) = label.strip_suffix(')')?.rsplit_once(" (")?;
+    Some((label, whose.parse().ok()?))
 }
 
 /// Whether two words are of a gesture that one instructor named so: of two of one number one was not.

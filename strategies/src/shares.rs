@@ -14,7 +14,7 @@ const LEAST: usize = 5;
 /// How many samples of a gesture that was named while the swarm works are not forgotten.
 const YOUNG: usize = 20;
 
-/// The shares of a set's room, once it is known who is there. In a swarm of n robots and a set of T samples each other
+/// The shares of a set's room, once it is known who is there. In a swarm of n robots that say something and a set of T samples each other
 /// robot has max(5, ⌈1.25 · T/n⌉), whether it is there or not; all robots together that were never alive in this life, max(5, ⌈T/4⌉): whoever makes up
 /// names has that at most. Of a robot's own samples max(5, ⌈T/n⌉), but at most half of T, stay whatever others send. All
 /// that matters when the set is full, and not before.
@@ -24,6 +24,8 @@ pub(crate) struct Shares {
     me: Option<RobotId>,
     /// The robots alive now, this one among them or not: as the others of its process know them too, one list serves all.
     alive: Arc<BTreeSet<RobotId>>,
+    /// Those of them that say nothing: names without robots, maybe.
+    silent: BTreeSet<RobotId>,
     /// Those that were alive at any time in this life and are not now: with those at most [`MAX_ROBOTS`].
     gone: BTreeSet<RobotId>,
     /// How many samples of strangers are held; `None` before they are counted.
@@ -33,6 +35,7 @@ pub(crate) struct Shares {
 impl Shares {
     /// These robots are alive now. Gives those that were not before.
     pub fn meet(&mut self, me: RobotId, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
+        self.silent.retain(|robot| alive.contains(robot));
         let before = std::mem::replace(&mut self.alive, alive);
         self.me = Some(me);
         let others = |robot: &RobotId| *robot != me;
@@ -44,6 +47,16 @@ impl Shares {
             self.gone.clear();
         }
         new
+    }
+
+    /// Those of the living say nothing, and no others. Gives those that did until now.
+    pub fn pass_over(&mut self, silent: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        if self.silent == *silent {
+            return BTreeSet::new();
+        }
+        let counted = silent.iter().copied().filter(|robot| self.is_said_alive(*robot)).collect();
+        let before = std::mem::replace(&mut self.silent, counted);
+        before.difference(&self.silent).copied().collect()
     }
 
     /// The set is another.
@@ -72,16 +85,22 @@ impl Shares {
 
     /// Whether that robot was alive at any time in this life, as far as is kept.
     fn has_met(&self, robot: RobotId) -> bool {
-        self.is_alive(robot) || self.gone.contains(&robot)
+        self.is_said_alive(robot) || self.gone.contains(&robot)
     }
 
-    pub fn is_alive(&self, robot: RobotId) -> bool {
+    fn is_said_alive(&self, robot: RobotId) -> bool {
         self.me != Some(robot) && self.alive.contains(&robot)
     }
 
-    /// How many other robots are alive.
+    /// Whether that robot is alive, and says something.
+    pub fn is_alive(&self, robot: RobotId) -> bool {
+        self.is_said_alive(robot) && !self.silent.contains(&robot)
+    }
+
+    /// How many other robots are alive, and say something.
     fn others(&self) -> usize {
-        self.alive.len() - usize::from(self.me.is_some_and(|me| self.alive.contains(&me)))
+        let all = self.alive.len() - usize::from(self.me.is_some_and(|me| self.alive.contains(&me)));
+        all.saturating_sub(self.silent.len())
     }
 
     /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
@@ -142,7 +161,7 @@ impl Shares {
         oldest(&most).map(|sample| sample.key)
     }
 
-    /// How many robots there are; `None` for one that knows of no other.
+    /// How many robots there are of which something is to be expected; `None` for one that knows of no other.
     pub fn robots(&self) -> Option<usize> {
         Some(self.others() + 1).filter(|robots| *robots > 1)
     }
@@ -204,6 +223,22 @@ mod tests {
             let goes = shares.above(&samples, 24).and_then(|key| samples.get(key)).unwrap();
             assert_eq!((goes.author(), goes.class), (Some(RobotId(2)), circle()));
         }
+    }
+
+    #[test]
+    fn names_that_say_nothing_take_no_robots_share_until_they_speak() {
+        let (mut shares, _) = held(&[]);
+        shares.meet(ME, Arc::new((1..=20).map(RobotId).collect()));
+        assert_eq!(shares.robots(), Some(20));
+        let silent = (4..=20).map(RobotId).collect();
+        assert_eq!(shares.pass_over(&silent), [].into());
+        assert_eq!((shares.robots(), shares.is_alive(RobotId(4))), (Some(3), false));
+        assert!(shares.has_met(RobotId(4)), "no stranger for that");
+        let silent = (5..=20).map(RobotId).collect();
+        assert_eq!(shares.pass_over(&silent), [RobotId(4)].into());
+        assert_eq!((shares.robots(), shares.is_alive(RobotId(4))), (Some(4), true));
+        shares.meet(ME, Arc::new((1..=5).map(RobotId).collect()));
+        assert_eq!(shares.robots(), Some(4), "one of them says nothing");
     }
 
     #[test]

@@ -111,7 +111,13 @@ impl TrainingSet {
         self.shares.meet(self.me(), alive)
     }
 
-    /// How many robots there are, this one included, as far as it was told.
+    /// Those of the living say nothing, and may be names without robots: they count for no room, and give way as those do that are not there. Gives
+    /// those that said nothing until now.
+    pub fn pass_over(&mut self, silent: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.shares.pass_over(silent)
+    }
+
+    /// How many robots there are, this one included, as far as it was told, and as they say something.
     #[must_use]
     pub fn robots(&self) -> usize {
         self.shares.robots().unwrap_or(1)
@@ -261,15 +267,13 @@ impl TrainingSet {
     /// Gives all samples of a round another class, whatever part they are in.
     pub fn relabel(&mut self, round: RoundId, class: ClassId) -> Vec<SetChange> {
         let wrong = self.of_round(round).filter(|sample| sample.class != class);
-        let relabelled: Vec<_> = wrong.map(|sample| HeldSample { class, ..sample.clone() }).collect();
-        relabelled
-            .into_iter()
-            .map(|sample| {
-                let key = sample.key;
-                self.replace(sample);
-                SetChange::Relabelled(key)
-            })
-            .collect()
+        let wrong: Vec<_> = wrong.cloned().collect();
+        let relabelled = wrong.into_iter().map(|sample| {
+            let change = SetChange::Relabelled(sample.key, sample.class);
+            self.replace(HeldSample { class, ..sample });
+            change
+        });
+        relabelled.collect()
     }
 
     /// Removes all samples of a round. They stay seen: they are not taken in again.
@@ -293,20 +297,26 @@ impl TrainingSet {
             return changes;
         }
         while self.samples.len() > self.capacity {
-            let oldest = self.samples.iter().next().map(|sample| sample.key);
-            let victim = self.shares.above(&self.samples, self.capacity).or_else(|| {
-                let named = self.forgetting.victim(&self.samples, rng).or(oldest);
-                let named = named.and_then(|key| self.samples.get(key));
-                let instead =
-                    named.and_then(|named| self.shares.in_place_of(named, &self.samples, self.capacity));
-                let victim = instead.or(named.map(|named| named.key)).or(oldest)?;
-                let class = self.samples.get(victim)?.class;
-                Some(self.shares.in_place_of_young(class, &self.samples, self.capacity).unwrap_or(victim))
-            });
-            let Some(victim) = victim.and_then(|key| self.remove(key)) else { break };
-            changes.push(SetChange::Removed(victim));
+            let gone = match self.shares.above(&self.samples, self.capacity) {
+                // It counts as never come: whoever floods a robot changes little of what its rule goes by.
+                Some(excess) => self.remove(excess),
+                None => self.victim(rng).and_then(|victim| self.forget(victim)),
+            };
+            let Some(gone) = gone else { break };
+            changes.push(SetChange::Removed(gone));
         }
         changes
+    }
+
+    /// The sample to forget where no author has more than its share.
+    fn victim(&mut self, rng: &mut dyn Rng) -> Option<u64> {
+        let oldest = self.samples.iter().next().map(|sample| sample.key);
+        let named = self.forgetting.victim(&self.samples, rng).or(oldest);
+        let named = named.and_then(|key| self.samples.get(key));
+        let instead = named.and_then(|named| self.shares.in_place_of(named, &self.samples, self.capacity));
+        let victim = instead.or(named.map(|named| named.key)).or(oldest)?;
+        let class = self.samples.get(victim)?.class;
+        Some(self.shares.in_place_of_young(class, &self.samples, self.capacity).unwrap_or(victim))
     }
 
     /// The most samples that are held.
@@ -380,10 +390,21 @@ impl TrainingSet {
     }
 
     fn remove(&mut self, key: u64) -> Option<HeldSample> {
+        let sample = self.take_out(key)?;
+        self.forgetting.removed(&sample);
+        Some(sample)
+    }
+
+    fn forget(&mut self, key: u64) -> Option<HeldSample> {
+        let sample = self.take_out(key)?;
+        self.forgetting.forgotten(&sample);
+        Some(sample)
+    }
+
+    fn take_out(&mut self, key: u64) -> Option<HeldSample> {
         let sample = self.samples.remove(key)?;
         self.shares.went(&sample);
         self.selection.removed(&sample);
-        self.forgetting.removed(&sample);
         Some(sample)
     }
 }

@@ -4,10 +4,10 @@ mod operations;
 mod plain;
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
-use gestalt_protocol::ClassId;
+use gestalt_protocol::{ClassId, RobotId};
 use gestalt_strategies::{
     Classify, ClassifyError, Forgetting, ForgettingRule, HeldSample, HeldSamples, SampleReceipt, Selection,
     SelectionRule, SetChange, TrainingSet, Vocabulary,
@@ -184,6 +184,11 @@ impl Forgetting for Weighed<Box<dyn Forgetting>> {
         self.weigh();
     }
 
+    fn forgotten(&mut self, sample: &HeldSample) {
+        self.0.forgotten(sample);
+        self.weigh();
+    }
+
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
         self.0.victim(samples, rng)
     }
@@ -271,4 +276,45 @@ fn a_class_balanced_reservoir_keeps_small_classes_whole_and_samples_large_ones_e
         let expected = if *class == 1 { 1.0 } else { 8.0 / 60.0 };
         assert!((part - expected).abs() < 0.035, "{held:?}");
     }
+}
+
+/// The oldest goes; notes which samples count as never come, and which were forgotten.
+#[derive(Debug)]
+struct Noting(Arc<Mutex<Vec<(&'static str, u64)>>>);
+
+impl Forgetting for Noting {
+    fn removed(&mut self, sample: &HeldSample) {
+        self.0.lock().unwrap().push(("removed", sample.key));
+    }
+
+    fn forgotten(&mut self, sample: &HeldSample) {
+        self.0.lock().unwrap().push(("forgotten", sample.key));
+    }
+
+    fn victim(&mut self, samples: &HeldSamples, _: &mut dyn Rng) -> Option<u64> {
+        samples.iter().next().map(|sample| sample.key)
+    }
+}
+
+#[test]
+fn a_rule_is_told_what_was_forgotten_in_place_of_its_victim_and_what_counts_as_never_come() {
+    let (noted, rng) = (Arc::<Mutex<Vec<_>>>::default(), &mut generator(1));
+    let rule = Box::new(Noting(noted.clone()));
+    let mut set = TrainingSet::new(ME, 10, SelectionRule::Random.build(), rule);
+    set.meet(Arc::new((0..10).map(RobotId).collect()));
+    let class = ClassId(0);
+    for counter in 1..=3 {
+        set.keep(class, round(counter), vec![0.0], rng);
+    }
+    for author in 1..=8 {
+        set.receive(id(author, 1), class, round(9), vec![0.0], rng);
+    }
+    set.retract(round(1));
+    for number in 2..=8 {
+        set.receive(id(8, number), class, round(9), vec![0.0], rng);
+    }
+    // Five of its own stay, so others' went for the first; and of one author there are five at most.
+    let (forgotten, removed) = (|key| ("forgotten", key), |key| ("removed", key));
+    let expected = [forgotten(4), removed(1), forgotten(5), forgotten(6), forgotten(7)];
+    assert_eq!(*noted.lock().unwrap(), [&expected[..], &[11, 12, 13].map(removed)].concat());
 }

@@ -132,6 +132,11 @@ impl Electorate {
         Expected::Living { alive, silent: &self.silent }
     }
 
+    /// Those of the living of whom nothing is to be expected.
+    pub fn silent(&self) -> &BTreeSet<RobotId> {
+        &self.silent
+    }
+
     /// Forgets who was not heard for that long; these are alive, and waited for instead.
     pub fn forget(&mut self, now: Duration, lately: Duration, alive: &Others) {
         let (unheard, large) = (&mut self.unheard, self.large);

@@ -19,8 +19,6 @@ use crate::sample::{HeldSample, HeldSamples, draw, take_out};
 #[derive(Clone, Debug, Default)]
 pub struct ClassBalancedReservoir {
     classes: BTreeMap<ClassId, Stream>,
-    /// Whom this rule named last: what else is removed was retracted, and counts as never come.
-    named: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,9 +36,14 @@ impl Forgetting for ClassBalancedReservoir {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
-        take_out(&mut self.classes, sample.class, |Stream { came, held, .. }| {
-            *came = came.saturating_sub(u64::from(is_retracted));
+        if let Some(Stream { came, .. }) = self.classes.get_mut(&sample.class) {
+            *came = came.saturating_sub(1);
+        }
+        self.forgotten(sample);
+    }
+
+    fn forgotten(&mut self, sample: &HeldSample) {
+        take_out(&mut self.classes, sample.class, |Stream { held, .. }| {
             *held = held.saturating_sub(1);
             *held == 0
         });
@@ -63,7 +66,7 @@ impl Forgetting for ClassBalancedReservoir {
 
         let Stream { came, full, .. } = self.classes.get(&newest.class).copied().unwrap_or_default();
         let kin = held(newest.class);
-        self.named = if !full || kin == 0 {
+        if !full || kin == 0 {
             let class = draw(&largest, rng)?;
             draw(samples.class_keys(class), rng)
         } else if rng.random_range(0..came.max(1)) < kin as u64 {
@@ -71,7 +74,6 @@ impl Forgetting for ClassBalancedReservoir {
             draw(&samples.class_keys(newest.class)[..kin], rng)
         } else {
             Some(newest.key)
-        };
-        self.named
+        }
     }
 }

@@ -44,9 +44,15 @@ pub trait Forgetting: Debug + Send {
         let _ = sample;
     }
 
-    /// A sample went.
+    /// A sample went that is to count as never come: it was retracted, or its author had more than its share of a full set.
     fn removed(&mut self, sample: &HeldSample) {
         let _ = sample;
+    }
+
+    /// A sample was forgotten: the [`victim`](Self::victim), or another in its place, where that one's author, or its class, has little. By default
+    /// as if it was removed.
+    fn forgotten(&mut self, sample: &HeldSample) {
+        self.removed(sample);
     }
 
     /// A sample has another class, or went from personal to shared, maybe with another vector. By default the old

@@ -19,8 +19,6 @@ use crate::sample::{HeldSample, HeldSamples, take_out};
 #[derive(Clone, Debug, Default)]
 pub struct HerdingForgetting {
     classes: BTreeMap<ClassId, Class>,
-    /// Whom this rule named last: what else is removed was retracted, and counts as never come.
-    named: Option<u64>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -37,12 +35,15 @@ impl Forgetting for HerdingForgetting {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        let is_retracted = self.named.take_if(|named| *named == sample.key).is_none();
-        take_out(&mut self.classes, sample.class, |Class { came, held }| {
+        if let Some(Class { came, .. }) = self.classes.get_mut(&sample.class) {
+            came.subtract(&sample.vector);
+        }
+        self.forgotten(sample);
+    }
+
+    fn forgotten(&mut self, sample: &HeldSample) {
+        take_out(&mut self.classes, sample.class, |Class { held, .. }| {
             held.remove(sample);
-            if is_retracted {
-                came.subtract(&sample.vector);
-            }
             held.is_empty()
         });
     }
@@ -57,7 +58,6 @@ impl Forgetting for HerdingForgetting {
         let Class { came, held } = self.classes.get(&samples.draw_largest_class(rng)?)?;
         let others = held.sum().count() - 1.0;
         let target = (0..).zip(came.mean()?).map(|(j, mean)| held.sum().total(j) - others * mean).collect();
-        self.named = held.points().nearest_to(&narrow(target));
-        self.named
+        held.points().nearest_to(&narrow(target))
     }
 }

@@ -12,24 +12,39 @@ fn quota(budget: u32, robots: usize, counter: u32, me: RobotId) -> usize {
     each + usize::from(place < left as u128)
 }
 
-/// What this robot has shared of the swarm's budget in the newest round.
+/// What this robot has shared in the newest round.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SharedSoFar {
     counter: u32,
     samples: usize,
+    bytes: usize,
 }
 
 impl SharedSoFar {
-    /// How many samples may still be shared in the round of that counter.
-    pub fn left(&self, budget: u32, robots: usize, counter: u32, me: RobotId) -> usize {
-        let before = if self.counter == counter { self.samples } else { 0 };
-        quota(budget, robots, counter, me).saturating_sub(before)
+    /// The same of the round of that counter: of another than that which it is of, nothing yet.
+    pub fn in_round(self, counter: u32) -> Self {
+        if self.counter == counter { self } else { Self { counter, ..Self::default() } }
     }
 
-    /// So many are shared.
-    pub fn add(&mut self, counter: u32, samples: usize) {
-        let before = if self.counter == counter { self.samples } else { 0 };
-        *self = Self { counter, samples: before + samples };
+    /// How many samples may still be shared of the swarm's budget.
+    pub fn left_of_swarm(&self, budget: u32, robots: usize, me: RobotId) -> usize {
+        quota(budget, robots, self.counter, me).saturating_sub(self.samples)
+    }
+
+    /// How many samples may still be shared where that is the most.
+    pub fn samples_left(&self, most: u32) -> usize {
+        (most as usize).saturating_sub(self.samples)
+    }
+
+    /// The same of bytes.
+    pub fn bytes_left(&self, most: u32) -> usize {
+        (most as usize).saturating_sub(self.bytes)
+    }
+
+    /// So many samples are shared, in so many bytes.
+    pub fn add(&mut self, samples: usize, bytes: usize) {
+        self.samples += samples;
+        self.bytes += bytes;
     }
 }
 
@@ -64,12 +79,16 @@ mod tests {
     #[test]
     fn what_was_shared_in_a_round_counts_in_that_round_alone() {
         let me = RobotId(3);
-        let mut so_far = SharedSoFar::default();
-        assert_eq!(so_far.left(10, 2, 1, me), 5);
-        so_far.add(1, 3);
-        so_far.add(1, 1);
-        assert_eq!((so_far.left(10, 2, 1, me), so_far.left(10, 2, 2, me)), (1, 5));
-        so_far.add(2, 9);
-        assert_eq!(so_far.left(10, 2, 2, me), 0);
+        let mut so_far = SharedSoFar::default().in_round(1);
+        assert_eq!(so_far.left_of_swarm(10, 2, me), 5);
+        so_far.add(3, 90);
+        so_far.add(1, 30);
+        let left = |so_far: SharedSoFar| {
+            (so_far.left_of_swarm(10, 2, me), so_far.samples_left(6), so_far.bytes_left(200))
+        };
+        assert_eq!((left(so_far.in_round(1)), left(so_far.in_round(2))), ((1, 2, 80), (5, 6, 200)));
+        so_far = so_far.in_round(2);
+        so_far.add(9, 300);
+        assert_eq!(left(so_far), (0, 0, 0));
     }
 }

@@ -75,7 +75,7 @@ pub enum LearningConfigError {
 /// | `share_samples` | none | n: the most samples shared per round | ≥ 0 |
 /// | `share_fraction` | 1.0 | B: the most samples shared, as a part of those newly acquired | 0–1 |
 /// | `share_per_round` | 100 | the most samples that the whole swarm shares per round | ≥ 0 |
-/// | `share_bytes` | 512 | the most bytes of samples per round, with their envelope | ≥ 128 |
+/// | `share_bytes` | 512 | the most bytes of samples per round, with their envelopes and, where robots sign, 64 for each signature | ≥ 128 |
 /// | `precision` | i8 | how shared vectors travel | |
 /// | `selection` | k_center | which samples are shared | |
 /// | `forgetting` | redundancy | which samples go when there are more than T | |
@@ -105,7 +105,7 @@ pub struct LearningConfig {
     /// thousand robots that share three each replace all of 1000 samples three times a round. By default it is a tenth of the default
     /// `capacity`: what a round brings stays for ten, and at most 33 robots that look three times share all they would.
     pub share_per_round: Option<u32>,
-    /// The most bytes of samples per round, with their envelope.
+    /// The most bytes of samples per round, with their envelopes and signatures.
     pub share_bytes: Option<u32>,
     /// How shared vectors travel.
     pub precision: Precision,

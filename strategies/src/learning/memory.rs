@@ -333,10 +333,21 @@ impl RobotMemory {
         rounds.chain(aside.map(|(_, aside)| aside.round)).map(|round| round.counter).max()
     }
 
+    /// Whether it holds nothing, whoever it is of.
+    fn is_bare(&self) -> bool {
+        let Self { owner: _, counters, samples, seen, lessons, namings, aside, batches } = self;
+        *counters == Counters::default()
+            && samples.is_empty()
+            && seen.series_count() == 0
+            && lessons.is_empty()
+            && namings.is_empty()
+            && aside.is_empty()
+            && batches.is_empty()
+    }
+
     pub(super) fn check(&self, owner: Owner, components: usize, classes: usize) -> Result<(), MemoryError> {
         let Some(found) = self.owner else {
-            let empty = self.samples.is_empty() && self.lessons.is_empty();
-            return if empty { Ok(()) } else { Err(MemoryError::Damaged("records without a head")) };
+            return if self.is_bare() { Ok(()) } else { Err(MemoryError::Damaged("records without a head")) };
         };
         if found.robot != owner.robot {
             return Err(MemoryError::Robot { found: found.robot, expected: owner.robot });

@@ -165,13 +165,13 @@ impl Learning {
         inserted_as(class, sample.key, &sample.vector, sample.round, group)
     }
 
-    /// Trains on a sample of the set as what it now shows.
-    pub(super) fn train_as_another(&mut self, key: u64) {
+    /// Trains on a sample of the set as what it now shows, where it showed that before.
+    pub(super) fn train_as_another(&mut self, key: u64, before: ClassId) {
         match self.set.get(key).map(|sample| sample.class) {
-            Some(class) if self.names.is_empty() && self.scrutiny.is_none() => {
+            // What is of the list is trained on; of what was named nobody may have heard the name.
+            Some(class) if !class.is_named() && !before.is_named() && self.scrutiny.is_none() => {
                 self.training.push(TrainingChange::Relabel { key, class })
             }
-            // It may not have been trained on before.
             _ => self.train_on(key),
         }
     }

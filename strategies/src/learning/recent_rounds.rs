@@ -95,10 +95,6 @@ impl RecentRounds {
         self.find_mut(round).map(|known| std::mem::take(&mut known.unlabelled)).unwrap_or_default()
     }
 
-    pub fn newest(&self) -> Option<RoundId> {
-        self.0.back()?.names.first().copied()
-    }
-
     /// All names of the round that has this one.
     pub fn names(&self, round: RoundId) -> impl Iterator<Item = RoundId> + '_ {
         let known = self.find(round);
@@ -145,7 +141,7 @@ mod tests {
         for counter in 3..200 {
             recent.enter(id(counter));
         }
-        assert_eq!((recent.0.len(), recent.newest()), (MAX_ROUNDS, Some(id(199))));
+        assert!(recent.0.len() == MAX_ROUNDS && recent.contains(id(199)));
         assert!(!recent.contains(id(1)));
         assert_eq!(recent.take_unlabelled(id(2)).len(), 1);
         // Of those in which something was seen the oldest is forgotten.

@@ -34,9 +34,28 @@ impl Learning {
         }
     }
 
+    /// Judges all that is held, of which nothing is remembered: as when they came, each among those that were the newest about then.
+    pub(super) fn judge_from_the_start(&mut self) {
+        let mut newer = self.set.len().saturating_sub(JUDGED);
+        while newer > 0 {
+            self.scrutinise_before(newer, Scrutiny::reckon);
+            newer = newer.saturating_sub(JUDGED);
+        }
+        self.scrutinise(Scrutiny::reckon);
+    }
+
     fn scrutinise<T>(&mut self, judge: impl FnOnce(&mut Scrutiny, &[Claim<'_>]) -> T) -> Option<T> {
+        self.scrutinise_before(0, judge)
+    }
+
+    /// Judges as if so many of the newest samples had not come yet.
+    fn scrutinise_before<T>(
+        &mut self,
+        newer: usize,
+        judge: impl FnOnce(&mut Scrutiny, &[Claim<'_>]) -> T,
+    ) -> Option<T> {
         let mut scrutiny = self.scrutiny.take()?;
-        let newest = self.set.iter().rev().take(JUDGED);
+        let newest = self.set.iter().rev().skip(newer).take(JUDGED);
         let held: Vec<Claim<'_>> = newest.filter_map(|sample| self.claim(sample)).collect();
         let judged = judge(&mut scrutiny, &held);
         self.scrutiny = Some(scrutiny);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{
     Batches as BatchesTold, ClassId, Envelope, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Stamp,
+    RoundId, SampleId, Samples, SharedSample, Signature, Stamp,
 };
 use gestalt_rounds::Classify;
 
@@ -12,6 +12,7 @@ use super::memory::Item;
 #[cfg(test)]
 use super::memory::RobotMemory;
 use super::state::{Learning, MAX_UNSENT};
+use crate::sample::SetPart;
 use crate::training_set::SetChange;
 use crate::vector_codec::decode_vector;
 
@@ -19,19 +20,24 @@ use crate::vector_codec::decode_vector;
 const BATCH_BYTES: usize = 16 * 1024;
 
 impl Learning {
-    /// Chooses what to share, within the bounds, in batches that `stamp` makes this robot's statements. While much waits for a disk
-    /// that does not keep up, nothing: it stays personal, and owed.
-    pub fn share(&mut self, classifier: Option<&dyn Classify>, stamp: impl FnMut(Samples) -> HeldBatch) {
+    /// Chooses what to share, within the bounds, in batches that `stamp` makes this robot's statements, and signs if it says so. While much waits for
+    /// a disk that does not keep up, nothing: it stays personal, and owed.
+    pub fn share(
+        &mut self,
+        classifier: Option<&dyn Classify>,
+        signs: bool,
+        stamp: impl FnMut(Samples) -> HeldBatch,
+    ) {
         if self.unsent.len() >= MAX_UNSENT {
             return;
         }
         // A hair more than a whole: tenths do not add up to one exactly.
         let by_fraction = (self.credit + 1e-9).floor() as usize;
-        let by_number = self.config.share_samples.map_or(usize::MAX, |n| n as usize);
-        let round = self.newest.unwrap_or_default();
-        let of_swarm = |budget| self.shared.left(budget, self.set.robots(), round, self.me);
+        self.shared = self.shared.in_round(self.newest.unwrap_or_default());
+        let by_number = self.config.share_samples.map_or(usize::MAX, |most| self.shared.samples_left(most));
+        let of_swarm = |budget| self.shared.left_of_swarm(budget, self.set.robots(), self.me);
         let by_budget = self.config.share_per_round.map_or(usize::MAX, of_swarm);
-        let n = by_fraction.min(by_number).min(self.most_by_bytes()).min(by_budget);
+        let n = self.most_by_bytes(by_fraction.min(by_number).min(by_budget), signs);
         // What the other bounds withhold is not owed.
         self.credit = (self.credit - by_fraction as f64).max(0.0);
         if n == 0 {
@@ -53,12 +59,11 @@ impl Learning {
             _ => None,
         });
         let shared: Vec<SharedSample> = ids.filter_map(|id| self.as_shared(id)).collect();
-        self.shared.add(round, shared.len());
         self.absorb(changes);
-        let each = self.config.precision.bytes() * self.space.components();
-        let fit = (BATCH_BYTES / each.max(1)).clamp(1, MAX_SAMPLES);
-        let batches = shared.chunks(fit).map(|some| Samples { space: self.space_id, samples: some.to_vec() });
+        let batches = shared.chunks(self.most_of_batch());
+        let batches = batches.map(|some| Samples { space: self.space_id, samples: some.to_vec() });
         for batch in batches.map(stamp).collect::<Vec<_>>() {
+            self.shared.add(batch.samples.samples.len(), Envelope::from(batch.clone()).encode().len());
             self.unsent.extend(batch.samples.first().map(|first| (self.revision + 1, first)));
             self.keep_batch(batch);
         }
@@ -71,14 +76,29 @@ impl Learning {
         Some(SharedSample { id, class: sample.class, round: sample.round, vector })
     }
 
-    /// How many samples fit in the bytes of a round.
-    fn most_by_bytes(&self) -> usize {
-        let Some(bytes) = self.config.share_bytes else { return usize::MAX };
+    /// How many samples one batch has at most.
+    fn most_of_batch(&self) -> usize {
+        let each = self.config.precision.bytes() * self.space.components();
+        (BATCH_BYTES / each.max(1)).clamp(1, MAX_SAMPLES)
+    }
+
+    /// How many of so many samples fit in what is left of the bytes of a round, whichever they are.
+    fn most_by_bytes(&self, n: usize, signs: bool) -> usize {
+        let Some(bytes) = self.config.share_bytes.filter(|_| n > 0) else { return n };
+        let mut round = RoundId { counter: 0, opener: RobotId(0), life: 0 };
+        let mut class = ClassId(0);
+        for sample in self.set.iter().filter(|sample| sample.part == SetPart::Personal) {
+            round.counter = round.counter.max(sample.round.counter);
+            round.opener = round.opener.max(sample.round.opener);
+            round.life = round.life.max(sample.round.life);
+            class = class.max(sample.class);
+        }
         let vector = vec![0.0; self.space.components()];
+        let beyond = u32::try_from(n.max(64)).unwrap_or(u32::MAX);
         let sample = SharedSample {
-            id: self.set.series().sample(self.set.next_number().saturating_add(64)),
-            class: ClassId(0),
-            round: self.recent.newest().unwrap_or(RoundId { counter: 1, opener: self.me, life: u32::MAX }),
+            id: self.set.series().sample(self.set.next_number().saturating_add(beyond)),
+            class,
+            round,
             vector: self.config.precision.encode(&vector, &self.space),
         };
         let length = |samples: Vec<SharedSample>| {
@@ -86,9 +106,12 @@ impl Learning {
             let stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
             Envelope { author: self.me, stamp, message, signature: None }.encode().len()
         };
-        let empty = length(Vec::new());
-        let each = length(vec![sample]) - empty;
-        (bytes as usize).saturating_sub(empty) / each.max(1)
+        let unsigned = length(Vec::new());
+        let each = (length(vec![sample]) - unsigned).max(1);
+        let empty = unsigned + if signs { Signature::LENGTH } else { 0 };
+        let (most, left) = (self.most_of_batch(), self.shared.bytes_left(bytes));
+        let full = empty + most * each;
+        n.min(left / full * most + most.min((left % full).saturating_sub(empty) / each))
     }
 
     /// A batch that may be sent now: shared, and remembered as such.

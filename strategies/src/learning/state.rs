@@ -193,7 +193,7 @@ impl Learning {
             unsent: VecDeque::new(),
         };
         learning.gestures = learning.all_gestures();
-        learning.reckon_samples();
+        learning.judge_from_the_start();
         learning.training = learning.training_anew();
         Ok(learning)
     }
@@ -215,6 +215,11 @@ impl Learning {
     /// These robots are alive now: their samples come before those of strangers. Gives those that were not alive before.
     pub fn meet(&mut self, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
         self.set.meet(alive)
+    }
+
+    /// Those of the living say nothing. Gives those that said nothing until now.
+    pub fn pass_over(&mut self, silent: &BTreeSet<RobotId>) -> BTreeSet<RobotId> {
+        self.set.pass_over(silent)
     }
 
     /// Whether this robot knows anything of a round.
@@ -328,10 +333,10 @@ impl Learning {
                 SetChange::Seen(series) => {
                     self.dirty.insert(Item::Seen(series));
                 }
-                SetChange::Relabelled(key) => {
+                SetChange::Relabelled(key, before) => {
                     self.dirty.insert(Item::Sample(key));
                     self.judge(key);
-                    self.train_as_another(key);
+                    self.train_as_another(key, before);
                 }
                 SetChange::Shared(key, id) => {
                     self.dirty.extend([Item::Sample(key), Item::Seen(id.series())]);

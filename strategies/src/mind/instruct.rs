@@ -85,7 +85,7 @@ impl Mind {
         if !learning.knows(round) {
             return Outcome::UnknownRound;
         }
-        let class = |gesture: &Gesture| learning.gesture(gesture, &instructed.by);
+        let class = |gesture: &Gesture| learning.gesture_shown(gesture, &instructed.by);
         let word = match instruction {
             Instruction::Open
             | Instruction::New { .. }

@@ -183,6 +183,12 @@ impl Mind {
             passed.note(&output);
             carry_out(output.into());
         });
+        if let Some(learning) = &mut self.learning {
+            let speak = learning.pass_over(self.rounds.silent());
+            if !speak.is_empty() {
+                self.exchanges.readmit(&speak);
+            }
+        }
         if self.rounds.round() != round {
             self.exchanges.forget_declined_lessons();
         }
@@ -283,7 +289,7 @@ impl Mind {
         if let Some(learning) = &mut self.learning {
             let classifier = self.rounds.classifier().cloned();
             let rounds = &mut self.rounds;
-            learning.share(classifier.as_deref(), |samples| {
+            learning.share(classifier.as_deref(), rounds.signs(), |samples| {
                 let Envelope { author: robot, stamp, signature, .. } =
                     rounds.stamped(Message::Samples(samples.clone()));
                 HeldBatch { robot, stamp, samples, signature }

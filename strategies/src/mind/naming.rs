@@ -12,7 +12,7 @@ use super::machine::Mind;
 use super::sample_repair::MAX_UNPROVEN;
 use crate::believe::Standing;
 use crate::learning::Learning;
-use crate::names::NamingReceipt;
+use crate::names::{NamingReceipt, of_somebody};
 
 /// From which probability on a round is said to look like a gesture.
 const LOOKS_LIKE: f64 = 0.5;
@@ -98,11 +98,20 @@ impl Mind {
 
 impl Learning {
     /// The gesture that an instructor means.
-    pub(super) fn gesture(&self, gesture: &Gesture, by: &InstructorId) -> Option<ClassId> {
+    fn gesture(&self, gesture: &Gesture, by: &InstructorId) -> Option<ClassId> {
+        self.meant(gesture, |label| self.names().find(label, by))
+    }
+
+    /// The gesture that an instructor means who says what was shown, or was not.
+    pub(super) fn gesture_shown(&self, gesture: &Gesture, by: &InstructorId) -> Option<ClassId> {
+        self.meant(gesture, |label| self.names().find_shown(label, by))
+    }
+
+    fn meant(&self, gesture: &Gesture, find: impl FnOnce(&str) -> Option<ClassId>) -> Option<ClassId> {
         match gesture {
             Gesture::Class(class) if class.is_named() => self.names().get(*class).map(Naming::gesture),
             Gesture::Class(class) => Some(*class).filter(|class| self.vocabulary().place(*class).is_some()),
-            Gesture::Label(label) => self.vocabulary().class(label).or_else(|| self.names().find(label, by)),
+            Gesture::Label(label) => self.vocabulary().class(label).or_else(|| find(label)),
         }
     }
 
@@ -111,7 +120,7 @@ impl Learning {
         if let Some(listed) = self.vocabulary().class(label) {
             return (Outcome::Known, Some(listed));
         }
-        if !(1..=MAX_LABEL).contains(&label.len()) {
+        if !(1..=MAX_LABEL).contains(&label.len()) || of_somebody(label).is_some() {
             return (Outcome::NoRoom, None);
         }
         self.say_of(by.clone(), label.to_owned(), said, Fate::InUse)

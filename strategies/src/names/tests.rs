@@ -62,6 +62,33 @@ fn two_who_choose_one_label_name_two_gestures() {
     assert_eq!(book.titles(&[])[&bobs], "circle (bob)");
 }
 
+#[test]
+fn what_is_called_as_another_can_be_is_told_from_it() {
+    let (anas, bobs) = (ClassId::named(&who("ana"), "circle"), ClassId::named(&who("bob"), "circle (ana)"));
+    let said = [naming("ana", "circle", 1, Fate::InUse), naming("bob", "circle (ana)", 1, Fate::InUse)];
+    let mut book = book(&said);
+    for by in ["ana", "bob", "cyn"] {
+        assert_eq!(book.find("circle (ana)", &who(by)), Some(anas), "as {by} says it");
+        assert_eq!(book.find("circle (ana) (bob)", &who(by)), Some(bobs));
+    }
+    assert_eq!(book.titles(&[]), [(anas, "circle".into()), (bobs, "circle (ana) (bob)".into())].into());
+    book.hear(&naming("cyn", "circle", 1, Fate::InUse));
+    let titles = book.titles(&[]);
+    assert_eq!((&*titles[&anas], &*titles[&bobs]), ("circle (ana)", "circle (ana) (bob)"));
+}
+
+#[test]
+fn what_was_shown_is_in_use_and_what_is_restored_is_not() {
+    let [anas, bobs] = ["ana", "bob"].map(|by| ClassId::named(&who(by), "circle"));
+    let mut book = book(&[naming("ana", "circle", 1, Fate::Retired)]);
+    assert_eq!(book.find_shown("circle", &who("ana")), Some(anas), "there is no other");
+    book.hear(&naming("bob", "circle", 1, Fate::InUse));
+    assert_eq!(book.find_shown("circle", &who("ana")), Some(bobs));
+    assert_eq!(book.find("circle", &who("ana")), Some(anas));
+    book.hear(&naming("ana", "circle", 2, Fate::InUse));
+    assert_eq!(book.find_shown("circle", &who("ana")), Some(anas));
+}
+
 /// What a gesture is by now, as the words on it read.
 fn step_by_step(book: &NameBook, gesture: ClassId) -> Option<ClassId> {
     let mut passed = vec![gesture];

@@ -113,9 +113,9 @@ impl Scrutiny {
         1.0 / (1.0 + (-odds).exp())
     }
 
-    /// Judges a sample that has just come, among all that are held, the newest first.
+    /// Judges a sample that has just come, or shows another gesture now, among those that are judged, the newest first. If it is none of these, it
+    /// stays what it was taken for.
     pub fn judge(&mut self, held: &[Claim<'_>], key: u64) {
-        self.left_out.remove(&key);
         let Some(claim) = held.iter().find(|claim| claim.key == key && claim.is_of_others) else { return };
         // Until it is found true, it counts for nothing.
         self.left_out.insert(key);
@@ -149,7 +149,7 @@ impl Scrutiny {
         LEAST.max((self.config.influence * middle as f64).ceil() as usize)
     }
 
-    /// Judges all samples anew, the newest first; gives those that are to be trained on from now on, or no longer.
+    /// Judges these samples anew, the newest first; gives those that are to be trained on from now on, or no longer.
     pub fn reckon(&mut self, held: &[Claim<'_>]) -> Vec<u64> {
         self.is_due = false;
         let others: Vec<&Claim<'_>> = held.iter().rev().filter(|claim| claim.is_of_others).collect();

@@ -1,6 +1,6 @@
 //! What becomes of a set when something is done with it.
 
-use gestalt_protocol::{SampleId, SampleSeries};
+use gestalt_protocol::{ClassId, SampleId, SampleSeries};
 
 use crate::sample::{HeldSample, SeenError};
 
@@ -11,8 +11,8 @@ pub enum SetChange {
     Added(u64),
     /// This sample went.
     Removed(HeldSample),
-    /// The sample with this key has another class.
-    Relabelled(u64),
+    /// The sample with this key has another class than this one, which it had before.
+    Relabelled(u64, ClassId),
     /// The sample with this key went from personal to shared under this name; its vector is now what travels.
     Shared(u64, SampleId),
     /// What was seen of this series is another set now, without a sample that came: it was forgotten for another series, or gaps in it count as seen.

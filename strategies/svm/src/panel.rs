@@ -77,12 +77,11 @@ impl<'a> Votes<'a> {
 
     pub fn certified(&self) -> Option<Certified> {
         let any = self.taught.contains(&true);
-        let votes = || {
-            let all = self.vocabulary.all().zip(self.votes.iter().copied()).zip(self.taught);
-            all.filter_map(|(said, taught)| (*taught || !any).then_some(said))
-        };
-        let (class, most) = votes().max_by_key(|(class, votes)| (*votes, Reverse(*class)))?;
-        // Of equals the one of the smaller number is said: such a one needs one vote less.
+        let votes = || self.vocabulary.all().zip(self.votes.iter().copied());
+        let met = votes().zip(self.taught).filter(|(_, taught)| **taught || !any).map(|(said, _)| said);
+        let (class, most) = met.max_by_key(|(class, votes)| (*votes, Reverse(*class)))?;
+        // Of equals the one of the smaller number is said: such a one needs one vote less, also where none has met it yet, for whoever lies may teach
+        // it. One that is yet to be named needs no fewer than the first of the list.
         let others = votes().filter(|(other, _)| *other != class);
         let others = others.map(|(other, votes)| votes + usize::from(other < class));
         let rival = others.chain([self.undecided]).max().unwrap_or(0);

@@ -107,6 +107,22 @@ fn unanimous_groups_stand_against_less_than_half_of_them_and_no_more() {
 }
 
 #[test]
+fn a_gesture_that_none_has_met_yet_can_be_taught_by_those_that_lie() {
+    let said = |lying: usize| {
+        let mut learner = learner_of(6, 4);
+        for (key, group) in (0..4_usize).flat_map(|group| [group; 4]).enumerate() {
+            let (class, at) = if key % 2 == 0 { (4, -1.0) } else { (5, 1.0) };
+            let class = if group < lying && class == 4 { 0 } else { class };
+            let vector = [at + key as f32 * 1e-3, 0.0].into();
+            learner.insert_of(Some(group), key as u64, ClassId(class), vector, key as u64).unwrap();
+        }
+        learner.learn().unwrap().certified(&[-1.0, 0.0]).unwrap()
+    };
+    assert_eq!(said(0), Certified { class: ClassId(4), votes: 4, tolerates: 1 });
+    assert_eq!((said(1).class, said(2).class), (ClassId(4), ClassId(0)), "of equals the first is said");
+}
+
+#[test]
 fn a_sample_changes_its_class_its_group_and_goes_for_all_groups_that_have_it() {
     let mut learner = learner(2);
     let at = |x: f32| Arc::from([x, 0.0]);

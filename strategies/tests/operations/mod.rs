@@ -94,7 +94,7 @@ impl Store {
                     self.seen.retain(|id| id.series() != *series);
                     self.seen.extend(set.seen().beyond(*series, &[]));
                 }
-                SetChange::Relabelled(key) => {
+                SetChange::Relabelled(key, _) => {
                     self.samples.insert(*key, set.get(*key).unwrap().clone());
                 }
                 SetChange::Shared(key, id) => {

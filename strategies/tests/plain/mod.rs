@@ -21,12 +21,11 @@ pub struct PlainForgetting {
     full: BTreeSet<ClassId>,
     /// How many are held of each class: of one of which none is, all is forgotten.
     held: BTreeMap<ClassId, usize>,
-    victim: Option<u64>,
 }
 
 impl PlainForgetting {
     pub fn new(rule: ForgettingRule) -> Self {
-        Self { rule, came: Vec::new(), full: BTreeSet::new(), held: BTreeMap::new(), victim: None }
+        Self { rule, came: Vec::new(), full: BTreeSet::new(), held: BTreeMap::new() }
     }
 }
 
@@ -91,9 +90,11 @@ impl Forgetting for PlainForgetting {
     }
 
     fn removed(&mut self, sample: &HeldSample) {
-        if self.victim != Some(sample.key) {
-            self.came.push((-1.0, sample.clone()));
-        }
+        self.came.push((-1.0, sample.clone()));
+        self.forgotten(sample);
+    }
+
+    fn forgotten(&mut self, sample: &HeldSample) {
         let held = self.held.entry(sample.class).or_default();
         *held -= 1;
         if *held == 0 {
@@ -108,8 +109,7 @@ impl Forgetting for PlainForgetting {
     }
 
     fn victim(&mut self, samples: &HeldSamples, rng: &mut dyn Rng) -> Option<u64> {
-        self.victim = self.pick(samples, rng);
-        self.victim
+        self.pick(samples, rng)
     }
 }
 

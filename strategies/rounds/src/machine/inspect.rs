@@ -1,5 +1,6 @@
 //! What a host may want to know of the rounds, and to show.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,6 +35,18 @@ impl Rounds {
     #[must_use]
     pub fn now(&self) -> Duration {
         self.now
+    }
+
+    /// Whether this robot signs what it stands by.
+    #[must_use]
+    pub fn signs(&self) -> bool {
+        self.signer.is_some()
+    }
+
+    /// Those of the living that said nothing through a whole round: they count for nobody until they do.
+    #[must_use]
+    pub fn silent(&self) -> &BTreeSet<RobotId> {
+        self.electorate.silent()
     }
 
     /// The newest round known.

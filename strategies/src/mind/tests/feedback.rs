@@ -164,3 +164,27 @@ fn a_lesson_counts_for_samples_that_come_after_it() {
     let set = swarm.minds[0].training_set().unwrap();
     assert_eq!((set.class_count(ClassId(3)), set.class_count(ClassId(1))), (3, 0));
 }
+
+#[test]
+fn what_others_share_of_a_round_leaves_what_this_robot_saw_in_it_until_its_gesture_is_said() {
+    let mut swarm = Swarm::new(1, config(2, 0.0), 14);
+    let round = swarm.show(1);
+    swarm.say("ada", Instruction::Wrong { round, of: Gesture::Class(ClassId(2)) });
+    let most = swarm.config.aside as u32;
+    let sample = |number| SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number },
+        class: ClassId(1),
+        round,
+        vector: Vector::F32(vec![0.5; 4]),
+    };
+    for number in 1..=most {
+        let message = Message::Samples(Samples { space: space().id(), samples: vec![sample(number)] });
+        let stamp = Stamp { boot: 1, sequence: number };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+    }
+    assert_eq!(swarm.minds[0].learned().unwrap().aside as u32, most);
+    swarm.restart(0);
+    swarm.was(round, 3);
+    assert_eq!(swarm.sizes(0), [2, 0, most as usize - 2]);
+    swarm.check();
+}

@@ -91,6 +91,43 @@ fn a_sample_of_a_gesture_that_nobody_named_here_waits_for_its_name() {
 }
 
 #[test]
+fn what_is_corrected_from_or_to_a_gesture_that_nobody_named_here_is_trained_on_as_what_it_is() {
+    let mut swarm = Swarm::new(1, config(2, 0.0), 68);
+    let (circle, round) = (anas("circle"), swarm.show(3));
+    swarm.was(round, 3);
+    let mut hear = |count, word| {
+        let instructor = "ana".parse().unwrap();
+        let lesson = Lesson { round, instructor, count, at: count, word, said: None };
+        swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
+        swarm.input(0, Input::Tick);
+        let of = |class| swarm.minds[0].training_set().unwrap().class_count(class);
+        ((of(ClassId(3)), of(circle)), (swarm.trained_as(ClassId(3))[0], swarm.trained_as(circle)[0]))
+    };
+    assert_eq!(hear(2, Word::Was(circle)), ((0, 2), (0, 0)), "nobody named it that was heard");
+    assert_eq!(hear(3, Word::Was(ClassId(3))), ((2, 0), (2, 0)));
+    swarm.check();
+}
+
+#[test]
+fn a_word_on_what_was_shown_means_what_is_in_use() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 69);
+    for by in ["ana", "bob"] {
+        swarm.say(by, new("circle"));
+    }
+    for (label, outcome) in [("circle (ana)", Outcome::NoRoom), ("circle (by ana)", Outcome::Learned)] {
+        let named = swarm.say("bob", new(label));
+        assert_eq!(swarm.outcome(named), outcome, "{label}");
+    }
+    swarm.say("ana", Instruction::Retire { class: called("circle") });
+    let round = swarm.show(2);
+    let word = swarm.say("ana", Instruction::Was { round, class: called("circle") });
+    assert_eq!(swarm.outcome(word), Outcome::Learned);
+    assert_eq!(swarm.trained_as(ClassId::named(&"bob".parse().unwrap(), "circle")), [4; 2]);
+    swarm.say("ana", Instruction::Restore { class: called("circle") });
+    assert_eq!(swarm.names(0).in_use(64).len(), 3, "her own is restored");
+}
+
+#[test]
 fn who_says_that_it_was_not_a_gesture_denies_what_that_was_merged_into_in_any_order() {
     let ring = anas("ring");
     // To the classifier what is aside is either 2 or 4.

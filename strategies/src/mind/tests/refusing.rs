@@ -71,6 +71,34 @@ fn a_memory_of_another_robot_or_space_is_refused() {
     assert!(matches!(space_error, LearningError::Memory(MemoryError::Space { .. })));
 }
 
+#[test]
+fn records_without_a_head_are_refused_whichever_they_are() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 13);
+    swarm.say("ana", Instruction::New { label: "circle".to_owned(), round: None });
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    let round = swarm.show(2);
+    swarm.say("ada", Instruction::Wrong { round, of: Gesture::Class(ClassId(2)) });
+    let mut records = swarm.disks[0].clone();
+    records.remove(&vec![0]);
+    assert!(records.keys().map(|key| key[0]).collect::<BTreeSet<u8>>().into_iter().eq(1..=7));
+    let aside = records.iter().find(|(key, _)| key[0] == 5).map(|(_, value)| value.clone()).unwrap();
+    records.insert([&[5][..], &[u8::MAX; 8]].concat(), aside);
+    for (key, value) in &records {
+        let memory = RobotMemory::read([(key.as_slice(), value.as_slice())]).unwrap();
+        let setup = LearningSetup {
+            config: config(2, 1.0),
+            space: space(),
+            vocabulary: vocabulary(),
+            rng: Box::new(ChaCha8Rng::seed_from_u64(1)),
+            memory: Some(memory),
+            rules: OwnRules::default(),
+        };
+        let refused = Learning::new(RobotId(1), 1, setup).map(|_| ()).unwrap_err();
+        assert!(matches!(refused, LearningError::Memory(MemoryError::Damaged(_))), "{key:?}: {refused}");
+    }
+}
+
 fn lessons(swarm: &mut Swarm, i: usize, lessons: Vec<Lesson>) {
     let stamp = Stamp { boot: 1, sequence: 1 };
     let message = Message::Lessons(gestalt_protocol::Lessons { lessons });

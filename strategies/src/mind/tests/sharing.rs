@@ -1,9 +1,13 @@
 //! How much is shared, and held.
 
+use gestalt_protocol::Signature;
+use gestalt_rounds::Sign;
+
 use super::*;
 use crate::forgetting::Forgetting;
 use crate::sample::HeldSamples;
 use crate::selection::Selection;
+use crate::training_set::TrainingSet;
 
 #[test]
 fn ten_robots_hold_what_the_source_says() {
@@ -72,6 +76,89 @@ fn bytes_bound_what_a_round_shares() {
         assert_eq!(own.len(), 1);
         assert!((80..=128).contains(&length), "{length} bytes");
     }
+}
+
+/// Signs anything.
+#[derive(Debug)]
+struct Scribe;
+
+impl Sign for Scribe {
+    fn sign(&self, _: &[u8]) -> Signature {
+        Signature::from_bytes([7; Signature::LENGTH])
+    }
+}
+
+#[test]
+fn bytes_bound_what_a_round_shares_signed_or_not_and_whatever_it_is_called() {
+    for (bytes, signs, is_named) in
+        (150..200).step_by(7).flat_map(|bytes| [(bytes, false, true), (bytes, true, false)])
+    {
+        let config = LearningConfig { share_bytes: Some(bytes), ..config(8, 1.0) };
+        let mut swarm = Swarm::new(1, config, 10);
+        if signs {
+            swarm.minds[0] = swarm.waken(0).signed_by(Arc::new(Scribe));
+            swarm.introduce(0);
+        }
+        let round = swarm.show(1);
+        let label = if is_named { "circle" } else { "1" };
+        swarm.say("ada", Instruction::New { label: label.to_owned(), round: Some(round) });
+        let learning = swarm.minds[0].learning.as_ref().unwrap();
+        let own: Vec<HeldBatch> = learning.lacking(|_| true, 1 << 20).flat_map(|told| told.batches).collect();
+        let length: usize = own.iter().map(|batch| Envelope::from(batch.clone()).encode().len()).sum();
+        assert!((bytes as usize - 48..=bytes as usize).contains(&length), "{length} of {bytes} bytes");
+        let are_so = own.iter().all(|batch| batch.signature.is_some() == signs);
+        assert!(
+            are_so && own[0].samples.samples[0].class.is_named() == is_named,
+            "or this test is of no use"
+        );
+    }
+}
+
+#[test]
+fn what_one_round_may_share_it_shares_once_however_many_words_come_in_it() {
+    for (samples, bytes) in [(Some(2), None), (None, Some(128))] {
+        let config = LearningConfig { share_samples: samples, share_bytes: bytes, ..config(8, 1.0) };
+        let mut swarm = Swarm::new(2, config, 11);
+        let rounds = [swarm.show(1), swarm.show(2)];
+        swarm.was(rounds[0], 1);
+        let once = swarm.sizes(0)[1];
+        assert!((1..8).contains(&once), "{once}");
+        swarm.was(rounds[1], 2);
+        assert_eq!(swarm.sizes(0)[1], once);
+        let round = swarm.show(3);
+        swarm.was(round, 3);
+        assert_eq!(swarm.sizes(0)[1], 2 * once, "the next has its own");
+    }
+}
+
+#[test]
+fn names_without_robots_take_nothing_of_what_a_swarm_shares_once_a_round_has_passed() {
+    let mut swarm = Swarm::new(3, LearningConfig { share_per_round: Some(12), ..config(4, 1.0) }, 12);
+    for i in 0..3 {
+        swarm.input(i, Input::Alive(Arc::new((1..=40).map(RobotId).collect())));
+    }
+    let robots = |swarm: &Swarm| {
+        let sets = swarm.minds.iter().filter_map(Mind::training_set);
+        sets.map(TrainingSet::robots).collect::<Vec<_>>()
+    };
+    assert_eq!(robots(&swarm), vec![40; 3]);
+    swarm.show(1);
+    let round = swarm.show(2);
+    assert_eq!(robots(&swarm), vec![3; 3]);
+    swarm.was(round, 2);
+    assert_eq!(swarm.sizes(0), [0, 4, 8]);
+    let vote = Vote {
+        round,
+        vocabulary: VocabularyId::NONE,
+        evidence: vec![],
+        looks: 0.0,
+        unknown: None,
+        named: vec![],
+    };
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    let said = Envelope { author: RobotId(40), stamp, message: Message::Vote(vote), signature: None };
+    swarm.input(0, Input::Received(said));
+    assert_eq!(robots(&swarm), [4, 3, 3], "one of them speaks");
 }
 
 #[test]

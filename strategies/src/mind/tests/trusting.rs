@@ -7,18 +7,30 @@ const LIAR: RobotId = RobotId(9);
 impl Swarm {
     /// A robot that nobody sees in rounds shares what looks like one gesture under the label of a round that showed another.
     fn mislead(&mut self, round: RoundId, class: u32, looks_like: u32, numbers: std::ops::Range<u32>) {
+        self.hear_of(LIAR, round, class, looks_like, numbers);
+    }
+
+    /// The same of any such robot, whether it is true or not.
+    fn hear_of(
+        &mut self,
+        author: RobotId,
+        round: RoundId,
+        class: u32,
+        looks_like: u32,
+        numbers: std::ops::Range<u32>,
+    ) {
         let sequence = numbers.start;
         let samples = numbers.map(|number| {
             let mut features: Vec<f32> = (0..8).map(|_| 0.3 + self.rng.random::<f32>() * 0.3).collect();
             features[0] += looks_like as f32;
             let vector = Vector::F32(space().project(&features).unwrap());
-            let id = SampleId { author: LIAR, life: 1, number: number + 1 };
+            let id = SampleId { author, life: 1, number: number + 1 };
             SharedSample { id, class: ClassId(class), round, vector }
         });
         let message = Message::Samples(Samples { space: space().id(), samples: samples.collect() });
         let stamp = Stamp { boot: 1, sequence };
         for i in 0..self.minds.len() {
-            let envelope = Envelope { author: LIAR, stamp, message: message.clone(), signature: None };
+            let envelope = Envelope { author, stamp, message: message.clone(), signature: None };
             if self.arrives() {
                 self.input(i, Input::Received(envelope));
             }
@@ -80,6 +92,27 @@ fn what_was_left_out_for_its_label_is_trained_on_when_the_label_is_corrected() {
     assert_eq!(swarm.heeded(0), Some((3, 0)));
     swarm.was(round, 4);
     assert_eq!(swarm.heeded(0), Some((3, 3)));
+    swarm.check();
+}
+
+#[test]
+fn a_lie_older_than_all_that_is_judged_after_a_lesson_stays_left_out_over_a_restart_and_a_correction() {
+    let mut swarm = Swarm::new(3, LearningConfig { capacity: 5000, ..defended() }, 33);
+    for class in [1, 4, 1, 4] {
+        let round = swarm.show(class);
+        swarm.was(round, class);
+    }
+    let round = |counter| RoundId { counter, opener: LIAR, life: 3 };
+    swarm.mislead(round(1), 1, 4, 0..3);
+    for part in 0..44 {
+        let (counter, class) = if part % 2 == 0 { (2, 1) } else { (3, 4) };
+        swarm.hear_of(RobotId(8), round(counter), class, class, 50 * part..50 * (part + 1));
+    }
+    assert_eq!(swarm.heeded(0), Some((3, 0)));
+    swarm.restart(0);
+    assert_eq!(swarm.heeded(0), Some((3, 0)));
+    swarm.was(round(1), 2);
+    assert_eq!(swarm.heeded(0), Some((3, 0)), "nobody judges it any more");
     swarm.check();
 }
 
