@@ -29,10 +29,11 @@ pub fn those_of_the_rules_of_fusion_are_what_is_printed() {
         assert!(row.starts_with(&printed), "{row} is printed as {printed}");
     }
     let single =
-        printed.lines().find_map(|line| line.split_once("one robot is right in ")?.1.split_once(" ["));
+        printed.lines().find_map(|line| line.split_once("one robot is right in ")?.1.split_once(" %"));
     let (single, _) = single.expect("how often one robot is right");
-    assert!(results.contains(&format!("one frame of one robot right in {single} % [")), "{single}");
+    assert!(results.contains(&format!("one frame of one robot right in {single} %")), "{single}");
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
-    let rounded: f64 = single.parse().expect("a share");
+    let (share, _) = single.split_once(" ±").expect("a share and its interval");
+    let rounded: f64 = share.parse().expect("a share");
     assert!(readme.contains(&format!("one frame of one robot is right in {rounded:.0} %")), "{single}");
 }

@@ -7,17 +7,18 @@ use gestalt_strategies::{Classify, Evaluation};
 use serde_json::json;
 
 use super::score::{self, Score};
-use super::train::{measure, naming};
+use super::train::{Eyes, measure, naming};
 use super::{Failure, report, say};
 use crate::config::ModelSection;
 use gestalt_draw::confusion;
-use gestalt_vision::dataset::{Dataset, joined};
+use gestalt_vision::dataset::{Dataset, LabelledImage, joined};
 use gestalt_vision::model;
 use gestalt_vision::model_file::Model;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::survey::{FalseAlarms, Survey};
 
-/// Evaluate a model on labelled images. Images and subjects it was trained on are left out. A folder `none` holds images
+/// Evaluate a model on labelled images. Images and subjects it was trained on are left out, and where learned eyes look, those that the eyes
+/// were made with. A folder `none` holds images
 /// without a gesture: of them is told in how many a hand is reported
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -60,20 +61,23 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     model.check_features(set.name(), set.length())?;
     let mut perception = Perception::new(set, HandConfig::default())?;
 
-    let (mut images, mut left_out, mut people, mut ignored) = (0, 0, 0, false);
+    let eyes = Eyes::of(set)?;
+    let (mut images, mut left_out, mut by_eyes, mut people, mut ignored) = (0, 0, 0, 0, false);
     let (mut evaluation, mut survey) = (Evaluation::new(vocabulary.classes()), Survey::default());
     let mut scores = Vec::new();
     for folder in &args.dataset {
         let dataset = Dataset::list_known(folder, naming(args.counts), vocabulary)?;
         report::ignored(folder, &dataset.ignored);
         ignored |= !dataset.ignored.is_empty();
-        let all = dataset.images.len();
-        let kept = if args.include_training { dataset.images } else { model.origin.unseen(dataset.images) };
-        if kept.is_empty() && all > 0 {
-            return Err(trained_on(folder).into());
-        }
+        let kept = if args.include_training {
+            dataset.images
+        } else {
+            let unseen = unseen(&model, &eyes, folder, dataset.images)?;
+            left_out += unseen.left_out;
+            by_eyes += unseen.by_eyes;
+            unseen.images
+        };
         images += kept.len();
-        left_out += all - kept.len();
         people += kept.iter().filter_map(|image| image.person).collect::<BTreeSet<u32>>().len();
         let (of_set, seen) = measure(&kept, &model.classifier, &mut perception)?;
         let alarms = FalseAlarms::count(&dataset.none, &mut perception);
@@ -82,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         evaluation.append(&of_set);
         survey.append(seen);
     }
-    if images == 0 && left_out == 0 && ignored {
+    if images == 0 && left_out + by_eyes == 0 && ignored {
         eprintln!(
             "note: no picture shows a gesture that the model knows, which are {}: false alarms alone are counted; --model names another",
             vocabulary.labels().join(", ")
@@ -99,13 +103,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         report["dataset"] = json!(datasets);
         report["by_dataset"] = score::json(&scores);
         report["people"] = json!(people);
-        report["left_out_as_trained_on"] = json!(left_out);
+        report["left_out_as_trained_on"] = json!(left_out + by_eyes);
         report["includes_training"] = json!(args.include_training);
         say(&format!("{report}\n"))
     } else {
         let mut text = format!("{images} images of {people} subjects, {datasets}\n");
         if left_out > 0 {
             text += &format!("  left out          {left_out} images of training subjects\n");
+        }
+        if by_eyes > 0 {
+            text += &format!("  left out          {by_eyes} images that the learned eyes were made with\n");
         }
         if args.include_training {
             text += "  warning           training images may be included\n";
@@ -128,10 +135,48 @@ fn read_model(section: &ModelSection) -> Result<(Model, String), Failure> {
     }
 }
 
+/// What is left to measure on, and how much is left out as the classifier's and as its eyes' training.
+struct Unseen {
+    images: Vec<LabelledImage>,
+    left_out: usize,
+    by_eyes: usize,
+}
+
+fn unseen(model: &Model, eyes: &Eyes, folder: &Path, images: Vec<LabelledImage>) -> Result<Unseen, Failure> {
+    let all = images.len();
+    let images = model.origin.unseen(images);
+    let left_out = all - images.len();
+    if images.is_empty() && all > 0 {
+        return Err(trained_on(folder).into());
+    }
+    let images = eyes.unseen(&[folder.to_owned()], images)?;
+    Ok(Unseen { left_out, by_eyes: all - left_out - images.len(), images })
+}
+
 fn trained_on(folder: &Path) -> String {
     format!(
         "the model was trained on all subjects in {}: hold some out (gestalt train --test-share 0.3), or use \
          --include-training to measure its training accuracy",
         folder.display()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::train::eyes_and_images;
+    use super::*;
+
+    #[test]
+    fn what_the_eyes_of_a_model_were_made_with_is_left_out_though_the_model_never_saw_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (images, eyes) = eyes_and_images(folder.path());
+        let mut model = model::hands().unwrap();
+        model.origin = gestalt_vision::model_file::Origin::default();
+        let kept = unseen(&model, &eyes, folder.path(), images.clone()).unwrap();
+        assert_eq!((kept.images, kept.left_out, kept.by_eyes), (images[2..].to_vec(), 0, 2));
+        // Of what the model saw too it is said as ever.
+        model.origin.images = vec![images[2].fingerprint().unwrap()];
+        let error = unseen(&model, &eyes, folder.path(), images[2..].to_vec()).err().unwrap().to_string();
+        assert!(error.contains("--include-training"), "{error}");
+    }
 }

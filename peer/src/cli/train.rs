@@ -1,5 +1,6 @@
 //! `gestalt train`: from folders of labelled images to a model.
 
+mod eyes;
 mod leave_one_out;
 mod outcome;
 
@@ -16,6 +17,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use serde_json::{Value, json};
 
+pub(super) use self::eyes::Eyes;
+#[cfg(test)]
+pub(super) use self::eyes::tests::images as eyes_and_images;
 use self::outcome::Outcome;
 use super::show::line;
 use super::{Failure, progress, report, say, score};
@@ -43,7 +47,8 @@ pub struct Args {
     /// Model file to write
     #[arg(long, value_name = "FILE", required_unless_present = "leave_one_out")]
     out: Option<PathBuf>,
-    /// Measure how well training carries over: for each dataset, train on the others and score on it
+    /// Measure how well training carries over: for each dataset, train on the others and score on it, but for the images that
+    /// learned eyes were made with
     #[arg(long)]
     leave_one_out: bool,
     /// Folders are counts of fingers: the number that their name begins with, so that `3_thumb_index_middle` is 3. Folders
@@ -76,7 +81,7 @@ pub struct Args {
     #[arg(long, default_value_t = 5, value_name = "N")]
     folds: usize,
     /// Hold out this share of the subjects as a test set (never trained on; reported at the end and used by `gestalt
-    /// evaluate`)
+    /// evaluate`). Those that learned eyes were made with are not tested on
     #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
     test_share: f64,
     /// Random seed of the held-out split
@@ -201,6 +206,8 @@ fn learn(
     }
     let (tested, learned): (Vec<_>, Vec<_>) =
         all.images.into_iter().partition(|image| image.person.is_some_and(|p| held_out.contains(&p)));
+    let held_out = tested.len();
+    let tested = Eyes::of(args.features)?.unseen(&args.dataset, tested)?;
     let survey = look(&learned, args.augment, args.seed, perception);
     report::rejected(&survey);
     if args.features == FeatureSet::Embedding && survey.seen.len() < survey.without_hand.len() {
@@ -230,6 +237,7 @@ fn learn(
         survey: &survey,
         seconds,
         test: test.as_ref(),
+        left_out: held_out - tested.len(),
         ignored: sets.iter().flat_map(|set| &set.ignored).map(|ignored| ignored.label.as_str()).collect(),
     };
     Ok((outcome.text(), outcome.json()))

@@ -40,7 +40,7 @@ pub fn unmoved(peace: &Swarm, war: &Swarm) -> Result<(), String> {
     Ok(())
 }
 
-/// Each gesture is decided as in peace, by all, and announced at most so much later.
+/// Each gesture is decided as in peace, by all, and announced at most so much later; and announced as final, where it was in peace.
 pub fn decided_alike(peace: &Swarm, war: &Swarm, later: Duration) -> Result<(), String> {
     for (n, (before, after)) in peace.shown().iter().zip(war.shown()).enumerate() {
         if before.held != after.held {
@@ -49,14 +49,13 @@ pub fn decided_alike(peace: &Swarm, war: &Swarm, later: Duration) -> Result<(), 
                 after.class, after.held, before.held
             ));
         }
-        let (Some(usual), Some(took)) = (before.announced, after.announced) else {
-            return Err(format!(
-                "showing {n}: announced {:?}, in peace {:?}",
-                after.announced, before.announced
-            ));
+        let in_time = |what: &str, usual: Option<Duration>, took: Option<Duration>| match (usual, took) {
+            (Some(usual), Some(took)) if took <= usual + later => Ok(()),
+            _ => Err(format!("showing {n}: {what} after {took:?}, in peace after {usual:?}")),
         };
-        if took > usual + later {
-            return Err(format!("showing {n}: announced after {took:?}, in peace after {usual:?}"));
+        in_time("announced", before.announced, after.announced)?;
+        if before.settled.is_some() {
+            in_time("final", before.settled, after.settled)?;
         }
     }
     Ok(())

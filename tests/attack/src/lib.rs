@@ -13,6 +13,7 @@
 //! The emulated robots are those of `gestalt-link` without Zenoh: the same mind, behind a [port](swarm) that takes the same
 //! bytes under the same keys, and in a sealed swarm asks `gestalt-trust` the same questions (of which a thread remembers the answers). `make attack` prints the table.
 
+pub mod arguments;
 pub mod attack;
 pub mod attacks;
 mod beside;

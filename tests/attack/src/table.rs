@@ -11,9 +11,7 @@ use crate::on_all_cores;
 #[must_use]
 pub fn print(numbers: &[String], seeds: u64) -> bool {
     let began = Instant::now();
-    let wanted = |attack: &Attack| {
-        numbers.is_empty() || attack.number.split(" · ").any(|n| numbers.iter().any(|w| w == n))
-    };
+    let wanted = |attack: &Attack| numbers.is_empty() || numbers.iter().any(|number| attack.is_of(number));
     let (mut reached, mut gaps, mut failed) = (0, 0, 0);
     println!("{:<10} {:<6} {:<2}  {:<8} attack → expected", "number", "swarm", "", "reached");
     let attacks: Vec<Attack> = all().into_iter().filter(|attack| wanted(attack)).collect();

@@ -23,7 +23,8 @@ pub enum AskedBy {
 pub struct Answering {
     /// Who asks; of no consequence where the instructor speaks unasked.
     pub asked_by: AskedBy,
-    /// Which part of what the instructor says names another gesture than the one shown, `0.0..=1.0`.
+    /// Which part of what the instructor says is wrong, `0.0..=1.0`: it names another gesture than the one shown, or says right of a wrong
+    /// decision and wrong of a right one.
     pub wrong: f64,
 }
 

@@ -19,7 +19,7 @@ pub(super) struct Said {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Calibration {
     /// The expected calibration error: the mean distance of confidence and share right, in ten bins of confidence, with the interval of a jackknife over
-    /// seeds.
+    /// seeds by Student's t.
     pub error: Mean,
     /// Wrong decisions, of those of a confidence of at least .99.
     pub sure_and_wrong: Proportion,
@@ -41,23 +41,27 @@ pub(super) struct Heard<'a> {
     pub untaught: u64,
 }
 
+impl Heard<'_> {
+    fn count(&self, of: impl Fn(&Said) -> bool) -> u64 {
+        self.said.iter().filter(|said| of(said)).count() as u64
+    }
+}
+
 impl Calibration {
     /// Of several seeds.
     pub(super) fn of(seeds: &[Heard<'_>]) -> Self {
-        let all = || seeds.iter().flat_map(|seed| seed.said);
-        let sure = all().filter(|said| said.confidence >= 0.99);
-        let taken = all().filter(|said| !said.taught && said.confidence >= 0.9).count() as u64;
-        let taught = all().filter(|said| said.taught);
-        let decided = taught.clone().count() as u64;
+        let sure = |said: &Said| said.confidence >= 0.99;
+        let share = |of: &dyn Fn(&Heard<'_>) -> (u64, u64)| Proportion::over_seeds(seeds.iter().map(of));
         Self {
             error: jackknife(seeds),
-            sure_and_wrong: Proportion::new(
-                sure.clone().filter(|said| !said.right).count() as u64,
-                sure.count() as u64,
-            ),
-            untaught_and_sure: Proportion::new(taken, seeds.iter().map(|seed| seed.untaught).sum()),
-            taught_and_decided: Proportion::new(decided, seeds.iter().map(|seed| seed.taught).sum()),
-            taught_and_right: Proportion::new(taught.filter(|said| said.right).count() as u64, decided),
+            sure_and_wrong: share(&|seed| (seed.count(|said| sure(said) && !said.right), seed.count(sure))),
+            untaught_and_sure: share(&|seed| {
+                (seed.count(|said| !said.taught && said.confidence >= 0.9), seed.untaught)
+            }),
+            taught_and_decided: share(&|seed| (seed.count(|said| said.taught), seed.taught)),
+            taught_and_right: share(&|seed| {
+                (seed.count(|said| said.taught && said.right), seed.count(|said| said.taught))
+            }),
         }
     }
 }
@@ -81,10 +85,7 @@ fn jackknife(seeds: &[Heard<'_>]) -> Mean {
         error(seeds.iter().enumerate().filter(|(k, _)| *k != left).flat_map(|(_, seed)| seed.said))
     };
     let without: Vec<f64> = (0..n).map(without).collect();
-    let mean = without.iter().sum::<f64>() / n.max(1) as f64;
-    let squares: f64 = without.iter().map(|error| (error - mean).powi(2)).sum();
-    let half_width = 1.96 * (squares * n.saturating_sub(1) as f64 / n.max(1) as f64).sqrt();
-    Mean { n, mean: all, half_width }
+    Mean::by_jackknife(all, &without)
 }
 
 #[cfg(test)]
@@ -104,10 +105,10 @@ mod tests {
         };
         assert!(of(&honest).error.mean < 1e-9);
         assert!((of(&boasting).error.mean - 0.245).abs() < 1e-9);
-        assert_eq!(of(&boasting).sure_and_wrong, Proportion::new(50, 200));
+        assert_eq!(of(&boasting).sure_and_wrong, Proportion::over_seeds([(25, 100); 2]));
         assert_eq!(of(&honest).sure_and_wrong.trials, 0);
-        assert_eq!(of(&honest).taught_and_decided, Proportion::new(200, 250));
-        assert_eq!(of(&honest).taught_and_right, Proportion::new(150, 200));
+        assert_eq!(of(&honest).taught_and_decided, Proportion::over_seeds([(100, 100), (100, 150)]));
+        assert_eq!(of(&honest).taught_and_right, Proportion::over_seeds([(75, 100); 2]));
         let unheard = [Said { confidence: 0.95, right: false, taught: false }];
         let of = Calibration::of(&[Heard { said: &unheard, taught: 3, untaught: 4 }]);
         assert_eq!(of.untaught_and_sure, Proportion::new(1, 4));

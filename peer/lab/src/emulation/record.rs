@@ -49,7 +49,7 @@ pub(super) struct Record {
     pub holds: Vec<Option<Arc<Decision>>>,
     /// The latest of them that differ: most robots come to hold the same.
     latest: Vec<Arc<Decision>>,
-    /// Frames judged before the instructor said what they show: afterwards robots have learned these very ones.
+    /// First frames of a robot of a showing, judged before the instructor said what they show: afterwards robots have learned these very ones.
     pub frames: u64,
     pub frames_right: u64,
     /// Whether what is being shown has been said.

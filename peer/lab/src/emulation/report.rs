@@ -34,7 +34,8 @@ pub struct Report {
     pub forged: Proportion,
     /// Rounds in which the likeliest class was the one shown, sure enough for a decision or not.
     pub likeliest_right: Proportion,
-    /// Single frames in which the robot that saw it found the gesture shown likeliest.
+    /// First frames, one of each robot and showing, in which the robot found the gesture shown likeliest. Later ones are not counted: while a
+    /// showing is hard robots look longer, by one fusion rule more so than by another.
     pub frames_right: Proportion,
     /// Votes counted in decisions whose likeliest class was the gesture shown.
     pub votes_right: Proportion,
@@ -208,8 +209,8 @@ pub struct Summary {
     pub undecided: Proportion,
     /// As in [`Report`], over the rounds of all seeds.
     pub likeliest_right: Proportion,
-    /// As in [`Report`], over the frames of all seeds.
-    pub frames_right: Proportion,
+    /// The shares of the seeds.
+    pub frames_right: Mean,
     /// As in [`Report`], over the votes of all seeds.
     pub votes_right: Proportion,
     /// As in [`Report`], over the rounds of all seeds.
@@ -235,8 +236,7 @@ impl Summary {
     #[must_use]
     pub fn of(rule: FusionRule, alpha: f64, reports: &[Report]) -> Self {
         let pool = |of: &dyn Fn(&Report) -> Proportion| {
-            let (hits, trials) = reports.iter().map(of).fold((0, 0), |(h, t), p| (h + p.hits, t + p.trials));
-            Proportion::new(hits, trials)
+            Proportion::over_seeds(reports.iter().map(of).map(|p| (p.hits, p.trials)))
         };
         let mean = |of: &dyn Fn(&Report) -> f64| Mean::of(&reports.iter().map(of).collect::<Vec<_>>());
         let means = |of: &dyn Fn(&Report) -> Mean| Mean::of_means(reports.iter().map(of));
@@ -250,7 +250,7 @@ impl Summary {
             wrong: pool(&|report| report.wrong),
             undecided: pool(&|report| report.undecided),
             likeliest_right: pool(&|report| report.likeliest_right),
-            frames_right: pool(&|report| report.frames_right),
+            frames_right: mean(&|report| report.frames_right.share),
             votes_right: pool(&|report| report.votes_right),
             unanimous: pool(&|report| report.unanimous),
             conflicts: reports.iter().map(|report| report.conflicts).sum(),
@@ -336,11 +336,16 @@ impl fmt::Display for Table<'_> {
         if let Some(any) = self.0.first() {
             writeln!(
                 f,
-                "{} robots, {} rounds of {} seeds; one frame of one robot is right in {} %, 95 % intervals",
+                "{} robots, {} rounds of {} seeds; one frame of one robot is right in {} %, 95 % intervals {}",
                 any.robots,
                 any.right.trials,
                 any.seeds,
-                percent(any.frames_right).trim_start(),
+                any.frames_right.percent(),
+                match any.seeds {
+                    0 | 1 => "(Wilson; of one seed, whose rounds count as independent)",
+                    _ =>
+                        "by seed (shares: Wilson with Student's t, of as many rounds as seeds show to be independent)",
+                },
             )?;
         }
         Ok(())

@@ -26,6 +26,33 @@ impl Proportion {
         let (share, low, high) = measured.map_or((0.0, 0.0, 1.0), |p| (p.value, p.low, p.high));
         Self { hits, trials, share, low, high }
     }
+
+    /// The share over seeds, of the hits and trials of each. Trials of one seed may depend on each other, as rounds do in which robots learn: of as
+    /// many independent ones as the scatter of the seeds lets there be (a jackknife of their ratio) it is the score interval, with Student's t.
+    /// Of a single seed it is that of [`Proportion::new`].
+    #[must_use]
+    pub fn over_seeds(seeds: impl IntoIterator<Item = (u64, u64)>) -> Self {
+        let seeds: Vec<(u64, u64)> = seeds.into_iter().filter(|(_, trials)| *trials > 0).collect();
+        let (hits, trials) = seeds.iter().fold((0, 0), |(h, t), (hits, trials)| (h + hits, t + trials));
+        let all = Self::new(hits, trials);
+        if seeds.len() < 2 {
+            return all;
+        }
+        let without = seeds.iter().map(|(h, t)| (hits - h) as f64 / (trials - t) as f64).collect::<Vec<_>>();
+        let (found, expected) = (jackknifed(&without), all.share * (1.0 - all.share) / trials as f64);
+        let n = if found > expected { trials as f64 * expected / found } else { trials as f64 };
+        let z = student((seeds.len() - 1) as f64).powi(2) / n;
+        let centre = (all.share + z / 2.0) / (1.0 + z);
+        let half = (z * (all.share * (1.0 - all.share) + z / 4.0)).sqrt() / (1.0 + z);
+        Self { low: (centre - half).max(0.0), high: (centre + half).min(1.0), ..all }
+    }
+}
+
+/// The variance of what was measured of several seeds, from the same measured without each of them (Quenouille 1956, Tukey 1958).
+fn jackknifed(without: &[f64]) -> f64 {
+    let n = without.len() as f64;
+    let mean = without.iter().sum::<f64>() / n;
+    without.iter().map(|one| (one - mean).powi(2)).sum::<f64>() * (n - 1.0) / n
 }
 
 /// The mean of a few numbers with its 95 % interval.
@@ -64,6 +91,13 @@ impl Mean {
     #[must_use]
     pub fn points(self) -> String {
         format!("{:+.1}{}", 100.0 * self.mean, self.interval(100.0, 1))
+    }
+
+    /// What was measured of several seeds together, with its interval by a jackknife, from the same measured without each of them.
+    pub(super) fn by_jackknife(all: f64, without: &[f64]) -> Self {
+        let n = without.len();
+        let half_width = if n < 2 { 0.0 } else { student((n - 1) as f64) * jackknifed(without).sqrt() };
+        Self { n, mean: all, half_width }
     }
 
     fn interval(self, scale: f64, decimals: usize) -> String {
@@ -120,6 +154,34 @@ mod tests {
         let none = Proportion::new(0, 20);
         assert_eq!(none.low, 0.0);
         near(none.high, 0.1611);
+    }
+
+    #[test]
+    fn a_share_over_seeds_is_as_sure_as_seeds_are_alike() {
+        // All seeds alike: rounds are independent, and it is Wilson's interval with the t of five seeds in place of 1.96.
+        let alike = Proportion::over_seeds([(8, 10); 5]);
+        assert_eq!((alike.hits, alike.trials, alike.share), (40, 50, 0.8));
+        // z = 2.776445: (p + z²/2n ± z √(p(1 − p)/n + z²/4n²)) / (1 + z²/n)
+        near(alike.low, 0.6083);
+        near(alike.high, 0.9115);
+        // All rounds of a seed come to the same: there are as many trials as seeds.
+        let whole = Proportion::over_seeds([(10, 10), (10, 10), (10, 10), (10, 10), (0, 10)]);
+        assert_eq!(whole.share, alike.share);
+        assert!(whole.high - whole.low > 2.0 * (alike.high - alike.low), "{whole:?}");
+        let Proportion { low, high, .. } = Proportion::over_seeds([(20, 20); 20]);
+        assert_eq!(high, 1.0);
+        near(low, 0.9892);
+        assert_eq!(Proportion::over_seeds([(8, 10), (0, 0)]), Proportion::new(8, 10));
+        assert_eq!(Proportion::over_seeds([]), Proportion::new(0, 0));
+    }
+
+    #[test]
+    fn a_jackknife_of_means_is_students_interval() {
+        let numbers = [0.3, 0.5, 0.1, 0.7];
+        let without = [1.3 / 3.0, 1.1 / 3.0, 1.5 / 3.0, 0.9 / 3.0];
+        let (found, expected) = (Mean::by_jackknife(0.4, &without), Mean::of(&numbers));
+        assert!((found.half_width - expected.half_width).abs() < 1e-9, "{found:?}");
+        assert_eq!(Mean::by_jackknife(0.4, &[0.0]).half_width, 0.0);
     }
 
     #[test]

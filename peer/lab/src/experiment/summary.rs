@@ -149,7 +149,7 @@ impl Summary {
         }
         text.push_str(
             "\n`single`: each robot judges what it sees; `swarm`: the logarithmic pool of all robots' views of one moment. \
-             `to the first`: the difference to the first row for single robots, seed by seed. `rounds to`: the first round \
+             Views in which a robot finds no hand are left out of both. `to the first`: the difference to the first row for single robots, seed by seed. `rounds to`: the first round \
              after which the mean of single robots is that high, and stays so. `published`: samples as their author says \
              them, once; `on links`: with what robots relay and tell for repair.\n",
         );

@@ -191,6 +191,7 @@ impl<'a> Exam<'a> {
         }
     }
 
+    /// How well robots judge now, of the views in which they find a hand.
     fn sit(&self, emulation: &mut Emulation<'_>, round: u32) -> Standing {
         emulation.learn(&self.examined);
         let classifiers: Vec<Option<Arc<Classifier>>> =

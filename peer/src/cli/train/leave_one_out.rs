@@ -1,18 +1,20 @@
 //! How well training carries over to people, cameras and places that nobody trained on: whole datasets are left out.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, Evaluation, LabelledFeatures, MIN_SAMPLES, Vocabulary};
 
 use super::super::score::Score;
 use super::super::{Failure, report};
-use super::{Args, fit, judge, look};
-use gestalt_vision::dataset::Dataset;
+use super::{Args, Eyes, fit, judge, look};
+use gestalt_vision::dataset::{Dataset, LabelledImage};
 use gestalt_vision::perception::Perception;
 use gestalt_vision::survey::{FalseAlarms, Survey, lessons};
 
-/// Scores each dataset by a model that is trained on the others. Gestures that the others do not show are left out.
+/// Scores each dataset by a model that is trained on the others. Gestures that the others do not show are left out, and so is what learned eyes
+/// were made with.
 pub(super) fn compare(
     args: &Args,
     sets: &[Dataset],
@@ -21,6 +23,14 @@ pub(super) fn compare(
     if sets.iter().filter(|set| !set.images.is_empty()).count() < 2 {
         return Err("--leave-one-out trains on all datasets but one: give --dataset at least twice".into());
     }
+    let eyes = Eyes::of(args.features)?;
+    let unseen = |(folder, set): (&PathBuf, &Dataset)| {
+        let images = eyes.unseen(std::slice::from_ref(folder), set.images.clone())?;
+        say_left_out(folder, set.images.len() - images.len(), "that the learned eyes were made with");
+        Ok(images)
+    };
+    let tested: Vec<Vec<LabelledImage>> =
+        args.dataset.iter().zip(sets).map(unseen).collect::<Result<_, Failure>>()?;
     let surveys: Vec<Survey> =
         sets.iter().map(|set| look(&set.images, args.augment, args.seed, perception)).collect();
     surveys.iter().for_each(report::rejected);
@@ -39,8 +49,8 @@ pub(super) fn compare(
         let vocabulary = Vocabulary::new(taught.labels(&set.vocabulary))
             .map_err(|error| format!("nothing to train on without {}: {error}", folder.display()))?;
         let classifier = fit(args, &vocabulary, &taught.samples(&lessons))?.classifier;
-        let (known, unknown) = taught.survey(&surveys[left]);
-        say_unknown(folder, unknown);
+        let (known, unknown) = taught.survey(&only(&surveys[left], &tested[left]));
+        say_left_out(folder, unknown, "of gestures that no other dataset shows");
         let mut evaluation = Evaluation::new(classifier.vocabulary().classes());
         judge(&known, &classifier, &mut evaluation)?;
         scores.push(Score::new(folder, &evaluation, &known, alarms));
@@ -48,12 +58,20 @@ pub(super) fn compare(
     Ok(scores)
 }
 
-fn say_unknown(folder: &Path, images: usize) {
+fn say_left_out(folder: &Path, images: usize, which: &str) {
     if images > 0 {
-        eprintln!(
-            "note: {}: left out {images} images of gestures that no other dataset shows",
-            folder.display()
-        );
+        eprintln!("note: {}: left out {images} images {which}", folder.display());
+    }
+}
+
+/// What was seen in these of the images.
+fn only(survey: &Survey, images: &[LabelledImage]) -> Survey {
+    let paths: BTreeSet<&Path> = images.iter().map(|image| image.path.as_path()).collect();
+    let is_one = |image: &LabelledImage| paths.contains(image.path.as_path());
+    Survey {
+        seen: survey.seen.iter().filter(|(image, _)| is_one(image)).cloned().collect(),
+        without_hand: survey.without_hand.iter().filter(|missed| is_one(&missed.image)).cloned().collect(),
+        unreadable: survey.unreadable.iter().filter(|file| is_one(&file.image)).cloned().collect(),
     }
 }
 
@@ -121,6 +139,15 @@ mod tests {
             without_hand: vec![rejected(3), rejected(0)],
             ..Survey::default()
         };
+        let named = |path: &str, class| LabelledImage { path: path.into(), ..image(class) };
+        let looked = Survey {
+            seen: vec![(named("a.jpg", 1), sample(1)), (named("b.jpg", 3), sample(3))],
+            without_hand: vec![Rejected { image: named("c.jpg", 1), cause: String::new() }],
+            ..Survey::default()
+        };
+        let left = only(&looked, &[named("b.jpg", 3)]);
+        assert_eq!((left.seen, left.without_hand.len()), (looked.seen[1..].to_vec(), 0));
+
         let (known, unknown) = taught.survey(&survey);
         assert_eq!(known.seen.iter().map(|(_, sample)| sample.class.0).collect::<Vec<_>>(), [1, 0]);
         assert_eq!((known.without_hand.len(), unknown), (1, 3));

@@ -28,6 +28,8 @@ pub(super) struct Outcome<'a> {
     pub seconds: f64,
     /// How it did on the images held out, if there are any.
     pub test: Option<&'a (Evaluation, Survey)>,
+    /// How many of these were left out, as the learned eyes were made with them.
+    pub left_out: usize,
     /// Folders that were left out.
     pub ignored: Vec<&'a str>,
 }
@@ -79,6 +81,12 @@ impl Outcome<'_> {
         ];
         if let Some((evaluation, survey)) = self.test {
             lines.push(format!("\n{} images of held-out subjects:", evaluation.count()));
+            if self.left_out > 0 {
+                let left_out = self.left_out;
+                lines.push(format!(
+                    "  left out          {left_out} images that the learned eyes were made with"
+                ));
+            }
             lines.push(report::text(evaluation, survey, classifier.vocabulary()));
         }
         lines.join("\n") + "\n"
@@ -112,6 +120,7 @@ impl Outcome<'_> {
                 "log_loss": trained.log_loss,
             },
             "seconds": self.seconds,
+            "test_left_out_as_trained_on": self.left_out,
             "test": self.test.map(|(evaluation, survey)| report::json(evaluation, survey, classifier.vocabulary())),
         })
     }

@@ -26,7 +26,13 @@ impl Swarm {
     pub fn begin(&mut self, class: u32) {
         self.gesture = Some(class % CLASSES);
         let began = self.now;
-        self.shown.push(Shown { class: class % CLASSES, began, held: Vec::new(), announced: None });
+        self.shown.push(Shown {
+            class: class % CLASSES,
+            began,
+            held: Vec::new(),
+            announced: None,
+            settled: None,
+        });
         self.tell(0, Input::Open);
     }
 
@@ -36,10 +42,12 @@ impl Swarm {
         self.gesture = None;
         let held: Vec<Option<u32>> = self.minds().map(|mind| Some(mind.held()?.class?.0)).collect();
         let of_it = self.announced.iter().filter(|(at, ..)| *at >= began);
-        let mut of_held = of_it.filter(|(.., decision)| held.contains(&decision.class.map(|class| class.0)));
-        let announced = of_held.next().map(|(at, ..)| *at - began);
+        let of_held = of_it.filter(|(.., decision)| held.contains(&decision.class.map(|class| class.0)));
+        let announced = of_held.clone().next().map(|(at, ..)| *at - began);
+        let mut settling = of_held.filter(|(.., decision)| decision.is_final && decision.class.is_some());
+        let settled = settling.next().map(|(at, ..)| *at - began);
         if let Some(shown) = self.shown.last_mut() {
-            (shown.held, shown.announced) = (held, announced);
+            (shown.held, shown.announced, shown.settled) = (held, announced, settled);
         }
         self.mind(1).round().unwrap_or(RoundId { counter: 0, opener: RobotId(0), life: 0 })
     }

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_strategies::{Classify, Input, Mind, Output};
-use rand::RngExt;
+use gestalt_strategies::{Classify, Input, Mind, Observation, Output};
 
 use super::parcel::Parcel;
 use super::robot::Robot;
@@ -61,8 +60,7 @@ impl Robot {
             Output::Opened(round) => {
                 self.looking = true;
                 self.looks += 1;
-                let phase: f64 = self.rng.random();
-                let first = now + Duration::from_secs_f64(self.observer.period() * phase);
+                let first = now + Duration::from_secs_f64(self.observer.period() * self.phase);
                 Some(Deed::Looks(round, first, self.looks))
             }
             Output::Closed(_) => {
@@ -91,16 +89,31 @@ impl Robot {
         }
         let next = now + Duration::from_secs_f64(self.observer.period());
         if up && let Some(observation) = self.observer.frame(&mut self.rng) {
-            let classifier: Option<Arc<dyn Classify>> = match &self.pupil {
-                Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
-                None => self.observer.classifier(),
-            };
-            let classifier = classifier.filter(|_| judges);
-            let judged = classifier.and_then(|c| c.probabilities(&observation.features).ok());
-            deeds.extend(judged.map(Deed::Judges));
+            if self.is_first && judges {
+                deeds.extend(self.judgement(&observation).map(Deed::Judges));
+            }
             self.tell(now, Input::Observed(observation), deeds);
         }
+        self.is_first = false;
         deeds.push(Deed::LooksOn(next, self.looks));
+    }
+
+    /// What it makes of its first frame of what is shown, if it has not looked yet.
+    pub fn first_frame(&mut self) -> Option<Vec<f64>> {
+        let judges = self.mind.as_ref().is_some_and(Mind::votes);
+        if !std::mem::take(&mut self.is_first) || !judges {
+            return None;
+        }
+        let observation = self.observer.frame(&mut self.rng)?;
+        self.judgement(&observation)
+    }
+
+    fn judgement(&self, observation: &Observation) -> Option<Vec<f64>> {
+        let classifier: Option<Arc<dyn Classify>> = match &self.pupil {
+            Some(pupil) => pupil.classifier().map(|classifier| classifier.clone() as Arc<dyn Classify>),
+            None => self.observer.classifier(),
+        };
+        classifier?.probabilities(&observation.features).ok()
     }
 
     /// Its classifier follows its samples.

@@ -86,10 +86,9 @@ impl Swarm<'_> {
 
     /// The gesture that the instructor names: the one shown, or where they err, the other one asked about, or any other.
     pub(super) fn names(&mut self, ask: Option<Ask>) -> ClassId {
-        let wrong = self.scenario.learning.as_ref().map_or(0.0, |teaching| teaching.answering.wrong);
         // Drawn whether or not it is needed: right and wrong answers are given of the same showings.
-        let (luck, which): (f64, u64) = (self.asking.rng.random(), self.asking.rng.random());
-        if luck >= wrong {
+        let (errs, which): (bool, u64) = (self.errs(), self.asking.rng.random());
+        if !errs {
             return self.shown;
         }
         if let Some(Ask::Between { classes: [a, b] }) = ask {
@@ -103,6 +102,12 @@ impl Swarm<'_> {
         let others: Vec<ClassId> =
             (0..).map(ClassId).take(self.scenario.classes).filter(|class| *class != self.shown).collect();
         others.get((which % others.len().max(1) as u64) as usize).copied().unwrap_or(self.shown)
+    }
+
+    /// Whether the instructor errs this time.
+    pub(super) fn errs(&mut self) -> bool {
+        let wrong = self.scenario.learning.as_ref().map_or(0.0, |teaching| teaching.answering.wrong);
+        self.asking.rng.random::<f64>() < wrong
     }
 
     /// The instructor answers, if that round is still the newest.

@@ -30,6 +30,8 @@ impl Swarm<'_> {
             robot.rng = stream(self.seed, frames(n, i));
             robot.observer.share(luck);
             robot.observer.show(self.shown, &mut robot.rng);
+            robot.phase = robot.rng.random();
+            robot.is_first = true;
         }
         let up = self.honest();
         if up.is_empty() {
@@ -87,7 +89,7 @@ impl Swarm<'_> {
             }
             (Feedback::Partial, Some(decided)) => {
                 let of = Gesture::Class(decided);
-                if decided == self.shown {
+                if (decided == self.shown) != self.errs() {
                     Instruction::Right { round, of }
                 } else {
                     Instruction::Wrong { round, of }
@@ -131,6 +133,12 @@ impl Swarm<'_> {
 
     pub(super) fn end_showing(&mut self) {
         let up = self.honest();
+        // Who had decided before it looked, looks now: else showings that are easy would count less, and by each rule others.
+        for i in &up {
+            if let Some(probabilities) = self.robots[*i].first_frame() {
+                self.record.frame(&probabilities, self.shown);
+            }
+        }
         self.record.end_showing(self.now, &up);
     }
 

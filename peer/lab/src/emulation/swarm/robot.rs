@@ -23,6 +23,9 @@ pub(super) struct Robot {
     pub mind: Option<Mind>,
     pub observer: Box<dyn Observer>,
     pub rng: ChaCha8Rng,
+    /// Which part of the time between two frames passes until its first frame of what is shown, and whether that is still to come.
+    pub phase: f64,
+    pub is_first: bool,
     pub wake: Option<Duration>,
     /// Whether it looks, and for the how-manyth time.
     pub looking: bool,
@@ -54,6 +57,8 @@ impl Robot {
             mind: None,
             observer,
             rng: stream(seed, 0),
+            phase: 0.0,
+            is_first: false,
             wake: None,
             looking: false,
             looks: 0,

@@ -17,7 +17,7 @@ pub(super) enum Deed {
     Looks(RoundId, Duration, u32),
     /// Its next frame comes then, of the same look.
     LooksOn(Duration, u32),
-    /// It judged a frame so.
+    /// It judged its first frame of what is shown so.
     Judges(Vec<f64>),
     /// It learned from so many samples.
     Learns(usize),

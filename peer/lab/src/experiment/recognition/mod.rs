@@ -6,7 +6,7 @@
 //! other people ─► training: one classifier for all cameras ─┘
 //! ```
 //!
-//! Within a seed all swarms are shown the same gestures by the same people, and the n-th robot of every kind stands at the
+//! Within a seed all swarms are shown the same gestures by the same people, and the n-th robot of every swarm stands at the
 //! same place: what differs between two swarms is what they are made of.
 
 mod outcome;

@@ -167,6 +167,12 @@ impl SwarmPlan {
         self.robots.iter().map(|kind| kind.count).sum()
     }
 
+    /// Each robot by its number in the whole swarm, whatever its kind: the n-th of every swarm stands at the same place, and each of one at a
+    /// place of its own.
+    pub fn members(&self) -> impl Iterator<Item = (usize, &Kind)> {
+        self.robots.iter().flat_map(|kind| std::iter::repeat_n(kind, kind.count)).enumerate()
+    }
+
     /// What it is made of, in words: `10 footbot + 2 parrot (2 fps)`.
     #[must_use]
     pub fn describe(&self) -> String {

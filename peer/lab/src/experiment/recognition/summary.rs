@@ -64,7 +64,8 @@ impl Summary {
         };
         let mut text = format!(
             "# {}\n\n{}, drawn hands of people the classifier was not trained on. Means with 95 % intervals (Student's t), \
-             in percent; `to the first`: the difference in `right` to the first row, seed by seed.\n\n\
+             in percent; `to the first`: the difference in `right` to the first row, seed by seed. `one frame right`: of the first frame that \
+             each robot takes of each gesture; those in which it finds no hand are left out.\n\n\
              | swarm | made of | right | wrong | undecided | to the first | one frame right | decided after, s |\n|{}\n",
             self.title,
             self.shown,

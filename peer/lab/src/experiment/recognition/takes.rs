@@ -29,7 +29,7 @@ impl Takes {
         Self { plan, seed, seen: BTreeMap::new() }
     }
 
-    /// What the `robot`th of a kind sees of that showing.
+    /// What the `robot`th of a swarm sees of that showing, if it is of that kind.
     pub fn of(
         &mut self,
         kind: &Kind,

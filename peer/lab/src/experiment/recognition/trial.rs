@@ -61,21 +61,19 @@ fn show(
     };
     let failure = Arc::new(Mutex::new(None));
     let mut observers: Vec<Box<dyn Observer>> = Vec::new();
-    for kind in &swarm.robots {
-        for robot in 0..kind.count {
-            observers.push(Box::new(Eyes {
-                seen: seen.clone(),
-                failure: failure.clone(),
-                classifier: classifier.clone(),
-                kind: kind.clone(),
-                layer: swarm.layer,
-                period: kind.model()?.period().as_secs_f64(),
-                robot,
-                showing: 0,
-                take: Take::default(),
-                next: 0,
-            }));
-        }
+    for (robot, kind) in swarm.members() {
+        observers.push(Box::new(Eyes {
+            seen: seen.clone(),
+            failure: failure.clone(),
+            classifier: classifier.clone(),
+            kind: kind.clone(),
+            layer: swarm.layer,
+            period: kind.model()?.period().as_secs_f64(),
+            robot,
+            showing: 0,
+            take: Take::default(),
+            next: 0,
+        }));
     }
     let mut emulation = Emulation::new(&scenario, seed, observers, None, Trace::none())?;
     while emulation.show_next() {
@@ -100,7 +98,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A robot's eyes: they see what was taken for its kind and number.
+/// A robot's eyes: they see what was taken for its kind and its number in the swarm.
 struct Eyes {
     seen: Arc<Mutex<Takes>>,
     failure: Arc<Mutex<Option<ExperimentError>>>,
@@ -137,5 +135,30 @@ impl Observer for Eyes {
         let frame = self.take.get(self.next).cloned().flatten();
         self.next += 1;
         frame
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn robots_stand_at_places_of_their_own_whatever_their_kinds() {
+        let text = "{ title: 't', swarms: [
+            { line: 'a', robots: [{ camera: 'footbot', count: 2 }] },
+            { line: 'b', robots: [{ camera: 'footbot', count: 1 }, { camera: 'footbot', count: 1 }] } ] }";
+        let plan = Recognition::parse(text, Path::new("test")).unwrap();
+        let mut takes = Takes::new(plan.clone(), 1);
+        let mut of = |swarm: &SwarmPlan| -> Vec<Take> {
+            let take = |(robot, kind): (usize, &Kind)| {
+                takes.of(kind, LayerConfig::default(), robot, (1, ClassId(3))).unwrap()
+            };
+            swarm.members().map(take).collect()
+        };
+        let [one, two] = [&plan.swarms[0], &plan.swarms[1]].map(|swarm| of(swarm));
+        assert_eq!(one, two);
+        assert_ne!(two[0], two[1]);
     }
 }
