@@ -124,7 +124,8 @@ async fn a_classifier_that_panics_makes_its_robot_blind_until_there_is_another()
 async fn a_guest_ends_with_its_host_and_its_classifier_is_guarded_too() {
     let name = unique();
     let mut robots = swarm(&name, 1, config(1, &name, &[])).await;
-    let guest = GuestConfig { id: gestalt_protocol::RobotId(2), name: "guest".to_owned(), boot: 1, identity: None };
+    let guest =
+        GuestConfig { id: gestalt_protocol::RobotId(2), name: "guest".to_owned(), boot: 1, identity: None };
     let guest = robots[0].robot.guest(guest).await.unwrap();
     let classifier: Arc<dyn Classify> = Arc::new(Fixed::default());
     guest.learned(classifier, "fixed");
