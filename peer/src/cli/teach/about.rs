@@ -66,11 +66,6 @@ impl About {
         }
     }
 
-    /// The round that words are about, and what was decided of it.
-    pub fn last(&self) -> Option<(RoundId, Option<ClassId>)> {
-        self.last
-    }
-
     /// The round that a word is about, and what was decided of it: what is withdrawn is what was said last, of whichever round that was.
     pub fn of(&self, word: &Word) -> Option<(RoundId, Option<ClassId>)> {
         match self.said {
@@ -174,10 +169,10 @@ mod tests {
         about.hear(&decided(6, 3, true), true);
         about.hear(&decided(6, 4, false), true);
         about.hear(&decided(5, 1, true), false);
-        assert_eq!(about.last(), Some((round(6), Some(ClassId(3)))), "the final one, and none before it");
+        assert_eq!(about.last, Some((round(6), Some(ClassId(3)))), "the final one, and none before it");
         let mut named = About::new(Some(round(5)), Some(&decided(6, 4, true)));
         named.hear(&decided(7, 4, true), true);
-        assert_eq!(named.last(), Some((round(5), None)));
+        assert_eq!(named.last, Some((round(5), None)));
         let mut none = About::new(None, None);
         assert_eq!(none.of(&Word::Undo), None);
         none.hear(&decided(1, 2, true), true);
@@ -196,7 +191,7 @@ mod tests {
             about.hear(&again(1, false), true);
             about.hear(&decided(before, 3, true), false);
             about.hear(&again(1, true), true);
-            assert_eq!(about.last(), Some((again(1, true).round, Some(ClassId(4)))));
+            assert_eq!(about.last, Some((again(1, true).round, Some(ClassId(4)))));
             let asked = Question { round: again(1, true).round, ..question(1, ["a", "b"]) };
             assert!(about.ask(Instant::now(), &asked));
         }
