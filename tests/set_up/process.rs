@@ -34,7 +34,8 @@ impl Process {
                 command
             }
         };
-        Self::run(command.arg(orders.to_string()))
+        // As its service runs it.
+        Self::run(command.env("MALLOC_ARENA_MAX", "2").arg(orders.to_string()))
     }
 
     /// Runs a program that prints a line of JSON for whatever happens; each gets the time at which it was read, `at_ms`

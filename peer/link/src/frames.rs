@@ -72,10 +72,10 @@ struct Cameras {
 }
 
 impl Cameras {
-    /// Whether nothing was started later that streams as that robot.
-    fn is_of_latest_sender(&mut self, frame: &FrameArrival) -> bool {
+    /// Whether nothing that was started later streams as that robot.
+    fn hears(&mut self, frame: &FrameArrival) -> bool {
         let has_room = self.senders.len() < MAX_ROBOTS || self.senders.contains_key(&frame.robot);
-        !has_room || self.senders.entry(frame.robot).or_default().is_latest(frame.header.nonce)
+        !has_room || self.senders.entry(frame.robot).or_default().hears(frame.header.nonce, frame.at)
     }
 }
 
@@ -188,7 +188,7 @@ impl Desk {
     /// The frame, if it is to be looked at.
     fn admit(&self, sample: &Sample) -> Result<FrameArrival, Refusal> {
         let arrival = self.believed(sample)?;
-        if self.cameras().is_of_latest_sender(&arrival) { Ok(arrival) } else { Err(Refusal::TwoSenders) }
+        if self.cameras().hears(&arrival) { Ok(arrival) } else { Err(Refusal::TwoSenders) }
     }
 
     /// The frame, if it is one, and its robot's.

@@ -1,28 +1,38 @@
 //! Which of two senders that stream for one robot is heard.
 
 use std::collections::VecDeque;
+use std::time::{Duration, Instant};
 
 /// So many earlier ones are known.
 const KNOWN: usize = 8;
 
-/// The starts of whatever streams for a robot, each known by its nonce. The latest is heard: who is started again takes its place at once. Who goes on
-/// beside it, with the same id by mistake, shows another hand.
+/// After so long an earlier one takes its place again: who is not answered sends a frame a second.
+const SILENT: Duration = Duration::from_secs(3);
+
+/// The starts of whatever streams for a robot, each known by its nonce. The latest is heard while it sends: who is started again takes its place at once. Who
+/// goes on beside it, with the same id by mistake, shows another hand.
 #[derive(Debug, Default)]
 pub(crate) struct Senders {
-    latest: Option<u64>,
+    latest: Option<(u64, Instant)>,
     earlier: VecDeque<u64>,
 }
 
 impl Senders {
-    /// Whether that is the latest, which it is if it was never heard before.
-    pub fn is_latest(&mut self, nonce: u64) -> bool {
-        if self.earlier.contains(&nonce) {
-            return false;
+    /// Whether the one with that nonce, which sends now, is to be heard.
+    pub fn hears(&mut self, nonce: u64, now: Instant) -> bool {
+        match self.latest {
+            Some((latest, _)) if latest == nonce => {}
+            Some((_, at)) if now.saturating_duration_since(at) < SILENT && self.earlier.contains(&nonce) => {
+                return false;
+            }
+            Some((latest, _)) => {
+                self.earlier.retain(|earlier| *earlier != nonce);
+                self.earlier.truncate(KNOWN - 1);
+                self.earlier.push_front(latest);
+            }
+            None => {}
         }
-        if let Some(before) = self.latest.replace(nonce).filter(|before| *before != nonce) {
-            self.earlier.truncate(KNOWN - 1);
-            self.earlier.push_front(before);
-        }
+        self.latest = Some((nonce, now));
         true
     }
 }
@@ -32,17 +42,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_started_again_is_heard_at_once_and_who_goes_on_beside_it_never() {
-        let mut senders = Senders::default();
-        assert!([1, 1, 2, 2, 3].into_iter().all(|nonce| senders.is_latest(nonce)));
-        assert!(![1, 2, 1, 2].into_iter().any(|nonce| senders.is_latest(nonce)));
-        assert!(senders.is_latest(3));
+    fn who_is_started_again_is_heard_at_once_and_who_goes_on_beside_it_is_not() {
+        let (mut senders, now) = (Senders::default(), Instant::now());
+        assert!([1, 1, 2, 2, 3].into_iter().all(|nonce| senders.hears(nonce, now)));
+        for second in 1..10 {
+            let now = now + Duration::from_secs(second);
+            assert!(![1, 2].into_iter().any(|nonce| senders.hears(nonce, now)) && senders.hears(3, now));
+        }
+    }
+
+    #[test]
+    fn who_sends_no_more_keeps_nobody_else_out() {
+        let (mut senders, now) = (Senders::default(), Instant::now());
+        assert!(senders.hears(1, now) && senders.hears(2, now) && !senders.hears(1, now));
+        let later = now + SILENT;
+        assert!(senders.hears(1, later) && !senders.hears(2, later));
+        assert_eq!(senders.earlier, [2]);
     }
 
     #[test]
     fn what_is_remembered_of_them_is_bounded() {
-        let mut senders = Senders::default();
-        assert!((0..1000).all(|nonce| senders.is_latest(nonce)));
+        let (mut senders, now) = (Senders::default(), Instant::now());
+        assert!((0..1000).all(|nonce| senders.hears(nonce, now)));
         assert_eq!(senders.earlier, (991..999).rev().collect::<Vec<u64>>());
     }
 }

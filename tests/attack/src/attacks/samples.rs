@@ -53,7 +53,7 @@ pub const ALL: &[Attack] = &[
         what: "an enrolled robot gives 600 samples with gaps in their numbers to robots that hold 60",
         tier: Tier::T4,
         setting: Setting::Sealed,
-        expected: "13 of them are held at most, its share; no own sample goes",
+        expected: "15 of them are held at most, its share where five robots vote; no own sample goes",
         counted: Counted::None("what is above the share of an author is the first to be forgotten"),
         gap: None,
         play: |seed| beside(&small(1), seed, by_a_member, its_share_at_most),
@@ -247,7 +247,7 @@ fn a_quarter_at_most(peace: &Swarm, war: &Swarm) -> Result<(), String> {
 }
 
 fn its_share_at_most(peace: &Swarm, war: &Swarm) -> Result<(), String> {
-    shares(peace, war, 13, |author| author.0 == 6)
+    shares(peace, war, 15, |author| author.0 == 6)
 }
 
 fn many_authors(swarm: &mut Swarm) {
