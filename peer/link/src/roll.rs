@@ -206,9 +206,9 @@ impl Roll {
                 .error(&format!("who was convicted before is not known: {}: {error}", path.display()));
         };
         match Evidence::kept_in(&folder) {
-            Ok((kept, unread)) => {
-                unread.iter().for_each(|(path, error)| unknown(path, error));
-                kept
+            Ok(kept) => {
+                kept.unread.iter().for_each(|(path, error)| unknown(path, error));
+                kept.evidence
             }
             Err(error) => {
                 unknown(&folder, &error);

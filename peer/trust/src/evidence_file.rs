@@ -15,6 +15,15 @@ const EXTENSION: &str = "evidence";
 /// How much of a file shows that it is too long to be evidence.
 const TOO_LONG: u64 = Evidence::MAX_LENGTH as u64 + 1;
 
+/// What was in a folder of evidence.
+#[derive(Debug, Default)]
+pub struct KeptEvidence {
+    /// What could be read, by the names of the files.
+    pub evidence: Vec<Evidence>,
+    /// What the system did not let be read, with its reason.
+    pub unread: Vec<(PathBuf, io::Error)>,
+}
+
 impl Evidence {
     /// Keeps evidence against that robot in a folder, which is made if there is none, in place of other evidence against it: whoever reads meanwhile, or
     /// after a power cut, finds the whole old one or the whole new one.
@@ -33,20 +42,20 @@ impl Evidence {
     ///
     /// # Errors
     /// Those of the file system, where the folder cannot be read.
-    pub fn kept_in(folder: &Path) -> io::Result<(Vec<Self>, Vec<(PathBuf, io::Error)>)> {
+    pub fn kept_in(folder: &Path) -> io::Result<KeptEvidence> {
         let entries = match fs::read_dir(folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((Vec::new(), Vec::new())),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(KeptEvidence::default()),
             entries => entries?,
         };
         let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
         paths.retain(|path| path.extension().is_some_and(|extension| extension == EXTENSION));
         paths.sort();
-        let (mut kept, mut unread, mut bytes) = (Vec::new(), Vec::new(), 0);
+        let (mut kept, mut bytes) = (KeptEvidence::default(), 0);
         for path in paths {
             let read = match read(&path) {
                 Ok(read) => read,
                 Err(error) => {
-                    unread.push((path, error));
+                    kept.unread.push((path, error));
                     continue;
                 }
             };
@@ -54,9 +63,9 @@ impl Evidence {
             if bytes > KEPT_BYTES {
                 break;
             }
-            kept.extend(Self::decode(&read));
+            kept.evidence.extend(Self::decode(&read));
         }
-        Ok((kept, unread))
+        Ok(kept)
     }
 }
 
@@ -90,7 +99,7 @@ mod tests {
     }
 
     fn kept_in(folder: &Path) -> Vec<Evidence> {
-        let (kept, unread) = Evidence::kept_in(folder).unwrap();
+        let KeptEvidence { evidence: kept, unread } = Evidence::kept_in(folder).unwrap();
         assert!(unread.is_empty(), "{unread:?}");
         kept
     }
@@ -176,7 +185,7 @@ mod tests {
         let unreadable = folder.path().join("robot-0.evidence");
         fs::create_dir(&unreadable).unwrap();
         evidence(1).keep(folder.path(), RobotId(1)).unwrap();
-        let (kept, unread) = Evidence::kept_in(folder.path()).unwrap();
+        let KeptEvidence { evidence: kept, unread } = Evidence::kept_in(folder.path()).unwrap();
         assert_eq!(kept, [evidence(1)]);
         assert_eq!(unread.into_iter().map(|(path, _)| path).collect::<Vec<_>>(), [unreadable]);
     }

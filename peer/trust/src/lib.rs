@@ -96,6 +96,7 @@ pub use budget::Budget;
 pub use channel::{CHANNEL_DOMAIN, Channels, Tag};
 pub use distrust::Distrust;
 pub use evidence::{Conviction, Evidence, EvidenceError, Lie, Refutes};
+pub use evidence_file::KeptEvidence;
 #[cfg(feature = "fake")]
 pub use fake::Fake;
 pub use frame::{CHALLENGE_DOMAIN, FRAME_DOMAIN, FrameClaim, FrameGuard, FrameSigner};

@@ -151,13 +151,13 @@ mod tests {
             { line: 'b', robots: [{ camera: 'footbot', count: 1 }, { camera: 'footbot', count: 1 }] } ] }";
         let plan = Recognition::parse(text, Path::new("test")).unwrap();
         let mut takes = Takes::new(plan.clone(), 1);
-        let mut of = |swarm: &SwarmPlan| -> Vec<Take> {
+        let of = |swarm: &SwarmPlan| -> Vec<Take> {
             let take = |(robot, kind): (usize, &Kind)| {
                 takes.of(kind, LayerConfig::default(), robot, (1, ClassId(3))).unwrap()
             };
             swarm.members().map(take).collect()
         };
-        let [one, two] = [&plan.swarms[0], &plan.swarms[1]].map(|swarm| of(swarm));
+        let [one, two] = [&plan.swarms[0], &plan.swarms[1]].map(of);
         assert_eq!(one, two);
         assert_ne!(two[0], two[1]);
     }
