@@ -130,10 +130,7 @@ pub async fn of_two_cameras_that_stream_as_one_robot_the_later_is_looked_at() {
     };
     let refused = || robot.status().counters.get("refused_frame_two_senders").copied().unwrap_or(0);
     wait_for("refusal", || (refused() >= 2).then_some(())).await;
-    let mut heard = Vec::new();
-    while let Ok(nonce) = nonces.try_recv() {
-        heard.push(nonce);
-    }
+    let heard: Vec<u64> = std::iter::from_fn(|| nonces.try_recv().ok()).collect();
     assert!(!heard.is_empty() && heard.iter().all(|nonce| *nonce == latest), "{heard:?} after {latest}");
     earlier.abort();
     later.abort();
