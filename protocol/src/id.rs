@@ -143,6 +143,14 @@ pub struct RoundId {
     pub life: u32,
 }
 
+impl RoundId {
+    /// Whether the two can be names of one showing: of one count, and not of one robot before and after it started again.
+    #[must_use]
+    pub fn may_merge(&self, other: &Self) -> bool {
+        self.counter == other.counter && (self.opener != other.opener || self.life == other.life)
+    }
+}
+
 impl fmt::Display for RoundId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}@{}-{:08x}", self.counter, self.opener, self.life)

@@ -7,8 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use gestalt_link::boot_number;
-use gestalt_link::{Event, Robot};
+use gestalt_link::{Event, FrameArrival, FrameGate, Robot, boot_number};
 use gestalt_peer::body::Body;
 use gestalt_peer::center::Center;
 use gestalt_peer::config::{CameraChoice, CameraSection, FilesSection, SourceSection, StreamSection};
@@ -20,6 +19,7 @@ use gestalt_tests::{Hands, center_config, config, sender_config, unique};
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::source::{Frame, Scene, Source, SourceError};
 use serde_json::json;
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use zenoh::qos::CongestionControl;
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -68,17 +68,20 @@ pub async fn wait_for<T>(what: &str, mut pick: impl FnMut() -> Option<T>) -> T {
     }
 }
 
+/// Has a robot receive frames, and answer none: the headers of those that are to be looked at.
+async fn frames_at(robot: &Robot) -> (FrameGate, UnboundedReceiver<FrameHeader>) {
+    let (sender, headers) = unbounded_channel();
+    let on_frame = move |frame: FrameArrival| {
+        let _ = sender.send(frame.header);
+    };
+    (robot.receive_frames(None, on_frame).await.unwrap(), headers)
+}
+
 pub async fn one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second() {
     let hands = Hands::new(2);
     let swarm = unique("credit");
     let robot = Robot::start(config(1, &swarm, &[])).await.unwrap();
-    let (sender, mut headers) = tokio::sync::mpsc::unbounded_channel();
-    let gate = robot
-        .receive_frames(None, move |frame| {
-            let _ = sender.send(frame.header);
-        })
-        .await
-        .unwrap();
+    let (gate, mut headers) = frames_at(&robot).await;
     let streaming = tokio::spawn(parrot(7, &swarm, robot.locators(), &hands.images()).run(|_| {}));
     let began = Instant::now();
     for _ in 0..3 {
@@ -110,27 +113,21 @@ pub async fn of_two_cameras_that_stream_as_one_robot_the_later_is_looked_at() {
     let hands = Hands::new(2);
     let swarm = unique("two");
     let robot = Robot::start(config(1, &swarm, &[])).await.unwrap();
-    let (arrived, mut nonces) = tokio::sync::mpsc::unbounded_channel();
-    let _gate = robot
-        .receive_frames(None, move |frame| {
-            let _ = arrived.send(frame.header.nonce);
-        })
-        .await
-        .unwrap();
+    let (_gate, mut headers) = frames_at(&robot).await;
     // Nobody answers: each sends a frame a second.
     let stream = || tokio::spawn(parrot(7, &swarm, robot.locators(), &hands.images()).run(|_| {}));
     let earlier = stream();
-    let first = nonces.recv().await.unwrap();
+    let first = headers.recv().await.unwrap().nonce;
     let later = stream();
     let latest = loop {
-        let nonce = nonces.recv().await.unwrap();
+        let nonce = headers.recv().await.unwrap().nonce;
         if nonce != first {
             break nonce;
         }
     };
     let refused = || robot.status().counters.get("refused_frame_two_senders").copied().unwrap_or(0);
     wait_for("refusal", || (refused() >= 2).then_some(())).await;
-    let heard: Vec<u64> = std::iter::from_fn(|| nonces.try_recv().ok()).collect();
+    let heard: Vec<u64> = std::iter::from_fn(|| Some(headers.try_recv().ok()?.nonce)).collect();
     assert!(!heard.is_empty() && heard.iter().all(|nonce| *nonce == latest), "{heard:?} after {latest}");
     earlier.abort();
     later.abort();
@@ -266,7 +263,7 @@ pub async fn who_is_there_already_and_who_comes_too_many_is_refused_and_counted(
 /// A thin client's messages, and a robot that takes its frames.
 struct Taken {
     robot: Robot,
-    _gate: Arc<std::sync::OnceLock<gestalt_link::FrameGate>>,
+    _gate: Arc<std::sync::OnceLock<FrameGate>>,
     frames: Arc<AtomicU64>,
     failures: Arc<std::sync::Mutex<Vec<(String, u64)>>>,
     sending: tokio::task::JoinHandle<()>,
@@ -276,7 +273,7 @@ struct Taken {
 impl Taken {
     async fn from(feed: Feed, swarm: &str) -> Self {
         let robot = Robot::start(config(1, swarm, &[])).await.unwrap();
-        let gate = Arc::new(std::sync::OnceLock::<gestalt_link::FrameGate>::new());
+        let gate = Arc::new(std::sync::OnceLock::<FrameGate>::new());
         let (frames, failures) = (Arc::<AtomicU64>::default(), Arc::<std::sync::Mutex<Vec<_>>>::default());
         let (of_gate, counted) = (gate.clone(), frames.clone());
         let opened = robot

@@ -78,7 +78,7 @@ pub(super) struct State {
 impl State {
     /// Whether there is nothing to take.
     fn is_empty(&self) -> bool {
-        !self.alive_changed && !self.links_changed && self.waiting.is_empty() && self.votes.is_empty()
+        !self.alive_changed && !self.links_changed && self.waiting.len() == 0 && self.votes.is_empty()
     }
 }
 
@@ -162,7 +162,7 @@ impl Inbox {
         }
         let mut state = self.lock();
         let state = &mut *state;
-        let mut inputs = Vec::new();
+        let mut inputs = Vec::with_capacity(state.waiting.len() + state.votes.len() + 2);
         if std::mem::take(&mut state.alive_changed) {
             inputs.push(Input::Alive(Arc::new(state.alive.clone())));
         }

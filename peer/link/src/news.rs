@@ -116,9 +116,7 @@ impl News {
     /// Whether that round, of which a decision was heard, is the newest of those, or one that merges with it.
     #[must_use]
     pub fn is_newest(&self, round: RoundId) -> bool {
-        self.known().newest.decided().is_some_and(|newest| {
-            newest.counter == round.counter && (newest.opener != round.opener || newest.life == round.life)
-        })
+        self.known().newest.decided().is_some_and(|newest| newest.may_merge(&round))
     }
 
     /// Takes in a round that is known to be decided, though nothing was heard of it.

@@ -81,8 +81,7 @@ impl Roll {
         account: Arc<Account>,
     ) -> Self {
         let first = roster.members().epoch;
-        account.set("roster_checksum", roster.checksum().into());
-        account.set("roster_epoch", first);
+        report(&account, &roster);
         let door = Arc::new(Door::new(roster.clone()));
         Self {
             me,
@@ -135,8 +134,7 @@ impl Roll {
         let members = next.members();
         let gone = before.iter().filter(|(robot, key)| members.robots.get(robot) != Some(key));
         let gone = gone.map(|(robot, _)| *robot).collect();
-        self.account.set("roster_checksum", next.checksum().into());
-        self.account.set("roster_epoch", members.epoch);
+        report(&self.account, &next);
         if members.robots.get(&self.me) != Some(&self.key) {
             self.account.count("expelled");
             self.account.error(&format!(
@@ -246,6 +244,12 @@ impl Roll {
         }
         is_kept
     }
+}
+
+/// Says in the status which roster is gone by: by its epoch, and by what tells two of one epoch apart, which stands there first.
+fn report(account: &Account, roster: &Roster) {
+    account.set("roster_checksum", roster.checksum().into());
+    account.set("roster_epoch", roster.members().epoch);
 }
 
 #[cfg(test)]

@@ -22,8 +22,8 @@ pub(super) struct Waiting {
 }
 
 impl Waiting {
-    pub fn is_empty(&self) -> bool {
-        self.inputs.is_empty()
+    pub fn len(&self) -> usize {
+        self.inputs.len()
     }
 
     pub fn is_full(&self) -> bool {

@@ -55,12 +55,9 @@ impl About {
         }
         let round = decision.round;
         self.newest = Some(round.counter);
-        let news = self.last.is_none_or(|(known, _)| {
-            // Rounds of one counter merge, unless who opened both started again between them.
-            let is_same =
-                known.counter == round.counter && (known.opener != round.opener || known.life == round.life);
-            !is_same || decision.is_final || !self.is_final
-        });
+        let news = self
+            .last
+            .is_none_or(|(known, _)| !known.may_merge(&round) || decision.is_final || !self.is_final);
         if news && !self.is_named {
             (self.last, self.is_final) = (Some((round, decision.class)), decision.is_final);
         }
