@@ -106,7 +106,7 @@ pub struct RoundsConfig {
     /// for this one may still be on its way. Nor does a newer round end it; zero lets any newer one, at any time.
     #[serde(with = "humantime_serde")]
     pub refractory: Duration,
-    /// The least time between two votes of one robot.
+    /// The least time between two votes of one robot: no longer than the deadline, or none would come in time.
     #[serde(with = "humantime_serde")]
     pub vote_interval: Duration,
     /// A vote is said again after this long, while the round is open.
@@ -279,6 +279,7 @@ impl RoundsConfig {
         let ordered = [
             ("patience", self.patience, "deadline", self.deadline),
             ("vote_interval", self.vote_interval, "vote_repeat", self.vote_repeat),
+            ("vote_interval", self.vote_interval, "deadline", self.deadline),
             ("repair_busy", self.repair_busy, "repair_idle", self.repair_idle),
         ];
         match ordered.iter().find(|(_, less, _, more)| less > more) {
@@ -349,6 +350,7 @@ mod tests {
             (RoundsConfig { settle: Duration::MAX, ..default() }, "settle"),
             (RoundsConfig { patience: ms(6000), ..default() }, "patience"),
             (RoundsConfig { vote_repeat: ms(100), ..default() }, "vote_repeat"),
+            (RoundsConfig { vote_interval: ms(6000), vote_repeat: ms(6000), ..default() }, "deadline"),
         ] {
             let error = config.validate().unwrap_err().to_string();
             assert!(error.contains(field), "{error}");

@@ -10,8 +10,9 @@ use crate::others::Others;
 /// Who counts as one of the swarm, whether or not it can be reached now.
 ///
 /// A robot that voted counts for a while after its last vote, and after it was last alive, however long nothing was shown before that: a part of the swarm
-/// that is cut off remembers how many there are elsewhere. One that is said to be alive and was not heard lately, or never, counts until a whole round has
-/// passed in which it said nothing: names without robots keep nobody from deciding for long.
+/// that is cut off remembers how many there are elsewhere. So does one that has not voted yet, where names cost a key, or if it told this one what it has.
+/// One that is said to be alive and was not heard lately, or never, counts until a whole round has passed in which it said nothing: names without robots
+/// keep nobody from deciding for long.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Electorate {
     /// When each other robot last voted. At most [`MAX_ROBOTS`].
@@ -20,6 +21,10 @@ pub(crate) struct Electorate {
     unheard: BTreeMap<RobotId, Unheard>,
     /// Alive through a whole round, and never heard.
     silent: BTreeSet<RobotId>,
+    /// Alive, and met as robots: they told this one what they have. They count as if they had voted once they are gone.
+    met: BTreeSet<RobotId>,
+    /// Whether nobody is alive without a key, so that each name has its robot.
+    keyed: bool,
     /// Heard, or alive, and not alive now: since when. At most [`MAX_ROBOTS`].
     gone: BTreeMap<RobotId, Duration>,
     /// How many other robots are alive.
@@ -45,7 +50,19 @@ impl Electorate {
         Self { most_asked, ..Self::default() }
     }
 
-    /// A robot voted, or was there until now and voted before.
+    /// From now on whoever is alive has a key.
+    pub fn require_keys(&mut self) {
+        self.keyed = true;
+    }
+
+    /// A robot that is alive told this one what it has.
+    pub fn meet(&mut self, robot: RobotId) {
+        if self.met.len() < MAX_ROBOTS {
+            self.met.insert(robot);
+        }
+    }
+
+    /// A robot voted, or was there until now and is known to be one.
     pub fn hear(&mut self, robot: RobotId, now: Duration) {
         self.unheard.remove(&robot);
         self.silent.remove(&robot);
@@ -71,7 +88,9 @@ impl Electorate {
                 self.gone.insert(robot, now);
             }
             let voted = self.unheard.get(&robot).is_some_and(|unheard| unheard.voted);
-            if voted || self.heard.contains_key(&robot) {
+            // Else a swarm that is cut before its first round would be two.
+            let is_robot = voted || self.keyed || self.met.contains(&robot);
+            if is_robot || self.heard.contains_key(&robot) {
                 self.hear(robot, now);
             }
         }
@@ -84,6 +103,7 @@ impl Electorate {
         self.alive = robots.len();
         self.unheard.retain(|robot, _| robots.contains(*robot));
         self.silent.retain(|robot| robots.contains(*robot));
+        self.met.retain(|robot| robots.contains(*robot));
         self.large = self.counted_large().is_some();
         if self.large {
             self.unheard.clear();
@@ -101,6 +121,7 @@ impl Electorate {
         self.heard.retain(|robot, _| !robots.contains(robot));
         self.unheard.retain(|robot, _| !robots.contains(robot));
         self.silent.retain(|robot| !robots.contains(robot));
+        self.met.retain(|robot| !robots.contains(robot));
         self.gone.retain(|robot, _| !robots.contains(robot));
     }
 
@@ -271,6 +292,24 @@ mod tests {
             }
             assert_eq!(electorate.count(), 5, "the others are elsewhere, {cut_first}");
             electorate.forget(at(422), LATELY, &none);
+            assert_eq!(electorate.count(), 1, "they stayed away");
+        }
+    }
+
+    /// As when the swarm is cut before anything was shown, or some started again since.
+    #[test]
+    fn who_is_known_to_be_a_robot_counts_when_it_is_gone_also_if_it_never_voted() {
+        for (keyed, expected) in [(true, 101), (false, 3)] {
+            let mut electorate = Electorate::default();
+            if keyed {
+                electorate.require_keys();
+            }
+            electorate.alive(&robots(1..=100), at(0));
+            electorate.meet(RobotId(1));
+            electorate.meet(RobotId(2));
+            electorate.change(&robots(1..=100), &robots([]), at(1));
+            assert_eq!(electorate.count(), expected, "{keyed}");
+            electorate.forget(at(62), LATELY, &robots([]));
             assert_eq!(electorate.count(), 1, "they stayed away");
         }
     }

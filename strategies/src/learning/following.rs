@@ -33,7 +33,8 @@ impl Follow for Learning {
     fn settled(&mut self, decision: &Decision, clip: f64) {
         let own = decision.certificate.vocabulary == self.vocabulary.id();
         if own && let Some(testimony) = Testimony::of(decision, clip) {
-            self.judged.note(decision.round, self.shelf.testimony(decision.round, testimony));
+            let testimony = self.shelf.testimony(decision.round, testimony);
+            self.judged.note(decision.round, self.recent.names(decision.round), testimony);
         }
     }
 

@@ -28,8 +28,14 @@ struct Judged {
 }
 
 impl JudgedRounds {
-    /// Notes the votes of a round as the decision held of it has them.
-    pub fn note(&mut self, round: RoundId, testimony: Arc<Testimony>) {
+    /// Notes the votes of a round as the decision held of it has them. `names`: all that the round has. What was held under another one counts no more:
+    /// one showing would weigh double.
+    pub fn note(&mut self, round: RoundId, names: impl Iterator<Item = RoundId>, testimony: Arc<Testimony>) {
+        for other in names.filter(|name| *name != round) {
+            if self.rounds.remove(&other).is_some() {
+                self.pool = None;
+            }
+        }
         let known = self.rounds.get(&round).is_some_and(|judged| judged.testimony == testimony);
         if known {
             return;
@@ -113,6 +119,22 @@ mod tests {
         RoundId { counter, opener: RobotId(0), life: 0 }
     }
 
+    /// A round of one name.
+    fn alone() -> std::iter::Empty<RoundId> {
+        std::iter::empty()
+    }
+
+    #[test]
+    fn a_round_counts_once_under_whichever_of_its_names_it_was_decided() {
+        let (shelf, mut judged) = (Shelf::default(), JudgedRounds::default());
+        let name = |opener| RoundId { opener: RobotId(opener), ..round(1) };
+        judged.note(name(3), alone(), testimony(0));
+        assert_eq!(judged.pool(&shelf, |_| Verdict::Class(ClassId(0))).rounds, 1);
+        judged.note(name(1), [name(1), name(3)].into_iter(), testimony(0));
+        assert_eq!(judged.pool(&shelf, |_| Verdict::Class(ClassId(0))).rounds, 1);
+        assert_eq!(judged.rounds.keys().collect::<Vec<_>>(), [&name(1)]);
+    }
+
     #[test]
     fn the_same_rounds_and_words_give_the_same_pool_in_any_order_and_words_taken_back_no_longer_count() {
         let was = |class: u32| Verdict::Class(ClassId(class));
@@ -120,7 +142,7 @@ mod tests {
         let verdict = |round: RoundId| if round.counter.is_multiple_of(3) { was(1) } else { was(0) };
         let (shelf, mut heard) = (Shelf::default(), JudgedRounds::default());
         assert_eq!(heard.pool(&shelf, verdict), Pool::PRIOR);
-        (0..30).for_each(|n| heard.note(round(n), testimony(0)));
+        (0..30).for_each(|n| heard.note(round(n), alone(), testimony(0)));
         assert_eq!(heard.pool(&shelf, |_| Verdict::Unsaid), Pool::PRIOR, "nobody said what they were");
         heard.doubt();
         let pool = heard.pool(&shelf, verdict);
@@ -131,7 +153,7 @@ mod tests {
         );
 
         let mut turned = JudgedRounds::default();
-        (0..30).rev().chain(5..10).for_each(|n| turned.note(round(n), testimony(0)));
+        (0..30).rev().chain(5..10).for_each(|n| turned.note(round(n), alone(), testimony(0)));
         turned.doubt();
         assert_eq!(turned.pool(&shelf, verdict), pool);
         heard.doubt();
@@ -141,7 +163,7 @@ mod tests {
     #[test]
     fn what_is_kept_is_bounded_and_the_newest() {
         let mut judged = JudgedRounds::default();
-        (0..3 * MAX_ROUNDS as u32).for_each(|n| judged.note(round(n), testimony(0)));
+        (0..3 * MAX_ROUNDS as u32).for_each(|n| judged.note(round(n), alone(), testimony(0)));
         assert_eq!(judged.rounds.len(), MAX_ROUNDS);
         assert_eq!(judged.rounds.keys().next(), Some(&round(2 * MAX_ROUNDS as u32)));
     }

@@ -27,7 +27,7 @@ impl Mind {
         };
         let config = &learning.config().questions;
         let is_over = !self.rounds.is_open() && self.rounds.looking().is_none();
-        let is_of_newest = self.rounds.round() == Some(question.round);
+        let is_of_newest = self.rounds.is_newest(question.round);
         let is_unsaid = learning.verdict(question.round) == Verdict::Unsaid;
         let is_its_turn =
             self.asks.is_turn_of(question.robot) && self.asks.budget.allows_another(now, config);
@@ -43,7 +43,7 @@ impl Mind {
     pub(super) fn carry_on_asking(&mut self, now: Duration, passed: Passed, out: &mut Vec<Output>) {
         let Some(learning) = &self.learning else { return };
         self.asks.enter(now, self.rounds.round());
-        if let Some((_, robot)) = passed.heard.filter(|(round, _)| self.rounds.round() == Some(*round)) {
+        if let Some((_, robot)) = passed.heard.filter(|(round, _)| self.rounds.is_newest(*round)) {
             self.asks.note_speaker(robot);
         }
         if passed.announced {

@@ -25,7 +25,7 @@ impl Rounds {
     /// Opens a round under the next count; one that is open is over. Names of rounds to come can be guessed, and one of which an instructor spoke is over:
     /// who speaks of them keeps nobody from opening one.
     pub(super) fn open_next(&mut self, effects: &mut Effects<'_>) {
-        let Some(next) = self.highest.map_or(Some(1), |highest| highest.checked_add(1)) else {
+        let Some(next) = self.last_counter().map_or(Some(1), |last| last.checked_add(1)) else {
             return self.refusals.add(Refusal::CountersUsedUp);
         };
         let named = |counter| RoundId { counter, opener: self.me, life: self.nonce };

@@ -41,7 +41,7 @@ impl Rounds {
             Message::Give(give) => self.on_give(author, give, effects),
             Message::Holding(holding) => {
                 let word = Holder { robot: author, stamp, holding, signature };
-                self.note_holder(word.clone());
+                self.note_holder(word.clone(), effects);
                 self.want(author, word.holding);
             }
             // That comes as what it is, an announcement.
@@ -58,7 +58,7 @@ impl Rounds {
     }
 
     /// Hears what a robot says that it holds, itself or by way of another. Says whether it was news.
-    pub(super) fn note_holder(&mut self, holder: Holder) -> bool {
+    pub(super) fn note_holder(&mut self, holder: Holder, effects: &mut Effects<'_>) -> bool {
         if !self.is_this_round(holder.holding.round) {
             let Holder { robot, stamp, holding: Holding { round: id, class, .. }, .. } = holder;
             if let Some(round) = self.round.as_mut().filter(|round| round.id.counter == id.counter) {
@@ -69,6 +69,7 @@ impl Rounds {
         if holder.robot == self.me {
             if holder.stamp.boot < self.stamp.boot {
                 self.note_restart(holder.robot);
+                self.say_holding(effects);
             }
             return false;
         }
@@ -261,6 +262,7 @@ impl Rounds {
         let gives_way = most_hold == Some(true);
         if let Err(refusal) = self.judge(&decision, this && !gives_way) {
             self.refusals.add(refusal);
+            self.note_counted_elsewhere(decision.round.counter, from);
             return Heard::Refused;
         }
         if gives_way {
@@ -279,15 +281,11 @@ impl Rounds {
             Ok(Ordering::Greater) => self.enter(decision.round, false, effects),
             Ok(Ordering::Equal) => {}
         }
+        self.cast_counted(&decision);
         let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
         let committee = self.committee.as_ref().map(|committee| &committee.members);
         let (scale, robots) = (self.own_scale(), self.electorate.count());
         let Some(round) = self.round.as_mut() else { return Heard::Refused };
-        for counted in &decision.certificate.votes {
-            if counted.robot != self.me && !self.past.contains(&counted.vote.round) {
-                round.ballot.cast(counted.held());
-            }
-        }
         let view = View { me: self.me, expected, robots, committee, scale };
         if self.config.liars > 0
             && decision.class.is_some()
@@ -305,6 +303,22 @@ impl Rounds {
             None => round.agreement.believe(decision),
         };
         if news { Heard::News } else { Heard::Known }
+    }
+
+    /// Counts the votes that a decision rests on. A robot whose vote was lost on its way here says something all the same: whoever took it
+    /// for a name without a robot would draw another committee than all others.
+    fn cast_counted(&mut self, decision: &Decision) {
+        let Some(round) = self.round.as_mut() else { return };
+        for counted in &decision.certificate.votes {
+            let robot = counted.robot;
+            if robot == self.me || self.past.contains(&counted.vote.round) {
+                continue;
+            }
+            if round.ballot.cast(counted.held()) == Cast::Counted && self.alive.contains(robot) {
+                self.electorate.hear(robot, self.now);
+            }
+        }
+        self.draw_if_the_size_calls_for_it();
     }
 
     /// Whether most hold the gesture of that decision where this robot holds another (`true`), or the other (`false`), long after its round was over.

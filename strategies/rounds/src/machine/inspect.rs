@@ -55,6 +55,12 @@ impl Rounds {
         self.round.as_ref().map(|round| round.id)
     }
 
+    /// Whether that is a name of it: it may have come to be called by a smaller one since somebody spoke of it.
+    #[must_use]
+    pub fn is_newest(&self, round: RoundId) -> bool {
+        self.round.as_ref().is_some_and(|newest| newest.is_named(round))
+    }
+
     /// Whether this robot takes part in that round by looking and voting.
     #[must_use]
     pub fn is_open(&self) -> bool {

@@ -62,14 +62,12 @@ impl Rounds {
         from: RobotId,
         effects: &mut Effects<'_>,
     ) -> Result<Ordering, Refusal> {
-        let (first, began) = self.began;
-        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
-        let bound = u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived;
+        let bound = self.bound();
         if u64::from(id.counter) > bound && !self.most_are_beyond(bound, (id, decided), from) {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
         }
-        let known = self.highest.unwrap_or(first);
+        let known = self.highest.unwrap_or(self.began.0);
         if id.counter > known.saturating_add(LEAP) && !self.is_vouched(known, (id, decided), from) {
             self.refusals.add(Refusal::FarAhead);
             return Err(Refusal::FarAhead);
@@ -91,6 +89,30 @@ impl Rounds {
             }
         }
         Ok(order)
+    }
+
+    /// How far counters may have come by now.
+    fn bound(&self) -> u64 {
+        let (first, began) = self.began;
+        let lived = self.now.saturating_sub(began.unwrap_or(self.now)).as_secs();
+        u64::from(first) + MAX_AHEAD + AHEAD_PER_SECOND * lived
+    }
+
+    /// Notes how far a robot counts whose decision is none here: in a swarm of its own it was enough, and it takes what is opened under a smaller count
+    /// for older.
+    pub(super) fn note_counted_elsewhere(&mut self, counter: u32, from: RobotId) {
+        if self.known(from).is_some() && Some(counter) > self.highest {
+            self.counted_elsewhere = self.counted_elsewhere.max(Some(counter));
+        }
+    }
+
+    /// The counter to go on from when a round is opened: the highest heard of, or how far others count of whom no more is known. That may be a lie: it
+    /// takes nobody as far as a leap, so that all follow who hear of the round, nor beyond the bound, and counts for one round.
+    pub(super) fn last_counter(&mut self) -> Option<u32> {
+        let elsewhere = self.counted_elsewhere.take();
+        let leap = self.highest.unwrap_or(self.began.0).saturating_add(LEAP - 1);
+        let bound = u32::try_from(self.bound() - 1).unwrap_or(u32::MAX);
+        self.highest.max(elsewhere.map(|counter| counter.min(leap).min(bound)))
     }
 
     /// Whether more robots than may lie say that the swarm is so far beyond what is `known` here, where there are that many: by a decision, which is the word of

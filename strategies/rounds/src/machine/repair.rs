@@ -51,6 +51,9 @@ impl Rounds {
             self.refusals.add(Refusal::HaveTooOften);
             return;
         }
+        if self.alive.contains(from) {
+            self.electorate.meet(from);
+        }
         // What a neighbour says it has is a hint: a newer round is asked for, and joined when it comes with the votes of those in it.
         let decided = have.decision.map(|rank| rank.decided);
         let order = have.round.map_or(Ordering::Less, |id| self.compare(id, decided));
@@ -98,7 +101,11 @@ impl Rounds {
                 news.votes.push(held);
             }
         }
-        news.holders = give.holders.into_iter().filter(|holder| self.note_holder(holder.clone())).collect();
+        for holder in give.holders {
+            if self.note_holder(holder.clone(), effects) {
+                news.holders.push(holder);
+            }
+        }
         let is_news = news.decision.is_some() || !news.votes.is_empty() || !news.holders.is_empty();
         if !is_news && !greater {
             return;

@@ -124,6 +124,8 @@ pub struct Rounds {
     pub(super) past: BTreeSet<RoundId>,
     /// The highest counter heard of, also of a round about which nothing else is known yet.
     pub(super) highest: Option<u32>,
+    /// The greatest counter of decisions heard since a round was opened that are none here: so far those count who made them.
+    pub(super) counted_elsewhere: Option<u32>,
     /// What robots said last of rounds far beyond it. Of those alone who are there.
     pub(super) far_ahead: BTreeMap<RobotId, u32>,
     /// The counter that this life began with, and when it began.
@@ -190,6 +192,7 @@ impl Rounds {
             past: BTreeSet::new(),
             far_ahead: BTreeMap::new(),
             highest: None,
+            counted_elsewhere: None,
             began: (0, None),
             afresh: false,
             electorate: Electorate::new(config.all_vote_up_to()),
@@ -258,6 +261,7 @@ impl Rounds {
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
         self.signer = Some(signer);
+        self.electorate.require_keys();
         self
     }
 

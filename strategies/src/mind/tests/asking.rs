@@ -180,6 +180,21 @@ fn whoever_asks_as_soon_as_a_round_is_over_has_every_other_turn_at_most() {
 }
 
 #[test]
+fn a_question_is_of_the_newest_round_by_whichever_of_its_names() {
+    let mut swarm = swarm(3, QuestionsConfig { ask: false, ..QuestionsConfig::default() });
+    rest(&mut swarm);
+    // All open at once, before they hear of each other.
+    swarm.loss = 1.0;
+    (0..3).for_each(|i| swarm.input(i, Input::Open));
+    swarm.loss = 0.0;
+    let alias = swarm.minds[2].round().unwrap();
+    let round = show(&mut swarm, 2, &SPLIT);
+    assert_eq!((round.counter, alias.opener, round.opener), (alias.counter, RobotId(3), RobotId(1)));
+    ask_as(&mut swarm, RobotId(1), alias);
+    assert_eq!(swarm.minds[2].question().map(|question| question.round), Some(alias));
+}
+
+#[test]
 fn robots_that_are_as_unsure_as_each_other_ask_to_be_shown_again() {
     let mut swarm = swarm(3, QuestionsConfig::default());
     rest(&mut swarm);

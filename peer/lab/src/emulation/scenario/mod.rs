@@ -170,6 +170,7 @@ mod tests {
     fn a_mistake_names_the_key() {
         for (change, key) in [
             ("signal: 1", "robots[0].view.signl", "signl: 1"),
+            ("fps: 2", "robots.view.fps", "fps: 1e-30"),
             ("\"line\"", "topology", "\"star-shaped\""),
             ("\"line\"", "mind.settle", "\"line\", mind: { settle: 3 }"),
             ("\"line\"", "alpha", "\"line\", mind: { alpha: 0.7 }"),

@@ -18,6 +18,10 @@ const MOST_ROUNDS: u32 = 100_000;
 /// The longest that anything may take: as many rounds of it can be added up.
 const DAY: Duration = Duration::from_secs(24 * 60 * 60);
 
+/// The fewest and the most frames per second: of fewer no run sees one, and the time between two must be one that there is.
+const SLOWEST: f64 = 0.001;
+const FASTEST: f64 = 1000.0;
+
 impl Scenario {
     /// Whether the scenario can be run.
     ///
@@ -49,8 +53,9 @@ impl Scenario {
             return wrong("link.loss", format!("is {}: choose from 0 to below 1", self.link.loss));
         }
         for view in self.robots.iter().filter_map(|group| group.view) {
-            if !(view.fps > 0.0 && view.fps <= 1000.0) {
-                return wrong("robots.view.fps", format!("is {}: choose above 0, at most 1000", view.fps));
+            if !(SLOWEST..=FASTEST).contains(&view.fps) {
+                let mend = format!("is {}: choose {SLOWEST} to {FASTEST}", view.fps);
+                return wrong("robots.view.fps", mend);
             }
             if !(view.signal >= 0.0 && view.signal <= 100.0) {
                 return wrong("robots.view.signal", format!("is {}: choose 0 to 100", view.signal));

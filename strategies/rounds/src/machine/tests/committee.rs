@@ -165,6 +165,32 @@ fn names_without_robots_are_drawn_once() {
 }
 
 #[test]
+fn whose_vote_was_lost_is_drawn_again_once_a_decision_brings_it() {
+    let (members, others) = drawn(1);
+    let mut mind = one_of_many(others[0], adding_up());
+    for robot in &members[1..] {
+        mind.handle(ms(1), votes(*robot, 1, vote(1, 2, SURE)));
+    }
+    live(&mut mind, ms(9000));
+    assert_eq!(mind.silent(), &robots([members[0]]), "nothing was heard of it");
+    let counted = |robot: &u32| CountedVote {
+        robot: RobotId(*robot),
+        stamp: Stamp { boot: 1, sequence: 1 },
+        class: ClassId(2),
+        weight: 1.0,
+        vote: vote(1, 2, SURE),
+        signature: None,
+    };
+    mind.handle(
+        ms(9000),
+        gives(1, decided(round(1, 1), Some(2), members.iter().map(counted).collect(), members[0])),
+    );
+    assert_eq!(mind.held().map(|held| held.certificate.votes.len()), Some(72));
+    assert!(mind.silent().is_empty());
+    assert_eq!(mind.electorate.count(), SWARM);
+}
+
+#[test]
 fn a_decision_is_final_once_most_of_the_committee_are_known_to_hold_it() {
     let (members, others) = drawn(1);
     let mut mind = one_of_many(others[0], adding_up());

@@ -69,3 +69,22 @@ fn what_one_who_is_expelled_said_of_the_next_round_is_not_heard_when_its_time_co
     live(&mut mind, ms(3000));
     assert_eq!(mind.round(), Some(round(1, 1)));
 }
+
+/// Where only some of the swarm vote, who is there no more counts for a while yet.
+#[test]
+fn who_is_expelled_from_a_large_swarm_counts_no_more_whichever_is_heard_first() {
+    for expelled_first in [true, false] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots(1..=1000))));
+        mind.handle(ms(1), votes(3, 1, null(1)));
+        let mut inputs =
+            [Input::Expelled(robots(501..=1000)), Input::Alive(Arc::new(robots(1..=500)))].to_vec();
+        if !expelled_first {
+            inputs.reverse();
+        }
+        inputs.into_iter().for_each(|input| _ = mind.handle(ms(2), input));
+        assert_eq!(mind.electorate.count(), 500, "{expelled_first}");
+        let committee = mind.committee.as_ref().expect("some of them vote");
+        assert!(committee.members.iter().all(|robot| robot.0 <= 500), "{expelled_first}");
+    }
+}

@@ -1,6 +1,7 @@
 //! One sentence of the design each.
 
 mod agreeing;
+mod alone;
 mod committee;
 mod deciding;
 mod expelling;

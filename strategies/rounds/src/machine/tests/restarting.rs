@@ -1,5 +1,7 @@
 //! What a robot that has lived before, and knows it, counts for.
 
+use gestalt_protocol::Holder;
+
 use super::*;
 
 /// It may have been for another gesture of the round, and have forgotten it; nobody that it hears knows.
@@ -60,5 +62,35 @@ fn who_started_again_in_the_midst_of_a_round_takes_what_was_decided_in_it_under_
         mind.handle(ms(20), gives(3, Decision { certificate, ..theirs }));
         let held = mind.held().and_then(|held| held.class);
         assert_eq!(held, Some(ClassId(if afresh { 0 } else { 1 })), "{afresh}");
+    }
+}
+
+/// Others keep what it said last, and count it for that until it says otherwise.
+#[test]
+fn who_learns_that_it_was_in_a_round_before_says_so_of_what_it_holds_already() {
+    for given in [true, false] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
+        live(&mut mind, ms(3000));
+        let held = mind.held().expect("it suffices").clone();
+        let (robot, stamp) = (RobotId(7), Stamp { boot: 0, sequence: 9 });
+        let give = match given {
+            true => {
+                let before = Holder { robot, stamp, holding: held.holding(false), signature: None };
+                Give { decision: None, votes: vec![], holders: vec![before] }
+            }
+            false => {
+                let before = HeldVote { robot, stamp, vote: vote(1, 1, SURE), signature: None };
+                Give { decision: None, votes: vec![before], holders: vec![] }
+            }
+        };
+        let out = mind.handle(ms(3000), says(3, 9, Message::Give(give)));
+        let says = |holding: &gestalt_protocol::Holding| {
+            out.iter().any(|output| match output {
+                Output::Broadcast(Envelope { message: Message::Holding(said), .. }) => said == holding,
+                _ => false,
+            })
+        };
+        assert!(says(&held.holding(true)), "{given}: {out:?}");
     }
 }

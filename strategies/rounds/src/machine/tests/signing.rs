@@ -8,11 +8,11 @@ use super::*;
 use crate::sign::Sign;
 
 /// What was signed and what was said to be done, in order.
-type Course = Arc<Mutex<Vec<String>>>;
+pub(super) type Course = Arc<Mutex<Vec<String>>>;
 
 /// Writes down which kind of message it signs.
 #[derive(Debug)]
-struct Scribe(Course);
+pub(super) struct Scribe(pub(super) Course);
 
 impl Sign for Scribe {
     fn sign(&self, statement: &[u8]) -> Signature {
