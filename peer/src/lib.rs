@@ -25,6 +25,7 @@ pub mod config;
 pub mod doctor;
 #[cfg(feature = "opencv")]
 pub mod eye;
+pub mod heaps;
 #[cfg(feature = "opencv")]
 pub mod model;
 pub mod open_files;

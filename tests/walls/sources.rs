@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// Every package and the folder of its sources, seen from the root.
-pub const CRATES: [(&str, &str); 21] = [
+pub const CRATES: [(&str, &str); 22] = [
     ("gestalt-protocol", "protocol/src"),
     ("gestalt-rounds", "strategies/rounds/src"),
     ("gestalt-svm", "strategies/svm/src"),
@@ -15,6 +15,7 @@ pub const CRATES: [(&str, &str); 21] = [
     ("gestalt-desk", "peer/desk/src"),
     ("gestalt-ros", "peer/ros/src"),
     ("gestalt-draw", "peer/draw/src"),
+    ("gestalt-file", "peer/file/src"),
     ("gestalt-lab", "peer/lab/src"),
     ("gestalt-peer", "peer/src"),
     ("gestalt-mind", "bindings/mind/src"),

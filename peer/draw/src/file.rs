@@ -1,8 +1,6 @@
 //! A drawing's file: SVG or PNG, by its name.
 
-use std::fs;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::error::DrawError;
 use crate::png::png;
@@ -36,15 +34,7 @@ impl Kind {
 /// See [`DrawError`].
 pub fn check(path: &Path) -> Result<(), DrawError> {
     Kind::of(path)?;
-    let failed = |cause| DrawError::io(path, cause);
-    // Opening a pipe would wait for its reader.
-    if is_stream(path) {
-        return Ok(());
-    }
-    let target = target(path).map_err(failed)?;
-    let was_there = fs::symlink_metadata(&target).is_ok();
-    fs::OpenOptions::new().create(true).append(true).open(&target).map_err(failed)?;
-    if was_there { Ok(()) } else { fs::remove_file(&target).map_err(failed) }
+    gestalt_file::check(path).map_err(|cause| DrawError::io(path, cause))
 }
 
 /// Writes an SVG drawing to a file, as SVG or PNG.
@@ -64,44 +54,7 @@ pub fn write(svg: &str, path: &Path) -> Result<(), DrawError> {
 /// # Errors
 /// A [`DrawError`] that names the path and what to do about it.
 pub fn save(bytes: &[u8], path: &Path) -> Result<(), DrawError> {
-    replace(bytes, path).map_err(|cause| DrawError::io(path, cause))
-}
-
-fn replace(bytes: &[u8], path: &Path) -> io::Result<()> {
-    if is_stream(path) {
-        return fs::write(path, bytes);
-    }
-    let path = target(path)?;
-    let mut file = tempfile::Builder::new();
-    #[cfg(unix)]
-    file.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = file.tempfile_in(folder(&path))?;
-    file.write_all(bytes)?;
-    file.persist(path).map(drop).map_err(|refused| refused.error)
-}
-
-/// Whether a device or a pipe is there: that is written to, not replaced.
-fn is_stream(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
-}
-
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// How many links may lead to one another: as many as Linux follows.
-const MAX_LINKS: usize = 40;
-
-/// Where a link leads, through others, though nothing is there; of what is no link, its own path.
-fn target(path: &Path) -> io::Result<PathBuf> {
-    let mut here = path.to_owned();
-    for _ in 0..=MAX_LINKS {
-        match fs::read_link(&here) {
-            Ok(next) => here = folder(&here).join(next),
-            Err(_) => return Ok(here),
-        }
-    }
-    Err(io::Error::other("its links lead in a circle"))
+    gestalt_file::write(path, bytes).map_err(|cause| DrawError::io(path, cause))
 }
 
 #[cfg(test)]
@@ -124,44 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn asking_leaves_everything_as_it_was() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("round.svg");
-        check(&path).unwrap();
-        assert!(!path.exists());
-        save(b"mine", &path).unwrap();
-        check(&path).unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"mine");
-        assert!(matches!(check(&folder.path().join("round.gif")), Err(DrawError::Name(_))));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_link_stays_and_what_it_leads_to_is_replaced() {
-        use std::os::unix::fs::symlink;
-
-        let folder = tempfile::tempdir().unwrap();
-        let [old, kept, link, round] =
-            ["old.svg", "kept.svg", "link.svg", "round.svg"].map(|name| folder.path().join(name));
-        symlink("old.svg", &link).unwrap();
-        symlink("round.svg", &round).unwrap();
-        check(&link).unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink() && !old.exists());
-        assert!(check(&round).is_err() && save(b"x", &round).is_err());
-        fs::write(&old, "old").unwrap();
-        fs::hard_link(&old, &kept).unwrap();
-        save(b"new", &link).unwrap();
-        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!((fs::read(&old).unwrap(), fs::read(&kept).unwrap()), (b"new".to_vec(), b"old".to_vec()));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn asking_does_not_wait_for_who_reads_a_pipe() {
-        let folder = tempfile::tempdir().unwrap();
-        let pipe = folder.path().join("pipe.svg");
-        if std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()) {
-            check(&pipe).unwrap();
-        }
+    fn what_is_asked_for_by_a_wrong_name_is_not_begun() {
+        assert!(matches!(check(Path::new("round.gif")), Err(DrawError::Name(_))));
     }
 }

@@ -77,6 +77,8 @@ impl Args {
 /// # Errors
 /// Whatever keeps the robot from starting, and what ends it before its time.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    // Few threads of one robot, for months: emulations have as many heaps as threads.
+    crate::heaps::share();
     let config = args.config()?;
     let model = crate::model::load(&config.model)?;
     let names = model.as_ref().map(|model| Names::new(model.classifier.vocabulary())).unwrap_or_default();

@@ -45,7 +45,7 @@ pub(crate) fn memory(config: &Config, model: &RobotModel) -> Result<(), ConfigEr
     let Some(mut learning) = learning(&config.learning, model) else { return Ok(()) };
     let Some(path) = learning.memory.take() else { return Ok(()) };
     let wrong = |cause: String| Err(ConfigError::value("learning.memory", cause));
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = gestalt_file::folder(&path);
     if !folder.is_dir() {
         return wrong(format!("the folder {} does not exist: create it", folder.display()));
     }

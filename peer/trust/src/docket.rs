@@ -13,6 +13,28 @@ pub(crate) const KEPT_BYTES: usize = 16 * 1024 * 1024;
 /// All of it is told again this often at most, whoever comes and goes.
 const AGAIN: Duration = Duration::from_secs(5);
 
+/// Who found something says it again so often at least, and twice as often each time before: it may have been lost, or come while false evidence
+/// had used up what its hearers look at.
+const SELDOM: Duration = Duration::from_secs(5 * 60);
+
+/// When something is told again, and how long after that.
+#[derive(Clone, Copy, Debug)]
+struct Reminder {
+    due: Duration,
+    pause: Duration,
+}
+
+impl Reminder {
+    fn after(now: Duration, pause: Duration) -> Self {
+        Self { due: now + pause, pause }
+    }
+
+    /// Also where the clock was set back: nobody waits until it has caught up.
+    fn is_due(&self, now: Duration) -> bool {
+        now >= self.due || now + self.pause < self.due
+    }
+}
+
 /// The evidence that convicted somebody.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Docket {
@@ -21,6 +43,8 @@ pub(crate) struct Docket {
     unkept: BTreeSet<RobotId>,
     /// Found here, and told to nobody yet.
     untold: BTreeSet<RobotId>,
+    /// Found here, and told.
+    reminders: BTreeMap<RobotId, Reminder>,
     /// Whether somebody is here who was not, and when that was last seen to.
     again: bool,
     told: Option<Duration>,
@@ -47,12 +71,18 @@ impl Docket {
         self.kept.retain(|robot, _| keeps(*robot));
         self.unkept.retain(|robot| keeps(*robot));
         self.untold.retain(|robot| keeps(*robot));
+        self.reminders.retain(|robot, _| keeps(*robot));
         self.fallen.retain(|(robot, _)| keeps(*robot));
     }
 
     /// What is to be told to all now.
     pub fn untold(&mut self, now: Duration) -> Vec<(RobotId, Evidence)> {
         let mut untold = std::mem::take(&mut self.untold);
+        self.reminders.extend(untold.iter().map(|robot| (*robot, Reminder::after(now, AGAIN))));
+        for (robot, reminder) in self.reminders.iter_mut().filter(|(_, reminder)| reminder.is_due(now)) {
+            *reminder = Reminder::after(now, SELDOM.min(2 * reminder.pause));
+            untold.insert(*robot);
+        }
         if self.again && self.told.is_none_or(|told| now.saturating_sub(told) >= AGAIN || now < told) {
             (self.again, self.told) = (false, Some(now));
             untold.extend(self.kept.keys());
@@ -104,7 +134,7 @@ mod tests {
     const NOW: Duration = Duration::from_secs(1000);
 
     #[test]
-    fn what_was_found_is_told_once_and_all_again_to_those_who_come() {
+    fn what_was_found_is_told_and_all_again_to_those_who_come() {
         let mut docket = Docket::default();
         docket.tell_again();
         assert_eq!(robots(docket.untold(NOW)), [0; 0], "nothing is known");
@@ -115,20 +145,35 @@ mod tests {
         assert_eq!(robots(docket.unkept()), [1, 2]);
         assert_eq!(robots(docket.unkept()), [0; 0]);
         assert_eq!(robots(docket.untold(NOW)), [1], "the other was told of");
-        assert_eq!(robots(docket.untold(NOW + 2 * AGAIN)), [0; 0], "nobody came");
+        let soon = NOW + AGAIN - Duration::from_millis(1);
+        assert_eq!(robots(docket.untold(soon)), [0; 0], "nobody came");
         docket.tell_again();
         assert_eq!(robots(docket.untold(NOW)), [1, 2]);
-        assert_eq!(robots(docket.untold(NOW + 2 * AGAIN)), [0; 0], "once");
         docket.tell_again();
-        assert_eq!(robots(docket.untold(NOW)), [0; 0], "not twice at once");
-        let soon = NOW + AGAIN - Duration::from_millis(1);
-        assert_eq!(robots(docket.untold(soon)), [0; 0]);
+        assert_eq!(robots(docket.untold(soon)), [0; 0], "not twice at once");
         enter(&mut docket, 3, 10, true);
         assert_eq!(robots(docket.untold(soon)), [3], "news need not wait");
         assert_eq!(robots(docket.untold(NOW + AGAIN)), [1, 2, 3]);
         // A clock that was set back makes nobody wait until it has caught up.
         docket.tell_again();
-        assert_eq!(robots(docket.untold(NOW)), [1, 2, 3]);
+        assert_eq!(robots(docket.untold(NOW - SELDOM)), [1, 2, 3]);
+    }
+
+    #[test]
+    fn who_found_something_says_it_again_ever_more_seldom_until_the_liar_is_gone() {
+        let mut docket = Docket::default();
+        enter(&mut docket, 1, 10, true);
+        enter(&mut docket, 2, 10, false);
+        let told = |docket: &mut Docket, seconds: std::ops::Range<u64>| -> Vec<u64> {
+            seconds
+                .filter(|second| robots(docket.untold(NOW + Duration::from_secs(*second))) == [1])
+                .collect()
+        };
+        assert_eq!(told(&mut docket, 0..1500), [0, 5, 15, 35, 75, 155, 315, 615, 915, 1215]);
+        // Nor does a clock that was set back keep it from being said.
+        assert_eq!(told(&mut docket, 10..20), [10]);
+        docket.retain(|robot| robot != RobotId(1));
+        assert_eq!(told(&mut docket, 2000..3000), [0; 0]);
     }
 
     #[test]

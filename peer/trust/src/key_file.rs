@@ -87,7 +87,10 @@ impl Identity {
             io::ErrorKind::AlreadyExists => KeyFileError::Exists { path: path.to_owned() },
             _ => KeyFileError::Write { path: path.to_owned(), source },
         })?;
-        let written = file.write_all(self.text().as_ref()).and_then(|()| file.sync_all());
+        let written = file
+            .write_all(self.text().as_ref())
+            .and_then(|()| file.sync_all())
+            .and_then(|()| gestalt_file::keep_name(path));
         written.map_err(|source| {
             // Half a key would stand in the way of the next attempt.
             let _ = fs::remove_file(path);

@@ -87,7 +87,6 @@ pub mod statement;
 #[cfg(test)]
 mod testing;
 mod verify;
-pub mod whole_file;
 mod witness;
 pub mod word;
 

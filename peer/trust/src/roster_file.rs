@@ -1,13 +1,19 @@
 //! A roster on disk.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::Read;
 use std::path::Path;
+use std::thread;
+use std::time::Duration;
 
 use crate::roster::{MAX_ROSTER, Roster};
 use crate::roster_error::RosterError;
 use crate::scheme::Scheme;
-use crate::whole_file;
+
+/// How often a folder that others write to is tried, and how long each time is waited. Whoever may read a folder can lock it: nobody is kept from
+/// writing for longer than that.
+const TRIES: usize = 200;
+const PAUSE: Duration = Duration::from_millis(10);
 
 impl<S: Scheme> Roster<S> {
     /// Reads and checks a roster file.
@@ -28,7 +34,7 @@ impl<S: Scheme> Roster<S> {
     /// # Errors
     /// [`RosterError::File`]; [`RosterError::Older`] and [`RosterError::Contradiction`] say that the one that is there stays.
     pub fn write(&self, path: &Path) -> Result<(), RosterError> {
-        let _alone = whole_file::lock(path);
+        let _alone = lock(path);
         // What is no roster, or one of another swarm, keeps nobody from writing this one.
         if let Ok(there) = Self::read(path) {
             match there.is_succeeded_by(self) {
@@ -37,7 +43,7 @@ impl<S: Scheme> Roster<S> {
                 Err(stays) => return Err(stays),
             }
         }
-        whole_file::write(path, self.to_json().as_bytes()).map_err(|source| RosterError::File {
+        gestalt_file::write(path, self.to_json().as_bytes()).map_err(|source| RosterError::File {
             path: path.to_owned(),
             verb: "written",
             source,
@@ -45,11 +51,24 @@ impl<S: Scheme> Roster<S> {
     }
 }
 
+/// Keeps others that ask for the same from writing beside that file, until what is returned is dropped. `None` where files cannot be locked, or when
+/// somebody keeps the lock: then nothing but the order of two writers at the same moment is left to chance.
+fn lock(path: &Path) -> Option<File> {
+    let folder = File::open(gestalt_file::folder(path)).ok()?;
+    for _ in 0..TRIES {
+        match folder.try_lock() {
+            Ok(()) => return Some(folder),
+            Err(TryLockError::WouldBlock) => thread::sleep(PAUSE),
+            Err(TryLockError::Error(_)) => return None,
+        }
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
     use std::sync::atomic::{AtomicBool, Ordering};
-    use std::thread;
 
     use super::*;
     use crate::testing::{authority, members, robot, roster};
@@ -138,5 +157,15 @@ mod tests {
         fs::write(&missing, vec![b' '; MAX_ROSTER + 1]).unwrap();
         let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
         assert!(matches!(error, RosterError::TooLong { .. }), "{error}");
+    }
+
+    #[test]
+    fn who_keeps_the_lock_keeps_nobody_from_writing_for_long() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("roster.json");
+        let kept = lock(&path);
+        assert!(kept.is_some() && lock(&path).is_none());
+        drop(kept);
+        assert!(lock(&path).is_some());
     }
 }

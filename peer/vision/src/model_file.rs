@@ -5,20 +5,16 @@
 //! ```
 //! Numbers are little-endian.
 
-mod place;
-
 use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use gestalt_strategies::{Classifier, MAX_MODEL, ModelError};
 use serde::{Deserialize, Serialize};
-use tempfile::NamedTempFile;
 use thiserror::Error;
 
 use crate::dataset::LabelledImage;
-use place::{folder, is_stream, target};
 
 const MAGIC: &[u8; 8] = b"GESTALT\n";
 /// The layout of the file; another layout gets another number.
@@ -221,16 +217,8 @@ impl Model {
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
 
-        let replaced = || {
-            let path = target(path)?;
-            let mut file = NamedTempFile::new_in(folder(&path))?;
-            file.write_all(&bytes)?;
-            file.as_file().sync_all()?;
-            allow_reading(file.as_file())?;
-            file.persist(path).map(drop).map_err(|error| error.error)
-        };
-        let written = if is_stream(path) { fs::write(path, &bytes) } else { replaced() };
-        written.map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
+        gestalt_file::write(path, &bytes)
+            .map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
     }
 
     /// Finds out whether [`Self::write`] can succeed, before the work of training is done.
@@ -238,14 +226,8 @@ impl Model {
     /// # Errors
     /// [`ModelFileError::Io`] when the folder does not exist or may not be written.
     pub fn check_writable(path: &Path) -> Result<(), ModelFileError> {
-        let failed = |source| ModelFileError::Io { action: "write", path: path.to_owned(), source };
-        if path.is_dir() {
-            return Err(failed(io::Error::other("it is a folder")));
-        }
-        if is_stream(path) {
-            return Ok(());
-        }
-        target(path).and_then(|path| NamedTempFile::new_in(folder(&path))).map(drop).map_err(failed)
+        gestalt_file::check(path)
+            .map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
     }
 
     /// Checks that the model takes what perception gives.
@@ -267,18 +249,6 @@ impl Model {
 
 fn little_endian(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
-}
-
-/// A temporary file is its owner's alone; a model is for whoever runs a robot.
-fn allow_reading(file: &File) -> io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.set_permissions(fs::Permissions::from_mode(0o644))?;
-    }
-    #[cfg(not(unix))]
-    let _ = file;
-    Ok(())
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use super::error::ExperimentError;
 use super::materials::Materials;
 use super::program::Program;
-use super::replace::replace;
 
 /// What `run.json` says.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +52,7 @@ pub fn claim(
     let json = serde_json::to_string_pretty(&file).expect("names and numbers can be written as JSON");
     // The run last: where it is, the rest is.
     for (path, text) in [(experiment, text), (run, &format!("{json}\n"))] {
-        replace(&path, text.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+        gestalt_file::write(&path, text.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     }
     Ok(())
 }

@@ -8,7 +8,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::error::ExperimentError;
-use super::replace::replace;
 
 /// Rows in a file. Numbers are written so that they are read as what they were.
 #[derive(Debug)]
@@ -64,7 +63,7 @@ impl Ledger {
 
 fn write_anew<R: Serialize>(path: &Path, rows: &[R]) -> Result<File, ExperimentError> {
     let written = written(rows, true)
-        .and_then(|text| replace(path, &text))
+        .and_then(|text| gestalt_file::write(path, &text))
         .and_then(|()| OpenOptions::new().append(true).open(path));
     written.map_err(|source| ExperimentError::Write { path: path.to_owned(), source })
 }

@@ -21,7 +21,6 @@ mod pool;
 mod program;
 mod progress;
 pub mod recognition;
-mod replace;
 mod results;
 mod runner;
 mod school;

@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
 use super::plan::{Experiment, Hands};
-use super::replace::replace;
 use super::setting::Drift;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::dataset::Dataset;
@@ -122,7 +121,7 @@ impl Pool {
     fn write(&self, path: &Path) -> std::io::Result<()> {
         let bytes = postcard::to_stdvec(self).map_err(std::io::Error::other)?;
         let sum = crc32fast::hash(&bytes).to_le_bytes();
-        replace(path, &[&sum[..], &bytes].concat())
+        gestalt_file::write(path, &[&sum[..], &bytes].concat())
     }
 
     /// The gestures.

@@ -17,7 +17,6 @@ use super::materials::Materials;
 use super::plan::{Cell, Experiment};
 use super::pool::Pool;
 use super::progress::Progress;
-use super::replace::replace;
 use super::results::Results;
 use super::school::Schools;
 use super::summary::Summary;
@@ -90,7 +89,7 @@ pub fn conduct_by(
         + &asking(&experiment, &cells, &runs, seeds).unwrap_or_default()
         + &drift(&experiment, &cells, &runs, seeds).unwrap_or_default();
     let path = folder.join("results.md");
-    replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+    gestalt_file::write(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &figures(&summary))?;
     Ok(table)
 }

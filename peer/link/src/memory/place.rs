@@ -52,15 +52,6 @@ impl FilePlace {
         PathBuf::from(name)
     }
 
-    /// Without this, a power cut soon after could leave the file without its name.
-    fn sync_folder(&self) -> io::Result<()> {
-        let folder = match self.0.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        File::open(folder)?.sync_all()
-    }
-
     fn make_draft(&self, draft: &Path, fill: Fill<'_>) -> Result<(), StoreError> {
         let system = |cause: io::Error| StoreError::of_system(&self.0, &cause);
         match fs::remove_file(draft) {
@@ -80,7 +71,7 @@ impl FilePlace {
             // A file system without second names, such as FAT.
             Err(_) => fs::rename(draft, &self.0).map_err(system)?,
         }
-        self.sync_folder().map_err(system)
+        gestalt_file::keep_name(&self.0).map_err(system)
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gestalt_protocol::Signature;
-use gestalt_trust::{Ed25519, Identity, PublicKey, Roster, Scheme, SwarmId, whole_file};
+use gestalt_trust::{Ed25519, Identity, PublicKey, Roster, Scheme, SwarmId};
 use rcgen::{
     BasicConstraints, CertificateParams, DistinguishedName, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer,
     KeyUsagePurpose, PKCS_ED25519, PublicKeyData, SerialNumber, SignatureAlgorithm, SigningKey,
@@ -124,7 +124,7 @@ impl Certificate {
     /// [`CertificateError::File`].
     pub fn write(&self, path: &Path) -> Result<(), CertificateError> {
         let unwritable = |source| CertificateError::File { path: path.to_owned(), verb: "written", source };
-        whole_file::write(path, self.to_pem().as_bytes()).map_err(unwritable)
+        gestalt_file::write(path, self.to_pem().as_bytes()).map_err(unwritable)
     }
 
     /// Whether it is that holder's, with that key, by the authority of that roster: said here, where it can be mended, and not by links that

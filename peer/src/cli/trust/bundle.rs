@@ -5,7 +5,7 @@ use std::path::Path;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gestalt_link::{Bearer, Certificate, Credentials};
-use gestalt_trust::{Applicant, Identity, Roster, whole_file};
+use gestalt_trust::{Applicant, Identity, Roster};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;
@@ -127,7 +127,7 @@ pub(super) fn write_client(
         roster.members().swarm
     );
     let file = folder.join("zenoh.json5");
-    whole_file::write_secret(&file, text.as_bytes())
+    gestalt_file::write_secret(&file, text.as_bytes())
         .map_err(|error| format!("cannot write {}: {error}", file.display()).into())
 }
 

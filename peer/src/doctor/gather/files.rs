@@ -66,7 +66,7 @@ fn judge(_: &Config, _: &mut RobotFacts, _: &mut Status) {}
 
 /// Whether there is room for a memory, and whether it is in use.
 fn place(path: &Path) -> MemoryFacts {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = gestalt_file::folder(path);
     let room = room(folder).and_then(|()| match File::options().append(true).open(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => Ok(()),

@@ -30,7 +30,6 @@ use super::error::ExperimentError;
 use super::fingerprint::this_program;
 use super::materials::Materials;
 use super::progress::Progress;
-use super::replace::replace;
 use super::{chart, folder};
 use results::RecognitionResults;
 use summary::Summary;
@@ -64,7 +63,7 @@ pub fn conduct(
     let summary = Summary::of(&plan, &counted);
     let table = summary.markdown();
     let path = folder.join("results.md");
-    replace(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+    gestalt_file::write(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &summary.figures())?;
     Ok(table)
 }
