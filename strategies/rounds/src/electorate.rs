@@ -23,6 +23,8 @@ pub(crate) struct Electorate {
     silent: BTreeSet<RobotId>,
     /// Alive, and met as robots: they told this one what they have. They count as if they had voted once they are gone.
     met: BTreeSet<RobotId>,
+    /// Of the swarm no more, though they may still be said to be alive for a moment. Who votes is one of the swarm again.
+    expelled: BTreeSet<RobotId>,
     /// Whether nobody is alive without a key, so that each name has its robot.
     keyed: bool,
     /// Heard, or alive, and not alive now: since when. At most [`MAX_ROBOTS`].
@@ -66,6 +68,7 @@ impl Electorate {
     pub fn hear(&mut self, robot: RobotId, now: Duration) {
         self.unheard.remove(&robot);
         self.silent.remove(&robot);
+        self.expelled.remove(&robot);
         if self.heard.len() < MAX_ROBOTS || self.heard.contains_key(&robot) {
             self.heard.insert(robot, now);
         }
@@ -81,7 +84,7 @@ impl Electorate {
     /// Those were alive, and these are now.
     pub fn change(&mut self, before: &Others, robots: &Others, now: Duration) {
         for robot in before.since(robots) {
-            if self.silent.contains(&robot) {
+            if self.silent.contains(&robot) || self.expelled.contains(&robot) {
                 continue;
             }
             if self.gone.len() < MAX_ROBOTS {
@@ -123,6 +126,8 @@ impl Electorate {
         self.silent.retain(|robot| !robots.contains(robot));
         self.met.retain(|robot| !robots.contains(robot));
         self.gone.retain(|robot, _| !robots.contains(robot));
+        let room = MAX_ROBOTS.saturating_sub(self.expelled.len());
+        self.expelled.extend(robots.iter().take(room));
     }
 
     /// A round is over that was open since then, for long enough to say something: who was alive all the while and said nothing is a name
@@ -294,6 +299,23 @@ mod tests {
             electorate.forget(at(422), LATELY, &none);
             assert_eq!(electorate.count(), 1, "they stayed away");
         }
+    }
+
+    /// As liveliness may tell of it late.
+    #[test]
+    fn who_is_expelled_does_not_count_as_gone_when_it_is_said_to_be_alive_once_more() {
+        let mut electorate = Electorate::default();
+        electorate.require_keys();
+        electorate.expel(&[RobotId(7)].into());
+        let count_when_it_goes = |electorate: &mut Electorate| {
+            electorate.change(&robots([]), &robots([7]), at(1));
+            electorate.change(&robots([7]), &robots([]), at(2));
+            electorate.count()
+        };
+        assert_eq!(count_when_it_goes(&mut electorate), 1);
+        // It was given another key.
+        electorate.hear(RobotId(7), at(2));
+        assert_eq!(count_when_it_goes(&mut electorate), 2);
     }
 
     /// As when the swarm is cut before anything was shown, or some started again since.

@@ -12,7 +12,8 @@ impl Rounds {
     /// Nothing that these said counts any more, in the midst of a round. A decision that counted them is no decision now: the round is
     /// concluded anew from the votes of the others. One of a round that is over stands, as what was true of the swarm then.
     pub(super) fn on_expelled(&mut self, robots: &BTreeSet<RobotId>) {
-        let stays = |robot: &RobotId| self.guests.contains(robot) || !robots.contains(robot);
+        self.guests.retain(|guest| !robots.contains(guest));
+        let stays = |robot: &RobotId| !robots.contains(robot);
         let alive: Arc<BTreeSet<RobotId>> = Arc::new(self.alive.iter().filter(stays).collect());
         // They have not just gone: who has counts for a while yet.
         self.alive = Others::new(self.me, alive.clone());
