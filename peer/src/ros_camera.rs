@@ -1,7 +1,7 @@
 //! A camera that a ROS driver owns: its topic, as a source of frames.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gestalt_protocol::RobotId;
 use gestalt_ros::message::{CompressedImage, Image};
@@ -98,19 +98,22 @@ impl Source for RosCamera {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        let asked = Instant::now();
         let topic = &self.topic;
         let picture = self.newest.take().ok_or_else(|| {
             SourceError::Own(format!(
                 "nothing is published on {topic}: `ros2 topic hz {topic}` shows whether its driver runs, with rmw_zenoh, in this domain"
             ))
         })?;
+        // As late as it was waited for.
+        let at = now + asked.elapsed();
         let no_picture =
             |cause: String| SourceError::Own(format!("what is published on {topic} is no picture: {cause}"));
         match picture.map_err(no_picture)? {
             Picture::Encoded(bytes) => {
                 let mut image = Mat::default();
                 decode(&bytes, MAX_MEGAPIXELS, &mut image).map_err(|cause| no_picture(cause.to_string()))?;
-                Ok(Frame { image, at: now })
+                Ok(Frame { image, at })
             }
             Picture::Pixels(image) => {
                 let megapixels = f64::from(image.width) * f64::from(image.height) / 1e6;
@@ -120,7 +123,7 @@ impl Source for RosCamera {
                     )));
                 }
                 let pixels = image.to_bgr().map_err(|cause| no_picture(cause.to_string()))?;
-                Frame::from_bgr(image.width, image.height, &pixels, now)
+                Frame::from_bgr(image.width, image.height, &pixels, at)
             }
         }
     }

@@ -3,15 +3,18 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use gestalt_strategies::{Classify, Evaluation};
+use gestalt_strategies::{Classify, Evaluation, Vocabulary};
 use serde_json::json;
+use thiserror::Error;
 
 use super::score::{self, Score};
 use super::train::{Eyes, measure, naming};
 use super::{Failure, report, say};
 use crate::config::ModelSection;
 use gestalt_draw::confusion;
-use gestalt_vision::dataset::{Dataset, LabelledImage, joined};
+use gestalt_vision::dataset::{
+    Dataset, DatasetError, LabelledImage, Naming, each_once, joined, leave_out_copies,
+};
 use gestalt_vision::model;
 use gestalt_vision::model_file::Model;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
@@ -46,6 +49,19 @@ pub struct Args {
     json: bool,
 }
 
+/// Nothing was measured.
+#[derive(Debug, Error)]
+#[error(
+    "nothing in {} can be scored: no picture that can be read and was not left out shows one of the model's gestures ({}), and none is without a gesture: \
+     name a folder after each gesture, or give another --model",
+    joined(folders),
+    labels.join(", ")
+)]
+struct NothingScored {
+    folders: Vec<PathBuf>,
+    labels: Vec<String>,
+}
+
 /// Measures and reports.
 ///
 /// # Errors
@@ -61,17 +77,25 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     model.check_features(set.name(), set.length())?;
     let mut perception = Perception::new(set, HandConfig::default())?;
 
+    let (sets, copies) = list(&args.dataset, naming(args.counts), vocabulary)?;
+    if copies > 0 {
+        eprintln!("note: left out {copies} copies of other pictures: each is scored once");
+    }
+
     let eyes = Eyes::of(set)?;
     let (mut images, mut left_out, mut by_eyes, mut people, mut ignored) = (0, 0, 0, 0, false);
+    let mut none_by_eyes = 0;
     let (mut evaluation, mut survey) = (Evaluation::new(vocabulary.classes()), Survey::default());
     let mut scores = Vec::new();
-    for folder in &args.dataset {
-        let dataset = Dataset::list_known(folder, naming(args.counts), vocabulary)?;
+    for (folder, mut dataset) in args.dataset.iter().zip(sets) {
         report::ignored(folder, &dataset.ignored);
         ignored |= !dataset.ignored.is_empty();
         let kept = if args.include_training {
             dataset.images
         } else {
+            let none = eyes.unseen_none(&dataset.none);
+            none_by_eyes += dataset.none.len() - none.len();
+            dataset.none = none;
             let unseen = unseen(&model, &eyes, folder, dataset.images)?;
             left_out += unseen.left_out;
             by_eyes += unseen.by_eyes;
@@ -85,6 +109,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scores.push(Score::new(folder, &of_set, &seen, alarms));
         evaluation.append(&of_set);
         survey.append(seen);
+    }
+    if scores.iter().all(Score::is_empty) {
+        let labels = vocabulary.labels().to_vec();
+        return Err(NothingScored { folders: args.dataset.clone(), labels }.into());
     }
     if images == 0 && left_out + by_eyes == 0 && ignored {
         eprintln!(
@@ -104,6 +132,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         report["by_dataset"] = score::json(&scores);
         report["people"] = json!(people);
         report["left_out_as_trained_on"] = json!(left_out + by_eyes);
+        report["without_gesture_left_out_as_trained_on"] = json!(none_by_eyes);
+        report["copies_left_out"] = json!(copies);
         report["includes_training"] = json!(args.include_training);
         say(&format!("{report}\n"))
     } else {
@@ -114,6 +144,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         if by_eyes > 0 {
             text += &format!("  left out          {by_eyes} images that the learned eyes were made with\n");
         }
+        if none_by_eyes > 0 {
+            text += &format!(
+                "  left out          {none_by_eyes} images without a gesture that the learned eyes were made with\n"
+            );
+        }
         if args.include_training {
             text += "  warning           training images may be included\n";
         }
@@ -123,6 +158,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
         say(&text)
     }
+}
+
+/// The images of each folder, each picture once, and how many copies are left out.
+fn list(
+    folders: &[PathBuf],
+    naming: Naming,
+    vocabulary: &Vocabulary,
+) -> Result<(Vec<Dataset>, usize), DatasetError> {
+    each_once(folders)?;
+    let known = |folder: &PathBuf| Dataset::list_known(folder, naming, vocabulary);
+    let mut sets: Vec<Dataset> = folders.iter().map(known).collect::<Result<_, _>>()?;
+    let copies = leave_out_copies(&mut sets);
+    Ok((sets, copies))
 }
 
 /// The model, and its name.
@@ -163,8 +211,50 @@ fn trained_on(folder: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::super::train::eyes_and_images;
     use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn written(folder: &Path, files: &[(&str, &str)]) {
+        for (file, content) in files {
+            let path = folder.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, content).unwrap();
+        }
+    }
+
+    #[test]
+    fn each_picture_is_scored_once_whatever_it_is_called_and_wherever_it_lies() {
+        let [one, other] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        written(one.path(), &[("3/a.jpg", "a hand"), ("3/b.jpg", "another")]);
+        written(other.path(), &[("3/c.jpg", "a hand"), ("2/d.jpg", "a third")]);
+        let vocabulary = Vocabulary::new(["2", "3"]).unwrap();
+        let [one, other] = [&one, &other].map(|folder| folder.path().to_owned());
+        let (sets, copies) = list(&[one.clone(), other], Naming::Names, &vocabulary).unwrap();
+        assert_eq!((sets.iter().map(|set| set.images.len()).collect::<Vec<_>>(), copies), (vec![2, 1], 1));
+        let again = list(&[one.clone(), one.join("3/..")], Naming::Names, &vocabulary);
+        assert!(matches!(again, Err(DatasetError::Twice(_))));
+    }
+
+    #[test]
+    fn nothing_to_score_is_no_success() {
+        let folder = tempfile::tempdir().unwrap();
+        written(
+            folder.path(),
+            &[("7/a.jpg", "of a gesture that the model does not know"), ("call/b.jpg", "")],
+        );
+        let dataset = folder.path().to_str().unwrap();
+        let line = ["evaluate", "--counts", "--model", "rendered", "--dataset", dataset];
+        let error = run(&Line::try_parse_from(line).unwrap().args).unwrap_err().to_string();
+        assert!(error.contains(dataset) && error.contains("can be scored"), "{error}");
+    }
 
     #[test]
     fn what_the_eyes_of_a_model_were_made_with_is_left_out_though_the_model_never_saw_it() {

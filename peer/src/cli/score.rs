@@ -32,6 +32,11 @@ impl Score {
         }
     }
 
+    /// No picture could be looked at: nothing is known.
+    pub fn is_empty(&self) -> bool {
+        self.images == 0 && self.alarms.images == 0
+    }
+
     /// The part of the images in which no hand was found.
     fn missed(&self) -> Option<f64> {
         (self.images > 0).then(|| self.without_hand as f64 / self.images as f64)

@@ -2,6 +2,7 @@
 
 mod eyes;
 mod leave_one_out;
+mod mirror;
 mod outcome;
 
 use std::collections::BTreeSet;
@@ -32,7 +33,7 @@ use gestalt_vision::survey::{Survey, lessons};
 /// Train a classifier on labelled images: one folder per gesture. File names `sNNN_…` identify the subject, so that
 /// cross-validation and --test-share never put one subject on both sides. A folder `none` holds images without a gesture:
 /// they are not learned
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Examples:
   gestalt train --dataset hands --out hands.gestalt
   gestalt train --dataset office --dataset garden --counts --leave-one-out")]
@@ -42,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", required_unless_present = "rendered")]
     dataset: Vec<PathBuf>,
     /// Make the embedded model again, from synthetic hands: gestures 0 to 5, always the same
-    #[arg(long, conflicts_with_all = ["dataset", "features", "classes", "components", "variance", "costs", "gammas", "folds", "test_share", "split_seed", "seed", "counts", "leave_one_out", "augment"])]
+    #[arg(long, conflicts_with_all = ["dataset", "features", "classes", "components", "variance", "costs", "gammas", "folds", "test_share", "split_seed", "seed", "counts", "leave_one_out", "augment", "no_mirror"])]
     rendered: bool,
     /// Model file to write
     #[arg(long, value_name = "FILE", required_unless_present = "leave_one_out")]
@@ -55,9 +56,13 @@ pub struct Args {
     /// that begin with no number are left out
     #[arg(long)]
     counts: bool,
-    /// Learn so many variations of each image beside it: mirrored or not, rolled by up to 30°, half to twice as bright. 0: none
+    /// Learn so many variations of each image beside it: mirrored or not, rolled by up to 30°, half to twice as bright. 0: none.
+    /// None is mirrored when the mirror image of one gesture is another, such as left and right; the program says so
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=50))]
     augment: u8,
+    /// Mirror no variation
+    #[arg(long)]
+    no_mirror: bool,
     /// Feature set: `embedding` (24 values of learned eyes, which know bare hands; carries over best to other people and
     /// cameras), `shape` (110 shape descriptors; gloves too) or `hog` (histogram of oriented gradients; for the same camera)
     #[arg(long, default_value = "embedding", value_name = "SET")]
@@ -200,15 +205,16 @@ fn learn(
     if args.test_share > 0.0 && held_out.is_empty() {
         return Err(
             "--test-share holds out subjects, but the file names (sNNN_…) identify fewer than two: name the files s001_a.jpg, s002_a.jpg, \
-             one number per person, as `gestalt capture --person N` does; or leave --test-share out, and the model is cross-validated"
+             one number per person, as `gestalt capture --person N` does; or leave --test-share out: cross-validation by image is all there is then, and it knows the subjects"
                 .into(),
         );
     }
     let (tested, learned): (Vec<_>, Vec<_>) =
         all.images.into_iter().partition(|image| image.person.is_some_and(|p| held_out.contains(&p)));
     let held_out = tested.len();
-    let tested = Eyes::of(args.features)?.unseen(&args.dataset, tested)?;
-    let survey = look(&learned, args.augment, args.seed, perception);
+    let eyes = Eyes::of(args.features)?;
+    let tested = eyes.unseen(&args.dataset, tested)?;
+    let mut survey = look(&learned, perception);
     report::rejected(&survey);
     if args.features == FeatureSet::Embedding && survey.seen.len() < survey.without_hand.len() {
         return Err(format!(
@@ -218,6 +224,8 @@ fn learn(
         )
         .into());
     }
+
+    mirror::vary(args, vocabulary, std::slice::from_mut(&mut survey), perception);
 
     let started = Instant::now();
     let trained = fit(args, vocabulary, &lessons(&[&survey]))?;
@@ -238,6 +246,7 @@ fn learn(
         seconds,
         test: test.as_ref(),
         left_out: held_out - tested.len(),
+        known: eyes.count_known(survey.seen.iter().map(|(image, _)| image.clone()).collect()),
         ignored: sets.iter().flat_map(|set| &set.ignored).map(|ignored| ignored.label.as_str()).collect(),
     };
     Ok((outcome.text(), outcome.json()))
@@ -284,10 +293,10 @@ fn remake(args: &Args) -> Result<(), Failure> {
     line(args.json, &json!({"model": out, "dataset": made_of, "support_vectors": vectors}), &words)
 }
 
-/// Looks at images, and at so many variations of each.
-fn look(images: &[LabelledImage], copies: u8, seed: u64, perception: &mut Perception) -> Survey {
+/// Looks at images.
+fn look(images: &[LabelledImage], perception: &mut Perception) -> Survey {
     let bar = progress::bar("features", images.len());
-    let survey = Survey::with_copies(images, perception, usize::from(copies), seed, || bar.inc(1));
+    let survey = Survey::of(images, perception, || bar.inc(1));
     bar.finish_and_clear();
     survey
 }
@@ -298,7 +307,7 @@ pub(super) fn measure(
     classifier: &Classifier,
     perception: &mut Perception,
 ) -> Result<(Evaluation, Survey), Failure> {
-    let survey = look(images, 0, 0, perception);
+    let survey = look(images, perception);
     let mut evaluation = Evaluation::new(classifier.vocabulary().classes());
     judge(&survey, classifier, &mut evaluation)?;
     Ok((evaluation, survey))

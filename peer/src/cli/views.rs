@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::config::LayerConfig;
-use gestalt_vision::model::RobotModel;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
@@ -15,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Failure, progress, say};
-use crate::config::CameraChoice;
+use crate::config::{CameraChoice, ModelSection};
 
 /// Write what a camera sees of drawn hands from many places, as feature vectors: the eyes of simulated robots
 ///
@@ -32,9 +31,10 @@ pub struct Args {
     /// Camera model
     #[arg(long, value_name = "MODEL", default_value = "footbot", value_parser = super::choice::camera())]
     camera: CameraChoice,
-    /// Model whose features are computed: a file written by `gestalt train`, or the embedded one of drawn hands
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    /// Model whose features are computed: a file written by `gestalt train`, `rendered` (drawn hands with a glove), or `hands`
+    /// (learned eyes, which know bare hands: these are drawn for them)
+    #[arg(long, value_name = "FILE|hands|rendered", default_value = "rendered")]
+    model: ModelSection,
     /// How many hands, each of another person, in another light, seen by other specimens of the camera
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=1000))]
     hands: u16,
@@ -73,10 +73,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if views > MOST_VIEWS {
         return Err(format!("{views} views are more than {MOST_VIEWS}: ask for fewer hands or places").into());
     }
-    let features = match &args.model {
-        Some(path) => RobotModel::read(path)?.features,
-        None => RobotModel::rendered()?.features,
-    };
+    let named = crate::model::load(&args.model)?;
+    let features =
+        named.ok_or("views are of a model's features: give --model FILE, hands or rendered")?.features;
     let model = args.camera.properties();
     let unwritable = |cause| {
         format!(
@@ -118,6 +117,14 @@ fn places(args: &Args) -> Result<Vec<Pose>, Failure> {
     Ok(places)
 }
 
+/// What the hands wear: learned eyes know bare ones.
+fn glove(features: FeatureSet) -> Glove {
+    match features {
+        FeatureSet::Embedding => Glove::Skin,
+        FeatureSet::Shape | FeatureSet::Hog => Glove::Cyan,
+    }
+}
+
 fn heading(features: FeatureSet) -> String {
     let mut line = "hand,bearing_deg,distance_m,gesture,frame,quality".to_owned();
     for n in 0..features.length() {
@@ -138,7 +145,7 @@ struct Place {
 impl Place {
     /// All gestures as lines of CSV, and in how many frames a hand was found.
     fn look(&self, features: FeatureSet, args: &Args) -> Result<(String, usize), Failure> {
-        let mut source = RenderedSource::new(self.camera.clone(), self.pose, Glove::Cyan, self.seed)?;
+        let mut source = RenderedSource::new(self.camera.clone(), self.pose, glove(features), self.seed)?;
         let layer = LayerConfig::ALL;
         let mut perception =
             Perception::for_camera(features, HandConfig::default(), layer, &args.camera.properties())?;
@@ -163,5 +170,37 @@ impl Place {
             }
         }
         Ok((lines, found))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn learned_eyes_are_shown_bare_hands_and_find_most() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("views.csv");
+        let lines = |model: &str| {
+            let words = ["views", "--out", out.to_str().unwrap(), "--model", model, "--hands", "2"];
+            let place = ["--frames", "1", "--bearings", "0", "--distances", "0.6"];
+            run(&Line::try_parse_from(words.into_iter().chain(place)).unwrap().args)?;
+            Ok::<_, Failure>(std::fs::read_to_string(&out)?)
+        };
+        let seen = lines("hands").unwrap();
+        assert_eq!(seen.lines().next().unwrap().split(',').count(), 6 + FeatureSet::Embedding.length());
+        let found = seen.lines().skip(1).filter(|line| !line.ends_with(',')).count();
+        assert!(found >= 8, "{found} of 12");
+        let gloved = lines("rendered").unwrap();
+        assert_eq!(gloved.lines().next().unwrap().split(',').count(), 6 + FeatureSet::Shape.length());
+        assert!(lines("none").unwrap_err().to_string().contains("--model FILE"));
     }
 }

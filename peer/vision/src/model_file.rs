@@ -217,8 +217,11 @@ impl Model {
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
 
-        gestalt_file::write(path, &bytes)
-            .map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
+        gestalt_file::write(path, &bytes).map_err(|source| ModelFileError::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        })
     }
 
     /// Finds out whether [`Self::write`] can succeed, before the work of training is done.
@@ -226,8 +229,11 @@ impl Model {
     /// # Errors
     /// [`ModelFileError::Io`] when the folder does not exist or may not be written.
     pub fn check_writable(path: &Path) -> Result<(), ModelFileError> {
-        gestalt_file::check(path)
-            .map_err(|source| ModelFileError::Io { action: "write", path: path.to_owned(), source })
+        gestalt_file::check(path).map_err(|source| ModelFileError::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        })
     }
 
     /// Checks that the model takes what perception gives.

@@ -20,6 +20,9 @@ use crate::source::Frame;
 use crate::steady::Steady;
 use mismatch::Mismatch;
 
+/// For so long it is remembered where a hand was.
+const REMEMBERED: Duration = Duration::from_secs(1);
+
 /// What a robot sees with, and what is done to its frames.
 #[derive(Clone, Debug)]
 pub struct SightConfig {
@@ -62,6 +65,8 @@ pub struct Sight {
     /// The frame at hand, for both.
     reduction: Reduction,
     mismatch: Mismatch,
+    /// When a hand was looked for last; `None` since a frame that was not to be judged.
+    looked: Option<Duration>,
 }
 
 /// What one frame said.
@@ -89,6 +94,7 @@ impl Sight {
             detector: motion.enabled.then(|| MotionDetector::new(motion)).transpose()?,
             reduction: Reduction::default(),
             mismatch: Mismatch::new(camera),
+            looked: None,
             layer,
             features,
         })
@@ -137,7 +143,9 @@ impl Sight {
             None
         });
         let is_whole = frame.image.size().is_ok_and(|size| size == whole);
-        let observation = (is_whole && self.looks_closely(judge)).then(|| {
+        let looks = is_whole && self.looks_closely(judge);
+        self.forget_what_is_over(frame.at, judge, looks);
+        let observation = looks.then(|| {
             let background = self.detector.as_ref().and_then(MotionDetector::background);
             match reduced {
                 true => self.perception.observe_reduced((&frame.image, &self.reduction.image), background),
@@ -145,6 +153,20 @@ impl Sight {
             }
         });
         Taken { at: frame.at, change, observation, trouble }
+    }
+
+    /// Where the hand was is forgotten when a round opens and when nothing was looked at for a while: whoever is shown then may
+    /// stand elsewhere, and what was taken for a hand may be none.
+    fn forget_what_is_over(&mut self, at: Duration, judge: bool, looks: bool) {
+        if !judge {
+            self.looked = None;
+        }
+        if looks {
+            if self.looked.is_none_or(|last| at.saturating_sub(last) > REMEMBERED) {
+                self.perception.forget();
+            }
+            self.looked = Some(at);
+        }
     }
 
     /// Reduces a frame for whoever looks at it; what is no frame is left to them to refuse.
@@ -194,5 +216,40 @@ impl Sight {
             }
             Err(error) => Some(format!("{said}; it cannot be read so: {error}")),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eyes::tests::hands;
+
+    #[test]
+    fn a_hand_is_not_followed_into_another_round_nor_over_a_pause() {
+        let motion = MotionConfig { enabled: false, ..MotionConfig::default() };
+        let config = SightConfig { camera: CameraModel::laptop(), layer: LayerConfig::ALL, motion };
+        let mut sight = Sight::new(config, FeatureSet::Embedding).unwrap();
+        let mut side = |image: &Mat, ms: u64, judge: bool| {
+            let taken = sight.take(&Frame { image: image.clone(), at: Duration::from_millis(ms) }, judge);
+            taken.observation.map(|seen| {
+                seen.unwrap();
+                sight.perception().region().x > image.cols() / 4
+            })
+        };
+        let both = hands(&[true, true]);
+        let first = side(&both, 0, true).unwrap();
+        // The other hand alone, and then both.
+        let other = hands(&[first, !first]);
+        let mut next = |at: u64, later: u64, pause: bool| {
+            assert_eq!(side(&other, at, true), Some(!first));
+            if pause {
+                assert_eq!(side(&both, at + 1, false), None);
+            }
+            side(&both, at + later, true).unwrap()
+        };
+        assert_eq!(next(2000, 33, false), !first, "it is followed");
+        assert_eq!(next(3000, 900, false), !first, "over a short pause too");
+        assert_eq!(next(4000, 1001, false), first, "not over a long one");
+        assert_eq!(next(6000, 33, true), first, "nor into a round that opens");
     }
 }

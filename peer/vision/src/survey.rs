@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use gestalt_protocol::ClassId;
 use gestalt_strategies::LabelledFeatures;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -10,7 +11,7 @@ use rand_chacha::rand_core::SeedableRng;
 use crate::dataset::LabelledImage;
 use crate::perception::Perception;
 use crate::source::read_image;
-use crate::variation::varied;
+use crate::variation::{mirrored, varied};
 
 /// What perception saw in some images.
 #[derive(Debug, Default)]
@@ -34,30 +35,15 @@ pub struct Rejected {
 
 impl Survey {
     /// Looks at each image; `step` is called after each.
-    pub fn of(images: &[LabelledImage], perception: &mut Perception, step: impl FnMut()) -> Self {
-        Self::with_copies(images, perception, 0, 0, step)
-    }
-
-    /// Looks at each image and, where it shows a hand, at as many [variations](varied) of it, drawn by the seed; those whose
-    /// hand is not found any more are left out. `step` is called after each image.
-    pub fn with_copies(
-        images: &[LabelledImage],
-        perception: &mut Perception,
-        copies: usize,
-        seed: u64,
-        mut step: impl FnMut(),
-    ) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    pub fn of(images: &[LabelledImage], perception: &mut Perception, mut step: impl FnMut()) -> Self {
         let mut survey = Self::default();
         for image in images {
             let rejected = |cause: String| Rejected { image: image.clone(), cause };
             match read_image(&image.path) {
                 Ok(frame) => match perception.observe(&frame) {
                     Ok(observation) => {
-                        let varied = (0..copies).filter_map(|_| varied(&frame, &mut rng).ok());
-                        let observed = varied.filter_map(|frame| perception.observe(&frame).ok());
-                        let variations = observed.map(|observation| observation.features).collect();
                         let (features, class, group) = (observation.features, image.class, image.person);
+                        let variations = Vec::new();
                         survey
                             .seen
                             .push((image.clone(), LabelledFeatures { features, class, group, variations }));
@@ -69,6 +55,44 @@ impl Survey {
             step();
         }
         survey
+    }
+
+    /// Looks at as many [variations](varied) of each image that shows a hand, drawn by the seed; those whose hand is not found
+    /// any more are left out. `step` is called after each image.
+    pub fn vary(
+        &mut self,
+        perception: &mut Perception,
+        (copies, mirror): (usize, bool),
+        seed: u64,
+        mut step: impl FnMut(),
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        for (image, sample) in &mut self.seen {
+            if let Ok(frame) = read_image(&image.path) {
+                let varied = (0..copies).filter_map(|_| varied(&frame, mirror, &mut rng).ok());
+                let observed = varied.filter_map(|frame| perception.observe(&frame).ok());
+                sample.variations = observed.map(|observation| observation.features).collect();
+            }
+            step();
+        }
+    }
+
+    /// What the mirror images of at most so many images of each gesture show: the gesture, and the features of those whose hand
+    /// is found. The images are taken evenly from all of its, so that all people have part.
+    pub fn mirrored(&self, perception: &mut Perception, most: usize) -> Vec<(ClassId, Vec<f32>)> {
+        let mut images: BTreeMap<ClassId, Vec<&Path>> = BTreeMap::new();
+        for (image, sample) in &self.seen {
+            images.entry(sample.class).or_default().push(&image.path);
+        }
+        let mut seen = Vec::new();
+        for (class, paths) in images {
+            for path in paths.iter().step_by(paths.len().div_ceil(most.max(1)).max(1)) {
+                let mirror_image = read_image(path).ok().and_then(|frame| mirrored(&frame).ok());
+                let observed = mirror_image.and_then(|frame| perception.observe(&frame).ok());
+                seen.extend(observed.map(|observation| (class, observation.features)));
+            }
+        }
+        seen
     }
 
     /// The labelled feature vectors of the images, each with those of its variations.
@@ -146,7 +170,6 @@ impl FalseAlarms {
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::ClassId;
     use opencv::core::Vector;
     use opencv::imgcodecs::imwrite;
 
@@ -175,7 +198,11 @@ mod tests {
         let images = pictures(folder.path(), &[Some(2), None, Some(5)]);
         let mut perception = Perception::new(FeatureSet::Shape, HandConfig::default()).unwrap();
         let plain = Survey::of(&images, &mut perception, || ());
-        let mut look = |seed| Survey::with_copies(&images, &mut perception, 3, seed, || ());
+        let mut look = |seed| {
+            let mut survey = Survey::of(&images, &mut perception, || ());
+            survey.vary(&mut perception, (3, true), seed, || ());
+            survey
+        };
         let survey = look(1);
         assert_eq!((survey.seen.len(), survey.without_hand.len(), survey.readable()), (2, 1, 3));
         let features = |survey: &Survey| -> Vec<_> {

@@ -11,23 +11,28 @@ pub const ROLL_DEG: f64 = 30.0;
 /// A picture becomes brighter or darker by at most this factor; what is brighter than white is white.
 pub const GAIN: f64 = 2.0;
 
-/// A variation of a picture (blue, green, red, 8 bits): mirrored or not, rolled by up to ±[`ROLL_DEG`], its levels times a
-/// gain between 1/[`GAIN`] and [`GAIN`]. Nothing is cut off: the picture grows with the roll, and its border is drawn out
-/// into the corners.
+/// The mirror image of a picture, left to right.
 ///
 /// # Errors
 /// OpenCV's, for a picture without pixels.
-pub fn varied(picture: &Mat, rng: &mut impl Rng) -> Result<Mat, opencv::Error> {
-    let (mirror, roll) = (rng.random_bool(0.5), rng.random_range(-ROLL_DEG..=ROLL_DEG));
+pub fn mirrored(picture: &Mat) -> Result<Mat, opencv::Error> {
+    const LEFT_TO_RIGHT: i32 = 1;
+    let mut mirrored = Mat::default();
+    core::flip(picture, &mut mirrored, LEFT_TO_RIGHT)?;
+    Ok(mirrored)
+}
+
+/// A variation of a picture (blue, green, red, 8 bits): where `mirror` allows it, [`mirrored`] or not; rolled by up to
+/// ±[`ROLL_DEG`], its levels times a gain between 1/[`GAIN`] and [`GAIN`]. Nothing is cut off: the picture grows with the
+/// roll, and its border is drawn out into the corners. Roll and gain do not depend on `mirror`.
+///
+/// # Errors
+/// OpenCV's, for a picture without pixels.
+pub fn varied(picture: &Mat, mirror: bool, rng: &mut impl Rng) -> Result<Mat, opencv::Error> {
+    let (heads, roll) = (rng.random_bool(0.5), rng.random_range(-ROLL_DEG..=ROLL_DEG));
     // Twice as bright is as likely as half as bright.
     let gain = GAIN.powf(rng.random_range(-1.0..=1.0));
-    let mut upright = Mat::default();
-    if mirror {
-        const LEFT_TO_RIGHT: i32 = 1;
-        core::flip(picture, &mut upright, LEFT_TO_RIGHT)?;
-    } else {
-        upright = picture.clone();
-    }
+    let upright = if mirror && heads { mirrored(picture)? } else { picture.clone() };
     let mut bright = Mat::default();
     rolled(&upright, roll)?.convert_to(&mut bright, -1, gain, 0.0)?;
     Ok(bright)
@@ -70,7 +75,7 @@ mod tests {
     fn the_same_seed_gives_the_same_pictures() {
         let pictures = |seed| -> Vec<Vec<u8>> {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let made = (0..4).map(|_| varied(&picture(), &mut rng).unwrap());
+            let made = (0..4).map(|_| varied(&picture(), true, &mut rng).unwrap());
             made.map(|made| made.data_bytes().unwrap().to_vec()).collect()
         };
         let made = pictures(1);
@@ -83,7 +88,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let (mut mirrored, mut gains) = (0, Vec::new());
         for _ in 0..200 {
-            let made = varied(&picture(), &mut rng).unwrap();
+            let made = varied(&picture(), true, &mut rng).unwrap();
             assert!(made.cols() >= 160 && made.rows() >= 120, "{:?}", made.size());
             let level =
                 |x: i32| f64::from(made.at_2d::<Vec3b>(made.rows() / 2, made.cols() / 2 + x).unwrap()[0]);
@@ -98,12 +103,30 @@ mod tests {
     }
 
     #[test]
+    fn without_mirroring_the_others_are_as_they_were() {
+        let made = |mirror| {
+            let mut rng = ChaCha8Rng::seed_from_u64(3);
+            let made = (0..40).map(move |_| varied(&picture(), mirror, &mut rng).unwrap());
+            made.map(|made| made.data_bytes().unwrap().to_vec()).collect::<Vec<_>>()
+        };
+        let (with, without) = (made(true), made(false));
+        let same = with.iter().zip(&without).filter(|(a, b)| a == b).count();
+        assert!((10..30).contains(&same), "{same} of 40");
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..40 {
+            let made = varied(&picture(), false, &mut rng).unwrap();
+            let level = |x: i32| made.at_2d::<Vec3b>(made.rows() / 2, made.cols() / 2 + x).unwrap()[0];
+            assert!(level(20) > level(-20), "the bar is on the right");
+        }
+    }
+
+    #[test]
     fn what_is_brighter_than_white_is_white() {
         let white = Mat::new_rows_cols_with_default(20, 20, CV_8UC3, Scalar::all(250.0)).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let levels: Vec<u8> =
-            (0..20).map(|_| varied(&white, &mut rng).unwrap().data_bytes().unwrap()[0]).collect();
+            (0..20).map(|_| varied(&white, true, &mut rng).unwrap().data_bytes().unwrap()[0]).collect();
         assert!(levels.contains(&255) && levels.iter().any(|level| *level < 200), "{levels:?}");
-        assert!(varied(&Mat::default(), &mut rng).is_err());
+        assert!(varied(&Mat::default(), true, &mut rng).is_err());
     }
 }

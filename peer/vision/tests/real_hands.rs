@@ -22,6 +22,7 @@ use gestalt_vision::source::read_image;
 use gestalt_vision::survey::{FalseAlarms, Survey};
 use opencv::core::{self, CV_16SC3, Mat, Scalar, Vec3b, Vector, no_array};
 use opencv::imgcodecs::{IMREAD_COLOR, IMWRITE_JPEG_QUALITY, imdecode, imencode};
+use opencv::imgproc;
 use opencv::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -37,6 +38,7 @@ fn main() -> std::process::ExitCode {
         [Works, Data] learned_eyes_count_fingers_before_a_camera_that_had_no_part_in_making_them,
         [Works, Data] faults_of_a_camera_cost_learned_eyes_little,
         [Works, Data] learned_eyes_seldom_see_a_hand_where_none_is,
+        [Works, Data] a_hand_beside_a_thing_that_was_taken_for_one_is_seen,
     ])
 }
 
@@ -235,6 +237,30 @@ fn learned_eyes_seldom_see_a_hand_where_none_is() {
     assert!(unreadable.is_empty(), "{unreadable:?}");
     eprintln!("a hand in {alarms} of {images} pictures without one");
     assert!(images > 30 && alarms as f64 <= 0.1 * images as f64, "{alarms} of {images}");
+}
+
+/// A banana is taken for a hand; then a hand is shown beside it.
+fn a_hand_beside_a_thing_that_was_taken_for_one_is_seen() {
+    let thing = read_image(&data("negatives/none/misc_banana_0.jpg")).unwrap();
+    let hand = read_image(&data("asl-digits/5/s003_IMG_1153.jpg")).unwrap();
+    let (mut large, mut both) = (Mat::default(), thing.clone());
+    imgproc::resize(&hand, &mut large, core::Size::new(300, 300), 0.0, 0.0, imgproc::INTER_LINEAR).unwrap();
+    let beside = core::Rect::new(20, 320, 300, 300);
+    large.copy_to(&mut Mat::roi_mut(&mut both, beside).unwrap()).unwrap();
+    let (camera, layer) = (CameraModel::laptop(), LayerConfig::ALL);
+    let mut eyes =
+        Perception::for_camera(FeatureSet::Embedding, HandConfig::default(), layer, &camera).unwrap();
+    for _ in 0..20 {
+        eyes.observe(&thing).unwrap();
+    }
+    let mut sees_the_hand = || {
+        let quality = eyes.observe(&both).unwrap().quality;
+        let region = eyes.region();
+        quality > 0.9 && beside.contains((region.tl() + region.br()) / 2)
+    };
+    let after = (0..100).position(|_| sees_the_hand()).unwrap();
+    eprintln!("the hand is seen in frame {after}");
+    assert!(after < 12 && (0..30).all(|_| sees_the_hand()), "{after}");
 }
 
 /// What a camera may do to a picture.

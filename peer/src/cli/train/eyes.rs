@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use gestalt_protocol::ClassId;
+
 use super::super::Failure;
 use gestalt_vision::dataset::{LabelledImage, joined};
 use gestalt_vision::model;
@@ -41,13 +43,25 @@ impl Eyes {
         }
         Ok(kept)
     }
+
+    /// Those of these pictures without a gesture that they were not made with.
+    pub fn unseen_none(&self, none: &[PathBuf]) -> Vec<PathBuf> {
+        let Some(origin) = &self.0 else { return none.to_vec() };
+        let nobodys = |path: &PathBuf| LabelledImage { path: path.clone(), class: ClassId(0), person: None };
+        let unseen = origin.unseen(none.iter().map(nobodys).collect());
+        unseen.into_iter().map(|image| image.path).collect()
+    }
+
+    /// How many of these images they were made with, or with the people in them.
+    pub fn count_known(&self, images: Vec<LabelledImage>) -> usize {
+        let all = images.len();
+        self.0.as_ref().map_or(0, |origin| all - origin.unseen(images).len())
+    }
 }
 
 #[cfg(test)]
 pub(in crate::cli) mod tests {
     use std::path::Path;
-
-    use gestalt_protocol::ClassId;
 
     use super::*;
 
@@ -73,6 +87,10 @@ pub(in crate::cli) mod tests {
         let error = eyes.unseen(&folders, images[..2].to_vec()).err().unwrap().to_string();
         assert!(error.contains("learned eyes") && error.contains("--features shape"), "{error}");
         assert_eq!(Eyes(None).unseen(&folders, images.clone()).unwrap(), images);
+        assert_eq!((eyes.count_known(images.clone()), Eyes(None).count_known(images.clone())), (2, 0));
+        // Of pictures without a gesture each counts for itself.
+        let none: Vec<PathBuf> = images.into_iter().map(|image| image.path).collect();
+        assert_eq!((eyes.unseen_none(&none), Eyes(None).unseen_none(&none)), (none[1..].to_vec(), none));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use gestalt_strategies::{Classify, Evaluation, LabelledFeatures, MIN_SAMPLES, Vo
 
 use super::super::score::Score;
 use super::super::{Failure, report};
-use super::{Args, Eyes, fit, judge, look};
+use super::{Args, Eyes, fit, judge, look, mirror};
 use gestalt_vision::dataset::{Dataset, LabelledImage};
 use gestalt_vision::perception::Perception;
 use gestalt_vision::survey::{FalseAlarms, Survey, lessons};
@@ -31,12 +31,17 @@ pub(super) fn compare(
     };
     let tested: Vec<Vec<LabelledImage>> =
         args.dataset.iter().zip(sets).map(unseen).collect::<Result<_, Failure>>()?;
-    let surveys: Vec<Survey> =
-        sets.iter().map(|set| look(&set.images, args.augment, args.seed, perception)).collect();
+    let mut surveys: Vec<Survey> = sets.iter().map(|set| look(&set.images, perception)).collect();
     surveys.iter().for_each(report::rejected);
+    if let Some(set) = sets.first() {
+        mirror::vary(args, &set.vocabulary, &mut surveys, perception);
+    }
     let mut scores = Vec::new();
     for (left, (folder, set)) in args.dataset.iter().zip(sets).enumerate() {
-        let alarms = FalseAlarms::count(&set.none, perception);
+        let none = eyes.unseen_none(&set.none);
+        let which = "without a gesture that the learned eyes were made with";
+        say_left_out(folder, set.none.len() - none.len(), which);
+        let alarms = FalseAlarms::count(&none, perception);
         report::unreadable(&alarms);
         if set.images.is_empty() {
             // Nothing to judge; whether a hand is found does not depend on the model.

@@ -30,6 +30,8 @@ pub(super) struct Outcome<'a> {
     pub test: Option<&'a (Evaluation, Survey)>,
     /// How many of these were left out, as the learned eyes were made with them.
     pub left_out: usize,
+    /// How many of the images trained on, and so cross-validated, the learned eyes were made with.
+    pub known: usize,
     /// Folders that were left out.
     pub ignored: Vec<&'a str>,
 }
@@ -74,8 +76,10 @@ impl Outcome<'_> {
                 classifier.support_vectors()
             ),
             format!(
-                "  validation accuracy {:.3}, {}-fold cross-validation {folding}",
-                trained.accuracy, self.folds
+                "  validation accuracy {:.3}, {}-fold cross-validation {folding}{}",
+                trained.accuracy,
+                self.folds,
+                known(self.known, self.survey.seen.len())
             ),
             format!("  trained in {:.1} s → {}", self.seconds, self.out.display()),
         ];
@@ -118,6 +122,7 @@ impl Outcome<'_> {
                 "by_person": trained.folding == Folding::ByGroup && self.by_person(),
                 "accuracy": trained.accuracy,
                 "log_loss": trained.log_loss,
+                "made_with": self.known,
             },
             "seconds": self.seconds,
             "test_left_out_as_trained_on": self.left_out,
@@ -126,10 +131,32 @@ impl Outcome<'_> {
     }
 }
 
+/// Of how many of the images cross-validation says too much: the learned eyes were made with them.
+fn known(known: usize, images: usize) -> String {
+    match known {
+        0 => String::new(),
+        known => format!(
+            "\n             too good: the learned eyes were made with {known} of these {images} images, or with the people in them"
+        ),
+    }
+}
+
 /// Part of the variance that the classifier's space keeps, `0.0..=1.0`.
 fn explained(classifier: &Classifier) -> f64 {
     match classifier.space().reduction() {
         Reduction::Pca(pca) => pca.explained(),
         Reduction::Selected { width, kept } => kept.len() as f64 / *width as f64,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::known;
+
+    #[test]
+    fn cross_validation_on_what_the_eyes_were_made_with_says_so() {
+        assert_eq!(known(0, 1443), "");
+        let said = known(1423, 1443);
+        assert!(said.contains("too good") && said.contains("made with 1423 of these 1443 images"), "{said}");
     }
 }

@@ -19,7 +19,8 @@ pub enum Naming {
     /// The one that the folder is named after.
     #[default]
     Names,
-    /// The number of fingers that its name begins with: 3 in `3` and in `3_thumb_index_middle`. Others show no gesture.
+    /// The number of fingers that its name begins with: 3 in `3`, `03`, `3-three` and `3_thumb_index_middle`. Others show no
+    /// gesture.
     Counts,
 }
 
@@ -29,8 +30,14 @@ impl Naming {
         match self {
             Self::Names => Some(folder),
             Self::Counts => {
-                let count = folder.split_once('_').map_or(folder, |(count, _)| count);
-                (!count.is_empty() && count.bytes().all(|b| b.is_ascii_digit())).then_some(count)
+                let digits = folder.bytes().take_while(u8::is_ascii_digit).count();
+                let (count, rest) = folder.split_at(digits);
+                if count.is_empty() || rest.starts_with(char::is_alphanumeric) {
+                    return None;
+                }
+                // A number, however it is written: all zeros are one.
+                let zeros = count.bytes().take_while(|digit| *digit == b'0').count();
+                Some(&count[zeros.min(digits - 1)..])
             }
         }
     }
@@ -145,7 +152,11 @@ mod tests {
             (count("3"), count("3_thumb_index_middle"), count("10_x")),
             (Some("3"), Some("3"), Some("10"))
         );
-        for name in ["call", "_3", "3a", "three_3", "pinch7", "", "-1", "3 fingers"] {
+        let number = |name| count(name).map(str::to_owned);
+        let written = ["03", "3-three", "3 fingers", "003.x"].map(number);
+        assert_eq!(written, [(); 4].map(|()| Some("3".to_owned())));
+        assert_eq!((count("0"), count("00_fist"), count("010")), (Some("0"), Some("0"), Some("10")));
+        for name in ["call", "_3", "3a", "3é", "three_3", "pinch7", "", "-1"] {
             assert_eq!(count(name), None, "{name}");
         }
         assert_eq!(Naming::Names.gesture("3_together"), Some("3_together"));

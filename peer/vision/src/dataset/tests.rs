@@ -110,6 +110,7 @@ fn folders_can_be_counts_of_fingers() {
     let folder = dataset(&[
         "3/a.jpg",
         "3_thumb/b.jpg",
+        "03-thumb/f.jpg",
         "3_thumb/boxes.csv",
         "0/c.jpg",
         "call/d.jpg",
@@ -119,7 +120,7 @@ fn folders_can_be_counts_of_fingers() {
     let folders = [folder.path().to_owned()];
     let counts = Dataset::list_several(&folders, Naming::Counts, None).unwrap().remove(0);
     assert_eq!(counts.vocabulary.labels(), ["0", "3"]);
-    assert_eq!(counts.images.iter().map(|image| image.class.0).collect::<Vec<_>>(), [0, 1, 1]);
+    assert_eq!(counts.images.iter().map(|image| image.class.0).collect::<Vec<_>>(), [0, 1, 1, 1]);
     assert_eq!((said(&counts), counts.none.len()), (vec!["call (1 images)".to_owned()], 1));
 }
 

@@ -62,10 +62,7 @@ pub fn candidates(maps: &FeatureMap) -> impl Iterator<Item = Candidate> + use<> 
     }
     for index in 1..PEAKS {
         let (higher, rest) = peaks.split_at_mut(index);
-        let is_copy = |of: &Candidate, other: &Candidate| {
-            let (a, b) = (of.place, other.place);
-            (a.x - b.x).hypot(a.y - b.y) <= NEAR * a.side.max(b.side)
-        };
+        let is_copy = |of: &Candidate, other: &Candidate| of.place.is_near(&other.place, NEAR);
         if rest[0].is_some_and(|peak| higher.iter().flatten().any(|other| is_copy(&peak, other))) {
             rest[0] = None;
         }

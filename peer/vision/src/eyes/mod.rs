@@ -5,7 +5,8 @@
 //!          160×120   at most 3     64×64 each                            48×48
 //! ```
 //!
-//! Where the hand was in the last frame, one close look replaces all before the reading. Where nothing convinces at first, a
+//! Where the hand was in the last frame, one close look replaces all before the reading; from time to time a glance is taken all
+//! the same, lest a better hand be overlooked for the sake of the one that is known. Where nothing convinces at first, a
 //! glance of twice the size looks for small hands. Every square is cut out of the frame itself, turned so that the hand's
 //! fingers point up; what the networks are shown is described at `standard`.
 
@@ -30,7 +31,7 @@ use crate::network::{Counter, FeatureMap, Finder, Refinement, Refiner, WeightsEr
 use crate::perception::{NoHand, NoObservation, check};
 
 use affine::Affine;
-use candidates::candidates;
+use candidates::{Candidate, candidates};
 use glance::Glance;
 use hand_mask::HandMask;
 pub use look::Look;
@@ -44,6 +45,10 @@ use standard::standardise;
 pub const MINIMUM: f32 = 0.55;
 /// A hand that is this likely where the last one was is the same.
 const STILL_THERE: f32 = 0.6;
+/// A hand must be found so many times as surely as the one that is known to take its place: of two hands alike, one stays.
+const BETTER: f32 = 1.1;
+/// A place nearer to the known one than this share of the larger one's side is the known hand's.
+const SAME: f32 = 0.5;
 /// The finer look is for hands up to this size, in pixels of a frame 160 wide: of larger ones it finds parts.
 const SMALL: f32 = 28.0;
 /// A count that is less likely than this is read once more, mirrored.
@@ -140,12 +145,35 @@ impl Eyes {
     /// # Errors
     /// See [`NoObservation`]; a frame without a hand is [`NoHand::Unrecognised`].
     pub fn look(&mut self, frame: &Mat, memory: Option<Place>) -> Result<Look, NoObservation> {
+        self.look_about(frame, memory, false)
+    }
+
+    /// The same; `about`: where the hand is still there, also takes a glance at the whole frame, and reads another hand instead
+    /// when that is found clearly more surely.
+    ///
+    /// # Errors
+    /// As [`Self::look`].
+    pub fn look_about(
+        &mut self,
+        frame: &Mat,
+        memory: Option<Place>,
+        about: bool,
+    ) -> Result<Look, NoObservation> {
         check(frame)?;
         self.pyramid.clear();
         let size = frame.size()?;
         if let Some(place) = memory.filter(|place| place.is_within(size)) {
             let seen = self.close_up_with_mask(frame, place)?;
             if seen.hand >= STILL_THERE {
+                let better = if about { self.better(frame, &seen)? } else { None };
+                if let Some(better) = better {
+                    match self.read_suspect(frame, better) {
+                        Err(NoObservation::NoHand(_)) => (),
+                        read => return read,
+                    }
+                    // The mask is that of the other one.
+                    self.close_up_with_mask(frame, place)?;
+                }
                 match self.read(frame, &seen, seen.hand) {
                     Err(NoObservation::NoHand(_)) => (),
                     read => return read,
@@ -159,8 +187,35 @@ impl Eyes {
             self.search(frame, 2, &mut search)?;
         }
         let Some(best) = search.best else { return Err(unrecognised(search.dismissed)) };
-        let seen = self.close_up_with_mask(frame, best.place)?;
-        self.read(frame, &seen, best.peak.sqrt() * seen.hand)
+        self.read_suspect(frame, best)
+    }
+
+    /// Looks once more at what was found, and reads it.
+    fn read_suspect(&mut self, frame: &Mat, found: Suspect) -> Result<Look, NoObservation> {
+        let seen = self.close_up_with_mask(frame, found.place)?;
+        self.read(frame, &seen, found.peak.sqrt() * seen.hand)
+    }
+
+    /// Another place that is clearly more surely a hand's than the known one would be at a first look. A known hand that a glance
+    /// does not show is as good as none.
+    fn better(&mut self, frame: &Mat, known: &Closeup) -> Result<Option<Suspect>, NoObservation> {
+        let letterbox = self.glance.take(frame, 1)?;
+        let found: Vec<Candidate> = candidates(self.finder.run(self.glance.picture())).collect();
+        let is_known = |found: &Candidate| letterbox.in_frame(found.place).is_near(&known.place, SAME);
+        let peak = found.iter().filter(|found| is_known(found)).map(|found| found.peak).fold(0.0, f32::max);
+        let (mut needed, mut better) = ((BETTER * peak.sqrt() * known.hand).max(MINIMUM), None);
+        for found in found.iter().filter(|found| !is_known(found)) {
+            let most = found.peak.sqrt();
+            if most > needed {
+                let seen = self.close_up(frame, letterbox.in_frame(found.place))?;
+                let score = most * seen.hand;
+                // What one close look corrects may lead to the known hand.
+                if score > needed && !seen.place.is_near(&known.place, SAME) {
+                    (needed, better) = (score, Some(Suspect { peak: found.peak, score, place: seen.place }));
+                }
+            }
+        }
+        Ok(better)
     }
 
     /// Takes a glance at so many times 160×120, and a close look at whatever may be better than the best so far.
@@ -280,4 +335,4 @@ impl Closeup {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

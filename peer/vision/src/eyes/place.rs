@@ -30,6 +30,11 @@ impl Place {
             && self.up.is_finite()
     }
 
+    /// Whether the centre of another one is within this share of the larger one's side.
+    pub(super) fn is_near(&self, other: &Self, share: f32) -> bool {
+        (self.x - other.x).hypot(self.y - other.y) <= share * self.side.max(other.side)
+    }
+
     /// The place that far from this one: right and down in its own sides and as it is turned, larger by a factor, turned
     /// clockwise.
     pub(super) fn moved(&self, (right, down): (f32, f32), larger: f32, turned: f32) -> Self {

@@ -112,6 +112,54 @@ fn a_memory_of_nowhere_is_no_memory() {
     }
 }
 
+/// Eyes that take whatever they look at closely for a hand, but find what the shipped ones find.
+pub(crate) fn easily_content() -> Eyes {
+    let refiner = saying(shipped::REFINER, &[(19, &[8.0]), (29, &[8.0; 4])]);
+    Eyes::new(shipped::FINDER, &refiner, &saying(shipped::COUNTER, &[(17, &[8.0])])).unwrap()
+}
+
+/// Before one wall, from the left to the right: a bare drawn hand or none.
+pub(crate) fn hands(shown: &[bool]) -> Mat {
+    use crate::camera_model::CameraModel;
+    use crate::pose::Pose;
+    use crate::source::{Glove, RenderedSource, Scene, Source};
+
+    let near = Pose { distance_m: 0.6, ..Pose::FRONTAL };
+    let mut source = RenderedSource::new(CameraModel::laptop(), near, Glove::Skin, 1).unwrap();
+    let mut side = |shown: &bool| {
+        let scene = Scene { gesture: shown.then_some(5), seed: 1 };
+        source.next_frame(std::time::Duration::ZERO, &scene).unwrap().image
+    };
+    let sides: opencv::core::Vector<Mat> = shown.iter().map(&mut side).collect();
+    let mut frame = Mat::default();
+    opencv::core::hconcat(&sides, &mut frame).unwrap();
+    frame
+}
+
+#[test]
+fn a_glance_finds_the_hand_that_a_thing_was_taken_for() {
+    let (mut eyes, frame) = (easily_content(), hands(&[true]));
+    let hand = eyes.look(&frame, None).unwrap().place;
+    // A corner of the wall, which the refiner takes for a hand.
+    let thing = Place { x: 30.0, y: 30.0, side: 50.0, up: 0.0 };
+    assert!(!thing.is_near(&hand, 1.0), "{hand:?}");
+    let followed = eyes.look(&frame, Some(thing)).unwrap();
+    assert_eq!((followed.place, followed.view), (thing, thing));
+    assert_eq!(eyes.look_about(&frame, Some(thing), true).unwrap().place, hand);
+}
+
+#[test]
+fn of_two_hands_alike_the_known_one_stays() {
+    let (mut eyes, frame) = (Eyes::shipped().unwrap(), hands(&[true, true]));
+    let hand = eyes.look(&hands(&[true]), None).unwrap();
+    for aside in [0.0, frame.cols() as f32 / 2.0] {
+        let known = Place { x: hand.place.x + aside, ..hand.place };
+        let seen = eyes.look(&frame, Some(known)).unwrap();
+        assert!(seen.place.is_near(&known, 0.2), "{seen:?}");
+        assert_eq!(eyes.look_about(&frame, Some(known), true).unwrap(), seen);
+    }
+}
+
 #[test]
 fn what_is_no_picture_is_refused_by_its_cause() {
     let mut eyes = Eyes::shipped().unwrap();

@@ -303,6 +303,13 @@ impl Perception {
         Ok(Observation { features, quality: self.colours.plausibility() * hand.plausibility })
     }
 
+    /// Forgets where the hand was: the next frame does not follow the last one.
+    pub fn forget(&mut self) {
+        if let Some(learned) = &mut self.learned {
+            learned.forget();
+        }
+    }
+
     /// What the white balance of the last frame multiplies its blue, green and red channel by.
     #[must_use]
     pub fn gains(&self) -> [f32; 3] {

@@ -13,11 +13,15 @@ const FRAMES: usize = 24;
 /// A rate that differs by no more than this factor is what was meant: cameras slow down in poor light.
 const RATE: f64 = 1.5;
 
+/// No camera is slower or faster than these, frames per second.
+const SLOWEST: f64 = 0.1;
+const FASTEST: f64 = 240.0;
+
 /// Compares frames with a camera's model.
 pub struct Mismatch {
     /// As the configuration says.
     model: CameraModel,
-    /// The rate it has instead, once it was said.
+    /// The rate it has instead, as it was said last.
     fps: Option<f64>,
     /// The rate its sender states.
     stated: Option<f64>,
@@ -76,18 +80,22 @@ impl Mismatch {
         ))
     }
 
-    /// Another rate than the configuration says; said once.
+    /// Another rate than the configuration says, or than was said last: each said once.
     pub fn notice_rate(&mut self, at: Duration) -> Option<String> {
-        if self.fps.is_some() {
-            return None;
-        }
         let measured = self.measured(at);
-        let fps = self.stated.or(measured)?;
+        let fps = self.stated.or(measured)?.clamp(SLOWEST, FASTEST);
         let meant = self.model.fps;
-        if (meant / RATE..=meant * RATE).contains(&fps) {
+        let is_near = |rate: f64| (rate / RATE..=rate * RATE).contains(&fps);
+        if is_near(self.fps.unwrap_or(meant)) {
             return None;
         }
-        self.fps = Some(fps.clamp(0.1, 240.0));
+        if is_near(meant) {
+            self.fps = None;
+            return Some(format!(
+                "the camera delivers {fps:.1} frames per second again, near the {meant} of camera.model"
+            ));
+        }
+        self.fps = Some(fps);
         Some(format!(
             "the camera delivers {fps:.1} frames per second where camera.model says {meant}: all counts in seconds, so it is used as it is; correct camera.model if that is its rate"
         ))
@@ -167,5 +175,23 @@ mod tests {
         mismatch.rate_is(5.0);
         let said = notice(&mut mismatch, frame(640, 360, 60_000));
         assert!(said[0].contains("5.0 frames per second where camera.model says 30"), "{said:?}");
+    }
+
+    #[test]
+    fn a_rate_that_changes_later_is_followed_and_each_is_said_once() {
+        let mut mismatch = Mismatch::new(CameraModel::parrot());
+        let (mut at_ms, mut said) = (0, Vec::new());
+        let mut rates = Vec::new();
+        for period in [33, 100, 200, 33, 11_000, 20_000] {
+            for _ in 0..60 {
+                at_ms += period;
+                said.extend(notice(&mut mismatch, frame(640, 360, at_ms)));
+            }
+            rates.push(mismatch.model().fps);
+        }
+        assert_eq!(rates, [30.0, 10.0, 5.0, 30.0, 0.1, 0.1]);
+        let [ten, five, thirty, slow] = &said[..] else { panic!("{said:?}") };
+        assert!(ten.contains("10.0 frames") && five.contains("5.0 frames") && slow.contains("0.1 frames"));
+        assert!(thirty.contains("30.3 frames per second again"), "{thirty}");
     }
 }

@@ -58,7 +58,9 @@ impl ImageFolder {
         if self.next == self.images.len() && self.looping {
             self.next = 0;
         }
-        let path = self.images.get(self.next).ok_or_else(|| SourceError::Ended(self.describe()))?;
+        let path = self.images.get(self.next).ok_or_else(|| {
+            SourceError::Ended(format!("{}, {} frames in all,", self.describe(), self.images.len()))
+        })?;
         self.next += 1;
         Ok(path)
     }
@@ -107,6 +109,8 @@ mod tests {
         for _ in 0..2 {
             assert!(matches!(next_width(&mut source), Err(SourceError::Ended(_))));
         }
+        let said = next_width(&mut source).unwrap_err().to_string();
+        assert!(said.contains(", 2 frames in all, has ended"), "{said}");
     }
 
     #[test]

@@ -99,7 +99,7 @@ pub trait Source<F = Frame>: Send {
 #[derive(Debug, Error)]
 pub enum SourceError {
     /// The last frame was given; the source does not start again.
-    #[error("{0} has ended: set it to loop to start again")]
+    #[error("{0} has ended: a robot begins it again with `loop: true` in camera.source")]
     Ended(String),
     /// The file or folder is not there.
     #[error("{} does not exist: check the path", .0.display())]

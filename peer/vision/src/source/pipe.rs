@@ -3,7 +3,7 @@
 use std::fs;
 use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use opencv::core::Mat;
 use opencv::prelude::*;
@@ -49,10 +49,11 @@ impl Source for Pipe {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        let asked = Instant::now();
         let mut image = Mat::default();
         if !self.capture.read(&mut image)? || image.empty() {
             return Err(SourceError::WriterGone(self.path.clone()));
         }
-        Ok(Frame { image, at: now })
+        Ok(Frame { image, at: now + asked.elapsed() })
     }
 }
