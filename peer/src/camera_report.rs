@@ -53,8 +53,7 @@ pub struct CameraReport {
     broken: Option<String>,
     /// The classifier panicked at the last hand.
     unclassified: Option<String>,
-    picture: u32,
-    picture_since: Duration,
+    picture: SamePicture,
     /// The features of the last hand, and when it was seen.
     hand: Option<(Vec<f32>, Duration)>,
     written: Option<Duration>,
@@ -93,8 +92,7 @@ impl CameraReport {
             ended: false,
             broken: None,
             unclassified: None,
-            picture: 0,
-            picture_since: Duration::ZERO,
+            picture: SamePicture::default(),
             hand: None,
             written: None,
             urgent: false,
@@ -109,7 +107,7 @@ impl CameraReport {
         Self {
             errors_allowed: 1,
             patience,
-            if_silent: "see that `gestalt stream` runs, and check its way here",
+            if_silent: "see that `gestalt stream` runs and its camera does not hang, and check its way here",
             expected: Some(now),
             blind: true,
             ..Self::of_camera(false, Duration::ZERO)
@@ -135,10 +133,7 @@ impl CameraReport {
         if !self.changes {
             return true;
         }
-        let picture = checksum(image);
-        if picture != self.picture {
-            (self.picture, self.picture_since) = (picture, at);
-        }
+        self.picture.note(checksum(image), at);
         !self.is_same_picture(at)
     }
 
@@ -209,11 +204,7 @@ impl CameraReport {
         }
         match last {
             Some(last) if self.is_same_picture(last) => {
-                let seconds = last.saturating_sub(self.picture_since).as_secs_f64();
-                let trouble = format!(
-                    "identical pictures for {seconds:.0} s: covered, saturated, or hanging; look at its lens and light, then unplug it and plug it in again"
-                );
-                (CameraState::Frozen, trouble)
+                (CameraState::Frozen, identical(self.picture.lasted(last)))
             }
             None if self.size == [0, 0] => (CameraState::Opening, trouble),
             _ => (CameraState::Live, trouble),
@@ -309,12 +300,46 @@ impl CameraReport {
     }
 
     fn is_same_picture(&self, at: Duration) -> bool {
-        self.changes && at.saturating_sub(self.picture_since) > self.patience()
+        self.changes && self.picture.lasted(at) > self.patience()
     }
 }
 
+/// Since when a camera delivers the same picture.
+#[derive(Debug, Default)]
+pub(crate) struct SamePicture {
+    checksum: u32,
+    since: Duration,
+}
+
+impl SamePicture {
+    /// A picture of that [`checksum`] came at that time.
+    pub fn note(&mut self, checksum: u32, at: Duration) {
+        if checksum != self.checksum {
+            *self = Self { checksum, since: at };
+        }
+    }
+
+    /// How long it had been the same at that time.
+    pub fn lasted(&self, at: Duration) -> Duration {
+        at.saturating_sub(self.since)
+    }
+
+    /// What is wrong with a camera that takes a picture every `period`, if it has delivered the same one for too long.
+    pub fn trouble(&self, at: Duration, period: Duration) -> Option<String> {
+        let lasted = self.lasted(at);
+        (lasted > PATIENCE.max(3 * period)).then(|| identical(lasted))
+    }
+}
+
+fn identical(lasted: Duration) -> String {
+    let seconds = lasted.as_secs_f64();
+    format!(
+        "identical pictures for {seconds:.0} s: covered, saturated, or hanging; look at its lens and light, then unplug it and plug it in again"
+    )
+}
+
 /// Of every sixteenth row: two pictures of a real sensor never agree in them.
-fn checksum(image: &Mat) -> u32 {
+pub(crate) fn checksum(image: &Mat) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     for row in (0..image.rows()).step_by(16) {
         // A row that cannot be read does not tell pictures apart.

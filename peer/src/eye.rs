@@ -11,7 +11,7 @@ use gestalt_strategies::Classify;
 use gestalt_vision::human::Human;
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::sight::{Sight, SightError, one_thread_per_frame};
-use gestalt_vision::source::{Opener, Source, SourceError};
+use gestalt_vision::source::{Opener, Pipe, Source, SourceError};
 use gestalt_vision::steady::Steady;
 use opencv::core::Mat;
 use thiserror::Error;
@@ -39,7 +39,7 @@ pub enum EyeError {
 
 /// An open eye.
 pub struct Eye {
-    /// `None`: a device that is not there yet.
+    /// `None`: one that is opened by whoever reads it, as it may not be there yet.
     source: Option<Box<dyn Source>>,
     open: Opener,
     describe: String,
@@ -78,8 +78,8 @@ impl Seen {
 }
 
 impl Eye {
-    /// Opens the eye a configuration describes; `None` for a robot without one. A device that is not there is no error: it is
-    /// tried again and again. `clock` is the time since 1970 now, for a human who goes by it.
+    /// Opens the eye a configuration describes; `None` for a robot without one. A device that is not there, or a pipe that
+    /// nobody writes to, is no error: it is tried again and again. `clock` is the time since 1970 now, for a human who goes by it.
     ///
     /// # Errors
     /// See [`EyeError`].
@@ -90,6 +90,12 @@ impl Eye {
         clock: Duration,
     ) -> Result<Option<Self>, EyeError> {
         let (section, period) = (camera.clone(), camera.model.properties().period());
+        // A driver may hang, a router may be late, a pipe opens when somebody writes to it: it is opened where it keeps nobody.
+        let keeps = match &camera.source {
+            SourceSection::Device(_) | SourceSection::Ros(_) => true,
+            SourceSection::Video(files) => Pipe::is_at(&files.path),
+            _ => false,
+        };
         Ok(match &camera.source {
             SourceSection::None => None,
             SourceSection::Stream(stream) => {
@@ -99,9 +105,8 @@ impl Eye {
                     Box::new(move || Ok(Box::new(StreamSource::new(frames_from.clone(), period))));
                 Some(Self { inlet: Some(inlet), ..Self::with(camera, model, open)? })
             }
-            SourceSection::Device(_) | SourceSection::Ros(_) => {
+            _ if keeps => {
                 let open = Box::new(move || open_source(&section, robot, clock));
-                // A driver may hang, a router may be late: it is opened where it keeps nobody.
                 Some(Self::new(camera, model, None, open)?)
             }
             _ => Some(Self::with(camera, model, Box::new(move || open_source(&section, robot, clock)))?),

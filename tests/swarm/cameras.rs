@@ -2,6 +2,8 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use gestalt_link::Event;
@@ -11,13 +13,16 @@ use gestalt_peer::config::{
     RenderedSection, SourceSection,
 };
 use gestalt_peer::picture::write_png;
+use gestalt_peer::stream::{Feed, Sender, SenderConfig, StreamEvent};
 use gestalt_peer::swarm::Members;
-use gestalt_protocol::{Camera, CameraState, Decision, RobotId};
-use gestalt_tests::{model, unique};
+use gestalt_protocol::{Camera, CameraState, Decision, RobotId, Status};
+use gestalt_tests::{Hands, model, unique};
 use gestalt_vision::config::DeviceSettings;
 use gestalt_vision::pose::Pose;
-use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
+use gestalt_vision::source::{Frame, Glove, RenderedSource, Scene, Source, SourceError};
 use serde_json::json;
+
+use crate::stream::{center_asking, wait_for};
 
 const PATIENCE: Duration = Duration::from_secs(15);
 
@@ -100,11 +105,74 @@ pub async fn a_camera_that_hangs_keeps_nobody() {
     let path = folder.path().join("video8");
     // Opening a pipe that nobody writes to never returns.
     assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
-    let body = Body::start(&config(1, &unique("cameras"), device(&path)), Some(model()), 1).await.unwrap();
-    let hung = camera(&body, |camera| camera.state == CameraState::Frozen).await;
-    assert!(hung.trouble.contains("no frame for"), "{hung:?}");
-    body.robot().open_round();
-    tokio::time::timeout(PATIENCE, body.stop()).await.expect("it stops though its camera hangs");
+    let pipe = SourceSection::Video(FilesSection { path: path.clone(), repeat: false });
+    for source in [device(&path), pipe] {
+        let (config, model) = (config(1, &unique("cameras"), source), Some(model()));
+        // On a thread of its own: one that waits for its camera would keep the test.
+        let starting = tokio::spawn(async move { Body::start(&config, model, 1).await.unwrap() });
+        let body = tokio::time::timeout(PATIENCE, starting).await.expect("it starts").unwrap();
+        let hung = camera(&body, |camera| camera.state == CameraState::Frozen).await;
+        assert!(hung.trouble.contains("no frame for"), "{hung:?}");
+        body.robot().open_round();
+        tokio::time::timeout(PATIENCE, body.stop()).await.expect("it stops though its camera hangs");
+    }
+}
+
+/// A camera that hangs while it is told to: it delivers its last picture again and again.
+struct Hanging(Arc<AtomicBool>, u8);
+
+impl Source for Hanging {
+    fn describe(&self) -> String {
+        "a camera in a test".to_owned()
+    }
+    fn period(&self) -> Duration {
+        Duration::from_millis(50)
+    }
+    fn is_live(&self) -> bool {
+        true
+    }
+    fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+        std::thread::sleep(self.period());
+        if !self.0.load(Ordering::Relaxed) {
+            self.1 = self.1.wrapping_add(1);
+        }
+        Frame::from_bgr(32, 24, &[self.1; 32 * 24 * 3], now)
+    }
+}
+
+pub async fn a_streamed_camera_that_hangs_is_not_looked_at_until_it_goes_on() {
+    let (swarm, hands) = (unique("hanging"), Hands::new(2));
+    let center = center_asking(&swarm, &hands, 1, Some(3)).await;
+    let hangs = Arc::new(AtomicBool::new(false));
+    let of_feed = hangs.clone();
+    let feed = Feed::with("a camera in a test", Box::new(move || Ok(Box::new(Hanging(of_feed.clone(), 0)))));
+    let config = SenderConfig {
+        link: serde_json::from_value(json!({"connect": center.robot().locators()})).unwrap(),
+        swarm,
+        robot: RobotId(7),
+        camera: "parrot".to_owned(),
+        quality: 80,
+        signer: None,
+    };
+    let said = Arc::<Mutex<Vec<String>>>::default();
+    let of_sender = said.clone();
+    let sending = tokio::spawn(Sender::start(config, feed).unwrap().run(move |event| {
+        if let StreamEvent::Failed { cause, .. } = event {
+            of_sender.lock().unwrap().push(cause);
+        }
+    }));
+    let is = async |state| {
+        let of = |status: &Status| status.camera.state == state;
+        wait_for("that state", || center.served().iter().any(of).then_some(())).await;
+    };
+    is(CameraState::Live).await;
+    hangs.store(true, Ordering::Relaxed);
+    is(CameraState::Frozen).await;
+    assert!(said.lock().unwrap().iter().any(|cause| cause.contains("identical pictures")), "{said:?}");
+    hangs.store(false, Ordering::Relaxed);
+    is(CameraState::Live).await;
+    sending.abort();
+    center.stop().await;
 }
 
 pub async fn pictures_that_vanish_and_come_back_are_taken_up_again() {

@@ -56,6 +56,21 @@ fn the_same_picture_over_and_over_is_frozen_and_not_worth_looking_at() {
 }
 
 #[test]
+fn what_is_streamed_is_the_same_for_too_long_as_what_is_looked_at_here() {
+    let mut same = SamePicture::default();
+    let trouble = |same: &SamePicture, at_ms| same.trouble(Duration::from_millis(at_ms), PERIOD);
+    for at in 10..40 {
+        same.note(7, PERIOD * at);
+        assert_eq!(trouble(&same, 100 * u64::from(at)).is_some(), at > 30, "{at}");
+    }
+    assert!(trouble(&same, 5000).unwrap().contains("identical pictures for 4 s"));
+    // One of a picture a second has the time of three.
+    assert_eq!(same.trouble(Duration::from_millis(3900), Duration::from_secs(1)), None);
+    same.note(8, Duration::from_secs(5));
+    assert_eq!(trouble(&same, 5100), None);
+}
+
+#[test]
 fn a_slow_camera_has_the_time_of_three_of_its_frames_from_the_first_on() {
     let mut report = CameraReport::of_camera(true, Duration::from_secs(10));
     report.expect(Duration::ZERO);

@@ -10,6 +10,7 @@ use gestalt_protocol::RobotId;
 use gestalt_vision::dataset::NONE;
 use gestalt_vision::perception::FeatureSet;
 use gestalt_vision::source::{Frame, Pipe, Reader, Scene, Source, SourceError, encode_jpeg};
+use gestalt_vision::steady::Broken;
 use serde_json::json;
 
 use super::show::{counted, line};
@@ -152,6 +153,11 @@ impl Feed {
             }
         }
     }
+
+    /// Whether pictures may come again: a camera that fails is opened anew until it delivers.
+    fn comes_back_after(&self, error: &SourceError) -> bool {
+        matches!(self, Self::Live(..)) && !matches!(error, SourceError::Panicked(Broken::GivenUp(_)))
+    }
 }
 
 /// One taking of pictures.
@@ -174,27 +180,30 @@ impl Session<'_> {
         }
         let (mut since, mut in_vain) = (Instant::now(), 0);
         while self.kept < self.args.count {
-            let frame = match feed.next().await {
-                Ok(frame) => frame,
+            match feed.next().await {
+                Ok(frame) => match self.judge.judge(&frame.image)? {
+                    None => {
+                        let file = self.album.keep(&encode_jpeg(&frame.image, QUALITY)?)?;
+                        self.kept += 1;
+                        self.in_a_row = ("", 0);
+                        (since, in_vain) = (Instant::now(), 0);
+                        self.say_kept(&file)?;
+                    }
+                    Some(unfit) => {
+                        in_vain += 1;
+                        self.refuse(unfit.word(), &unfit.to_string())?;
+                    }
+                },
                 // A pipe ends with its writer.
                 Err(SourceError::Ended(_) | SourceError::WriterGone(_)) => break,
-                Err(error) if error.is_of_one_picture() => {
-                    self.refuse("unreadable", &error.to_string())?;
-                    continue;
+                Err(error) if error.is_of_one_picture() => self.refuse("unreadable", &error.to_string())?,
+                Err(error) if feed.comes_back_after(&error) => {
+                    self.refuse("camera failed", &error.to_string())?;
                 }
-                Err(error) => return Err(error.into()),
-            };
-            match self.judge.judge(&frame.image)? {
-                None => {
-                    let file = self.album.keep(&encode_jpeg(&frame.image, QUALITY)?)?;
-                    self.kept += 1;
-                    self.in_a_row = ("", 0);
-                    (since, in_vain) = (Instant::now(), 0);
-                    self.say_kept(&file)?;
-                }
-                Some(unfit) => {
-                    in_vain += 1;
-                    self.refuse(unfit.word(), &unfit.to_string())?;
+                Err(error) if self.kept == 0 => return Err(error.into()),
+                Err(error) => {
+                    eprintln!("note: {error}; it ends here");
+                    break;
                 }
             }
             if in_vain >= MOST_IN_VAIN || matches!(feed, Feed::Live(..)) && since.elapsed() > PATIENCE {
@@ -316,6 +325,64 @@ mod tests {
         capture(&["--gesture", "two", "--source", source.to_str().unwrap(), "--features", "shape"], &again)
             .unwrap();
         assert_eq!(pictures(&again.join("two")), 2);
+    }
+
+    /// A camera that shows one grey, and fails after so many pictures.
+    struct Hiccup {
+        level: u8,
+        left: u8,
+    }
+
+    impl Source for Hiccup {
+        fn describe(&self) -> String {
+            "a camera in a test".to_owned()
+        }
+        fn period(&self) -> Duration {
+            Duration::from_millis(5)
+        }
+        fn is_live(&self) -> bool {
+            true
+        }
+        fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
+            std::thread::sleep(self.period());
+            self.left -= 1;
+            match self.left {
+                0 => Err(SourceError::NoFrame("/dev/video7".into())),
+                _ => Frame::from_bgr(32, 24, &[self.level; 32 * 24 * 3], now),
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_that_fails_and_comes_back_is_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let words =
+            ["capture", "--gesture", "none", "--source", "/dev/video7", "--countdown", "0", "--count", "3"];
+        let words = words.into_iter().chain(["--every", "1ms", "--out", folder.path().to_str().unwrap()]);
+        let args = Line::try_parse_from(words).unwrap().args;
+        // One picture of each opening is kept, the others repeat it; it opens at every third try.
+        let mut tries = 0_u8;
+        let open = move || -> Result<Box<dyn Source>, SourceError> {
+            tries = tries.wrapping_add(1);
+            match tries % 3 {
+                1 => Ok(Box::new(Hiccup { level: tries.wrapping_mul(20), left: 40 })),
+                _ => Err(SourceError::Missing("/dev/video7".into())),
+            }
+        };
+        let reader = Reader::start(None, Box::new(open), Instant::now()).unwrap();
+        reader.want(Some(Scene::default()));
+        let mut feed = Feed::Live(reader, args.every);
+        let mut session = Session {
+            args: &args,
+            judge: Judge::new(FeatureSet::Shape, false).unwrap(),
+            album: Album::open(&args.out, &args.gesture, args.person).unwrap(),
+            kept: 0,
+            refused: BTreeMap::new(),
+            in_a_row: ("", 0),
+        };
+        crate::cli::runtime().unwrap().block_on(session.shoot(&mut feed)).unwrap();
+        assert_eq!((session.kept, pictures(&folder.path().join("none"))), (3, 3));
+        assert!(session.refused.contains_key("camera failed"), "{:?}", session.refused);
     }
 
     #[test]

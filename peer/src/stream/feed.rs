@@ -5,6 +5,7 @@ use std::time::Duration;
 use gestalt_protocol::{MAX_FRAME, RobotId};
 use opencv::core::Mat;
 
+use crate::camera_report::checksum;
 use crate::camera_source::{describe, human_before, open_source};
 use crate::config::{CameraSection, SourceSection};
 use gestalt_vision::human::Human;
@@ -27,6 +28,8 @@ pub struct Shot {
     pub at: Duration,
     /// The time between two pictures.
     pub period: Duration,
+    /// Of a camera that runs by itself, what tells a picture from the next: the same over and over is a fault. `None`: of files.
+    pub checksum: Option<u32>,
 }
 
 /// What a picture is.
@@ -90,7 +93,7 @@ impl Source<Shot> for Files {
             Some(jpeg) => Content::Encoded(jpeg),
             None => Content::Picture(read_image(path)?),
         };
-        Ok(Shot { content, at: now, period: self.period() })
+        Ok(Shot { content, at: now, period: self.period(), checksum: None })
     }
 }
 
@@ -112,6 +115,7 @@ impl Source<Shot> for Camera {
 
     fn next_frame(&mut self, now: Duration, scene: &Scene) -> Result<Shot, SourceError> {
         let frame = self.0.next_frame(now, scene)?;
-        Ok(Shot { content: Content::Picture(frame.image), at: frame.at, period: self.period() })
+        let checksum = self.is_live().then(|| checksum(&frame.image));
+        Ok(Shot { content: Content::Picture(frame.image), at: frame.at, period: self.period(), checksum })
     }
 }

@@ -10,6 +10,7 @@ use tokio::time::MissedTickBehavior;
 use super::credit::Credit;
 use super::failures::Failures;
 use super::feed::{Content, Feed, Shot};
+use crate::camera_report::SamePicture;
 use gestalt_link::{Client, Decisions, FrameSender, LinkConfig, LinkError, TakenError, fresh_nonce};
 use gestalt_trust::FrameSigner;
 use gestalt_vision::human::Human;
@@ -54,7 +55,7 @@ pub enum StreamEvent {
     },
     /// The swarm decided.
     Decided(Box<Announcement>),
-    /// A picture could not be taken or sent, or something arrived that is no acknowledgement. Told at most once a second.
+    /// A picture could not be taken or sent, is the same for too long, or something arrived that is no acknowledgement. Told at most once a second.
     Failed {
         /// Why, and how to fix it: the latest of those since the last message.
         cause: String,
@@ -79,6 +80,8 @@ pub struct Sender {
     /// The zero of the pictures' time.
     zero: Instant,
     human: Human,
+    /// A camera that hangs sends nothing: whoever looks is to take it for silent, not for a hand held still.
+    same: SamePicture,
     failures: Failures,
     nonce: u64,
     sent: u64,
@@ -101,8 +104,8 @@ impl Sender {
         let zero = Instant::now();
         let reader = Reader::start(None, open, zero)?;
         reader.want(Some(Scene::default()));
-        let failures = Failures::default();
-        Ok(Self { config, reader, zero, human, failures, nonce: fresh_nonce(), sent: 0, taken: 0 })
+        let (same, failures) = (SamePicture::default(), Failures::default());
+        Ok(Self { config, reader, zero, human, same, failures, nonce: fresh_nonce(), sent: 0, taken: 0 })
     }
 
     /// Sends, and tells of what happens, until the camera has come to its end. It stays through whatever becomes of the robot
@@ -227,7 +230,13 @@ impl Sender {
         credit: &mut Credit,
         shot: Result<Shot, SourceError>,
     ) -> Result<(), String> {
-        let Shot { content, at, period } = shot.map_err(|error| error.to_string())?;
+        let Shot { content, at, period, checksum } = shot.map_err(|error| error.to_string())?;
+        if let Some(checksum) = checksum {
+            self.same.note(checksum, at);
+            if let Some(trouble) = self.same.trouble(at, period) {
+                return Err(trouble);
+            }
+        }
         let jpeg = match content {
             Content::Encoded(jpeg) => jpeg,
             Content::Picture(picture) => tokio::task::block_in_place(|| self.encode(&picture))?,

@@ -18,7 +18,7 @@ use gestalt_vision::model::RobotModel;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
 use gestalt_vision::source::{
-    Device, Glove, ImageFolder, RenderedSource, Scene, Source, SourceError, Video, read_image,
+    Device, Glove, ImageFolder, Pipe, RenderedSource, Scene, Source, SourceError, Video, read_image,
 };
 
 /// Show what perception makes of one frame: raw, white-balanced, mask, hand, features, opinion
@@ -27,7 +27,7 @@ use gestalt_vision::source::{
   gestalt look hand.jpg
   gestalt look /dev/video0 --camera laptop --out stages.png")]
 pub struct Args {
-    /// Image, folder of images, video, device (/dev/video0), ROS 2 topic (`ros:/camera/image_raw`), or `rendered:3` (a
+    /// Image, folder of images, video, named pipe, device (/dev/video0), ROS 2 topic (`ros:/camera/image_raw`), or `rendered:3` (a
     /// synthetic hand showing 3 fingers; `rendered`: an empty scene; `rendered:3,bearing=-30,distance=1.2,seed=7`)
     #[arg(value_name = "SOURCE", required_unless_present = "from")]
     source: Option<SourceArg>,
@@ -150,6 +150,10 @@ fn frame(
                 Kind::Folder => {
                     (skip(&mut ImageFolder::open(path, Duration::ZERO, false)?, first, &still)?, named(first))
                 }
+                // It waits until somebody writes.
+                Kind::Video if Pipe::is_at(path) => {
+                    (skip(&mut Pipe::open(path)?, first, &still)?, named(first))
+                }
                 Kind::Video => (skip(&mut Video::open(path, false)?, first, &still)?, named(first)),
                 Kind::Device => {
                     let index = index.unwrap_or(WARM_UP);
@@ -216,6 +220,24 @@ mod tests {
         let empty = folder.path().join("empty");
         std::fs::create_dir(&empty).unwrap();
         assert!(failure(&empty).contains("no images"));
+    }
+
+    #[test]
+    fn a_look_through_a_pipe_is_at_what_somebody_writes_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let (pipe, out) = (folder.path().join("camera"), folder.path().join("x.png"));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let hand = frame(&"rendered:3".parse().unwrap(), None, None, None).unwrap().0;
+        let jpeg = gestalt_vision::source::encode_jpeg(&hand, 90).unwrap();
+        let written = pipe.clone();
+        let writing = std::thread::spawn(move || {
+            let mut writer = std::fs::OpenOptions::new().write(true).open(written).unwrap();
+            // Until the look is over.
+            while std::io::Write::write_all(&mut writer, &jpeg).is_ok() {}
+        });
+        run(&args(pipe.to_str().unwrap(), &out)).unwrap();
+        writing.join().unwrap();
+        assert!(std::fs::read(&out).unwrap().starts_with(b"\x89PNG"));
     }
 
     #[test]
