@@ -5,9 +5,9 @@
 //! classifier for them. Here the "camera" is a number, and the classifier tells small from large.
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
-use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, fresh_nonce};
+use gestalt_link::{Event, LinkConfig, Robot, RobotConfig, boot_number, fresh_nonce};
 use gestalt_protocol::RobotId;
 use gestalt_strategies::{Classify, ClassifyError, MindConfig, Observation, Vocabulary};
 
@@ -33,7 +33,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let robot = Robot::start(RobotConfig {
         id: RobotId(1),
         name: "my-robot".to_owned(),
-        boot: 1,
+        // Higher at every start; a robot with a key of its own takes `counted_boot`.
+        boot: boot_number(SystemTime::now()),
         swarm: "embed".to_owned(),
         mind: MindConfig::default(),
         fusion: None,

@@ -9,9 +9,18 @@ One message per decision; `round` tells the rare repeat (a spokesrobot that died
 """
 import argparse
 import json
+import sys
 import time
 
 import zenoh
+
+
+def in_words(decision: dict) -> str:
+    # Null where nothing was decided; the label also where whoever says it has another vocabulary.
+    what = "no decision" if decision["class"] is None else decision["label"] or f"class {decision['class']}"
+    certificate = decision["certificate"]
+    voted = f"{len(certificate['votes'])} robots, {certificate['elapsed_ms']} ms"
+    return f"round {decision['round']['counter']}: {what} ({decision['confidence']:.3f}, {voted})"
 
 
 def main() -> None:
@@ -40,20 +49,16 @@ def main() -> None:
             if sample is None:
                 time.sleep(0.02)
                 continue
-            text = sample.payload.to_string()
+            text = sample.payload.to_bytes().decode(errors="replace")
             seen += 1
             if given.json:
                 print(text, flush=True)
                 continue
-            decision = json.loads(text)
-            # Null where nothing was decided; the label also where whoever says it has another vocabulary.
-            what = "no decision" if decision["class"] is None else decision["label"] or f"class {decision['class']}"
-            robots = len(decision["certificate"]["votes"])
-            print(
-                f"round {decision['round']['counter']}: {what}"
-                f" ({decision['confidence']:.3f}, {robots} robots, {decision['certificate']['elapsed_ms']} ms)",
-                flush=True,
-            )
+            try:
+                print(in_words(json.loads(text)), flush=True)
+            except (ValueError, TypeError, KeyError) as error:
+                # In an open swarm anybody may say anything there.
+                print(f"what is no decision: {error!r}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

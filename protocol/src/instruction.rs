@@ -287,7 +287,7 @@ impl Outcome {
             }
             Self::NotAllowed => {
                 "not allowed: ask whoever has the swarm's authority key for the role (gestalt trust roster shows who may do what, gestalt trust \
-                 enrol --client gives it)"
+                 enrol --client gives it); under a name that has a key nothing may be said without it (--keys)"
             }
         }
     }

@@ -174,8 +174,9 @@ pub async fn clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more() {
     assert_eq!(answer.outcome, Outcome::NotAllowed);
     let answer = local.teach(&name("console"), &was, PATIENCE).await.unwrap().expect("an answer");
     assert_eq!(answer.outcome, Outcome::NotAllowed);
-    // Without a key nobody speaks for one who has one.
-    local.instruct(&name("ada"), &was).await.unwrap();
+    // Without a key nobody speaks for one who has one, and hears that.
+    let answer = local.teach(&name("ada"), &was, PATIENCE).await.unwrap().expect("an answer");
+    assert_eq!(answer.outcome, Outcome::NotAllowed);
     counted(&robots[0], "refused_feedback_unsigned", 1).await;
     // They do not learn; her word is heeded as far as that.
     let answer = ada.teach(&name("ada"), &was, PATIENCE).await.unwrap().expect("an answer");

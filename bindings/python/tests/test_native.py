@@ -55,6 +55,13 @@ class Probabilities(unittest.TestCase):
         with self.assertRaisesRegex(gestalt_swarm.ModelError, "checksum"):
             _native.Model.decode(bytes(data))
 
+    def test_what_is_no_argument_of_its_kind_raises_pythons_own(self):
+        ballot = gestalt_swarm.Ballot(["left", "right"])
+        mind = gestalt_swarm.Mind(1, seed=1, vocabulary=["left", "right"])
+        for call in (lambda: ballot.cast(-1, [0.5, -0.5]), lambda: mind.observe(-1, [0.5, 0.5])):
+            self.assertRaises(OverflowError, call)
+        self.assertRaises(TypeError, lambda: ballot.cast("one", [0.5, -0.5]))
+
     def test_wrong_shapes_and_numbers_raise_and_never_abort(self):
         hands = model()
         for rows in (b"abc", grid(1, hands.features - 1), struct.pack("f", float("nan")) * hands.features):

@@ -23,14 +23,22 @@ const MAX_LINKS: usize = 40;
 /// # Errors
 /// What the operating system objects to; what was there is left, and nothing beside it.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    put(path, bytes, 0o666)
+    if is_stream(path) { fs::write(path, bytes) } else { put(path, bytes, 0o666) }
 }
 
-/// As [`write`], of a file that its owner alone can read.
+/// As [`write`], of a file of the program's own: also what is no file is replaced, as writing to a pipe would wait for its reader.
 ///
 /// # Errors
 /// As [`write`].
-pub fn write_secret(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    put(path, bytes, 0o666)
+}
+
+/// As [`replace`], of a file that its owner alone can read.
+///
+/// # Errors
+/// As [`write`].
+pub fn replace_secret(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put(path, bytes, 0o600)
 }
 
@@ -66,9 +74,6 @@ pub fn keep_name(path: &Path) -> io::Result<()> {
 }
 
 fn put(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
-    if is_stream(path) {
-        return fs::write(path, bytes);
-    }
     let path = target(path)?;
     let mut beside = tempfile::Builder::new();
     #[cfg(unix)]
@@ -151,7 +156,7 @@ mod tests {
         let mode = || fs::metadata(&path).unwrap().permissions().mode() & 0o777;
         write(&path, b"for all").unwrap();
         assert_ne!(mode() & 0o400, 0);
-        write_secret(&path, b"mine").unwrap();
+        replace_secret(&path, b"mine").unwrap();
         assert_eq!(mode(), 0o600);
     }
 
@@ -179,12 +184,14 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn asking_does_not_wait_for_who_reads_a_pipe() {
+    fn nobody_waits_for_who_reads_a_pipe() {
         let place = tempfile::tempdir().unwrap();
         let pipe = place.path().join("pipe");
         if std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()) {
             check(&pipe).unwrap();
             assert!(is_stream(&pipe));
+            replace(&pipe, b"state").unwrap();
+            assert_eq!(fs::read(&pipe).unwrap(), b"state");
         }
     }
 }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{DecodeError, Reported, RobotId, Status};
+use gestalt_protocol::{DecodeError, InstructorId, Reported, RobotId, Status};
+use gestalt_strategies::Vocabulary;
 use gestalt_trust::{Distrust, EvidenceError, Lie, RosterError};
 
 const MAX_ERRORS: usize = 16;
@@ -35,6 +36,13 @@ impl Account {
     /// The zero of the robot's own time.
     pub(super) fn started(&self) -> Instant {
         self.started
+    }
+
+    /// The robot judges with that model from now on.
+    pub(super) fn judges_with(&self, vocabulary: &Vocabulary, model: String) {
+        let mut status = self.lock();
+        status.vocabulary = vocabulary.labels().to_vec();
+        status.model = model;
     }
 
     /// Reports what Zenoh refused to send.
@@ -158,8 +166,9 @@ pub(super) enum Refusal {
     TwoSenders,
     #[error("more of it than is looked into: it comes again")]
     TooOften,
-    #[error("nobody but those on this robot's own computer say anything without a signature")]
-    Unsaid,
+    /// Answered, as what may not be said.
+    #[error("'{0}' has a key: say it with that (--keys), or under another name")]
+    HasKey(InstructorId),
 }
 
 impl Refusal {
@@ -186,7 +195,7 @@ impl Refusal {
             Self::First => "unasked",
             Self::TwoSenders => "two_senders",
             Self::TooOften => "too_often",
-            Self::Unsaid => "unsigned",
+            Self::HasKey(_) => "unsigned",
             Self::Distrust(cause) => cause.name().trim_start_matches("refused_"),
         }
     }

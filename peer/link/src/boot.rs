@@ -5,7 +5,6 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-
 use crate::identity::fresh_nonce;
 
 /// A boot number for a robot that keeps no count of its starts: tenths of a second since 2026, which grows from
@@ -36,7 +35,7 @@ pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
         0
     });
     let number = boot_number(now).max(last.saturating_add(1));
-    if let Err(error) = gestalt_file::write(file, format!("{number}\n").as_bytes()) {
+    if let Err(error) = gestalt_file::replace(file, format!("{number}\n").as_bytes()) {
         tracing::warn!("the number of this start cannot be kept in {}: {error}", file.display());
     }
     number

@@ -12,6 +12,7 @@ use crate::account::Account;
 use crate::error::LinkError;
 use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
+use crate::given::Given;
 use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::inbox::Inbox;
@@ -79,13 +80,14 @@ impl Robot {
                 .await
                 .map_err(|error| LinkError::open(&*error))?;
         let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
-        let classifier = Arc::default();
+        let (given, classifier) = (Arc::<Given>::default(), Arc::default());
         let guest = Guest {
             voter,
             presence,
             account: account.clone(),
             host_account: self.account.clone(),
             commands: command_queue,
+            given: given.clone(),
             events: events.clone(),
             classifier: Arc::clone(&classifier),
             departure,
@@ -99,6 +101,7 @@ impl Robot {
             account,
             started: self.started,
             commands,
+            given,
             events,
             first_events: Mutex::new(Some(first_events)),
             classifier,
@@ -123,6 +126,7 @@ struct Guest {
     account: Arc<Account>,
     host_account: Arc<Account>,
     commands: mpsc::Receiver<Input>,
+    given: Arc<Given>,
     events: broadcast::Sender<Event>,
     classifier: Arc<Mutex<Option<Arc<dyn Classify>>>>,
     departure: Departure,
@@ -176,13 +180,18 @@ impl Guest {
     /// Runs until the robot's handle is gone, or the host is.
     async fn run(mut self, mut host_events: broadcast::Receiver<Event>) {
         self.catch_up();
+        let given = self.given.clone();
         loop {
             let wake = self.voter.next_wake().map(|wake| self.account.started() + wake);
             tokio::select! {
                 command = self.commands.recv() => match command {
-                    Some(command) => self.command(command).await,
+                    Some(command) => {
+                        self.take_given();
+                        self.command(command).await;
+                    }
                     None => break,
                 },
+                () = given.there() => self.take_given(),
                 event = host_events.recv() => match event {
                     Ok(Event::Held(decision)) => self.hold(&decision).await,
                     Ok(event) => self.on_event(event),
@@ -263,17 +272,21 @@ impl Guest {
         self.account.lock().alive = alive.into_iter().collect();
     }
 
+    /// Takes up the classifier that the program gave last, if it has not yet.
+    fn take_given(&mut self) {
+        let Some((classifier, model)) = self.given.take() else { return };
+        let Some(guarded) = self.sight.guard(classifier.clone()) else { return };
+        self.account.judges_with(guarded.vocabulary(), model);
+        self.voter.learned(guarded);
+        *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier);
+    }
+
     async fn command(&mut self, command: Input) {
         match command {
             Input::Observed(observation) => {
                 if !self.voter.observed(self.account.started().elapsed(), &observation) {
                     self.account.count(gestalt_strategies::Refusal::Unclassified.name());
                 }
-            }
-            Input::Learned(classifier) => {
-                let Some(guarded) = self.sight.guard(classifier.clone()) else { return };
-                self.voter.learned(guarded);
-                *self.classifier.lock().unwrap_or_else(PoisonError::into_inner) = Some(classifier);
             }
             Input::Blind(blind) => self.sight.told(blind),
             Input::Shown(_) => {

@@ -12,6 +12,7 @@ use tokio::sync::mpsc;
 use crate::apprentice::Apprentice;
 use crate::effector::Effector;
 use crate::event::Event;
+use crate::given::Given;
 use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::identity::{self, fresh_nonce};
@@ -30,6 +31,7 @@ pub(crate) struct Host {
     pub inbox: Arc<Inbox>,
     pub supervisor: Arc<Supervisor>,
     pub commands: mpsc::Receiver<Input>,
+    pub given: Arc<Given>,
     pub guests: Arc<Guests>,
     /// Your own fusion rule.
     pub fusion: Option<Arc<dyn Fuse>>,
@@ -43,7 +45,7 @@ pub(crate) struct Host {
 impl Host {
     /// Serves the mind until the robot's handle is gone, or a part has failed that it cannot do without.
     pub async fn run(mut self) {
-        let (inbox, guests) = (self.inbox.clone(), self.guests.clone());
+        let (inbox, guests, given) = (self.inbox.clone(), self.guests.clone(), self.given.clone());
         let ended = self.supervisor.ended();
         tokio::pin!(ended);
         self.believe();
@@ -59,9 +61,13 @@ impl Host {
                     self.effector.voice.pass_on();
                 }
                 command = self.commands.recv() => match command {
-                    Some(input) => self.step(input),
+                    Some(input) => {
+                        self.take_given();
+                        self.step(input);
+                    }
                     None => break,
                 },
+                () = given.there() => self.take_given(),
                 found = found(&mut self.effector.apprentice) => self.take_up(found),
                 () = guests.changed() => self.step(Input::Guests(guests.present())),
                 () = sleep_until(wake) => self.step(Input::Tick),
@@ -72,8 +78,23 @@ impl Host {
         tokio::task::block_in_place(|| drop(self));
     }
 
+    /// Takes up the classifier that the program gave last, if it has not yet.
+    fn take_given(&mut self) {
+        let Some((classifier, model)) = self.given.take() else { return };
+        let Some(input) = self.note(Input::Learned(classifier)) else { return };
+        if let Input::Learned(guarded) = &input {
+            self.effector.account.judges_with(guarded.vocabulary(), model);
+        }
+        self.take_in(input);
+    }
+
     fn step(&mut self, input: Input) {
-        let Some(input) = self.note(input) else { return };
+        if let Some(input) = self.note(input) {
+            self.take_in(input);
+        }
+    }
+
+    fn take_in(&mut self, input: Input) {
         self.handle(input);
         // The classifier may just have failed.
         if let Some(blind) = self.sight.news() {

@@ -1,13 +1,13 @@
 //! Between Zenoh's threads, which must never wait, and the one task that owns the mind.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
     Announcement, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message,
-    RobotId, Topic, decode_json,
+    RobotId, Stamp, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Channels, Distrust, Evidence, Judge};
@@ -19,13 +19,11 @@ use zenoh::session::ZenohId;
 
 use super::account::{Account, Refusal};
 use super::checks::Checks;
+use super::echoes::Echoes;
 use super::roll::Roll;
 use super::waiting::Waiting;
 use super::ways::Ways;
 use super::words::{Vouched, Words};
-
-/// How many of its own latest votes a robot recognises when they come back to it.
-const OWN_VOTES: usize = 64;
 
 /// Everything that arrives, checked, until the mind's task takes it.
 ///
@@ -62,7 +60,7 @@ pub(super) struct Sealed {
 pub(super) struct State {
     pub(super) votes: BTreeMap<RobotId, Envelope>,
     pub(super) waiting: Waiting,
-    own_votes: VecDeque<u32>,
+    own_votes: Echoes,
     pub(super) links: BTreeMap<ZenohId, RobotId>,
     /// Those of them that relay for others.
     pub(super) relays: BTreeSet<ZenohId>,
@@ -175,12 +173,8 @@ impl Inbox {
     }
 
     /// Remembers a vote of this robot's own, so that an echo of it is told from a twin's vote.
-    pub(super) fn said(&self, vote: &[u8]) {
-        let mut state = self.lock();
-        if state.own_votes.len() == OWN_VOTES {
-            state.own_votes.pop_front();
-        }
-        state.own_votes.push_back(crc32fast::hash(vote));
+    pub(super) fn said(&self, stamp: Stamp, vote: &[u8]) {
+        self.lock().own_votes.said(stamp, vote);
     }
 
     /// Whatever arrives under a key of the swarm.
@@ -244,8 +238,9 @@ impl Inbox {
             return Err(Refusal::Distrust(Distrust::Expelled));
         }
         if id == self.me {
-            // Zenoh's routing can loop for a moment after a heal; what it brings back is this robot's own.
-            let echo = state.own_votes.contains(&crc32fast::hash(&bytes));
+            let own = &state.own_votes;
+            let echo = own.is_one(&bytes)
+                || self.is_sealed() && own.may_be_one(envelope.stamp, self.account.lock().boot);
             return if echo { Ok(()) } else { Err(Refusal::Twin) };
         }
         if state.votes.len() >= MAX_ROBOTS && !state.votes.contains_key(&id) {
@@ -279,7 +274,8 @@ impl Inbox {
         let bytes = payload(sample, MAX_MESSAGE)?;
         let mut envelope = Envelope::decode(&bytes)?;
         if envelope.author == self.me {
-            return Err(Refusal::Twin);
+            // In a sealed swarm no robot shares a secret with itself to show who says it.
+            return Err(if self.is_sealed() { Distrust::Forged.into() } else { Refusal::Twin });
         }
         self.was_told(&envelope, &bytes, sample)?;
         // What is said to all comes under a key of its own.
@@ -320,7 +316,7 @@ impl Inbox {
         Ok(self.judged(|judge, now| judge.evidence(now, evidence)).ok_or(Refusal::Kind)??)
     }
 
-    /// Evidence against members that is to be told to all, each once.
+    /// Evidence against members that is to be told to all now.
     pub(super) fn untold(&self) -> Vec<Evidence> {
         let untold = self.judged(Judge::untold).unwrap_or_default();
         untold.into_iter().map(|(_, evidence)| evidence).collect()

@@ -15,7 +15,7 @@ use crate::account::Refusal;
 use crate::believer::Believer;
 use crate::inbox::{Inbox, payload};
 use crate::seal::Seal;
-use crate::words::Vouched;
+use crate::words::{Vouched, next_count};
 
 /// The most words of those on this computer that wait to be passed on.
 const MAX_VOUCHED: usize = 64;
@@ -31,7 +31,11 @@ impl Inbox {
         let sealed = self.sealed.as_ref().ok_or(Refusal::Kind)?;
         let (roles, has_key) = sealed.roll.local_roles(&by);
         if has_key {
-            return Err(Refusal::Unsaid);
+            // Whoever has a key may have forgotten to say so; and nobody signs in the name of one.
+            let said = Instructed { by: by.clone(), at: next_count(0), instruction, said: None };
+            self.queue_word(Input::Disallowed(said), sample)?;
+            self.ready.notify_one();
+            return Err(Refusal::HasKey(by));
         }
         let mut words = sealed.words.lock().unwrap_or_else(PoisonError::into_inner);
         let vouched = words.vouch(&by, payload(sample, MAX_WORD)?.into_owned());

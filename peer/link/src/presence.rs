@@ -39,11 +39,11 @@ impl Presence {
         supervisor: &Arc<Supervisor>,
     ) -> zenoh::Result<Self> {
         let status_key = keys.key(&Topic::Status(me));
-        let (of_status, node) = (account.clone(), session.zid().to_string());
+        let (of_status, node, own) = (account.clone(), session.zid().to_string(), status_key.clone());
         account.lock().session.clone_from(&node);
         let status = session
             .declare_queryable(&status_key)
-            .callback(move |query| on_status(&of_status, &node, &query))
+            .callback(move |query| on_status(&of_status, &node, &own, &query))
             .await?;
         let vote = session
             .declare_publisher(keys.key(&Topic::Vote(me)))
@@ -84,8 +84,9 @@ impl Presence {
     }
 }
 
-/// Answers a query for the status; one that a robot of the same id sends is a twin's.
-fn on_status(account: &Account, node: &str, query: &Query) {
+/// Answers a query for the status; one that a robot of the same id sends is a twin's. Under the robot's own key, whatever was asked
+/// for: of several answers under one key Zenoh keeps one.
+fn on_status(account: &Account, node: &str, own: &str, query: &Query) {
     if query.parameters().get("from").is_some_and(|from| from != node) {
         account.twin();
     }
@@ -97,7 +98,7 @@ fn on_status(account: &Account, node: &str, query: &Query) {
             .expect("every field of a status, with string keys and finite numbers, has a place in JSON")
     };
     account.sent("status", json.len());
-    let _ = query.reply(query.key_expr().clone(), json).encoding(Encoding::APPLICATION_JSON).wait();
+    let _ = query.reply(own, json).encoding(Encoding::APPLICATION_JSON).wait();
 }
 
 /// Asks once whether anyone else answers to this robot's id.

@@ -23,6 +23,7 @@ use crate::effector::Effector;
 use crate::error::LinkError;
 use crate::event::{Event, MAX_COMMANDS, MAX_EVENTS};
 use crate::failure::{Failure, Part};
+use crate::given::Given;
 use crate::guard::Sight;
 use crate::guests::Guests;
 use crate::host::Host;
@@ -49,8 +50,9 @@ pub struct RobotConfig {
     pub id: RobotId,
     /// Its name for people.
     pub name: String,
-    /// Grows at every start of this robot, so that what it says outranks what it said before. A robot with a memory
-    /// on disk counts its starts there, from this number on.
+    /// Grows at every start of this robot, so that what it says outranks what it said before: see [`boot_number`](super::boot_number).
+    /// A number that comes twice convicts a sealed robot for good, see [`counted_boot`](super::counted_boot). A robot with a memory on
+    /// disk counts its starts there, from this number on.
     pub boot: u32,
     /// The swarm's name: 1 to 64 of the characters `A-Z a-z 0-9 _ -`.
     pub swarm: String,
@@ -77,6 +79,7 @@ pub struct Robot {
     pub(super) supervisor: Arc<Supervisor>,
     pub(super) started: Instant,
     pub(super) commands: mpsc::Sender<Input>,
+    pub(super) given: Arc<Given>,
     pub(super) events: broadcast::Sender<Event>,
     /// For the first who asks: a link may stand before there was time to.
     pub(super) first_events: Mutex<Option<broadcast::Receiver<Event>>>,
@@ -230,8 +233,7 @@ impl Robot {
         let (watched, watching) = (node.session().clone(), supervisor.clone());
         supervisor.keep(Part::Session, move || watch_session(watched.clone(), watching.clone()));
         let (commands, command_queue) = mpsc::channel(MAX_COMMANDS);
-        let classifier = Arc::new(Mutex::new(None));
-        let guests = Arc::<Guests>::default();
+        let (classifier, given, guests) = (Arc::default(), Arc::<Given>::default(), Arc::<Guests>::default());
         let (session, lost_links) = (node.session().clone(), inbox.lost_links());
         let host = Host {
             me: id,
@@ -242,8 +244,9 @@ impl Robot {
             inbox: inbox.clone(),
             supervisor: supervisor.clone(),
             commands: command_queue,
+            given: given.clone(),
             guests: guests.clone(),
-            classifier: classifier.clone(),
+            classifier: Arc::clone(&classifier),
             effector: Effector { account: account.clone(), events: events.clone(), apprentice, voice },
             sight: Sight::new(supervisor.clone()),
         };
@@ -251,6 +254,7 @@ impl Robot {
             account,
             started,
             commands,
+            given,
             events,
             first_events: Mutex::new(Some(first_events)),
             classifier,
@@ -302,13 +306,9 @@ impl Robot {
         self.tell(Input::Observed(observation));
     }
 
-    /// Puts a new classifier in the place of the old one. `model` is its name for people.
+    /// Puts a new classifier in the place of the old one. `model` is its name for people, in the status as soon as it is in use.
     pub fn learned(&self, classifier: Arc<dyn Classify>, model: &str) {
-        let mut status = self.account.lock();
-        status.vocabulary = classifier.vocabulary().labels().to_vec();
-        model.clone_into(&mut status.model);
-        drop(status);
-        self.tell(Input::Learned(classifier));
+        self.given.put(classifier, model);
     }
 
     /// The classifier it judges with now; `None` for one that has none yet.

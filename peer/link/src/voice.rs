@@ -64,10 +64,10 @@ impl Voice {
             .express(true)
             .await?;
         let last = Arc::new(Last::default());
-        let (of_query, of_inbox) = (last.clone(), inbox.clone());
+        let (of_query, of_inbox, key) = (last.clone(), inbox.clone(), keys.key(&Topic::Decision));
         session
-            .declare_queryable(keys.key(&Topic::Decision))
-            .callback(move |query| of_query.on_query(&query, &of_inbox))
+            .declare_queryable(key.clone())
+            .callback(move |query| of_query.on_query(&query, &key, &of_inbox))
             .background()
             .await?;
         let (session, keys) = (session.clone(), keys.clone());
@@ -94,8 +94,12 @@ impl Voice {
                 let (key, bytes) = (self.keys.key(&Topic::Sample(self.me)), envelope.encode());
                 self.outbox.send(Parcel { kind: "sample", key, bytes, attachment: None, express: false });
             }
-            Message::Holding(_) => self.unsaid = Some(envelope.clone()),
-            _ => self.inbox.said(&self.presence.vote(envelope)),
+            Message::Holding(_) => {
+                self.unsaid = Some(envelope.clone());
+                // What it says anew of the decision that it holds already is due at once.
+                self.due.get_or_insert_with(Instant::now);
+            }
+            _ => self.inbox.said(envelope.stamp, &self.presence.vote(envelope)),
         }
     }
 
@@ -228,14 +232,15 @@ impl Last {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some((announcement, at));
     }
 
-    fn on_query(&self, query: &Query, inbox: &Inbox) {
+    /// Answers under the decision's own key, whatever was asked for: of several answers under one key Zenoh keeps the latest.
+    fn on_query(&self, query: &Query, key: &str, inbox: &Inbox) {
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some((mut announcement, at)) = last {
             if inbox.is_sealed() {
                 let statement = Envelope::from(announcement.clone()).statement();
                 announcement.signature = inbox.sign_statement(&statement);
             }
-            let (key, json) = (query.key_expr().clone(), as_json(&announcement));
+            let json = as_json(&announcement);
             // A client that has gone meanwhile is no error of this robot's.
             let _ = query.reply(key, json).encoding(Encoding::APPLICATION_JSON).timestamp(Some(at)).wait();
         }

@@ -9,6 +9,9 @@ use crate::config::ModelSection;
 use crate::config::{Config, ConfigError, Document, Override};
 use gestalt_link::{LinkConfig, LinkError};
 
+/// Where a configuration names its swarm.
+pub(super) const SWARM: &[&str] = &["swarm"];
+
 /// Which configuration, and what to change in it.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ConfigArgs {
@@ -36,7 +39,7 @@ pub struct ConfigArgs {
     #[arg(long)]
     pub no_multicast_scouting: bool,
 
-    /// Name of the swarm
+    /// Name of the swarm [default: gestalt; for a client that of its keys]
     #[arg(long, value_name = "NAME")]
     pub swarm: Option<String>,
 
@@ -85,13 +88,15 @@ impl ConfigArgs {
         Config::from_document(self.document(settings)?)
     }
 
-    /// The swarm these flags name, and how a client reaches it: at the endpoints given, or else by scouting. The
-    /// rest of a robot's configuration does not concern a client.
+    /// The swarm these flags name, or that of the keys, and how a client reaches it: at the endpoints given, or else by
+    /// scouting. The rest of a robot's configuration does not concern a client.
     ///
     /// # Errors
     /// Whatever is wrong with the file or a flag, by key.
     pub fn client(&self) -> Result<(String, LinkConfig), ConfigError> {
-        client_of(&self.load()?)
+        let document = self.document(Vec::new())?;
+        let is_named = document.says(SWARM);
+        client_of(&mut Config::from_document(document)?, is_named)
     }
 
     /// The configuration of a robot that only streams: it needs no classifier, and how it reaches the others is a client's
@@ -101,14 +106,16 @@ impl ConfigArgs {
     /// Whatever is wrong with the file or a flag, by key.
     #[cfg(feature = "opencv")]
     pub(super) fn streaming(&self, settings: Vec<Setting>) -> Result<(Config, LinkConfig), ConfigError> {
-        let mut config: Config = self.document(settings)?.meaning()?;
+        let document = self.document(settings)?;
+        let is_named = document.says(SWARM);
+        let mut config: Config = document.meaning()?;
         // Mind and model are those of whoever processes its frames.
         config.model = ModelSection::None;
         config.learning.enabled = false;
         let source = std::mem::take(&mut config.camera.source);
         config.validate()?;
         config.camera.source = source;
-        let (_, link) = client_of(&config)?;
+        let (_, link) = client_of(&mut config, is_named)?;
         Ok((config, link))
     }
 
@@ -138,7 +145,7 @@ impl ConfigArgs {
             set(&["links", "scouting", "enabled"], json!(false))?;
         }
         if let Some(swarm) = &self.swarm {
-            set(&["swarm"], json!(swarm))?;
+            set(SWARM, json!(swarm))?;
         }
         if let Some(keys) = &self.keys {
             set(&["trust", "keys"], json!(keys))?;
@@ -156,14 +163,18 @@ impl ConfigArgs {
     }
 }
 
-/// The swarm, how a client reaches it, and what it shows to be let in.
-fn client_of(config: &Config) -> Result<(String, LinkConfig), ConfigError> {
-    let mut link = config.link();
-    let credentials = config.trust.credentials(config.robot.id);
-    link.credentials = credentials.map_err(|error| match error {
+/// The swarm, how a client reaches it, and what it shows to be let in. Of a swarm that is not named the keys know the name.
+fn client_of(config: &mut Config, is_named: bool) -> Result<(String, LinkConfig), ConfigError> {
+    let wrong = |error| match error {
         LinkError::Config { key, cause } => ConfigError::Value { key, cause },
         other => ConfigError::value("trust.keys", other),
-    })?;
+    };
+    let named = is_named.then_some(config.swarm.0.as_str());
+    if let Some(swarm) = config.trust.client_swarm(named).map_err(wrong)? {
+        config.swarm.0 = swarm;
+    }
+    let mut link = config.link();
+    link.credentials = config.trust.credentials(config.robot.id).map_err(wrong)?;
     link.zenoh.remove("listen");
     let endpoints = link.zenoh.get("connect").and_then(|connect| connect.get("endpoints"));
     if endpoints.is_some_and(|endpoints| !endpoints.as_array().is_some_and(Vec::is_empty)) {
@@ -178,9 +189,12 @@ fn client_of(config: &Config) -> Result<(String, LinkConfig), ConfigError> {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use gestalt_protocol::RobotId;
+    use gestalt_trust::Roles;
 
     use super::*;
     use crate::cli::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
+    use crate::cli::trust::Authority;
     use crate::config::{CameraChoice, SourceSection};
 
     #[derive(Parser)]
@@ -209,6 +223,28 @@ mod tests {
         assert!(matches!(config.camera.source, SourceSection::Device(_)));
         assert!(matches!(config.camera.model, CameraChoice::Laptop));
         assert_eq!(config.model, ModelSection::Hands);
+    }
+
+    #[test]
+    fn a_client_with_keys_is_of_their_swarm_and_of_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+        authority.enrol_here(RobotId(1)).unwrap();
+        authority.save().unwrap();
+        let client = |swarm: Option<&str>| {
+            let cfg = vec!["robot.id:1".parse().unwrap()];
+            let (swarm, keys) = (swarm.map(str::to_owned), Some(folder.path().to_owned()));
+            let flags = ConfigArgs { cfg, swarm, keys, ..ConfigArgs::default() };
+            let (streaming, _) = flags.streaming(Vec::new()).map_err(|error| error.to_string())?;
+            let (swarm, link) = flags.client().map_err(|error| error.to_string())?;
+            assert!(link.credentials.is_some() && streaming.swarm.0 == swarm);
+            Ok::<_, String>(swarm)
+        };
+        assert_eq!([client(None), client(Some("demo"))], [Ok("demo".to_owned()), Ok("demo".to_owned())]);
+        let error = client(Some("gestalt")).unwrap_err();
+        assert!(error.contains("write --swarm demo"), "{error}");
+        let open = ConfigArgs::default().client().unwrap();
+        assert_eq!(open.0, "gestalt");
     }
 
     #[test]

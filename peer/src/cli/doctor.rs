@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::Failure;
-use super::config_args::{ConfigArgs, Setting};
+use super::config_args::{ConfigArgs, SWARM, Setting};
 #[cfg(feature = "opencv")]
 use super::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
 use super::show::{counted, line};
@@ -75,7 +75,18 @@ impl Args {
                 return Subject { file, unreadable: Some(cause), config: None, problems: Vec::new() };
             }
         };
-        let (config, mut problems) = document.meaning_in_part::<Config>();
+        let is_named = document.says(SWARM);
+        let (mut config, mut problems) = document.meaning_in_part::<Config>();
+        // Who looks at a swarm alone is its client.
+        if let Some(config) = config.as_mut().filter(|_| file.is_none() && !describes) {
+            match config.trust.client_swarm(is_named.then_some(config.swarm.0.as_str())) {
+                Ok(swarm) => config.swarm.0 = swarm.unwrap_or_else(|| config.swarm.0.clone()),
+                Err(error) => {
+                    let unreadable = Some(error.to_string());
+                    return Subject { file: by_flags(), unreadable, config: None, problems: Vec::new() };
+                }
+            }
+        }
         problems.extend(config.iter().flat_map(Config::problems));
         let problems: Vec<String> = problems.iter().map(words).collect();
         // What is wrong with flags is said, be there a robot or not.

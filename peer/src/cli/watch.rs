@@ -29,7 +29,7 @@ pub struct Args {
     #[command(flatten)]
     config: ConfigArgs,
 
-    /// Stop after this many decisions
+    /// Stop after this many decisions; 0: never
     #[arg(long, value_name = "N")]
     count: Option<u64>,
 
@@ -108,7 +108,7 @@ async fn watch(args: &Args, nobody: &str, client: &Client, news: &mut News) -> R
                 let words = show::announced(&it, &names);
                 line(args.json, &json!({"event": "decision", "decision": it}), &words)?;
                 decisions += 1;
-                if args.count.is_some_and(|count| decisions >= count) {
+                if is_last(decisions, args.count) {
                     break;
                 }
             }
@@ -131,6 +131,11 @@ async fn watch(args: &Args, nobody: &str, client: &Client, news: &mut News) -> R
         next = news.next().await;
     }
     Ok(())
+}
+
+/// Whether so many decisions are all that are wanted.
+fn is_last(decisions: u64, count: Option<u64>) -> bool {
+    count.is_some_and(|count| count > 0 && decisions >= count)
 }
 
 /// Why there may be nobody to hear of: a swarm of another name is as silent as one that is off, and so is one that lets nobody in.
@@ -208,4 +213,15 @@ async fn statuses(as_json: bool, nobody: &str, client: &Client) -> Result<(), Fa
         line(as_json, &serde_json::to_value(status)?, &words)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_decision_is_the_last_of_none() {
+        assert!(is_last(1, Some(1)) && !is_last(1, Some(2)));
+        assert!(!is_last(1, Some(0)) && !is_last(1, None), "never");
+    }
 }

@@ -1,6 +1,5 @@
 //! Whether the files that a configuration names can be used: what keeps a robot from starting, found before it starts.
 
-use std::path::Path;
 use std::time::Duration;
 
 use gestalt_link::LinkError;
@@ -74,6 +73,8 @@ pub(crate) fn memory(config: &Config, model: &RobotModel) -> Result<(), ConfigEr
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     fn found(text: &str) -> Vec<String> {

@@ -94,6 +94,24 @@ impl TrustSection {
         Ok(Some(FrameSigner::new(robot, identity, roster)))
     }
 
+    /// The swarm of a client: that of its roster, if none is `named`; `None` where there is no roster.
+    ///
+    /// # Errors
+    /// [`LinkError::Config`] for a roster that cannot be read, or is of another swarm than the one that is named.
+    pub fn client_swarm(&self, named: Option<&str>) -> Result<Option<String>, LinkError> {
+        let Some(folder) = &self.keys else { return Ok(None) };
+        let file = folder.join(ROSTER_FILE);
+        let roster: Roster = Roster::read(&file).map_err(wrong)?;
+        let of = &roster.members().swarm;
+        match named.filter(|named| named != of) {
+            None => Ok(Some(of.clone())),
+            Some(named) => Err(wrong(format_args!(
+                "{} is of the swarm \"{of}\", and not of \"{named}\": write --swarm {of}, or --keys with the folder of \"{named}\"",
+                file.display()
+            ))),
+        }
+    }
+
     /// What a program shows to be let in that is no robot: the one client's key in the folder, or else this robot's own.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use gestalt_protocol::RobotId;
+use gestalt_protocol::{Camera, CameraState, RobotId};
 
 use super::finding::Finding;
 
@@ -122,6 +122,8 @@ pub struct CameraFacts {
     pub devices: Vec<String>,
     /// Whether it runs by itself, and serves one program at a time: a device, or a pipe.
     pub live: bool,
+    /// Whether the running robot says that it has it.
+    pub held: bool,
     /// Width and height that its model says, in pixels.
     pub size: [u32; 2],
     /// Frames per second that its model says.
@@ -159,7 +161,7 @@ pub fn findings(facts: &RobotFacts) -> Vec<Finding> {
         found.extend(facts.memory.as_ref().map(|it| memory(it, facts.running)));
         found.extend(facts.keys.as_ref().map(|it| keys(it, facts.id)));
         found.extend(facts.ports.iter().map(port));
-        found.extend(facts.camera.as_ref().map(|it| camera(it, facts.running)));
+        found.extend(facts.camera.as_ref().map(camera));
     }
     found.extend(facts.multicast.as_ref().map(|it| multicast(it, facts.connects)));
     found
@@ -214,10 +216,7 @@ fn model(model: &Result<String, String>) -> Finding {
 
 fn memory(memory: &MemoryFacts, running: bool) -> Finding {
     let (path, shown) = (&memory.path, memory.path.display());
-    let folder = path
-        .parent()
-        .filter(|it| !it.as_os_str().is_empty())
-        .map_or(".".to_owned(), |it| it.display().to_string());
+    let folder = gestalt_file::folder(path).display();
     let lost = "what the robot learns is lost when it stops, and until it can write it answers no instructor and shares nothing";
     match &memory.room {
         Room::NoFolder => Finding::failure(
@@ -310,13 +309,20 @@ fn multicast(multicast: &Result<(), String>, connects: bool) -> Finding {
     }
 }
 
-fn camera(camera: &CameraFacts, running: bool) -> Finding {
+/// Whether a robot that runs, and says that of its camera, has the camera of that source.
+#[must_use]
+pub fn has(said: &Camera, source: &str) -> bool {
+    let delivers = matches!(said.state, CameraState::Opening | CameraState::Live | CameraState::Frozen);
+    delivers && said.source.replacen("video pipe ", "video ", 1) == source
+}
+
+fn camera(camera: &CameraFacts) -> Finding {
     let source = &camera.source;
     let blind = "a robot that sees nothing gives no evidence";
     let given = match &camera.gave {
         Ok(given) => given,
         // It serves one program at a time; the status of the one that runs says how it goes.
-        Err(_) if running && camera.live => {
+        Err(_) if camera.held && camera.live => {
             return Finding::fine("camera", format!("{source}: the running robot has it"));
         }
         Err(cause) => return Finding::failure("camera", cause.clone(), blind, camera_fix(camera, cause)),

@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_link::rounds_in_words;
-use gestalt_protocol::{CameraState, LearningStatus, RobotId, Status};
+use gestalt_protocol::{Camera, CameraState, LearningStatus, RobotId, Status};
 use gestalt_strategies::MindConfig;
 use serde_json::json;
 
@@ -42,6 +42,7 @@ fn camera() -> CameraFacts {
         setting: "camera: {source: {device: {path: \"/dev/video0\"}}}".to_owned(),
         devices: vec!["/dev/video2".to_owned()],
         live: true,
+        held: false,
         size: [640, 480],
         fps: 15.0,
         gave: Ok(GIVEN),
@@ -208,9 +209,19 @@ fn what_a_running_robot_holds_itself_is_no_fault() {
     let running = on(|facts| {
         facts.running = true;
         facts.memory.as_mut().unwrap().held = true;
-        facts.camera.as_mut().unwrap().gave = Err("in use".to_owned());
+        let camera = facts.camera.as_mut().unwrap();
+        (camera.held, camera.gave) = (true, Err("in use".to_owned()));
     });
     assert_eq!(troubles(robot::findings(&running)), []);
+    // With another camera, or with one that is not there, it has not the one that was looked at.
+    let mut other = running;
+    other.camera.as_mut().unwrap().held = false;
+    is_named("other", robot::findings(&other), Severity::Failure, "camera", "in use", "--source /dev/video2");
+    let said = |source: &str, state| Camera { source: source.to_owned(), state, ..Camera::default() };
+    let has = |source: &str, state| robot::has(&said(source, state), "device /dev/video0");
+    assert!(has("device /dev/video0", CameraState::Live) && has("device /dev/video0", CameraState::Opening));
+    assert!(!has("rendered", CameraState::Live) && !has("device /dev/video0", CameraState::Failing));
+    assert!(robot::has(&said("video pipe /tmp/frames", CameraState::Live), "video /tmp/frames"));
 }
 
 #[test]

@@ -32,7 +32,7 @@ impl Evidence {
     pub fn keep(&self, folder: &Path, against: RobotId) -> io::Result<()> {
         fs::create_dir_all(folder)?;
         let path = folder.join(format!("robot-{against}.{EXTENSION}"));
-        gestalt_file::write(&path, &self.encode())
+        gestalt_file::replace(&path, &self.encode())
     }
 
     /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What cannot be read as evidence is passed over, and what it

@@ -47,7 +47,7 @@ impl fmt::Display for Role {
 
 /// A word that names no role.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("'{0}' is no role: write one or more of open, teach, overrule, with commas between them")]
+#[error("'{0}' is no role: there are open, teach and overrule, and listen for none of them")]
 pub struct RoleError(String);
 
 impl FromStr for Role {
@@ -58,6 +58,9 @@ impl FromStr for Role {
         found.ok_or_else(|| RoleError(text.chars().take(40).collect()))
     }
 }
+
+/// What whoever has no role may do, as everybody who is let in.
+const LISTEN: &str = "listen";
 
 /// What somebody may do. In JSON a list of words, on the wire one byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -75,6 +78,14 @@ impl Roles {
             Role::Teach => Self::from_iter([Role::Open, Role::Teach]),
             Role::Overrule => Self::from_iter(Role::ALL),
         }
+    }
+
+    /// Those that a role usually comes with, by its word; `listen` for none.
+    ///
+    /// # Errors
+    /// [`RoleError`] for any other word.
+    pub fn named(word: &str) -> Result<Self, RoleError> {
+        if word == LISTEN { Ok(Self::NONE) } else { word.parse().map(Self::up_to) }
     }
 
     /// Whether that is one of them.
@@ -105,7 +116,7 @@ impl FromIterator<Role> for Roles {
 impl fmt::Display for Roles {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if *self == Self::NONE {
-            return f.pad("nothing");
+            return f.pad(LISTEN);
         }
         let names: Vec<&str> = self.iter().map(Role::name).collect();
         f.pad(&names.join(", "))
@@ -183,7 +194,10 @@ mod tests {
         }
         assert!("reign".parse::<Role>().unwrap_err().to_string().contains("overrule"));
         assert_eq!(Roles::up_to(Role::Teach).to_string(), "open, teach");
-        assert_eq!(Roles::NONE.to_string(), "nothing");
+        assert_eq!(Roles::NONE.to_string(), "listen");
+        assert_eq!(Roles::named("listen"), Ok(Roles::NONE));
+        assert_eq!(Roles::named("teach"), Ok(Roles::up_to(Role::Teach)));
+        assert!(Roles::named("reign").unwrap_err().to_string().contains("listen"));
         assert!(Roles::from_iter([Role::Teach, Role::Teach]).has(Role::Teach), "said twice it is said");
     }
 }

@@ -43,7 +43,7 @@ impl<S: Scheme> Roster<S> {
                 Err(stays) => return Err(stays),
             }
         }
-        gestalt_file::write(path, self.to_json().as_bytes()).map_err(|source| RosterError::File {
+        gestalt_file::replace(path, self.to_json().as_bytes()).map_err(|source| RosterError::File {
             path: path.to_owned(),
             verb: "written",
             source,

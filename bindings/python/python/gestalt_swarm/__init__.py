@@ -6,7 +6,8 @@
 - `decode`, `encode` and their like: every message of the wire, between bytes and dictionaries.
 - `Mind`: the robot itself, for your own simulator: messages in, messages out, time is an argument.
 
-Whatever is refused raises a `GestaltError`, which is a `ValueError`, and names the cause and the fix.
+Whatever Gestalt refuses raises a `GestaltError`, which is a `ValueError`, and names the cause and the fix. What is no argument of its kind
+raises Python's own: `TypeError` for a text in place of a number, `OverflowError` for a whole number beyond its type, as a negative count.
 """
 
 from ._native import (

@@ -52,7 +52,8 @@ pub fn claim(
     let json = serde_json::to_string_pretty(&file).expect("names and numbers can be written as JSON");
     // The run last: where it is, the rest is.
     for (path, text) in [(experiment, text), (run, &format!("{json}\n"))] {
-        gestalt_file::write(&path, text.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
+        gestalt_file::write(&path, text.as_bytes())
+            .map_err(|source| ExperimentError::Write { path, source })?;
     }
     Ok(())
 }

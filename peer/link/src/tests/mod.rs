@@ -1,10 +1,12 @@
 //! Whole robots on the loopback interface, whose parts fail and whose neighbours do not read.
 
+mod asked;
 mod failing;
 mod links;
 mod memory;
 mod sealed;
 mod slow;
+mod told;
 
 use std::path::PathBuf;
 use std::sync::Arc;

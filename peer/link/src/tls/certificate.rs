@@ -124,7 +124,7 @@ impl Certificate {
     /// [`CertificateError::File`].
     pub fn write(&self, path: &Path) -> Result<(), CertificateError> {
         let unwritable = |source| CertificateError::File { path: path.to_owned(), verb: "written", source };
-        gestalt_file::write(path, self.to_pem().as_bytes()).map_err(unwritable)
+        gestalt_file::replace(path, self.to_pem().as_bytes()).map_err(unwritable)
     }
 
     /// Whether it is that holder's, with that key, by the authority of that roster: said here, where it can be mended, and not by links that

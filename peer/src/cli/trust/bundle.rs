@@ -127,7 +127,7 @@ pub(super) fn write_client(
         roster.members().swarm
     );
     let file = folder.join("zenoh.json5");
-    gestalt_file::write_secret(&file, text.as_bytes())
+    gestalt_file::replace_secret(&file, text.as_bytes())
         .map_err(|error| format!("cannot write {}: {error}", file.display()).into())
 }
 

@@ -9,7 +9,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use gestalt_protocol::{InstructorId, RobotId};
-use gestalt_trust::{Applicant, PublicKey, Request, Role, Roles, Roster};
+use gestalt_trust::{Applicant, PublicKey, Request, Roles, Roster};
 use serde_json::json;
 
 use self::folder::{applicant, key_of, said};
@@ -51,9 +51,9 @@ struct New {
     /// Name of the swarm
     #[arg(long, default_value = "gestalt", value_name = "NAME")]
     swarm: String,
-    /// What whoever works on a robot's own computer may do without a key, with what comes before it: open, teach, overrule
-    #[arg(long, default_value = "teach", value_name = "ROLE")]
-    local_role: Role,
+    /// What whoever works on a robot's own computer may do without a key, with what comes before it: listen, open, teach, overrule
+    #[arg(long, default_value = "teach", value_name = "ROLE", value_parser = Roles::named)]
+    local_role: Roles,
     /// Folder to write to. authority.key can enrol robots: keep it where no robot is
     folder: PathBuf,
 }
@@ -76,9 +76,9 @@ struct Enrol {
     /// Make a client a member, and all that it needs in a folder of its own (client-NAME): a Zenoh configuration for any language, a key to speak with
     #[arg(long, value_name = "NAME", conflicts_with = "request")]
     client: Option<InstructorId>,
-    /// What the client may do, with what comes before it: open, teach, overrule [default: listen]
-    #[arg(long, value_name = "ROLE")]
-    role: Option<Role>,
+    /// What the client may do, with what comes before it: listen, open, teach, overrule [default: listen]
+    #[arg(long, value_name = "ROLE", value_parser = Roles::named)]
+    role: Option<Roles>,
     /// The line that `gestalt trust request` printed where the new member is
     #[arg(long, value_name = "LINE")]
     request: Option<Request>,
@@ -211,7 +211,7 @@ fn say(words: &str) -> Result<(), Failure> {
 }
 
 fn new(args: &New) -> Result<(), Failure> {
-    let authority = Authority::create(&args.folder, &args.swarm, Roles::up_to(args.local_role))?;
+    let authority = Authority::create(&args.folder, &args.swarm, args.local_role)?;
     let roster = authority.roster()?;
     say(&format!(
         "swarm \"{}\" {}: {} can enrol and expel, and is to be kept where no robot is",
@@ -222,7 +222,7 @@ fn new(args: &New) -> Result<(), Failure> {
 }
 
 fn enrol(args: &Enrol) -> Result<(), Failure> {
-    let roles = args.role.map_or(Roles::NONE, Roles::up_to);
+    let roles = args.role.unwrap_or_default();
     if args.role.is_some() && !args.robots.is_empty() {
         return Err("robots have no roles: whoever works on their computer has those of `gestalt trust new --local-role`".into());
     }
@@ -397,6 +397,7 @@ mod tests {
         run(&["enrol", "--client", "desk", "--role", "open", &keys]).unwrap();
         let first = key().unwrap();
         run(&["enrol", "--client", "desk", "--role", "teach", &keys]).unwrap();
+        run(&["enrol", "--client", "desk", "--role", "listen", &keys]).unwrap();
         assert_eq!(key(), Some(first), "another role takes no key away");
         run(&["expel", "desk", "--offline", &keys]).unwrap();
         assert_eq!(key(), None);

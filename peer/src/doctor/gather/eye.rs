@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use gestalt_protocol::Camera;
 use gestalt_vision::source::{Frame, Pipe, Reader, Scene};
 use opencv::core::{Mat, Vector, mean_std_dev, no_array};
 use opencv::prelude::*;
@@ -9,15 +10,16 @@ use opencv::prelude::*;
 use super::since_1970;
 use crate::camera_source::{describe, open_source};
 use crate::config::{CameraSection, Config, SourceSection};
-use crate::doctor::robot::{CameraFacts, Given};
+use crate::doctor::robot::{CameraFacts, Given, has};
 
 /// How long a camera is looked at, and how many frames are enough: of one that runs by itself, and of files.
 const LOOK: Duration = Duration::from_secs(2);
 const LIVE_FRAMES: usize = 40;
 const FRAMES: usize = 2;
 
-/// What the robot's camera gives; `None` for one without a camera of this machine. The camera of a robot that runs is left alone.
-pub(super) async fn look(config: &Config, running: bool) -> Option<CameraFacts> {
+/// What the robot's camera gives; `None` for one without a camera of this machine. The one that the robot has, by what it says of it
+/// while it runs, is left alone.
+pub(super) async fn look(config: &Config, said: Option<&Camera>) -> Option<CameraFacts> {
     let camera = &config.camera;
     let (setting, live) = match &camera.source {
         SourceSection::None | SourceSection::Stream(_) => return None,
@@ -34,10 +36,13 @@ pub(super) async fn look(config: &Config, running: bool) -> Option<CameraFacts> 
         }
     };
     let model = camera.model.properties();
+    let source = describe(camera);
+    let held = said.is_some_and(|said| has(said, &source));
     let gave =
-        if running && live { Err("the running robot has it".to_owned()) } else { take(config, live).await };
+        if held && live { Err("the running robot has it".to_owned()) } else { take(config, live).await };
     Some(CameraFacts {
-        source: describe(camera),
+        source,
+        held,
         setting: format!("camera: {{{setting}}}"),
         devices: devices(),
         live,

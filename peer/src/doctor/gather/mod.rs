@@ -9,11 +9,11 @@ mod statuses;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_link::rounds_in_words;
-use gestalt_protocol::{RobotId, Status};
+use gestalt_protocol::{Camera, RobotId, Status};
 use gestalt_trust::Roster;
 use tokio::task::spawn_blocking;
 
-use super::robot::RobotFacts;
+use super::robot::{RobotFacts, has};
 use super::swarm::{RosterFacts, SwarmFacts};
 use crate::config::{Config, ROSTER_FILE};
 
@@ -42,9 +42,9 @@ pub async fn gather(subject: &Subject) -> (RobotFacts, Option<SwarmFacts>) {
         return (facts, None);
     };
     let ports = network::ports(config);
-    let home = statuses::home(config, &ports).await;
+    let (home, seeing) = statuses::home(config, &ports).await.unzip();
     let running = home.is_some();
-    let camera = camera(subject, config, running);
+    let camera = camera(subject, config, seeing.flatten());
     let swarm = statuses::ask_around(config, home);
     // A slow disk holds nobody up.
     let (files, described) = (subject.clone(), config.clone());
@@ -57,10 +57,13 @@ pub async fn gather(subject: &Subject) -> (RobotFacts, Option<SwarmFacts>) {
     });
     robot.camera = camera;
     robot.connects = !network::endpoints(config, "connect").is_empty();
-    let answers = |id: RobotId| swarm.parts.iter().flatten().any(|answer| answer.status.robot == id);
+    let answer = swarm.parts.iter().flatten().find(|answer| answer.status.robot == robot.id);
     // One that holds its memory and answers is the one whose memory it is, wherever it listens.
     let held = robot.memory.as_ref().is_some_and(|memory| memory.held);
-    robot.running = running || held && answers(robot.id);
+    robot.running = running || held && answer.is_some();
+    if let (Some(camera), Some(answer)) = (&mut robot.camera, answer.filter(|_| robot.running)) {
+        camera.held |= has(&answer.status.camera, &camera.source);
+    }
     if subject.file.is_some() {
         robot.ports = if robot.running { Vec::new() } else { ports };
         swarm.mine = Some(mine);
@@ -94,13 +97,17 @@ fn roster(config: &Config) -> Option<RosterFacts> {
 }
 
 #[cfg(feature = "opencv")]
-async fn camera(subject: &Subject, config: &Config, running: bool) -> Option<super::robot::CameraFacts> {
+async fn camera(
+    subject: &Subject,
+    config: &Config,
+    said: Option<Camera>,
+) -> Option<super::robot::CameraFacts> {
     subject.file.as_ref()?;
-    eye::look(config, running).await
+    eye::look(config, said.as_ref()).await
 }
 
 /// Without OpenCV no robot has a camera.
 #[cfg(not(feature = "opencv"))]
-async fn camera(_: &Subject, _: &Config, _: bool) -> Option<super::robot::CameraFacts> {
+async fn camera(_: &Subject, _: &Config, _: Option<Camera>) -> Option<super::robot::CameraFacts> {
     None
 }

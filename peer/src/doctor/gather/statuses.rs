@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_link::{Client, LinkConfig, hear};
-use gestalt_protocol::{RobotId, Status};
+use gestalt_protocol::{Camera, RobotId, Status};
 use serde_json::json;
 use tokio::task::{JoinSet, spawn_blocking};
 
@@ -32,15 +32,18 @@ struct Reply {
     answers: Vec<Answer>,
 }
 
-/// Where the robot that is described is reached, if it runs on this machine: it answers at its own port.
-pub(super) async fn home(config: &Config, ports: &[PortFacts]) -> Option<String> {
+/// Where the robot that is described is reached, if it runs on this machine: it answers at its own port. And what it says of its camera.
+pub(super) async fn home(config: &Config, ports: &[PortFacts]) -> Option<(String, Option<Camera>)> {
     for port in ports.iter().filter(|port| port.taken.is_some()) {
         let endpoint = at_home(&port.endpoint);
         let Ok(client) = attach(config, std::slice::from_ref(&endpoint)).await else { continue };
-        let at = client.attached().await;
+        let at = client.attached().await.filter(|at| *at == config.robot.id);
+        let statuses =
+            if at.is_some() { client.statuses(ANSWER).await.unwrap_or_default() } else { Vec::new() };
         client.close().await;
-        if at == Some(config.robot.id) {
-            return Some(endpoint);
+        if let Some(at) = at {
+            let own = statuses.into_iter().find(|status| status.robot == at);
+            return Some((endpoint, own.map(|status| status.camera)));
         }
     }
     None
@@ -133,7 +136,8 @@ async fn attach(config: &Config, endpoints: &[String]) -> Result<Client, String>
     }
     let patience = u64::try_from(LINK.as_millis()).unwrap_or(u64::MAX);
     zenoh.insert("connect".to_owned(), json!({"endpoints": endpoints, "timeout_ms": patience}));
-    // What is wrong with its keys is found where they are looked at.
+    config.trust.client_swarm(Some(&config.swarm.0)).map_err(|error| error.to_string())?;
+    // What else is wrong with its keys is found where they are looked at.
     let credentials = config.trust.credentials(config.robot.id).ok().flatten();
     let link = LinkConfig { zenoh, credentials, ..LinkConfig::default() };
     let opened = tokio::time::timeout(LINK + ANSWER, Client::open(&config.swarm.0, &link)).await;
