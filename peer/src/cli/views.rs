@@ -9,7 +9,7 @@ use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::config::LayerConfig;
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
-use gestalt_vision::source::{Glove, RenderedSource, Scene, Source};
+use gestalt_vision::source::{RenderedSource, Scene, Source};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -117,14 +117,6 @@ fn places(args: &Args) -> Result<Vec<Pose>, Failure> {
     Ok(places)
 }
 
-/// What the hands wear: learned eyes know bare ones.
-fn glove(features: FeatureSet) -> Glove {
-    match features {
-        FeatureSet::Embedding => Glove::Skin,
-        FeatureSet::Shape | FeatureSet::Hog => Glove::Cyan,
-    }
-}
-
 fn heading(features: FeatureSet) -> String {
     let mut line = "hand,bearing_deg,distance_m,gesture,frame,quality".to_owned();
     for n in 0..features.length() {
@@ -145,7 +137,7 @@ struct Place {
 impl Place {
     /// All gestures as lines of CSV, and in how many frames a hand was found.
     fn look(&self, features: FeatureSet, args: &Args) -> Result<(String, usize), Failure> {
-        let mut source = RenderedSource::new(self.camera.clone(), self.pose, glove(features), self.seed)?;
+        let mut source = RenderedSource::new(self.camera.clone(), self.pose, features.glove(), self.seed)?;
         let layer = LayerConfig::ALL;
         let mut perception =
             Perception::for_camera(features, HandConfig::default(), layer, &args.camera.properties())?;

@@ -217,11 +217,7 @@ impl Model {
         bytes.extend(crc32fast::hash(&body).to_le_bytes());
         bytes.extend(body);
 
-        gestalt_file::write(path, &bytes).map_err(|source| ModelFileError::Io {
-            action: "write",
-            path: path.to_owned(),
-            source,
-        })
+        gestalt_file::write(path, &bytes).map_err(unwritable(path))
     }
 
     /// Finds out whether [`Self::write`] can succeed, before the work of training is done.
@@ -229,11 +225,7 @@ impl Model {
     /// # Errors
     /// [`ModelFileError::Io`] when the folder does not exist or may not be written.
     pub fn check_writable(path: &Path) -> Result<(), ModelFileError> {
-        gestalt_file::check(path).map_err(|source| ModelFileError::Io {
-            action: "write",
-            path: path.to_owned(),
-            source,
-        })
+        gestalt_file::check(path).map_err(unwritable(path))
     }
 
     /// Checks that the model takes what perception gives.
@@ -251,6 +243,10 @@ impl Model {
             found: length,
         })
     }
+}
+
+fn unwritable(path: &Path) -> impl Fn(io::Error) -> ModelFileError {
+    |source| ModelFileError::Io { action: "write", path: path.to_owned(), source }
 }
 
 fn little_endian(bytes: &[u8]) -> u64 {

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
+use gestalt_vision::source::SourceError;
 use gestalt_vision::source::rendered::{LabelledFrame, TrainingFrames};
-use gestalt_vision::source::{Glove, SourceError};
 
 use super::error::ExperimentError;
 use super::program::Program;
@@ -38,10 +38,9 @@ fn eyes(features: FeatureSet) -> Result<u32, ExperimentError> {
     Ok(seen.finalize())
 }
 
-/// Hands that these eyes can see: learned ones know bare hands only.
+/// Hands that these eyes can see.
 fn frames(features: FeatureSet) -> impl Iterator<Item = Result<LabelledFrame, SourceError>> {
-    let glove = if features == FeatureSet::Embedding { Glove::Skin } else { Glove::Cyan };
-    TrainingFrames::new(Vec::new(), glove, 60.0, 1).take(FRAMES)
+    TrainingFrames::new(Vec::new(), features.glove(), 60.0, 1).take(FRAMES)
 }
 
 fn minds() -> Result<u32, ExperimentError> {

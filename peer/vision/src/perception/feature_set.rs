@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use super::features::FEATURES;
 use super::hog;
+use crate::config::Glove;
 use crate::network::{EMBEDDING, shipped};
 
 /// Which feature vector perception computes.
@@ -25,6 +26,15 @@ pub enum FeatureSet {
 impl FeatureSet {
     /// All sets.
     pub const ALL: [Self; 3] = [Self::Shape, Self::Hog, Self::Embedding];
+
+    /// What drawn hands wear for these eyes to see them: learned ones know bare hands.
+    #[must_use]
+    pub fn glove(self) -> Glove {
+        match self {
+            Self::Embedding => Glove::Skin,
+            Self::Shape | Self::Hog => Glove::Cyan,
+        }
+    }
 
     /// Names the set and its version: vectors of sets with different names never mix. Embeddings of other weights are
     /// another version.

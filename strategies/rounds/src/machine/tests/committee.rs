@@ -92,18 +92,21 @@ fn votes_of_those_who_were_not_drawn_are_evidence_but_no_quorum() {
     assert_eq!(mind.held().unwrap().certificate.votes.len(), 236);
 }
 
+fn counted(robot: &u32) -> CountedVote {
+    CountedVote {
+        robot: RobotId(*robot),
+        stamp: Stamp { boot: 1, sequence: 1 },
+        class: ClassId(2),
+        weight: 1.0,
+        vote: vote(1, 2, SURE),
+        signature: None,
+    }
+}
+
 #[test]
 fn a_decision_that_others_made_among_themselves_is_refused() {
     let (members, others) = drawn(1);
     let of = |robots: &[u32]| {
-        let counted = |robot: &u32| CountedVote {
-            robot: RobotId(*robot),
-            stamp: Stamp { boot: 1, sequence: 1 },
-            class: ClassId(2),
-            weight: 1.0,
-            vote: vote(1, 2, SURE),
-            signature: None,
-        };
         let mut robots = robots.to_vec();
         robots.sort_unstable();
         decided(round(1, 1), Some(2), robots.iter().map(counted).collect(), robots[0])
@@ -173,14 +176,6 @@ fn whose_vote_was_lost_is_drawn_again_once_a_decision_brings_it() {
     }
     live(&mut mind, ms(9000));
     assert_eq!(mind.silent(), &robots([members[0]]), "nothing was heard of it");
-    let counted = |robot: &u32| CountedVote {
-        robot: RobotId(*robot),
-        stamp: Stamp { boot: 1, sequence: 1 },
-        class: ClassId(2),
-        weight: 1.0,
-        vote: vote(1, 2, SURE),
-        signature: None,
-    };
     mind.handle(
         ms(9000),
         gives(1, decided(round(1, 1), Some(2), members.iter().map(counted).collect(), members[0])),
