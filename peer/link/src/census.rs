@@ -2,6 +2,7 @@
 //!
 //! Zenoh tells of each liveliness token as it comes and goes, but after many changes at once some of that news was
 //! measured to be lost for good (a hundred robots linking up: 1 % of the pairs), while a query finds the token.
+//! What no query finds is that a robot is gone: who is silent is asked itself.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,6 +14,7 @@ use zenoh::query::Reply;
 
 use crate::inbox::Inbox;
 use crate::session::Node;
+use crate::silent::ask_the_silent;
 
 /// How long after a change the census is taken, and after that one the next, in a swarm of a few robots.
 const AFTER: [Duration; 3] = [Duration::from_secs(1), Duration::from_secs(2), Duration::from_secs(4)];
@@ -23,8 +25,13 @@ const FEW: u32 = 20;
 /// How long answers are waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Takes a census some time after every change. Never returns.
+/// Takes a census some time after every change, and asks who is silent. Never returns.
 pub(crate) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) -> Result<(), String> {
+    tokio::join!(count(&node, &keys, &inbox), ask_the_silent(&node, &keys, &inbox));
+    Ok(())
+}
+
+async fn count(node: &Node, keys: &Keys, inbox: &Arc<Inbox>) {
     loop {
         inbox.unrest().await;
         let mut absent = None;
@@ -32,7 +39,7 @@ pub(crate) async fn take_census(node: Node, keys: Keys, inbox: Arc<Inbox>) -> Re
             let robots = u32::try_from(inbox.tokens().len()).unwrap_or(u32::MAX);
             tokio::time::sleep(pause + pause * (robots / FEW)).await;
             let before = inbox.tokens();
-            let Ok(present) = ask(&node, &keys, &inbox).await else { continue };
+            let Ok(present) = ask(node, keys, inbox).await else { continue };
             let missing: BTreeSet<_> = before.difference(&present).copied().collect();
             let twice = absent.map(|absent: BTreeSet<_>| &absent & &missing).unwrap_or_default();
             inbox.on_census(&present, &twice);

@@ -21,6 +21,7 @@ use super::account::{Account, Refusal};
 use super::checks::Checks;
 use super::echoes::Echoes;
 use super::roll::Roll;
+use super::silence::Silence;
 use super::waiting::Waiting;
 use super::ways::Ways;
 use super::words::{Vouched, Words};
@@ -67,6 +68,7 @@ pub(super) struct State {
     /// Since when each of those is linked, and when it last told this robot something.
     pub(super) heard: BTreeMap<RobotId, (Instant, Option<Instant>)>,
     pub(super) alive: BTreeSet<RobotId>,
+    pub(super) silence: Silence,
     pub(super) links_changed: bool,
     pub(super) alive_changed: bool,
     /// Words that this robot signed, and are yet to be said.
@@ -184,7 +186,13 @@ impl Inbox {
         }
         let key = sample.key_expr().as_str();
         let expulsions = self.lock().waiting.expulsions();
-        let (kind, taken) = match self.keys.parse(key) {
+        let topic = self.keys.parse(key);
+        // Whose word it is stands in the key of what a robot says to all.
+        let author = match &topic {
+            Some(Topic::Vote(id) | Topic::Sample(id) | Topic::RobotDecision(id)) => Some(*id),
+            _ => None,
+        };
+        let (kind, taken) = match topic {
             Some(Topic::Vote(id)) => ("vote", self.on_vote(id, sample, expulsions)),
             Some(Topic::Sample(id)) => ("sample", self.on_shared(id, sample, expulsions)),
             Some(Topic::Repair(id)) if id == self.me => ("repair", self.on_repair(sample, expulsions)),
@@ -203,6 +211,7 @@ impl Inbox {
         let bytes = sample.payload().len();
         match taken {
             Ok(()) => {
+                author.into_iter().for_each(|author| self.on_spoken(author));
                 self.ready.notify_one();
                 self.account.received(kind, bytes);
             }
@@ -379,9 +388,13 @@ impl Inbox {
             return self.account.refused("alive", sample.key_expr().as_str(), 0, &Distrust::Stranger.into());
         }
         let mut state = self.lock();
+        state.silence.changed(id);
         let changed = match sample.kind() {
             SampleKind::Put => state.alive.len() < MAX_ROBOTS && state.alive.insert(id),
-            SampleKind::Delete => state.alive.remove(&id),
+            SampleKind::Delete => {
+                state.silence.lost(Instant::now());
+                state.alive.remove(&id)
+            }
         };
         if changed {
             // Whoever comes listens before it says that it is there.
@@ -401,7 +414,7 @@ impl Inbox {
         let before = state.alive.clone();
         state.alive.retain(|id| !gone.contains(id));
         for robot in present {
-            if state.alive.len() < MAX_ROBOTS && !self.is_stranger(*robot) {
+            if state.alive.len() < MAX_ROBOTS && !self.is_stranger(*robot) && !state.silence.is_gone(*robot) {
                 state.alive.insert(*robot);
             }
         }

@@ -34,6 +34,7 @@ impl Inbox {
             if !state.links.values().any(|other| *other == robot) {
                 state.heard.remove(&robot);
             }
+            state.silence.lost(Instant::now());
             self.lost_links.send_modify(|lost| *lost += 1);
         }
         state.links_changed = true;

@@ -20,6 +20,9 @@ use crate::token::keep_token;
 /// When a new robot asks whether its id is taken: late enough that its links stand.
 const TWIN_CHECK: Duration = Duration::from_secs(3);
 
+/// The parameter of a query that asks whether a robot is there, and not how it is.
+pub(crate) const BRIEFLY: &str = "briefly";
+
 /// A robot's declarations on a session. Dropping it withdraws them; its liveliness token goes when the supervisor's parts
 /// are ended.
 pub(crate) struct Presence {
@@ -89,6 +92,11 @@ impl Presence {
 fn on_status(account: &Account, node: &str, own: &str, query: &Query) {
     if query.parameters().get("from").is_some_and(|from| from != node) {
         account.twin();
+    }
+    if query.parameters().contains_key(BRIEFLY) {
+        account.sent("status", 0);
+        let _ = query.reply(own, "").wait();
+        return;
     }
     let clock = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_millis();
     let json = {

@@ -5,6 +5,7 @@ mod failing;
 mod links;
 mod memory;
 mod sealed;
+mod silent;
 mod slow;
 mod told;
 
