@@ -249,6 +249,12 @@ impl Agreement {
         self.held.as_ref().map(|held| held.since)
     }
 
+    /// When its class last changed, or was first contradicted.
+    #[must_use]
+    pub fn unsettled(&self) -> Option<Duration> {
+        self.held.as_ref().map(|held| held.unsettled)
+    }
+
     /// The rank of the decision held.
     #[must_use]
     pub fn rank(&self) -> Option<Rank> {

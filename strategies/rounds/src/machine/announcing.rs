@@ -40,6 +40,18 @@ impl Rounds {
         self.config.takeover.saturating_mul(self.turns)
     }
 
+    /// Before when it announces nothing, whatever the others hold.
+    pub(super) fn earliest_announcement(&self) -> Option<Duration> {
+        let wait = self.config.settle.saturating_add(self.turn());
+        Some(self.round.as_ref()?.agreement.unsettled()?.saturating_add(wait))
+    }
+
+    /// Whether it is time to announce the decision held. Asked at every input: how many hold it is counted only once there is nothing else to wait for.
+    pub(super) fn is_to_announce(&self) -> bool {
+        let is_due = |due: Duration| self.now >= due;
+        self.earliest_announcement().is_some_and(is_due) && self.announcement().is_some_and(is_due)
+    }
+
     /// When this robot, as the spokesrobot or in its place, is to announce the decision it holds.
     pub(super) fn announcement(&self) -> Option<Duration> {
         let wait = self.config.settle.saturating_add(self.turn());

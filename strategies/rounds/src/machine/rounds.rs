@@ -323,20 +323,21 @@ impl Rounds {
             .filter(|round| round.open && round.agreement.held().is_none())
             .map(|round| round.patience_and_deadline(&self.config))
             .unzip();
-        [
+        let rest = [
             round.and_then(|round| round.vote_due(&self.config)),
             patience.filter(|patience| *patience > self.now),
             deadline,
             self.closing(),
-            self.announcement(),
             self.looking_until(follower),
             self.showing(),
             self.partners.due(&self.alive),
             self.wanted.as_ref().map(|wanted| wanted.due),
-        ]
-        .into_iter()
-        .flatten()
-        .min()
+        ];
+        let rest = rest.into_iter().flatten().min();
+        // Asked at every input, as most of it is: how many hold the decision is counted where that may be what comes next.
+        let may_be_next = |earliest: &Duration| rest.is_none_or(|rest| *earliest < rest);
+        let announcement = self.earliest_announcement().filter(may_be_next).and_then(|_| self.announcement());
+        rest.into_iter().chain(announcement).min()
     }
 
     /// Does whatever is due.
@@ -350,7 +351,7 @@ impl Rounds {
             self.on_open(effects);
             self.shown = None;
         }
-        if self.announcement().is_some_and(|due| self.now >= due) {
+        if self.is_to_announce() {
             self.announce(effects);
         }
         if !self.is_open() {
