@@ -42,7 +42,7 @@ mod tests {
     }
 
     fn samples(keys: impl Iterator<Item = u64>) -> Vec<KernelRow> {
-        keys.map(|key| KernelRow::new(Key::Inserted(key), [].into())).collect()
+        keys.map(|key| KernelRow::new(Key::Inserted(key), [].into(), 0)).collect()
     }
 
     #[test]

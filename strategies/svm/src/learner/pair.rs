@@ -136,8 +136,7 @@ fn rows<'a>(samples: &'a KernelMatrix, classes: [usize; 2]) -> impl Fn(usize, us
 
 /// The kernel of a sample with those of a pair.
 fn row(samples: &KernelMatrix, classes: [usize; 2], place: Place) -> [&[f32]; 2] {
-    let row = samples.row(place);
-    classes.map(|class| row[class].as_slice())
+    classes.map(|class| samples.row(place, class))
 }
 
 #[cfg(test)]
@@ -193,7 +192,7 @@ mod tests {
                 let place = samples.place(Key::Inserted(key)).unwrap();
                 let kernel = |other: &KernelRow| {
                     let other = samples.place(other.key).unwrap();
-                    f64::from(samples.row(place)[other.class][other.position])
+                    f64::from(samples.row(place, other.class)[other.position])
                 };
                 let sum = |class: usize| -> f64 {
                     let weights = alone.solution.weights(class).iter();

@@ -21,13 +21,13 @@ pub(super) struct KernelRow {
     pub key: Key,
     pub vector: Arc<[f32]>,
     /// For each class, the kernel with its samples, in their order: what a pair of classes needs of the matrix lies
-    /// side by side. Worked out when it is first asked for: of most samples no machine ever asks.
-    kernel: OnceLock<Vec<Vec<f32>>>,
+    /// side by side. Each is worked out when it is first asked for: of most samples no machine ever asks, and of the others few ask for all classes.
+    kernel: Vec<OnceLock<Vec<f32>>>,
 }
 
 impl KernelRow {
-    pub fn new(key: Key, vector: Arc<[f32]>) -> Self {
-        Self { key, vector, kernel: OnceLock::new() }
+    pub fn new(key: Key, vector: Arc<[f32]>, classes: usize) -> Self {
+        Self { key, vector, kernel: vec![OnceLock::new(); classes] }
     }
 }
 
@@ -49,6 +49,8 @@ pub(super) struct KernelMatrix {
     places: BTreeMap<Key, Place>,
     /// As many samples there will be at least, by class.
     room: Vec<usize>,
+    /// Whether the kernel of any sample with those of a class is there: where it is not, a sample that comes or goes need not look at all others for it.
+    is_there: Vec<OnceLock<()>>,
     /// What other learners have worked out already.
     known: Option<Arc<SharedKernel>>,
 }
@@ -56,9 +58,9 @@ pub(super) struct KernelMatrix {
 impl KernelMatrix {
     pub fn new(classes: usize, gamma: f32) -> Self {
         let (places, room) = (BTreeMap::new(), vec![0; classes]);
-        let shared = vec![Vec::new(); classes];
+        let (shared, is_there) = (vec![Vec::new(); classes], vec![OnceLock::new(); classes]);
         let classes = (0..classes).map(|_| Vec::new()).collect();
-        Self { gamma, classes, shared, places, room, known: None }
+        Self { gamma, classes, shared, places, room, is_there, known: None }
     }
 
     /// From now on looks there first.
@@ -80,11 +82,11 @@ impl KernelMatrix {
 
     /// Makes room for one more class.
     pub fn add_class(&mut self) {
-        let rows = self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut());
-        rows.for_each(|row| row.push(Vec::new()));
+        self.classes.iter_mut().flatten().for_each(|sample| sample.kernel.push(OnceLock::new()));
         self.classes.push(Vec::new());
         self.shared.push(Vec::new());
         self.room.push(0);
+        self.is_there.push(OnceLock::new());
     }
 
     /// The samples of a class, in its order.
@@ -96,20 +98,29 @@ impl KernelMatrix {
         &self.classes[place.class][place.position]
     }
 
-    /// The kernel of the sample there with the samples of each class, in their order.
-    pub fn row(&self, place: Place) -> &[Vec<f32>] {
-        self.at(place).kernel.get_or_init(|| self.work_out(place))
+    /// The kernel of the sample there with those of a class, in their order.
+    pub fn row(&self, place: Place, class: usize) -> &[f32] {
+        self.at(place).kernel[class].get_or_init(|| {
+            self.is_there[class].get_or_init(|| ());
+            self.work_out(place, class)
+        })
     }
 
     /// Lets go of all rows: each is worked out again when it is asked for.
     pub fn let_rows_go(&mut self) {
-        self.classes.iter_mut().flatten().for_each(|sample| drop(sample.kernel.take()));
+        self.classes
+            .iter_mut()
+            .flatten()
+            .flat_map(|sample| &mut sample.kernel)
+            .for_each(|row| drop(row.take()));
+        self.is_there.fill(OnceLock::new());
     }
 
-    /// Of how many samples the kernel is there.
+    /// Of how many samples and classes the kernel is there.
     #[cfg(test)]
     pub fn rows_held(&self) -> usize {
-        self.classes.iter().flatten().filter(|sample| sample.kernel.get().is_some()).count()
+        let rows = self.classes.iter().flatten().flat_map(|sample| &sample.kernel);
+        rows.filter(|row| row.get().is_some()).count()
     }
 
     pub fn place(&self, key: Key) -> Option<Place> {
@@ -124,38 +135,39 @@ impl KernelMatrix {
     /// Puts a sample at the end of its class.
     pub fn insert(&mut self, key: Key, class: usize, vector: Arc<[f32]>) -> Place {
         let shared = self.known.as_ref().and_then(|known| known.place(&vector));
-        let new = KernelRow::new(key, vector);
-        let lengths: Vec<usize> = self
-            .classes
-            .iter()
-            .zip(&self.room)
-            .map(|(samples, room)| roomy_for(samples.len() + 1, *room))
-            .collect();
-        // Where all others have their rows it has its own at once, from the same products. Of many that come together most are never asked for.
+        let new = KernelRow::new(key, vector, self.classes.len());
+        if self.is_there[class].get().is_none() {
+            return self.append(class, new, shared);
+        }
+        // Where all others have the kernel with its class it has its own at once, from the same products. Of many that come together most are never asked for.
         let is_last = count(&self.classes) + 1 >= self.room.iter().sum();
-        let mut own = is_last.then(|| lengths.into_iter().map(Vec::with_capacity).collect::<Vec<Vec<f32>>>());
         let known = self.known.as_ref().map(|known| known.row(shared));
         let values = known.as_ref().map_or(&[][..], Row::values);
         for (of, (samples, places)) in self.classes.iter_mut().zip(&self.shared).enumerate() {
+            let length = roomy_for(samples.len() + 1, self.room[of]);
+            let mut own = is_last.then(|| Vec::with_capacity(length));
             for (sample, place) in samples.iter_mut().zip(places) {
-                let Some(row) = sample.kernel.get_mut() else {
+                let Some(row) = sample.kernel[class].get_mut() else {
                     own = None;
                     continue;
                 };
                 let value = look_up(values, *place);
                 let value = value.unwrap_or_else(|| kernel(self.gamma, &sample.vector, &new.vector));
-                push(&mut row[class], value);
+                push(row, value);
                 if let Some(own) = &mut own {
-                    own[of].push(value);
+                    own.push(value);
                 }
+            }
+            if let Some(mut own) = own {
+                if of == class {
+                    own.push(1.0);
+                }
+                self.is_there[of].get_or_init(|| ());
+                // It has none yet.
+                let _ = new.kernel[of].set(own);
             }
         }
         drop(known);
-        if let Some(mut own) = own {
-            own[class].push(1.0);
-            // It has none yet.
-            let _ = new.kernel.set(own);
-        }
         self.append(class, new, shared)
     }
 
@@ -164,8 +176,10 @@ impl KernelMatrix {
         let Place { class, position } = place;
         let gone = self.classes[class].swap_remove(position);
         self.shared[class].swap_remove(position);
-        for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut()) {
-            row[class].swap_remove(position);
+        if self.is_there[class].get().is_some() {
+            for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel[class].get_mut()) {
+                row.swap_remove(position);
+            }
         }
         self.places.remove(&gone.key);
         self.moved(place);
@@ -173,9 +187,14 @@ impl KernelMatrix {
 
     /// Moves a sample to the end of another class.
     pub fn relabel(&mut self, place: Place, class: usize) -> Place {
-        for row in self.classes.iter_mut().flatten().filter_map(|sample| sample.kernel.get_mut()) {
-            let value = row[place.class].swap_remove(place.position);
-            push(&mut row[class], value);
+        for sample in self.classes.iter_mut().flatten() {
+            let value = sample.kernel[place.class].get_mut().map(|row| row.swap_remove(place.position));
+            match (value, sample.kernel[class].get_mut()) {
+                (Some(value), Some(row)) => push(row, value),
+                // It is worked out again when it is asked for.
+                (None, Some(_)) => drop(sample.kernel[class].take()),
+                (_, None) => {}
+            }
         }
         let sample = self.classes[place.class].swap_remove(place.position);
         let shared = self.shared[place.class].swap_remove(place.position);
@@ -198,22 +217,19 @@ impl KernelMatrix {
         }
     }
 
-    /// The kernel of a sample with all: what others have of it already is looked up.
-    fn work_out(&self, place: Place) -> Vec<Vec<f32>> {
+    /// The kernel of a sample with those of a class: what others have of it already is looked up.
+    fn work_out(&self, place: Place, class: usize) -> Vec<f32> {
         let (of, its) = (self.at(place), self.shared[place.class][place.position]);
         let known = self.known.as_ref().map(|known| known.row(its));
         let values = known.as_ref().map_or(&[][..], Row::values);
-        let theirs = |other: &KernelRow| other.kernel.get().map(|row| row[place.class][place.position]);
+        let theirs = |other: &KernelRow| other.kernel[place.class].get().map(|row| row[place.position]);
         let reckoned = |other: &KernelRow| kernel(self.gamma, &other.vector, &of.vector);
-        let all = self.classes.iter().zip(&self.shared).zip(&self.room);
-        let of_class = |((samples, places), room): ((&Vec<KernelRow>, &Vec<Option<u32>>), &usize)| {
-            let mut row = Vec::with_capacity(roomy_for(samples.len(), *room));
-            row.extend(places.iter().zip(samples).map(|(place, other)| {
-                look_up(values, *place).or_else(|| theirs(other)).unwrap_or_else(|| reckoned(other))
-            }));
-            row
-        };
-        all.map(of_class).collect()
+        let (samples, places) = (&self.classes[class], &self.shared[class]);
+        let mut row = Vec::with_capacity(roomy_for(samples.len(), self.room[class]));
+        row.extend(places.iter().zip(samples).map(|(place, other)| {
+            look_up(values, *place).or_else(|| theirs(other)).unwrap_or_else(|| reckoned(other))
+        }));
+        row
     }
 }
 
@@ -247,6 +263,10 @@ mod tests {
             let keys: Vec<Key> = samples.places().keys().copied().collect();
             let any = keys.get(rng.random_range(0..keys.len().max(1) as u64) as usize);
             let class = rng.random_range(0..3_u64) as usize;
+            // Of some the kernel with some classes is there.
+            if let Some(place) = any.and_then(|key| samples.place(*key)).filter(|_| step % 3 == 0) {
+                samples.row(place, class);
+            }
             match (rng.random_range(0..5_u64), any.and_then(|key| samples.place(*key))) {
                 (0 | 1, Some(place)) => samples.remove(place),
                 (2, Some(place)) if place.class != class => drop(samples.relabel(place, class)),
@@ -260,14 +280,14 @@ mod tests {
             let sample = samples.at(*place);
             assert_eq!(sample.key, *key);
             for class in 0..3 {
-                let row = &samples.row(*place)[class];
-                held += row.capacity();
+                let row = samples.row(*place, class);
+                held += sample.kernel[class].get().map_or(0, Vec::capacity);
                 let expected: Vec<f32> = samples
                     .of(class)
                     .iter()
                     .map(|other| (-0.3 * squared_distance(&sample.vector, &other.vector)).exp())
                     .collect();
-                assert_eq!(*row, expected);
+                assert_eq!(row, expected);
             }
         }
         assert!(held <= samples.places().len() * (peak + peak / 8 + 3 * 4), "{held} for {peak}");

@@ -174,7 +174,7 @@ mod tests {
                     for class in 0..3 {
                         let others = samples.of(class).iter();
                         let own = others.map(|other| kernel(0.3, &other.vector, &samples.at(*place).vector));
-                        assert!(own.eq(samples.row(*place)[class].iter().copied()), "{step}");
+                        assert!(own.eq(samples.row(*place, class).iter().copied()), "{step}");
                     }
                 }
             }

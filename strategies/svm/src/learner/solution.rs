@@ -369,14 +369,14 @@ mod tests {
                     if count > 3 && rng.random_bool(0.3) {
                         let position = rng.random_range(0..count as u64) as usize;
                         let place = super::super::samples::Place { class: side, position };
-                        let row = || [0, 1].map(|class| samples.row(place)[class].as_slice());
+                        let row = || [0, 1].map(|class| samples.row(place, class));
                         solution.remove(side, position, row);
                         samples.remove(place);
                     } else {
                         // Some are in one place, with different classes.
                         let x = if next % 5 == 4 { vec![0.5; 5] } else { vector(side, &mut rng) };
                         let place = samples.insert(Key::Inserted(next), side, x.into());
-                        let row = || [0, 1].map(|class| samples.row(place)[class].as_slice());
+                        let row = || [0, 1].map(|class| samples.row(place, class));
                         solution.insert(side, row);
                         next += 1;
                     }
@@ -386,7 +386,7 @@ mod tests {
                 }
                 let rows = |side: usize, position: usize| -> [&[f32]; 2] {
                     let place = super::super::samples::Place { class: side, position };
-                    [0, 1].map(|class| samples.row(place)[class].as_slice())
+                    [0, 1].map(|class| samples.row(place, class))
                 };
                 solution.solve(cost, &rows, |_, _| false);
                 let violation = violation(&solution, &samples, f64::from(gamma), cost);

@@ -199,6 +199,7 @@ fn there_is_room_for_so_many_gestures_and_no_more() {
 fn one_that_slims_down_after_each_round_learns_the_same() {
     let mut rng = generator(9);
     let (mut slim, mut full) = (learner(), learner());
+    let mut most_held = 0;
     // Some come together, as where a robot begins anew.
     slim.make_room((0..60).map(|key| ClassId(key % CLASSES as u32)));
     for round in 0..12_u64 {
@@ -216,6 +217,8 @@ fn one_that_slims_down_after_each_round_learns_the_same() {
         let x = vector(1, &mut rng);
         assert_eq!(learned[0].probabilities_in_space(&x), learned[1].probabilities_in_space(&x));
         slim.slim_down();
-        assert!(slim.samples.rows_held() == 0 && full.samples.rows_held() > 0);
+        assert_eq!(slim.samples.rows_held(), 0);
+        most_held = most_held.max(full.samples.rows_held());
     }
+    assert!(most_held > 0);
 }
