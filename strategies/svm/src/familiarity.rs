@@ -14,7 +14,7 @@ use std::f64::consts::LN_2;
 use serde::{Deserialize, Serialize};
 
 use calibrating::{Calibrated, TERMS, log_ratio};
-pub(crate) use scatter::{Scatter, Seen};
+pub(crate) use scatter::{LogsLeftOut, Scatter, Seen};
 
 use crate::head::{Discriminant, Shown};
 use crate::scatter::{entries, whiten};
@@ -103,11 +103,10 @@ impl Familiarity {
         Some(Self::of(&Scatter::of(samples, spread)?, None))
     }
 
-    /// The same of classes that were found to lie so, and of what a discriminant makes of them.
-    pub fn of(scatter: &Scatter, discriminant: Option<&Discriminant>) -> Self {
-        let plain = discriminant.map(|discriminant| discriminant.clone().sharpened(1.0));
-        let (known, unknown) = scatter.left_out(plain.as_ref());
-        let between = plain.as_ref().map(|plain| scatter.between(plain));
+    /// The same of classes that were found to lie so, and of what a plain discriminant makes of them.
+    pub fn of(scatter: &Scatter, plain: Option<(&Discriminant, &LogsLeftOut)>) -> Self {
+        let (known, unknown) = scatter.left_out(plain);
+        let between = plain.map(|(plain, _)| scatter.between(plain));
         let Calibrated { any: [offset, distance, lead, margin], gesture, bounds } =
             Calibrated::by(&known, &unknown, between.as_ref());
         Self {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Score, Shown};
-use crate::head::{Discriminant, margin_of};
+use crate::head::{Discriminant, Spot, margin_of};
 use crate::scatter::{Covariance, whiten};
 
 /// The mean of a showing, and its samples, each with its place among all.
@@ -14,6 +14,9 @@ type ByClass<'a> = BTreeMap<usize, Vec<Showing<'a>>>;
 
 /// The samples of a showing, each with its place among all.
 type Views<'a> = Vec<(usize, &'a [f32])>;
+
+/// What a discriminant says of samples, each without its showing; `None` where that is all that is known of its class.
+pub(crate) type LogsLeftOut = Vec<Option<Vec<f64>>>;
 
 /// What views score, with what each weighs.
 pub(super) type Scores = Vec<(Score, f64)>;
@@ -140,10 +143,21 @@ impl Scatter {
         Discriminant::of(&self.whitening, &self.means(), &self.showings(), &met, classes)
     }
 
+    /// What a discriminant says of each sample that is not all of its class, without its showing: by its place here.
+    pub fn logs_left_out(&self, plain: &Discriminant) -> LogsLeftOut {
+        let spots = |class: &OfClass| class.showings.iter().map(|mean| plain.spot(mean)).collect();
+        let showings: Vec<Vec<Spot>> = self.classes.iter().map(spots).collect();
+        let logs = |seen: &Seen| {
+            let own = &showings[seen.class][seen.showing];
+            plain.logs_without(&plain.spot(&seen.white), self.classes[seen.class].name, own)
+        };
+        self.samples.iter().map(logs).collect()
+    }
+
     /// What views of known gestures score, each without its showing, and views of unknown ones, each without its class; with what each weighs.
-    pub fn left_out(&self, plain: Option<&Discriminant>) -> (Scores, Scores) {
+    pub fn left_out(&self, plain: Option<(&Discriminant, &LogsLeftOut)>) -> (Scores, Scores) {
         let (mut known, mut unknown) = (Vec::new(), Vec::new());
-        for Seen { class, showing, weight, white, .. } in &self.samples {
+        for (place, Seen { class, showing, weight, white, .. }) in self.samples.iter().enumerate() {
             let to = |(k, of_class): (usize, &OfClass)| {
                 let n = of_class.showings.len() as f64;
                 if k != *class {
@@ -157,18 +171,16 @@ impl Scatter {
             };
             let distances: Vec<(usize, f64)> = self.classes.iter().enumerate().filter_map(to).collect();
             let others = distances.iter().filter(|(k, _)| k != class).map(|(_, distance)| *distance);
-            let spot = plain.map(|plain| plain.spot(white));
-            let margin = plain.zip(spot.as_ref()).and_then(|(plain, spot)| {
-                let mut logs = plain.logs_at(spot);
+            let without = plain.and_then(|(_, left_out)| left_out[place].as_ref());
+            let margin = plain.and_then(|(plain, _)| {
+                // Of the other classes it says the same either way.
+                let mut logs = without.cloned().unwrap_or_else(|| plain.logs_at(&plain.spot(white)));
                 logs[self.classes[*class].name] = f64::NEG_INFINITY;
                 margin_of(&logs)
             });
             unknown.extend(Score::of(others).map(|score| (Score { margin, ..score }, *weight)));
             if distances.len() == self.classes.len() {
-                let margin = plain.zip(spot.as_ref()).and_then(|(plain, spot)| {
-                    let own = plain.spot(&self.classes[*class].showings[*showing]);
-                    margin_of(&plain.logs_without(spot, self.classes[*class].name, &own)?)
-                });
+                let margin = without.and_then(|logs| margin_of(logs));
                 let score = Score::of(distances.iter().map(|(_, d)| *d));
                 known.extend(score.map(|score| (Score { margin, ..score }, *weight)));
             }

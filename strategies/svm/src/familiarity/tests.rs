@@ -98,7 +98,7 @@ fn what_lies_between_gestures_makes_no_taught_one_look_like_another() {
         let world = World::new(8, &mut rng);
         let scatter = world.scatter(5, 3, &mut rng).unwrap();
         let plain = scatter.discriminant(5).sharpened(1.0);
-        let familiarity = Familiarity::of(&scatter, Some(&plain));
+        let familiarity = Familiarity::of(&scatter, Some((&plain, &scatter.logs_left_out(&plain))));
         for class in 0..8 {
             let view = world.showing(class, 1, &mut rng).remove(0);
             let Unfamiliar { any, gesture } = familiarity.judge(&view, margin_of(&plain.logs(&view)));

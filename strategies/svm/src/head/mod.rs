@@ -17,6 +17,7 @@ use std::fmt::Debug;
 
 pub(crate) use blend::{Blend, Few, Losses, YOUNG, blended};
 pub use discriminant::Discriminant;
+pub(crate) use discriminant::Spot;
 pub use discriminant_sums::DiscriminantSums;
 pub(crate) use sharpness::sharpness;
 pub(crate) use sums::Sums;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::samples::{KernelMatrix, Key};
-use crate::familiarity::{Familiarity, Scatter, Seen};
+use crate::familiarity::{Familiarity, LogsLeftOut, Scatter, Seen};
 use crate::feature_space::FeatureSpace;
 use crate::head::{Few, Shown, Sums, Teach, sharpness};
 
@@ -59,10 +59,11 @@ impl FewShowings {
         Scatter::by(&self.shown(samples), self.sums.spread().len(), whitening)
     }
 
-    /// What is familiar, of so many classes; with the margins of the discriminant, where that is the head.
-    pub fn familiarity(&self, scatter: &Scatter, classes: usize) -> Familiarity {
-        let discriminant = self.own.is_none().then(|| scatter.discriminant(classes));
-        Familiarity::of(scatter, discriminant.as_ref())
+    /// What is familiar, of so many classes; with the margins of the discriminant, where that is the head, and what that says of each sample without its showing.
+    pub fn familiarity(&self, scatter: &Scatter, classes: usize) -> (Familiarity, Option<LogsLeftOut>) {
+        let plain = self.own.is_none().then(|| scatter.discriminant(classes));
+        let logs = plain.as_ref().map(|plain| scatter.logs_left_out(plain));
+        (Familiarity::of(scatter, plain.as_ref().zip(logs.as_ref())), logs)
     }
 
     /// The head that knows all samples, of the classes at these places, in that order.
@@ -88,32 +89,22 @@ impl FewShowings {
         }
     }
 
-    /// What the head says of each sample without its showing, by class and position. Settles how sharp a discriminant is.
+    /// What the head says of each sample without its showing, by class and position: a discriminant has said that already. Settles how sharp it is.
     pub fn left_out(
         &mut self,
         samples: &KernelMatrix,
-        scatter: &Scatter,
+        (scatter, said): (&Scatter, Option<LogsLeftOut>),
         folds: &[Vec<usize>],
-        head: &Few,
         space: &FeatureSpace,
     ) -> Vec<Vec<LeftOut>> {
         let mut by_place: Vec<Vec<LeftOut>> =
             folds.iter().map(|of_class| vec![None; of_class.len()]).collect();
         let places: Vec<_> = samples.places().values().copied().collect();
-        match head {
-            Few::Discriminant(discriminant) => {
-                let plain = discriminant.clone().sharpened(1.0);
-                let showings: Vec<Vec<_>> = scatter
-                    .classes
-                    .iter()
-                    .map(|class| class.showings.iter().map(|mean| plain.spot(mean)).collect())
-                    .collect();
-                let logs = |seen: &Seen| {
-                    let own = &showings[seen.class][seen.showing];
-                    plain.logs_without(&plain.spot(&seen.white), scatter.classes[seen.class].name, own)
-                };
+        match said {
+            Some(logs) => {
+                let said = scatter.samples.iter().zip(logs);
                 let all: Vec<(&Seen, Vec<f64>)> =
-                    scatter.samples.iter().filter_map(|seen| Some((seen, logs(seen)?))).collect();
+                    said.filter_map(|(seen, logs)| Some((seen, logs?))).collect();
                 // In an order that does not depend on what came first.
                 self.sharpness =
                     sharpness(all.iter().map(|(seen, logs)| {
@@ -125,7 +116,7 @@ impl FewShowings {
                     by_place[place.class][place.position] = Some((seen.weight, logs));
                 }
             }
-            Few::Own(_) => {
+            None => {
                 let Some(own) = &self.own else { return by_place };
                 let shown = self.shown(samples);
                 let fold = |place: &super::Place| folds[place.class][place.position];

@@ -291,15 +291,16 @@ impl Learner {
         let present = self.present();
         self.few.sums.settle();
         let scatter = self.few.scatter(&self.samples);
-        let familiarity = scatter.as_ref().map(|scatter| self.few.familiarity(scatter, self.touched.len()));
+        let found = scatter.as_ref().map(|scatter| self.few.familiarity(scatter, self.touched.len()));
+        let (familiarity, said) = found.unzip();
         // A head of the classes of these places.
         let head = |few: &FewShowings, places: &[usize]| {
             let familiarity = familiarity.as_ref()?;
             Some(few.head(&self.samples, familiarity, &present, (places, &self.space)))
         };
         let (stale, all) = (self.stale(), self.classes().collect::<Vec<_>>());
-        if let (Some(scatter), Some(head), false) = (&scatter, head(&self.few, &all), stale.is_empty()) {
-            let left_out = self.few.left_out(&self.samples, scatter, &self.folds, &head, &self.space);
+        if let (Some(scatter), Some(said), false) = (&scatter, said, stale.is_empty()) {
+            let left_out = self.few.left_out(&self.samples, (scatter, said), &self.folds, &self.space);
             for index in stale {
                 self.pairs[index].calibrate(&self.samples, cost, (&self.folds, count), &left_out);
             }
