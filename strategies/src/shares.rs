@@ -30,9 +30,16 @@ pub(crate) struct Shares {
     gone: BTreeSet<RobotId>,
     /// How many samples of strangers are held; `None` before they are counted.
     strange: Option<usize>,
+    /// Nobody has a share: whatever the rule of forgetting names goes, whosever it is.
+    none: bool,
 }
 
 impl Shares {
+    /// Nobody's.
+    pub fn none() -> Self {
+        Self { none: true, ..Self::default() }
+    }
+
     /// These robots are alive now. Gives those that were not before.
     pub fn meet(&mut self, me: RobotId, alive: Arc<BTreeSet<RobotId>>) -> BTreeSet<RobotId> {
         self.silent.retain(|robot| alive.contains(robot));
@@ -106,7 +113,7 @@ impl Shares {
     /// The sample to go because its author, or all strangers together, have more than their share: of whoever is furthest
     /// above, the oldest of the class that it has most of; of a young one only where it has no others.
     pub fn above(&mut self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
-        let n = self.robots()?;
+        let n = self.robots().filter(|_| !self.none)?;
         let each = LEAST.max((5 * capacity).div_ceil(4 * n));
         let strangers = LEAST.max(capacity.div_ceil(4));
         let count =
@@ -141,7 +148,8 @@ impl Shares {
 
     /// Whether there are so few own samples that none goes for those of others.
     fn own_stay(&self, samples: &HeldSamples, capacity: usize) -> bool {
-        let reserve = self.robots().map(|n| LEAST.max(capacity.div_ceil(n)).min(capacity / 2));
+        let robots = self.robots().filter(|_| !self.none);
+        let reserve = robots.map(|n| LEAST.max(capacity.div_ceil(n)).min(capacity / 2));
         let own = samples.total(SetPart::Personal) + samples.total(SetPart::Shared);
         reserve.is_some_and(|reserve| own <= reserve)
     }
@@ -184,8 +192,11 @@ fn oldest_of_most(samples: &HeldSamples, of: RobotId) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::{RoundId, SampleId};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::{ForgettingRule, SelectionRule, TrainingSet};
 
     const ME: RobotId = RobotId(1);
 
@@ -223,6 +234,32 @@ mod tests {
             let goes = shares.above(&samples, 24).and_then(|key| samples.get(key)).unwrap();
             assert_eq!((goes.author(), goes.class), (Some(RobotId(2)), circle()));
         }
+    }
+
+    #[test]
+    fn without_shares_the_rule_of_forgetting_alone_says_what_goes() {
+        let left = |shared: bool| {
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            let rules = (SelectionRule::Random.build(), ForgettingRule::Fifo.build());
+            let mut set = TrainingSet::new(ME, 12, rules.0, rules.1);
+            if !shared {
+                set = set.without_shares();
+            }
+            set.meet(Arc::new((1..=3).map(RobotId).collect()));
+            let round = RoundId { counter: 1, opener: ME, life: 0 };
+            for _ in 0..3 {
+                set.keep(ClassId(0), round, vec![0.0], &mut rng);
+            }
+            // The last of them sends more than its five.
+            for (author, number) in (1..=3).map(|n| (3, n)).chain((1..=10).map(|n| (2, n))) {
+                let id = SampleId { author: RobotId(author), life: 1, number };
+                set.receive(id, ClassId(0), round, [0.0], &mut rng);
+            }
+            let of = |author| set.iter().filter(|it| it.author() == Some(RobotId(author))).count();
+            [set.total(SetPart::Personal), of(3), of(2)]
+        };
+        assert_eq!(left(true), [3, 3, 6]);
+        assert_eq!(left(false), [0, 2, 10]);
     }
 
     #[test]

@@ -103,6 +103,13 @@ impl TrainingSet {
         self
     }
 
+    /// The same set without shares of its room: what the rule of forgetting names goes, whosever it is. Who sends most pushes out what others sent.
+    #[must_use]
+    pub(crate) fn without_shares(mut self) -> Self {
+        self.shares = Shares::none();
+        self
+    }
+
     /// These other robots are alive now. From then on no author's samples push out those of the others when the set is full,
     /// and when more series were seen than are kept track of, those of robots that are not there give way, or where all are
     /// there the oldest life of the robot that has most: each other robot has at most max(5, ⌈1.25 · capacity / robots⌉)

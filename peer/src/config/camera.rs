@@ -8,7 +8,7 @@ use gestalt_ros::NodeName;
 use gestalt_vision::camera_model::CameraModel;
 use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, Schedule};
 use gestalt_vision::pose::Pose;
-use gestalt_vision::source::Glove;
+use gestalt_vision::config::Glove;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;

@@ -11,7 +11,7 @@ use crate::camera_source::open_source;
 use crate::model;
 
 /// Everything that keeps a robot with that configuration from starting: keys, values, and files; empty when it can start.
-/// Reads the model and opens the source; the memory is tried on a copy. A camera device that is not there is not among
+/// Reads the model and opens the source; the memory is tried on a copy in this process. A camera device that is not there is not among
 /// it: a robot starts without, and waits for it.
 #[must_use]
 pub fn problems(document: Document) -> (Option<Config>, Vec<ConfigError>) {
@@ -32,7 +32,10 @@ fn files(config: &Config) -> Vec<ConfigError> {
         found.push(ConfigError::value("camera.source", error));
     }
     match model::load(&config.model) {
-        Ok(Some(model)) => found.extend(memory(config, &model).err()),
+        Ok(Some(model)) => {
+            let tried = memory(config, &model);
+            found.extend(tried.err().map(|error| ConfigError::value("learning.memory", said(&error))));
+        }
         Ok(None) => {}
         Err(error) => found.push(ConfigError::value("model", error)),
     }
@@ -40,40 +43,32 @@ fn files(config: &Config) -> Vec<ConfigError> {
 }
 
 /// Whether the robot's memory is its own, and fits its model.
-pub(crate) fn memory(config: &Config, model: &RobotModel) -> Result<(), ConfigError> {
-    let Some(mut learning) = learning(&config.learning, model) else { return Ok(()) };
-    let Some(path) = learning.memory.take() else { return Ok(()) };
-    let wrong = |cause: String| Err(ConfigError::value("learning.memory", cause));
-    let folder = gestalt_file::folder(&path);
+pub(crate) fn memory(config: &Config, model: &RobotModel) -> Result<(), LinkError> {
+    let Some(learning) = learning(&config.learning, model) else { return Ok(()) };
+    let Some(path) = &learning.memory else { return Ok(()) };
+    let wrong = |cause: String| LinkError::Config { key: "learning.memory".to_owned(), cause };
+    // Of a link it is the folder that it leads to.
+    let end = gestalt_file::target(path).map_err(|cause| wrong(format!("{}: {cause}", path.display())))?;
+    let folder = gestalt_file::folder(&end);
     if !folder.is_dir() {
-        return wrong(format!("the folder {} does not exist: create it", folder.display()));
+        return Err(wrong(format!("the folder {} does not exist: create it", folder.display())));
     }
-    if !path.exists() {
-        return Ok(());
+    if path.exists() { learning.check(config.robot.id, &config.rounds) } else { Ok(()) }
+}
+
+/// What is wrong, without the key.
+pub(crate) fn said(error: &LinkError) -> String {
+    match error {
+        LinkError::Config { cause, .. } => cause.clone(),
+        other => other.to_string(),
     }
-    // A start is counted in the memory; this is none.
-    let tried = tempfile::tempdir().and_then(|place| {
-        let copy = place.path().join("memory");
-        std::fs::copy(&path, &copy)?;
-        Ok((place, copy))
-    });
-    let (_place, copy) = match tried {
-        Ok(tried) => tried,
-        Err(cause) => return wrong(format!("cannot read {}: {cause}", path.display())),
-    };
-    learning.memory = Some(copy.clone());
-    learning.check(config.robot.id, &config.rounds).or_else(|error| {
-        let said = match error {
-            LinkError::Config { cause, .. } => cause,
-            other => other.to_string(),
-        };
-        wrong(said.replace(&copy.display().to_string(), &path.display().to_string()))
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+
+    use gestalt_link::{LinkConfig, Robot, RobotConfig, fresh_nonce};
 
     use super::*;
 
@@ -124,8 +119,8 @@ mod tests {
         assert!(missing.len() == 1 && missing[0].contains("missing does not exist"), "{missing:?}");
     }
 
-    #[test]
-    fn a_memory_of_another_robot_or_garbage_is_refused_and_left_as_it_is() {
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_memory_of_another_robot_or_garbage_is_refused_and_left_as_it_is() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("robot.memory");
         std::fs::write(&path, "not a database at all").unwrap();
@@ -137,8 +132,20 @@ mod tests {
         std::fs::remove_file(&path).unwrap();
         let (config, _) = problems(Document::parse(&text, "test").unwrap());
         let (config, model) = (config.unwrap(), RobotModel::rendered().unwrap());
-        let learning = learning(&config.learning, &model).unwrap();
-        learning.check(gestalt_protocol::RobotId(7), &config.rounds).unwrap();
+        let robot = Robot::start(RobotConfig {
+            id: gestalt_protocol::RobotId(7),
+            name: String::new(),
+            boot: 1,
+            swarm: "check".to_owned(),
+            mind: config.rounds.clone(),
+            fusion: None,
+            link: LinkConfig::default(),
+            vocabulary: None,
+            learning: learning(&config.learning, &model),
+            nonce: fresh_nonce(),
+            seal: None,
+        });
+        robot.await.unwrap().stop().await;
         let before = std::fs::read(&path).unwrap();
         let others = found(&text);
         assert!(

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::ConfigError;
-use super::finite::Finite;
+use super::strict::Strict;
 
 /// A configuration file's tree of values.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -220,7 +220,7 @@ fn json(text: &str) -> Result<Value, String> {
     if is_too_deep(text) {
         return Err(format!("brackets within brackets, more than {DEEPEST} deep"));
     }
-    json5::from_str(text).map(|Finite(value)| value).map_err(|cause| cause.to_string())
+    json5::from_str(text).map(|Strict(value)| value).map_err(|cause| cause.to_string())
 }
 
 /// Whether brackets are open so deep, as if none stood in text.
@@ -277,11 +277,23 @@ mod tests {
                 assert!(refused.contains("write a number, or null at line 2"), "{refused}");
             }
         }
-        let whole =
-            "{a: [1, -2, 0.5, 'x', null, true, {b: {}}], a: 1, c: [1, -2, 0.5, 'x', null, true, {b: {}}]}";
+        let whole = "{a: 1, c: [1, -2, 0.5, 'x', null, true, {b: {}}]}";
         let plain: Value = serde_json::json!({"a": 1, "c": [1, -2, 0.5, "x", null, true, {"b": {}}]});
         assert_eq!(Value::Object(document(whole, &[]).unwrap().root), plain);
         assert!(document("[1]", &[]).unwrap_err().to_string().contains("no object"));
+    }
+
+    #[test]
+    fn a_key_that_stands_twice_is_refused_with_its_second_place() {
+        let text = "{links: {\n  cells: {size: 32},\n  max_links: 4,\n  'cells': null}}";
+        for text in [text.to_owned(), format!("{{zenoh: [{{a: 1}}, {text}]}}")] {
+            let refused = document(&text, &[]).unwrap_err().to_string();
+            assert!(refused.contains("'cells'") && refused.contains("at line 4"), "{refused}");
+        }
+        let refused = "links:{cells: 1, cells: 2}".parse::<Override>().unwrap_err().to_string();
+        assert!(refused.contains("'cells'"), "{refused}");
+        // In two objects it stands once in each.
+        assert!(document("{a: {b: {a: 1}}, b: [{a: 1}, {a: 1}]}", &[]).is_ok());
     }
 
     #[test]

@@ -25,7 +25,11 @@ mod tests {
             }
             if let Some((key, value)) = line.split_once(": ") {
                 path.push(key);
-                explained.insert(path.join("."), comment.clone());
+                let key = path.join(".");
+                assert!(
+                    explained.insert(key, comment.clone()).is_none(),
+                    "{path:?} stands in the template twice"
+                );
                 if value != "{" {
                     path.pop();
                 }

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_link::{Bearer, Certificate, Credentials, LinkError, Seal, SealError, boot_number, counted_boot};
 use gestalt_protocol::{InstructorId, RobotId};
@@ -28,6 +28,15 @@ pub fn client_key_file(folder: &Path, client: &InstructorId) -> PathBuf {
 /// The number of a robot's last start, beside its key.
 fn starts_file(key: &Path) -> PathBuf {
     key.with_extension("starts")
+}
+
+/// Among how many centres the numbers of a robot's starts are shared out.
+const SHARES: u32 = 16;
+
+/// The time whose [`boot_number`] that is.
+fn time_of(boot: u32) -> SystemTime {
+    const YEAR_2026: Duration = Duration::from_secs(1_767_225_600);
+    UNIX_EPOCH + YEAR_2026 + Duration::from_millis(100) * boot
 }
 
 /// The certificate beside a key.
@@ -69,6 +78,19 @@ impl TrustSection {
             Some(folder) => counted_boot(&starts_file(&key_file(folder, robot)), now),
             None => boot_number(now),
         }
+    }
+
+    /// The number of a start of a robot that happens now at a centre that votes for it. Where it has a key, one number of every sixteen is that
+    /// centre's: two centres that start it by one clock would say two things under one stamp, which convicts it for good.
+    #[must_use]
+    pub fn boot_at(&self, centre: RobotId, robot: RobotId, now: SystemTime) -> u32 {
+        let counted = self.boot(robot, now);
+        let ahead = (centre.0 % SHARES).wrapping_sub(counted) % SHARES;
+        if self.keys.is_none() || ahead == 0 {
+            return counted;
+        }
+        // Counted as if it were as late as that: it is kept, and the next one is higher.
+        self.boot(robot, time_of(counted.saturating_add(ahead)))
     }
 
     /// The key of a robot that votes through another; `None` in an open swarm.
@@ -133,4 +155,37 @@ impl TrustSection {
 
 fn wrong(error: impl Display) -> LinkError {
     LinkError::Config { key: "trust.keys".to_owned(), cause: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn starts_at_two_centres_have_no_number_in_common_and_those_at_each_grow() {
+        let (robot, now) = (RobotId(2), SystemTime::now());
+        let folders = [100, 101].map(|centre| (RobotId(centre), tempfile::tempdir().unwrap()));
+        let numbers = folders.each_ref().map(|(centre, folder)| {
+            let trust = TrustSection { keys: Some(folder.path().to_owned()), insecure: false };
+            // At one moment, by one clock, again and again; by a clock without a battery; and later.
+            let late = now + Duration::from_secs(3600);
+            let times = (0..40).map(|_| now).chain([UNIX_EPOCH, UNIX_EPOCH, late]);
+            let numbers: Vec<u32> = times.map(|time| trust.boot_at(*centre, robot, time)).collect();
+            assert!(numbers.is_sorted_by(|one, next| one < next), "{numbers:?}");
+            assert!(numbers[0].abs_diff(boot_number(now)) < 16, "{}", numbers[0]);
+            // Started on its own in the same folder it counts on.
+            assert!(trust.boot(robot, now) > numbers[42]);
+            numbers.into_iter().collect::<BTreeSet<u32>>()
+        });
+        assert!(numbers[0].is_disjoint(&numbers[1]), "{numbers:?}");
+    }
+
+    #[test]
+    fn a_time_is_that_of_its_number() {
+        for boot in [1, 16, 290_000_000, u32::MAX] {
+            assert_eq!(boot_number(time_of(boot)), boot);
+        }
+    }
 }

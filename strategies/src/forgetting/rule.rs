@@ -15,7 +15,8 @@ use super::redundancy::Redundancy;
 use super::representativity::RepresentativityForgetting;
 use super::reservoir::Reservoir;
 
-/// The forgetting rules that come with Gestalt.
+/// The forgetting rules that come with Gestalt. A rule is asked where no author has more than its share of the room, and own samples that it names stay
+/// while they are few: see [`author_shares`](crate::LearningConfig::author_shares).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ForgettingRule {
@@ -23,7 +24,7 @@ pub enum ForgettingRule {
     Fifo,
     /// See [`RandomForgetting`].
     Random,
-    /// See [`Redundancy`]. The default: what goes has another close to it, and it was measured to cost the least.
+    /// See [`Redundancy`]. The default: what goes has another close to it, and of those compared, within shares of authors, it cost the least.
     #[default]
     Redundancy,
     /// See [`RepresentativityForgetting`].

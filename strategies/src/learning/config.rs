@@ -38,6 +38,11 @@ pub enum LearningConfigError {
         /// The least it may be.
         least: f64,
     },
+    /// Groups have room of their own, and no share beside.
+    #[error(
+        "author_shares is false and learner.groups set: groups have room of their own, and the rule of forgetting is not asked; leave one of them out"
+    )]
+    Shares,
     /// Fewer bytes than one sample takes.
     #[error(
         "share_bytes is {0}: one sample takes up to 128 bytes and more; choose at least 128, or leave it out"
@@ -79,6 +84,7 @@ pub enum LearningConfigError {
 /// | `precision` | i8 | how shared vectors travel | |
 /// | `selection` | k_center | which samples are shared | |
 /// | `forgetting` | redundancy | which samples go when there are more than T | |
+/// | `author_shares` | true | no author's samples push out those of the others, whatever the rule of forgetting names; false: the rule alone | |
 /// | `sure` | 0.95 | probability from which a sample of several possible gestures is labelled by the robot itself | 0.5–1 |
 /// | `poison` | | how samples of others are met that would teach wrongly: see [`PoisonDefence`] |  |
 /// | `aside` | 256 | the most samples kept aside until it is known what they show | 0–100,000 |
@@ -113,6 +119,10 @@ pub struct LearningConfig {
     pub selection: SelectionRule,
     /// Which samples go when there are more than T.
     pub forgetting: ForgettingRule,
+    /// Whether each author has a share of the room: of more than ⌈1.25 · T / robots⌉ samples of another robot the oldest go before the rule of
+    /// forgetting is asked, and own ones stay while they are ⌈T / robots⌉ or fewer, though the rule names them. So whoever sends most changes
+    /// little. Without it the rule alone says what goes: that is for comparing rules, and for no robot among strangers.
+    pub author_shares: bool,
     /// From which probability on a sample of which several gestures are possible is labelled by the robot itself.
     pub sure: f64,
     /// The most samples kept aside until it is known what they show.
@@ -138,6 +148,7 @@ impl Default for LearningConfig {
             precision: Precision::default(),
             selection: SelectionRule::default(),
             forgetting: ForgettingRule::default(),
+            author_shares: true,
             sure: 0.95,
             aside: 256,
             poison: PoisonDefence::default(),
@@ -177,6 +188,9 @@ impl LearningConfig {
         if self.learner.groups > 0 && self.poison != PoisonDefence::default() {
             return Err(LearningConfigError::Groups);
         }
+        if self.learner.groups > 0 && !self.author_shares {
+            return Err(LearningConfigError::Shares);
+        }
         if let Some(bytes) = self.share_bytes.filter(|bytes| *bytes < 128) {
             return Err(LearningConfigError::Bytes(bytes));
         }
@@ -215,6 +229,14 @@ mod tests {
                     ..default()
                 },
                 "agreement",
+            ),
+            (
+                LearningConfig {
+                    author_shares: false,
+                    learner: LearnerOptions { groups: 3, ..Default::default() },
+                    ..default()
+                },
+                "author_shares",
             ),
             (LearningConfig { spacing: Duration::MAX, ..default() }, "spacing"),
         ] {

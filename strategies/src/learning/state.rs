@@ -136,6 +136,9 @@ impl Learning {
         let (selection, forgetting) = rules.make(&config);
         let mut set = TrainingSet::new(me, config.capacity, selection, forgetting).in_life(life);
         set = set.in_groups(Groups::new(config.learner.groups));
+        if !config.author_shares {
+            set = set.without_shares();
+        }
         let fresh = memory.is_empty();
         let RobotMemory { counters, samples, seen, lessons: heard, namings, aside, batches: told, .. } =
             memory;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision};
+use gestalt_protocol::{ClassId, Decision, Gesture, Instruction};
 
 /// So many different decisions are compared with each that a robot comes to hold.
 const DIFFERENT: usize = 16;
@@ -15,6 +15,8 @@ pub(super) struct Showing {
     pub shown: ClassId,
     /// The counter of its round; none when no robot opened one.
     pub counter: Option<u32>,
+    /// Whether the instructor said of it that it was the gesture shown.
+    pub named_rightly: bool,
     pub announcements: u32,
     /// Whether the gesture shown, and whether another, was announced as final.
     pub finally_right: bool,
@@ -81,6 +83,7 @@ impl Record {
             at,
             shown,
             counter,
+            named_rightly: false,
             announcements: 0,
             finally_right: false,
             finally_wrong: false,
@@ -112,9 +115,15 @@ impl Record {
         });
     }
 
-    /// The instructor spoke.
-    pub fn tell(&mut self) {
+    /// The instructor said that.
+    pub fn tell(&mut self, instruction: &Instruction) {
         self.told = true;
+        if let Instruction::Was { round, class: Gesture::Class(named) }
+        | Instruction::Right { round, of: Gesture::Class(named) } = instruction
+            && let Some(showing) = self.showing(round.counter)
+        {
+            showing.named_rightly |= *named == showing.shown;
+        }
     }
 
     pub fn frame(&mut self, probabilities: &[f64], shown: ClassId) {

@@ -60,7 +60,7 @@ pub struct Report {
     /// Its decisions for a gesture.
     #[serde(skip)]
     pub(super) said: Vec<Said>,
-    /// How many of the showings were of gestures that nobody had taught yet.
+    /// How many of the showings were of gestures that no instructor had named yet.
     pub untaught: u64,
 }
 
@@ -119,10 +119,10 @@ impl Report {
             Mean::of(&opened.iter().filter_map(|s| Some(ms(s, at(s)?))).collect::<Vec<_>>())
         };
         let open = record.open.as_secs_f64();
-        // Robots that do not learn know all gestures; those that do were told of each that was shown.
+        // Robots that do not learn know all gestures; those that do know what somebody named, and rightly.
         let taught = |n: usize| {
             let (showing, before) = (&record.showings[n], &record.showings[..n]);
-            learned.is_none() || before.iter().any(|b| b.counter.is_some() && b.shown == showing.shown)
+            learned.is_none() || before.iter().any(|b| b.named_rightly && b.shown == showing.shown)
         };
         let heard: Vec<usize> =
             (0..record.showings.len()).filter(|n| record.showings[*n].counter.is_some()).collect();
@@ -209,7 +209,7 @@ pub struct Summary {
     pub undecided: Proportion,
     /// As in [`Report`], over the rounds of all seeds.
     pub likeliest_right: Proportion,
-    /// The shares of the seeds.
+    /// The shares of those seeds in which a robot saw anything.
     pub frames_right: Mean,
     /// As in [`Report`], over the votes of all seeds.
     pub votes_right: Proportion,
@@ -250,7 +250,7 @@ impl Summary {
             wrong: pool(&|report| report.wrong),
             undecided: pool(&|report| report.undecided),
             likeliest_right: pool(&|report| report.likeliest_right),
-            frames_right: mean(&|report| report.frames_right.share),
+            frames_right: Mean::of_shares(reports.iter().map(|report| report.frames_right)),
             votes_right: pool(&|report| report.votes_right),
             unanimous: pool(&|report| report.unanimous),
             conflicts: reports.iter().map(|report| report.conflicts).sum(),
@@ -287,10 +287,6 @@ impl fmt::Display for Table<'_> {
         )?;
         for summary in self.0 {
             let rule = summary.rule;
-            let decided = match summary.decided_ms {
-                Mean { n: 0, .. } => "–".to_owned(),
-                decided => decided.decimals(0),
-            };
             writeln!(
                 f,
                 "{rule:<20} {:>5}  {:<20} {:<18} {:>9}  {:<20} {:<20} {:>14} {:>9.0}",
@@ -300,33 +296,35 @@ impl fmt::Display for Table<'_> {
                 summary.undecided.hits,
                 percent(summary.likeliest_right),
                 percent(summary.unanimous),
-                decided,
+                summary.decided_ms.decimals(0),
                 summary.vote_bytes_per_open_second.mean,
             )?;
         }
         writeln!(
             f,
-            "\n{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
+            "\n{:<20} {:>5}  {:<19} {:<9} {:<26} {:<26} {:<28} {:<26}",
             "rule",
             "alpha",
             "calibration error",
+            "by chance",
             "≥ .99 and wrong %",
             "untaught, and ≥ .9 %",
             "taught, and decided %",
             "of these right %"
         )?;
         for summary in self.0 {
-            let Calibration { error, .. } = summary.calibration;
+            let Calibration { error, error_by_chance, .. } = summary.calibration;
             let of = |p: Proportion| match p.trials {
                 0 => "–".to_owned(),
                 trials => format!("{} of {trials}", percent(p)),
             };
             writeln!(
                 f,
-                "{:<20} {:>5}  {:<19} {:<26} {:<26} {:<28} {:<26}",
+                "{:<20} {:>5}  {:<19} {:<9} {:<26} {:<26} {:<28} {:<26}",
                 summary.rule,
                 summary.alpha,
                 error.decimals(3),
+                format!("≤ {error_by_chance:.3}"),
                 of(summary.calibration.sure_and_wrong),
                 of(summary.calibration.untaught_and_sure),
                 of(summary.calibration.taught_and_decided),

@@ -39,13 +39,20 @@ impl Proportion {
             return all;
         }
         let without = seeds.iter().map(|(h, t)| (hits - h) as f64 / (trials - t) as f64).collect::<Vec<_>>();
-        let (found, expected) = (jackknifed(&without), all.share * (1.0 - all.share) / trials as f64);
-        let n = if found > expected { trials as f64 * expected / found } else { trials as f64 };
-        let z = student((seeds.len() - 1) as f64).powi(2) / n;
-        let centre = (all.share + z / 2.0) / (1.0 + z);
-        let half = (z * (all.share * (1.0 - all.share) + z / 4.0)).sqrt() / (1.0 + z);
-        Self { low: (centre - half).max(0.0), high: (centre + half).min(1.0), ..all }
+        let t = student((seeds.len() - 1) as f64);
+        let (low, high) = score_interval(all.share, trials as f64, jackknifed(&without), t);
+        Self { low, high, ..all }
     }
+}
+
+/// The score interval of a share of so many trials, or of fewer, as many as would scatter as was found.
+fn score_interval(share: f64, trials: f64, found: f64, t: f64) -> (f64, f64) {
+    let expected = share * (1.0 - share) / trials;
+    let n = if found > expected { trials * expected / found } else { trials };
+    let z = t.powi(2) / n;
+    let centre = (share + z / 2.0) / (1.0 + z);
+    let half = (z * (share * (1.0 - share) + z / 4.0)).sqrt() / (1.0 + z);
+    ((centre - half).max(0.0), (centre + half).min(1.0))
 }
 
 /// The variance of what was measured of several seeds, from the same measured without each of them (Quenouille 1956, Tukey 1958).
@@ -75,22 +82,46 @@ impl Mean {
         Self::of(&measured.collect::<Vec<_>>())
     }
 
-    /// The mean and its interval with so many decimals, for a table; of a single number there is no interval.
+    /// The mean of such of these shares as are of any trials.
+    #[must_use]
+    pub fn of_shares(shares: impl IntoIterator<Item = Proportion>) -> Self {
+        let measured = shares.into_iter().filter(|share| share.trials > 0).map(|share| share.share);
+        Self::of(&measured.collect::<Vec<_>>())
+    }
+
+    /// The mean and its interval with so many decimals, for a table; of a single number there is no interval, and of none a dash.
     #[must_use]
     pub fn decimals(self, decimals: usize) -> String {
-        format!("{:.decimals$}{}", self.mean, self.interval(1.0, decimals))
+        self.written(format!("{:.decimals$}", self.mean), 1.0, decimals)
     }
 
     /// The same of shares, in percent.
     #[must_use]
     pub fn percent(self) -> String {
-        format!("{:.1}{}", 100.0 * self.mean, self.interval(100.0, 1))
+        self.written(format!("{:.1}", 100.0 * self.mean), 100.0, 1)
     }
 
-    /// The same of differences of shares, in points.
+    /// The same of differences of shares, in points. Where none differs from another there is no interval: their scatter says nothing.
     #[must_use]
     pub fn points(self) -> String {
-        format!("{:+.1}{}", 100.0 * self.mean, self.interval(100.0, 1))
+        let mean = format!("{:+.1}", 100.0 * self.mean);
+        match self {
+            Self { n: 2.., half_width: 0.0, .. } => format!("{mean} in each"),
+            _ => self.written(mean, 100.0, 1),
+        }
+    }
+
+    /// The mean of shares of that many trials each, in percent, with an interval that stays within 0 and 100 and has a width where all are alike: the
+    /// score interval with Student's t, of as many independent trials as the scatter of the shares lets there be.
+    #[must_use]
+    pub fn percent_of(self, trials: usize) -> String {
+        if self.n < 2 {
+            return self.percent();
+        }
+        let t = student((self.n - 1) as f64);
+        let (all, found) = ((self.n * trials.max(1)) as f64, (self.half_width / t).powi(2));
+        let (low, high) = score_interval(self.mean, all, found, t);
+        format!("{:.1} [{:.1}, {:.1}]", 100.0 * self.mean, 100.0 * low, 100.0 * high)
     }
 
     /// What was measured of several seeds together, with its interval by a jackknife, from the same measured without each of them.
@@ -100,8 +131,12 @@ impl Mean {
         Self { n, mean: all, half_width }
     }
 
-    fn interval(self, scale: f64, decimals: usize) -> String {
-        if self.n < 2 { String::new() } else { format!(" ± {:.decimals$}", scale * self.half_width) }
+    fn written(self, mean: String, scale: f64, decimals: usize) -> String {
+        match self.n {
+            0 => "–".to_owned(),
+            1 => mean,
+            _ => format!("{mean} ± {:.decimals$}", scale * self.half_width),
+        }
     }
 
     /// The mean with its interval by Student's t.
@@ -142,7 +177,24 @@ mod tests {
             [mean.decimals(2), mean.percent(), mean.points()]
         };
         assert_eq!(shown(&[0.5]), ["0.50", "50.0", "+50.0"]);
-        assert_eq!(shown(&[0.5, 0.5]), ["0.50 ± 0.00", "50.0 ± 0.0", "+50.0 ± 0.0"]);
+        assert_eq!(shown(&[0.25, 0.75]), ["0.50 ± 3.18", "50.0 ± 317.7", "+50.0 ± 317.7"]);
+        assert_eq!(shown(&[]), ["–"; 3]);
+        assert_eq!(Mean::of(&[0.5, 0.5]).points(), "+50.0 in each");
+        let shares = [Proportion::new(0, 0), Proportion::new(1, 2)];
+        assert_eq!(Mean::of_shares(shares), Mean::of(&[0.5]));
+    }
+
+    #[test]
+    fn shares_that_are_all_alike_are_no_certainty_and_none_is_beyond_0_and_100() {
+        let of = |shares: &[f64], trials| Mean::of(shares).percent_of(trials);
+        // As many trials in each seed: what `over_seeds` says of hits and trials.
+        let all = Proportion::over_seeds([(60, 60); 20]);
+        assert_eq!(of(&[1.0; 20], 60), format!("100.0 [{:.1}, 100.0]", 100.0 * all.low));
+        let Proportion { low, high, .. } = Proportion::over_seeds([(8, 10); 5]);
+        assert_eq!(of(&[0.8; 5], 10), format!("80.0 [{:.1}, {:.1}]", 100.0 * low, 100.0 * high));
+        let Proportion { low, high, .. } = Proportion::over_seeds([(10, 10), (9, 10), (10, 10), (4, 10)]);
+        assert_eq!(of(&[1.0, 0.9, 1.0, 0.4], 10), format!("82.5 [{:.1}, {:.1}]", 100.0 * low, 100.0 * high));
+        assert_eq!([of(&[0.5], 10), of(&[], 10)], ["50.0", "–"]);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod ahead;
 mod answering;
 mod certified;
+mod forgetting;
 mod partition;
 
 use std::collections::{BTreeMap, BTreeSet};

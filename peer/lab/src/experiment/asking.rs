@@ -26,7 +26,7 @@ pub fn asking(
     experiment: &Experiment,
     cells: &[Cell],
     runs: &BTreeMap<Run, Vec<Standing>>,
-    seeds: u32,
+    (seeds, judged): (u32, usize),
 ) -> Option<String> {
     let asked = cells.iter().any(|cell| cell.setting.feedback == Feedback::Asked);
     if !asked {
@@ -57,8 +57,8 @@ pub fn asking(
             text,
             "| {name} | {:.1} | {} | {} | {} ",
             last(|standing| standing.labels).mean,
-            Mean::percent(last(|standing| standing.swarm)),
-            Mean::percent(last(|standing| standing.single)),
+            last(|standing| standing.swarm).percent_of(judged),
+            last(|standing| standing.single).percent_of(judged),
             gain.points(),
         );
         for (_, measure) in WHOSE {
@@ -84,7 +84,7 @@ pub fn asking(
         text,
         "\n`labels`: answers of the instructor. `to`: given when the accuracy on held-out hands had first been that high after {IN_A_ROW} rounds in a row, over the \
          seeds in which it was; how many of all is said beside it. `of the first's`: the geometric mean of the ratio to the first row of its line, seed by seed, where both \
-         reached it. Means with 95 % intervals (Student's t)."
+         reached it. Means with 95 % intervals (±: Student's t; brackets of accuracies: Wilson's with Student's t)."
     );
     Some(text)
 }
@@ -169,7 +169,7 @@ mod tests {
             runs.insert((String::new(), "a".to_owned(), seed), run(60, 3, worth));
             runs.insert((String::new(), "b".to_owned(), seed), run(60, 4, 2.0 * worth));
         }
-        let table = asking(&experiment, &experiment.cells().unwrap(), &runs, 3).unwrap();
+        let table = asking(&experiment, &experiment.cells().unwrap(), &runs, (3, 60)).unwrap();
         let row = table.lines().find(|line| line.starts_with("| b ")).unwrap();
         // 8 and 4 labels against 15 and 8 for .90.
         let ratio = ((8.0f64 / 15.0).ln() + (4.0f64 / 8.0).ln()) / 2.0;
@@ -182,6 +182,6 @@ mod tests {
         let text =
             "{ title: 't', base: { rounds: 1 }, axis: { name: 'x', values: [ { name: 'a', set: {} } ] } }";
         let experiment = Experiment::parse(text, Path::new("test")).unwrap();
-        assert_eq!(asking(&experiment, &experiment.cells().unwrap(), &BTreeMap::new(), 1), None);
+        assert_eq!(asking(&experiment, &experiment.cells().unwrap(), &BTreeMap::new(), (1, 60)), None);
     }
 }

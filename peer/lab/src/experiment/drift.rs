@@ -6,11 +6,12 @@ use std::fmt::Write;
 use super::plan::{Cell, Experiment};
 use super::results::Run;
 use super::setting::Drift;
+use super::split::Split;
 use super::standing::Standing;
 use crate::emulation::Mean;
 
 type Measure = fn(&Standing) -> f64;
-type Written = fn(Mean) -> String;
+type Written<'a> = &'a dyn Fn(Mean) -> String;
 
 /// So many of the last rounds before the change are compared with the first one after it.
 const BEFORE: usize = 5;
@@ -41,7 +42,7 @@ pub fn drift(
     experiment: &Experiment,
     cells: &[Cell],
     runs: &BTreeMap<Run, Vec<Standing>>,
-    seeds: u32,
+    (seeds, split): (u32, &Split),
 ) -> Option<String> {
     if cells.iter().all(|cell| cell.setting.drift == Drift::None) {
         return None;
@@ -57,7 +58,8 @@ pub fn drift(
     for cell in cells {
         let around: Vec<Around<'_>> = cell.runs(runs, seeds).into_values().filter_map(Around::of).collect();
         let _ = write!(text, "| {} ", cell.name());
-        let columns: [(Measure, Written); 2] = [(|it| it.unknown, nats), (|it| it.single, Mean::percent)];
+        let percent = |mean: Mean| mean.percent_of(split.judged());
+        let columns: [(Measure, Written<'_>); 2] = [(|it| it.unknown, &nats), (|it| it.single, &percent)];
         for (measure, written) in columns {
             let before = |it: &Around<'_>| it.before.iter().map(measure).sum::<f64>() / BEFORE as f64;
             let _ = write!(
@@ -71,15 +73,18 @@ pub fn drift(
         let alarms: Vec<(bool, f64)> = (0..around.len()).filter_map(|n| alarm(&around, n)).collect();
         let after = alarms.iter().map(|(after, _)| f64::from(u8::from(*after)));
         let before = alarms.iter().map(|(_, before)| *before);
-        let _ =
-            writeln!(text, "| {} | {} | {} |", mean(after).percent(), mean(before).percent(), auroc(&around));
+        // The rounds before a change follow each other: a seed has one alarm, or a part of one.
+        let [after, before] = [mean(after), mean(before)].map(|alarms| alarms.percent_of(1));
+        let _ = writeln!(text, "| {after} | {before} | {} |", auroc(&around));
     }
     let _ = writeln!(
         text,
         "\n`unknown`: the logarithm of the odds that single robots give that a held-out hand shows nothing they were taught, in nats; `before`: after the last {BEFORE} rounds before the change, asked of hands as \
          they were; `after`: after the first round after it, and `end`: after the last, asked of hands as they are then. `alarm`: it is more than it ever was in these {BEFORE} rounds of any \
          other seed; `alarm after`: in which part of the seeds, `alarm before`: in which part of these {BEFORE} rounds, all of them false. AUROC: how often a round after the change has more of it than one \
-         before, of all seeds. Where nothing changes the same is said of the middle of the run. Accuracies and alarms in percent, all with 95 % intervals (Student's t)."
+         before, of all seeds. Where nothing changes the same is said of the middle of the run. Accuracies and alarms in percent, all with 95 % intervals \
+         (±: Student's t; brackets: Wilson's with Student's t). Held-out hands are {}.",
+        split.describe()
     );
     Some(text)
 }
@@ -120,6 +125,10 @@ mod tests {
 
     use super::*;
 
+    fn split() -> Split {
+        Split { held_out: [vec![0; 60], vec![0; 60]], ..Split::default() }
+    }
+
     /// A run of twenty rounds in which so much is unknown up to the middle, and after it.
     fn run(before: f64, after: f64) -> Vec<Standing> {
         let unknown = |round| if round > 10 { after } else { before };
@@ -135,7 +144,7 @@ mod tests {
             runs.insert((String::new(), "light".to_owned(), seed), of_changed(seed));
             runs.insert((String::new(), "nothing".to_owned(), seed), run(0.1, 0.1));
         }
-        drift(&experiment, &experiment.cells().unwrap(), &runs, u32::try_from(seeds).unwrap())
+        drift(&experiment, &experiment.cells().unwrap(), &runs, (u32::try_from(seeds).unwrap(), &split()))
     }
 
     #[test]
@@ -150,11 +159,11 @@ mod tests {
         assert!(light[2].starts_with("0.15 ±") && light[3].starts_with("0.3"), "{light:?}");
         // Two of four are above .2; nothing is before. 1 of 2 × (.15 against .1 and .2), and 1 (.6 against both).
         assert!(
-            light[8].starts_with("50.0 ±") && light[9] == "0.0 ± 0.0" && light[10] == "0.750",
+            light[8].starts_with("50.0 [") && light[9].starts_with("0.0 [0.0, 7") && light[10] == "0.750",
             "{light:?}"
         );
         let nothing = row("nothing");
-        assert!(nothing[8] == "0.0 ± 0.0" && nothing[10] == "0.500", "{nothing:?}");
+        assert!(nothing[8].starts_with("0.0 [0.0, 7") && nothing[10] == "0.500", "{nothing:?}");
     }
 
     #[test]
@@ -168,7 +177,7 @@ mod tests {
             .map(str::trim)
             .collect();
         // Of the three others the bound is the high one's .3; of that one it is .1.
-        assert!(light[8].starts_with("25.0 ±") && light[9].starts_with("25.0 ±"), "{light:?}");
+        assert!(light[8].starts_with("25.0 [") && light[9].starts_with("25.0 ["), "{light:?}");
     }
 
     #[test]
@@ -176,6 +185,6 @@ mod tests {
         let text =
             "{ title: 't', base: { rounds: 1 }, axis: { name: 'x', values: [ { name: 'a', set: {} } ] } }";
         let experiment = Experiment::parse(text, Path::new("test")).unwrap();
-        assert_eq!(drift(&experiment, &experiment.cells().unwrap(), &BTreeMap::new(), 1), None);
+        assert_eq!(drift(&experiment, &experiment.cells().unwrap(), &BTreeMap::new(), (1, &split())), None);
     }
 }

@@ -77,6 +77,12 @@ pub enum ExperimentError {
     /// The folder holds the results of something else.
     #[error("{} holds the results of another experiment or dataset: choose another folder", .0.display())]
     Other(PathBuf),
+    /// What is in the folder was measured on other pictures.
+    #[error(
+        "{} was measured on other pictures than the datasets hold now, or by a version that did not write down on which: put the \
+         pictures back as they were, or choose another folder", .0.display()
+    )]
+    OtherPictures(PathBuf),
     /// What is in the folder was measured with another version of this program.
     #[error(
         "{} was measured with {before}, this is {now}: the two would not be comparable; choose another folder, or go on \

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
-use super::materials::Materials;
+use super::materials::{Contents, Materials};
 use super::program::Program;
 
 /// What `run.json` says.
@@ -15,14 +15,17 @@ use super::program::Program;
 struct RunFile {
     seeds: u32,
     datasets: Materials,
+    /// What was in them.
+    #[serde(default)]
+    contents: Contents,
     program: Program,
 }
 
-/// Makes the folder and writes down what is run in it: the experiment as given (`experiment.json5`), seeds, datasets and
+/// Makes the folder and writes down what is run in it: the experiment as given (`experiment.json5`), seeds, datasets, what is in them, and
 /// program (`run.json`).
 ///
 /// # Errors
-/// [`ExperimentError::Other`] and [`ExperimentError::OtherProgram`] where something else was run in it;
+/// [`ExperimentError::Other`], [`ExperimentError::OtherPictures`] and [`ExperimentError::OtherProgram`] where something else was run in it;
 /// [`ExperimentError::Read`] and [`ExperimentError::Write`].
 pub fn claim(
     folder: &Path,
@@ -40,6 +43,9 @@ pub fn claim(
         if read(&experiment)?.as_deref() != Some(text) || before.datasets != *materials {
             return Err(other());
         }
+        if before.contents != materials.contents()? {
+            return Err(ExperimentError::OtherPictures(folder.to_owned()));
+        }
         if before.program != *program {
             let (before, now) = (Box::new(before.program), Box::new(program.clone()));
             return Err(ExperimentError::OtherProgram { folder: folder.to_owned(), before, now });
@@ -48,7 +54,8 @@ pub fn claim(
         // Nobody knows what these were measured with.
         return Err(other());
     }
-    let file = RunFile { seeds, datasets: materials.clone(), program: program.clone() };
+    let contents = materials.contents()?;
+    let file = RunFile { seeds, datasets: materials.clone(), contents, program: program.clone() };
     let json = serde_json::to_string_pretty(&file).expect("names and numbers can be written as JSON");
     // The run last: where it is, the rest is.
     for (path, text) in [(experiment, text), (run, &format!("{json}\n"))] {
@@ -92,6 +99,36 @@ mod tests {
         );
         std::fs::write(path.join("run.json"), "{").unwrap();
         assert!(matches!(claim("{}", &none, program(1)), Err(ExperimentError::Other(_))));
+    }
+
+    #[test]
+    fn what_was_measured_on_pictures_is_not_gone_on_with_on_changed_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let (set, path) = (folder.path().join("hands"), folder.path().join("new"));
+        let write = |bytes: &str| {
+            std::fs::create_dir_all(set.join("1")).unwrap();
+            std::fs::write(set.join("1/a.png"), bytes).unwrap();
+        };
+        for seen in [true, false] {
+            let materials =
+                Materials { dataset: seen.then(|| set.clone()), start: (!seen).then(|| set.clone()) };
+            let claim = || super::claim(&path, "{}", &materials, 2, &program(1));
+            write("a hand");
+            claim().unwrap();
+            claim().unwrap();
+            write("another");
+            let refused = claim().unwrap_err();
+            assert!(matches!(refused, ExperimentError::OtherPictures(_)), "{refused}");
+            write("a hand");
+            claim().unwrap();
+            // As it was written before pictures were looked into: nobody knows which they were.
+            let run = std::fs::read_to_string(path.join("run.json")).unwrap();
+            let mut run: serde_json::Value = serde_json::from_str(&run).unwrap();
+            run.as_object_mut().unwrap().remove("contents");
+            std::fs::write(path.join("run.json"), run.to_string()).unwrap();
+            assert!(matches!(claim(), Err(ExperimentError::OtherPictures(_))));
+            std::fs::remove_dir_all(&path).unwrap();
+        }
     }
 
     #[test]

@@ -16,6 +16,9 @@ use gestalt_vision::pose::Placement;
 use gestalt_vision::source::Glove;
 use gestalt_vision::vocabulary::GestureBook;
 
+/// The most places that hands are looked at from.
+pub(super) const MOST_PLACES: usize = 200;
+
 /// What is asked, and how: a commented JSON5 file. See `configs/experiments/`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -68,7 +71,7 @@ pub struct Choice {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hands {
-    /// How many places there are; each robot of a run stands at one drawn from them.
+    /// How many places there are; each robot of a run stands at one drawn from them, and where robots are more, several do.
     pub places: usize,
     /// Where they lie around the hand.
     pub placement: Placement,
@@ -116,7 +119,7 @@ impl Hands {
         if CameraModel::named(&self.camera).is_none() {
             return wrong("the camera is none of footbot, parrot and laptop");
         }
-        if !(1..=200).contains(&self.places) || !(4..=1000).contains(&self.people) {
+        if !(1..=MOST_PLACES).contains(&self.places) || !(4..=1000).contains(&self.people) {
             return wrong("choose 1 to 200 places and 4 to 1000 people");
         }
         if !(4..=1000).contains(&self.pictures) {

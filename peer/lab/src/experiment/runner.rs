@@ -5,6 +5,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::asking::asking;
@@ -19,6 +21,7 @@ use super::pool::Pool;
 use super::progress::Progress;
 use super::results::Results;
 use super::school::Schools;
+use super::split::Split;
 use super::summary::Summary;
 use super::{chart, trial};
 use crate::emulation::{Rules, School};
@@ -85,9 +88,11 @@ pub fn conduct_by(
     let runs = run_what_is_left(&taught, &pool, results, seeds, &progress)?.finish()?;
 
     let summary = Summary::of(&experiment, &cells, &runs, seeds);
-    let table = summary.markdown(&pool, materials)
-        + &asking(&experiment, &cells, &runs, seeds).unwrap_or_default()
-        + &drift(&experiment, &cells, &runs, seeds).unwrap_or_default();
+    // That of any run: how many are held out, and whether people are, does not depend on the seed.
+    let split = Split::draw(&pool.gestures, &pool.moments, &mut ChaCha8Rng::seed_from_u64(0))?;
+    let table = summary.markdown(&pool, materials, &split)
+        + &asking(&experiment, &cells, &runs, (seeds, split.judged())).unwrap_or_default()
+        + &drift(&experiment, &cells, &runs, (seeds, &split)).unwrap_or_default();
     let path = folder.join("results.md");
     gestalt_file::write(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &figures(&summary))?;

@@ -19,6 +19,29 @@ pub struct Split {
     pub taught: [Vec<Vec<usize>>; 2],
     /// Held-out moments before and after the drift.
     pub held_out: [Vec<usize>; 2],
+    /// Whether they are of people who taught nothing in that half; else of those who taught it, at other moments.
+    pub of_others: [bool; 2],
+}
+
+impl Split {
+    /// How many hands are judged after each round, where before and after a drift differ the fewer.
+    #[must_use]
+    pub fn judged(&self) -> usize {
+        self.held_out.iter().map(Vec::len).filter(|judged| *judged > 0).min().unwrap_or(0)
+    }
+
+    /// Whose hands are judged, for people.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let whose = |half: usize| match self.of_others[half] {
+            true => "hands of people who taught nothing",
+            false => "other moments of the hands that taught",
+        };
+        match &self.held_out {
+            [_, after] if after.is_empty() || whose(0) == whose(1) => whose(0).to_owned(),
+            _ => format!("{} (after the change on {})", whose(0), whose(1)),
+        }
+    }
 }
 
 /// Who and what is held out of one half of a run.
@@ -84,6 +107,7 @@ impl Split {
                 .collect();
             let before = draw.take().filter(|before| before.people == people);
             let drawn = draw.insert(before.unwrap_or_else(|| Draw::new(people, &of_classes, rng)));
+            split.of_others[half] = drawn.order.is_empty();
             let mut held_out: Vec<Vec<usize>> = Vec::new();
             for (class, of_class) in of_classes.iter().enumerate() {
                 let (held, taught) = drawn.part(moments, class, of_class);
@@ -151,12 +175,27 @@ mod tests {
     #[test]
     fn other_people_after_a_change_are_taught_and_judged_too() {
         let moments = shown(20, true, 20);
-        let Split { taught, held_out } = split(&moments, 1);
+        let Split { taught, held_out, .. } = split(&moments, 1);
         for half in 0..2 {
             assert_eq!(taught[half].iter().map(Vec::len).sum::<usize>(), 30);
             assert_eq!(held_out[half].len(), 30);
             assert!(held_out[half].iter().all(|n| moments[*n].after == (half == 1)));
         }
+    }
+
+    #[test]
+    fn it_is_said_whether_people_or_only_moments_are_held_out() {
+        let said = |times, known, later| split(&shown(times, known, later), 1).describe();
+        assert_eq!(said(36, true, 36), "hands of people who taught nothing");
+        assert_eq!(said(60, false, 0), "other moments of the hands that taught");
+        let mut few_then_many = shown(20, true, 20);
+        few_then_many.iter_mut().filter(|moment| !moment.after).for_each(|moment| moment.person = Some(1));
+        let of = split(&few_then_many, 1);
+        assert_eq!(
+            of.describe(),
+            "other moments of the hands that taught (after the change on hands of people who taught nothing)"
+        );
+        assert_eq!(of.judged(), 30);
     }
 
     #[test]

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::materials::Materials;
-use super::plan::{Cell, Experiment};
+use super::plan::{Cell, Experiment, MOST_PLACES};
 use super::pool::Pool;
 use super::results::Run;
+use super::setting::Start;
+use super::split::Split;
 use super::standing::Standing;
 use super::trial::{ALL_EXAMINED, EXAMINED};
 use crate::emulation::Mean;
@@ -102,8 +104,14 @@ impl Summary {
 
     /// The table, with a word on how to read it.
     #[must_use]
-    pub fn markdown(&self, pool: &Pool, materials: &Materials) -> String {
+    pub fn markdown(&self, pool: &Pool, materials: &Materials, split: &Split) -> String {
         let mut text = format!("# {}\n\n", self.title);
+        let percent = |mean: Mean| mean.percent_of(split.judged());
+        // Who knows nothing guesses, and that is not measured.
+        let start = |cell: &Cell, mean: Mean| match cell.setting.start {
+            Start::Nothing => format!("{:.1}", 100.0 * mean.mean),
+            Start::Model | Start::Shipped => percent(mean),
+        };
         let hands = materials.dataset.as_ref().map_or("rendered hands".to_owned(), |folder| {
             format!("pictures of {}", folder.file_name().unwrap_or_default().to_string_lossy())
         });
@@ -111,10 +119,13 @@ impl Summary {
         let _ = writeln!(
             text,
             "{} seeds; {hands}, gestures {}; a hand is found in {:.1} % of the views. Means with 95 % intervals \
-             (Student's t), accuracies in percent on hands that nobody was taught with.\n",
+             (±: Student's t; brackets: Wilson's with Student's t, of as many of the {} hands judged in each seed as seeds show to be independent), \
+             accuracies in percent on {}.\n",
             self.seeds,
             pool.gestures.join(" "),
             100.0 * pool.found(),
+            split.judged(),
+            split.describe(),
         );
         let [low, high] = MILESTONES.map(|milestone| format!("{:.0} %", 100.0 * milestone));
         let line = if self.lines { "line | " } else { "" };
@@ -135,11 +146,11 @@ impl Summary {
                 text,
                 "| {line}{} | {} | {} | {} | {} | {} | {} | {} | {low} | {high} | {} | {} | {} |",
                 cell.value,
-                Mean::percent(curves.single.first().copied().unwrap_or(Mean::of(&[]))),
-                Mean::percent(last(&curves.single)),
-                Mean::percent(last(&curves.swarm)),
-                Mean::percent(last(&curves.majority)),
-                Mean::percent(curves.over_rounds),
+                start(cell, curves.single.first().copied().unwrap_or(Mean::of(&[]))),
+                percent(last(&curves.single)),
+                percent(last(&curves.swarm)),
+                percent(last(&curves.majority)),
+                percent(curves.over_rounds),
                 Mean::points(curves.gain_at_the_end),
                 Mean::points(curves.gain_over_rounds),
                 last(&curves.published).decimals(0),
@@ -160,12 +171,14 @@ impl Summary {
                  those of all."
             );
         }
-        self.write_certified(&mut text);
+        let robots = self.cells.iter().map(|(cell, _)| cell.setting.robots).max().unwrap_or(0);
+        text.push_str(&crowded(robots, pool.places).unwrap_or_default());
+        self.write_certified(&mut text, split);
         text
     }
 
     /// Of robots that learn from groups of authors apart: what is certain.
-    fn write_certified(&self, text: &mut String) {
+    fn write_certified(&self, text: &mut String, split: &Split) {
         for (cell, curves) in self.cells.iter().filter(|(cell, _)| cell.setting.learning.learner.groups > 0) {
             let last = curves.certified.last().copied().unwrap_or(Mean::of(&[]));
             let line = if self.lines { format!("{}, ", cell.line) } else { String::new() };
@@ -174,7 +187,7 @@ impl Summary {
                 text,
                 "\n{line}{}: at the end single robots judge {} % rightly, whatever {} had said.",
                 cell.value,
-                last.percent(),
+                last.percent_of(split.judged()),
                 match cell.setting.liars {
                     0 | 1 => "any one other robot".to_owned(),
                     liars => format!("any {liars} others"),
@@ -182,6 +195,17 @@ impl Summary {
             );
         }
     }
+}
+
+/// That some robots see the same, where there are more of them than places.
+fn crowded(robots: usize, places: usize) -> Option<String> {
+    (robots > places).then(|| {
+        format!(
+            "\n**Up to {robots} robots stand at {places} places**: who stand at one place are taught and judged by the same views, so with more robots than places nothing \
+             more is seen. For a place each set `hands.places`, and for pictures `photographs.places`, to {} in the experiment's file.\n",
+            robots.min(MOST_PLACES)
+        )
+    })
 }
 
 /// The accuracy of single robots, averaged over the rounds.
@@ -208,6 +232,16 @@ mod tests {
         assert_eq!(rounds_to(&curve(&[0.1, 0.9, 0.8, 0.9, 0.95]), 0.85), Some(3));
         assert_eq!(rounds_to(&curve(&[0.9, 0.9]), 0.85), Some(0));
         assert_eq!(rounds_to(&curve(&[0.9, 0.8]), 0.85), None);
+    }
+
+    #[test]
+    fn more_robots_than_places_are_warned_of() {
+        assert_eq!(crowded(24, 24), None);
+        assert!(
+            crowded(100, 24)
+                .unwrap()
+                .contains("`hands.places`, and for pictures `photographs.places`, to 100")
+        );
     }
 
     #[test]

@@ -86,7 +86,8 @@ impl Swarm<'_> {
 
     /// The gesture that the instructor names: the one shown, or where they err, the other one asked about, or any other.
     pub(super) fn names(&mut self, ask: Option<Ask>) -> ClassId {
-        // Drawn whether or not it is needed: right and wrong answers are given of the same showings.
+        // Both are drawn for each answer: whether one is wrong does not shift what is drawn for the next. Who asks by chance draws from the same
+        // stream, so where others ask other showings are answered wrongly.
         let (errs, which): (bool, u64) = (self.errs(), self.asking.rng.random());
         if !errs {
             return self.shown;

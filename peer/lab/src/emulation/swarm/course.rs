@@ -112,7 +112,7 @@ impl Swarm<'_> {
         }
         let robot = self.robots[i].id;
         self.asking.labels += 1;
-        self.record.tell();
+        self.record.tell(&instruction);
         self.note(&Happening::Instruct { robot, instruction: &instruction });
         let by: InstructorId = INSTRUCTOR.parse().expect("it is a name");
         let bytes = json_bytes(&instruction);

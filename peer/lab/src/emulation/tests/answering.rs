@@ -35,3 +35,21 @@ fn who_errs_says_wrong_of_what_is_right() {
     let [right, wrong] = said(1.0);
     assert!(right == 0 && wrong >= 1, "{right} of six are said to be right, {wrong} wrong");
 }
+
+/// Of how many showings of robots that begin with nothing the gesture counts as taught, and of how many as untaught; each is shown twice.
+fn taught(feedback: Feedback, wrong: f64) -> [u64; 2] {
+    let mut scenario = Scenario { rounds: 12, ..learning(3, 1.0, NetworkShape::Ring) };
+    let teaching = scenario.learning.as_mut().unwrap();
+    (teaching.feedback, teaching.answering.wrong) = (feedback, wrong);
+    let calibration = compare(&scenario, 1, || ()).unwrap().remove(0).calibration;
+    [calibration.taught_and_decided.trials, calibration.untaught_and_sure.trials]
+}
+
+#[test]
+fn only_what_somebody_named_and_named_rightly_counts_as_taught() {
+    assert_eq!(taught(Feedback::Full, 0.0), [6, 6]);
+    assert_eq!(taught(Feedback::Full, 1.0), [0, 12], "what was named is another gesture");
+    assert_eq!(taught(Feedback::None, 0.0), [0, 12]);
+    // Robots that know nothing decide nothing that could be said to be right.
+    assert_eq!(taught(Feedback::Partial, 0.0), [0, 12]);
+}

@@ -9,8 +9,9 @@ pub struct Outcome {
     pub wrong: f64,
     /// It did not decide.
     pub undecided: f64,
-    /// First frames, one of each robot and gesture, in which the robot found the gesture shown likeliest, of those with a hand.
-    pub frames_right: f64,
+    /// First frames, one of each robot and gesture, in which the robot found the gesture shown likeliest, of those with a hand; none where no robot
+    /// found any.
+    pub frames_right: Option<f64>,
     /// Seconds from the showing until the first robot held a class, over the decided ones; none where none was decided.
     pub decided_s: Option<f64>,
 }

@@ -22,7 +22,7 @@ struct Row {
     right: f64,
     wrong: f64,
     undecided: f64,
-    frames_right: f64,
+    frames_right: Option<f64>,
     decided_s: Option<f64>,
 }
 
@@ -109,11 +109,11 @@ mod tests {
             { line: 'Foot-bots, \"old\"', robots: [{ camera: 'footbot', count: 10 }] },
             { line: 'mixed', robots: [{ camera: 'footbot', count: 4 }, { camera: 'parrot', count: 2 }] } ] }";
         let plan = Recognition::parse(text, Path::new("test")).unwrap();
-        let outcome = |right, decided_s| Outcome {
+        let outcome = |right, decided_s: Option<f64>| Outcome {
             right,
             wrong: 0.25,
             undecided: 0.75 - right,
-            frames_right: 1.0 / 3.0,
+            frames_right: decided_s.map(|_| 1.0 / 3.0),
             decided_s,
         };
         let outcomes = vec![outcome(0.0, None), outcome(0.5, Some(0.7))];

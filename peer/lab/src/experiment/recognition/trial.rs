@@ -88,7 +88,7 @@ fn show(
     Ok(Outcome {
         right: report.right.share,
         wrong: report.wrong.share,
-        frames_right: report.frames_right.share,
+        frames_right: (report.frames_right.trials > 0).then_some(report.frames_right.share),
         undecided: report.undecided.share,
         decided_s: (report.decided_ms.n > 0).then_some(report.decided_ms.mean / 1000.0),
     })
