@@ -33,7 +33,8 @@ inside apt-get update -qq
 inside apt-get install -y -qq --no-install-recommends /tmp/gestalt.deb >/dev/null
 inside dpkg --audit
 inside gestalt --version
-inside install -d -o gestalt -g gestalt /var/lib/gestalt
+# Before any robot has started.
+as_gestalt gestalt trust request 1 /var/lib/gestalt/keys
 
 for robot in 1 2; do
   inside sh -c "sed 's/id: 1, name: \"footbot-1\"/id: $robot/' /usr/share/doc/gestalt/examples/footbot.json5 >/etc/gestalt-$robot.json5"

@@ -1,6 +1,7 @@
 //! A running swarm into a file.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -81,6 +82,8 @@ impl Recording {
             _ => RecordingError::Create { path: file.to_owned(), cause },
         })?;
         let begun = Begun(file);
+        gestalt_file::keep_name(file)
+            .map_err(|cause| RecordingError::Create { path: file.to_owned(), cause })?;
         let mut about = BTreeMap::from([
             (SWARM.to_owned(), swarm.to_owned()),
             ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
@@ -119,7 +122,12 @@ impl Recording {
     pub async fn finish(self) -> Result<Ledger, RecordingError> {
         let Self { file: path, recorder, tap } = self;
         tap.close().await;
-        let finished = tokio::task::spawn_blocking(|| recorder.finish()).await;
+        let written_to = path.clone();
+        let finish = move || {
+            let (ledger, ended) = recorder.finish();
+            (ledger, ended.and_then(|()| settle(&written_to).map_err(WriteError::Disk)))
+        };
+        let finished = tokio::task::spawn_blocking(finish).await;
         let (ledger, ended) = finished.map_err(|error| RecordingError::Create {
             path: path.clone(),
             cause: std::io::Error::other(error),
@@ -133,6 +141,12 @@ impl Recording {
             }
         }
     }
+}
+
+/// Makes a recording that is whole survive a power cut.
+fn settle(path: &Path) -> std::io::Result<()> {
+    File::open(path)?.sync_all()?;
+    gestalt_file::keep_name(path)
 }
 
 /// A new file that goes again where no recording begins in it: it would keep the next one from its name.

@@ -27,7 +27,7 @@ const TEXTS: [&str; 16] = [
 const APART: [(&str, &str); 19] = [
     ("sudo ", "changes the system; packaging/installed.sh does it in one of its own"),
     ("gestalt config | sudo ", "likewise"),
-    ("gestalt doctor /etc/gestalt/", "needs the line before"),
+    ("cd /var/lib/gestalt && sudo ", "likewise"),
     ("curl ", "installs Rust"),
     ("git clone ", "needs the reader's own copy"),
     ("CARGO_BUILD_JOBS=2 make deb", "builds for an hour on a Raspberry Pi"),

@@ -10,6 +10,7 @@ fn main() -> std::process::ExitCode {
         [Waits] notify::a_robot_that_hangs_says_nothing,
         [Waits] notify::an_address_that_is_none_keeps_it_from_starting,
         [Works] unit::the_unit_starts_the_program_as_its_command_line_wants_it,
+        [Works] unit::the_folder_of_robots_is_there_before_one_starts_as_the_unit_has_it,
         [Works, Systemd] unit::systemd_takes_the_unit_and_finds_it_hardened,
         [Works, Debian] deb::the_package_is_whole_and_lintian_finds_no_error,
     ])

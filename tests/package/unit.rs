@@ -34,6 +34,14 @@ pub fn the_unit_starts_the_program_as_its_command_line_wants_it() {
     assert_eq!(values("NotifyAccess"), ["main"]);
 }
 
+pub fn the_folder_of_robots_is_there_before_one_starts_as_the_unit_has_it() {
+    let script = std::fs::read_to_string(root().join("packaging/postinst")).unwrap();
+    let one = |key: &str| values(key).pop().expect("one value");
+    let (user, group, mode) = (one("User"), one("Group"), one("StateDirectoryMode"));
+    let line = format!("install -d -o {user} -g {group} -m {mode} /var/lib/{}", one("StateDirectory"));
+    assert!(script.contains(&line), "{line} is missing in\n{script}");
+}
+
 pub fn systemd_takes_the_unit_and_finds_it_hardened() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gestalt@front.service");

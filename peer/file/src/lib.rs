@@ -91,7 +91,10 @@ fn is_stream(path: &Path) -> bool {
 }
 
 /// Where a link leads, through others, though nothing is there; of what is no link, its own path.
-fn target(path: &Path) -> io::Result<PathBuf> {
+///
+/// # Errors
+/// Links that lead in a circle.
+pub fn target(path: &Path) -> io::Result<PathBuf> {
     let mut here = path.to_owned();
     for _ in 0..=MAX_LINKS {
         match fs::read_link(&here) {
@@ -173,6 +176,7 @@ mod tests {
         symlink("round", &round).unwrap();
         assert!(check(&round).is_err() && write(&round, b"x").is_err());
         // What a link leads to need not be there.
+        assert_eq!(target(&first).unwrap(), old);
         check(&first).unwrap();
         write(&first, b"old").unwrap();
         fs::hard_link(&old, &kept).unwrap();

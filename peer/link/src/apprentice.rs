@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use tokio::sync::mpsc;
 
 use crate::account::Account;
-use crate::boot::boot_number;
+use crate::boot::{boot_number, leap};
 use crate::error::LinkError;
 use crate::identity;
 use crate::inbox::Inbox;
@@ -37,8 +37,9 @@ pub struct RobotLearning {
     /// The file it keeps its memory in; `None` for a robot that forgets all when it stops.
     ///
     /// A file that is damaged, or another's, is refused at the start. Where the disk is not there, full or read-only, the
-    /// robot starts, says so in its status, and goes on trying; until it succeeds, nothing counts as learned for good:
-    /// nothing is shared, and no instructor answered.
+    /// robot starts, with what it can read of the file, says so in its status, and goes on trying; until it succeeds, nothing
+    /// that it sees or hears counts as learned for good: nothing of it is shared, and no instructor answered. Then it begins
+    /// anew with what is on the disk.
     pub memory: Option<PathBuf>,
     /// What its random choices follow from, together with its id and the number of its start.
     pub seed: u64,
@@ -83,6 +84,8 @@ pub(crate) struct Prepared {
     pub boot: u32,
     place: Option<Arc<dyn Place>>,
     store: Option<Store>,
+    /// The number of the start that was counted last.
+    counted: u32,
     records: Records,
     memory: Option<RobotMemory>,
     remembered: Option<Arc<Classifier>>,
@@ -92,50 +95,75 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    /// Opens the memory. A disk that fails is no error yet: the robot goes on without, and says so.
+    /// Opens the memory. A disk that fails is no error yet: the robot goes on with what it can read of it, and says so.
     pub fn open(id: RobotId, boot: u32, learning: RobotLearning) -> Result<Self, LinkError> {
-        let place = learning.memory.clone().map(|path| Arc::new(FilePlace::new(path)) as Arc<dyn Place>);
-        Self::open_at(place, id, boot, learning)
+        let mut prepared = Self::with_nothing(boot, learning);
+        if let Some(place) = prepared.place.clone() {
+            prepared.open_at(place, id)?;
+        }
+        Ok(prepared)
     }
 
-    fn open_at(
-        place: Option<Arc<dyn Place>>,
-        id: RobotId,
-        boot: u32,
-        learning: RobotLearning,
-    ) -> Result<Self, LinkError> {
-        let mut prepared = Self {
-            learning,
+    /// What a robot has that remembers nothing yet.
+    pub fn with_nothing(boot: u32, learning: RobotLearning) -> Self {
+        let place = learning.memory.clone().map(|path| Arc::new(FilePlace::new(path)) as Arc<dyn Place>);
+        Self {
             boot,
-            place: place.clone(),
             store: None,
+            counted: 0,
             records: Records::new(),
             memory: place.as_ref().map(|_| RobotMemory::default()),
+            place,
+            learning,
             remembered: None,
             failure: None,
             new: false,
-        };
-        let Some(place) = place else { return Ok(prepared) };
-        let opened = Store::open(place, id, boot).and_then(|(store, new)| {
-            Ok((store.memory()?, store.records()?, store.classifier()?, store, new))
-        });
-        match opened {
-            Ok((memory, records, remembered, store, new)) => {
-                prepared.boot = store.boot();
-                prepared.memory = Some(memory);
-                prepared.records = records;
-                prepared.remembered = remembered.map(Arc::new);
-                prepared.store = Some(store);
-                prepared.new = new;
-            }
-            Err(error) if error.is_of_the_disk() => {
-                // The starts are counted on the disk: until it is there, the clock has to do.
-                prepared.boot = boot.max(boot_number(SystemTime::now()));
-                prepared.failure = Some(error);
-            }
-            Err(error) => return Err(error.into()),
         }
-        Ok(prepared)
+    }
+
+    /// The same, of the memory that lies there.
+    pub fn open_at(&mut self, place: Arc<dyn Place>, id: RobotId) -> Result<(), StoreError> {
+        let failure = match self.open_store(&place, id) {
+            Err(error) if error.is_of_the_disk() => error,
+            opened => return opened,
+        };
+        // The starts are counted on the disk: until it takes them, the clock has to do, and chance where it is behind.
+        self.boot = self.boot.max(boot_number(SystemTime::now()));
+        if self.boot <= self.counted {
+            self.boot = self.counted.saturating_add(leap());
+        }
+        self.failure = Some(failure);
+        Ok(())
+    }
+
+    /// Opens the memory, takes up what it holds, and counts this start in it. What can be read alone is taken up, too.
+    fn open_store(&mut self, place: &Arc<dyn Place>, id: RobotId) -> Result<(), StoreError> {
+        let (mut store, new) = match Store::look(place.clone(), id) {
+            Err(error) if error.is_of_the_disk() => {
+                let copy = Store::copy(place.clone(), id);
+                return match copy.and_then(|copy| copy.map_or(Ok(()), |copy| self.know(&copy))) {
+                    Err(other) if !other.is_of_the_disk() => Err(other),
+                    _ => Err(error),
+                };
+            }
+            opened => opened?,
+        };
+        self.know(&store)?;
+        store.count(self.boot)?;
+        self.boot = store.boot();
+        self.store = Some(store);
+        self.new = new;
+        Ok(())
+    }
+
+    /// Takes up what stands there.
+    fn know(&mut self, store: &Store) -> Result<(), StoreError> {
+        let (memory, records, classifier) = (store.memory()?, store.records()?, store.classifier()?);
+        self.memory = Some(memory);
+        self.records = records;
+        self.remembered = classifier.map(Arc::new);
+        self.counted = store.boot();
+        Ok(())
     }
 
     /// That mind, set up to learn, with what was on the disk: which tells that it has lived before also where nothing was taught.
@@ -143,7 +171,8 @@ impl Prepared {
     /// # Errors
     /// See [`Mind::learning`].
     pub fn bring_up(&mut self, mind: Mind) -> Result<Mind, LearningError> {
-        let has_lived = self.store.is_some() && !self.new;
+        // Also where the disk takes nothing, or is not there, it most likely was before.
+        let has_lived = self.place.is_some() && !self.new;
         let setup = self.learning.setup(mind.me(), self.boot, self.memory.take());
         let mind = mind.learning(setup)?;
         Ok(if has_lived { mind.started_again() } else { mind })
@@ -156,15 +185,17 @@ impl Prepared {
 }
 
 impl RobotLearning {
-    /// Whether that robot could learn like this: opens its memory as a start would, which counts as one, and closes it.
+    /// Whether that robot could learn like this: brings it up with a copy of its memory, which is in this process alone. The file is left as it is,
+    /// and one that is not there is not made.
     ///
     /// # Errors
-    /// See [`LinkError`]: a memory that cannot be opened, is another robot's, or does not fit the model.
+    /// See [`LinkError`]: a memory that cannot be read, is another robot's, or does not fit the model.
     pub fn check(&self, robot: RobotId, mind: &MindConfig) -> Result<(), LinkError> {
-        let mut prepared = Prepared::open(robot, 1, self.clone())?;
-        if let Some(failure) = &prepared.failure {
-            let key = "learning.memory".to_owned();
-            return Err(LinkError::Config { key, cause: failure.to_string() });
+        let mut prepared = Prepared::with_nothing(1, self.clone());
+        if let Some(place) = prepared.place.clone()
+            && let Some(copy) = Store::copy(place, robot)?
+        {
+            prepared.know(&copy)?;
         }
         prepared.bring_up(Mind::new(robot, identity::life(prepared.boot, 0), mind.clone())?)?;
         Ok(())

@@ -1,7 +1,7 @@
 //! The number of a robot's life.
 
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -21,8 +21,23 @@ pub fn boot_number(now: SystemTime) -> u32 {
     }
 }
 
-/// The same for a robot that signs what it says, and keeps the number of its last start in that file: higher than that one also where the clock is set
-/// to one moment at each start, as it is without a battery. Where the file can be neither read nor written the clock has to do, and the log says so.
+/// How far the number of a start goes beyond that of the last one, where the clock does not: by chance, as what is counted from may be an old copy,
+/// which was counted from before: one of thousands. By no more, as numbers that outrun the clock stay ahead of it: two million starts use them
+/// up.
+pub(crate) fn step() -> u32 {
+    1 + (fresh_nonce() >> 52) as u32
+}
+
+/// The same where the number cannot be kept: each start goes on from the same one, so it is drawn from as many as there are in three weeks of the
+/// clock. Once numbers are kept again, this robot's may be lower for a while than what others heard of it; one that comes twice would convict it for
+/// good.
+pub(crate) fn leap() -> u32 {
+    1 + (fresh_nonce() >> 40) as u32
+}
+
+/// The number of a start for a robot that signs what it says, and keeps that of its last start in that file: higher than that one also where the
+/// clock is set to one moment at each start, as it is without a battery. Where the file cannot be written chance keeps the numbers of starts apart,
+/// and the log says so.
 #[must_use]
 pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
     let last = match fs::read_to_string(file) {
@@ -34,11 +49,27 @@ pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
         tracing::warn!("the number of the last start is not known from {}: {error}", file.display());
         0
     });
-    let number = boot_number(now).max(last.saturating_add(1));
-    if let Err(error) = gestalt_file::replace(file, format!("{number}\n").as_bytes()) {
-        tracing::warn!("the number of this start cannot be kept in {}: {error}", file.display());
+    after(last, boot_number(now), |number| {
+        let kept = gestalt_file::replace(file, format!("{number}\n").as_bytes());
+        kept.inspect_err(|error| {
+            tracing::error!(
+                "the number of this start cannot be kept in {}: {error}: it is drawn at random, as one that came twice would convict this robot: \
+                 let it write to that folder",
+                file.display()
+            );
+        })
+    })
+}
+
+/// The number of a start after that one, by that clock.
+fn after(last: u32, clock: u32, keep: impl FnOnce(u32) -> io::Result<()>) -> u32 {
+    let number = if clock > last { clock } else { last.saturating_add(step()) };
+    match keep(number) {
+        Ok(()) => number,
+        // A clock that is ahead may be set to one moment at each start; or be right, and is not to be outrun by weeks.
+        Err(_) if clock > last => number.saturating_add(leap() >> 8),
+        Err(_) => number.saturating_add(leap()),
     }
-    number
 }
 
 #[cfg(test)]
@@ -65,11 +96,42 @@ mod tests {
         let (now, of_clock) = (SystemTime::now(), boot_number(SystemTime::now()));
         let first = counted_boot(&file, now);
         assert!(first.abs_diff(of_clock) < 1000);
-        assert_eq!([counted_boot(&file, now), counted_boot(&file, UNIX_EPOCH)], [first + 1, first + 2]);
+        let mut last = first;
+        for clock in [now, UNIX_EPOCH, now] {
+            let number = counted_boot(&file, clock);
+            assert!((last + 1..=last + 4096).contains(&number), "{number} after {last}");
+            last = number;
+        }
         fs::write(&file, "nonsense").unwrap();
         assert_eq!(counted_boot(&file, now), first);
-        assert_eq!(counted_boot(&file, now), first + 1);
-        // No folder: the clock has to do.
-        assert_eq!(counted_boot(&folder.path().join("none/starts"), now), first);
+        assert!(counted_boot(&file, now) > first);
+    }
+
+    #[test]
+    fn a_copy_of_the_number_is_not_counted_on_from_alike() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("robot-7.starts");
+        let last = boot_number(SystemTime::now()) + 1_000_000;
+        let starts = (0..20).map(|_| {
+            fs::write(&file, last.to_string()).unwrap();
+            counted_boot(&file, SystemTime::now())
+        });
+        let drawn: std::collections::BTreeSet<u32> = starts.collect();
+        assert!(drawn.len() > 8 && drawn.first() > Some(&last), "{drawn:?}");
+    }
+
+    #[test]
+    fn starts_that_cannot_be_kept_have_no_number_twice_whatever_the_clock_says() {
+        let refused = |_: u32| -> io::Result<()> { Err(ErrorKind::PermissionDenied.into()) };
+        for (last, clock) in [(2_000_000, 1_000_000), (0, 1_000_000)] {
+            let drawn: std::collections::BTreeSet<u32> =
+                (0..20).map(|_| after(last, clock, refused)).collect();
+            assert!(drawn.len() > 18 && drawn.first() >= Some(&last.max(clock)), "{drawn:?}");
+        }
+        // Nor where the folder is not there.
+        let folder = tempfile::tempdir().unwrap();
+        let (file, now) = (folder.path().join("none/robot-7.starts"), SystemTime::now());
+        let drawn: std::collections::BTreeSet<u32> = (0..20).map(|_| counted_boot(&file, now)).collect();
+        assert!(drawn.len() > 18 && drawn.first() >= Some(&boot_number(now)), "{drawn:?}");
     }
 }

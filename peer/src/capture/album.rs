@@ -1,6 +1,6 @@
 //! Where captured pictures are kept: the folder tree that training reads. Nothing that is there is ever written over.
 
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -76,22 +76,27 @@ impl Album {
             let person = self.person.map_or(String::new(), |person| format!("s{person:03}_"));
             let path = self.folder.join(format!("{person}{number:04}.jpg"));
             self.next = number.saturating_add(1);
-            let mut file = match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => file,
+            return match whole(&path, jpeg) {
+                Ok(()) => Ok(path),
                 // Another program captures here too.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists && number < u32::MAX => continue,
-                Err(cause) => return Err(AlbumError::Write { path, cause }),
-            };
-            return match file.write_all(jpeg).and_then(|()| file.sync_data()) {
-                Ok(()) => Ok(path),
-                Err(cause) => {
-                    // Half a picture would stop the training.
-                    let _ = fs::remove_file(&path);
-                    Err(AlbumError::Write { path, cause })
-                }
+                Err(cause) => Err(AlbumError::Write { path, cause }),
             };
         }
     }
+}
+
+/// Makes a new file that is whole as soon as it is there: half a picture would stop the training. Whoever may by the process's `umask` can read it.
+fn whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = gestalt_file::folder(path);
+    let mut beside = tempfile::Builder::new();
+    #[cfg(unix)]
+    beside.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = beside.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist_noclobber(path).map_err(|refused| refused.error)?;
+    gestalt_file::keep_name(path)
 }
 
 /// The number that an image's name ends with.
@@ -119,6 +124,7 @@ mod tests {
         assert_eq!(album.keep(b"new").unwrap(), fist.join("s001_0045.jpg"));
         assert_eq!(fs::read(fist.join("s001_0043.jpg")).unwrap(), b"other");
         assert_eq!(fs::read(fist.join("s001_0044.jpg")).unwrap(), b"meanwhile");
+        assert_eq!(fs::read_dir(&fist).unwrap().count(), 5, "nothing is left beside them");
         let mut anew = Album::open(dataset.path(), "palm", None).unwrap();
         assert_eq!(anew.keep(b"x").unwrap(), dataset.path().join("palm/0001.jpg"));
     }

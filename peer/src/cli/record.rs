@@ -83,8 +83,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         }
         let ledger = recording.finish().await?;
-        report(args.json, &args.file, &ledger)?;
-        check_heard(&ledger, &swarm, link.credentials.is_some())
+        keep_heard(&args.file, &ledger, &swarm, link.credentials.is_some())?;
+        report(args.json, &args.file, &ledger)
+    })
+}
+
+/// As [`check_heard`], and a recording of nobody goes again: it would keep the next one from its name.
+fn keep_heard(file: &Path, ledger: &Ledger, swarm: &str, is_sealed: bool) -> Result<(), Failure> {
+    check_heard(ledger, swarm, is_sealed).inspect_err(|_| {
+        let _ = std::fs::remove_file(file);
     })
 }
 
@@ -123,5 +130,17 @@ mod tests {
         assert!(of(&ledger, true).is_err_and(|no| no.contains("not on the roster any more")));
         ledger.received.insert(Kind::Decision, 1);
         assert_eq!(of(&ledger, true), Ok(()));
+    }
+
+    #[test]
+    fn a_recording_of_nobody_leaves_its_name_free() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.mcap");
+        let mut ledger = Ledger::default();
+        std::fs::write(&file, "a recording").unwrap();
+        assert!(keep_heard(&file, &ledger, "demo", false).is_err() && !file.exists());
+        std::fs::write(&file, "a recording").unwrap();
+        ledger.received.insert(Kind::Status, 1);
+        assert!(keep_heard(&file, &ledger, "demo", false).is_ok() && file.exists());
     }
 }

@@ -63,7 +63,7 @@ impl RobotFacts {
 /// A robot's memory on disk.
 #[derive(Clone, Debug)]
 pub struct MemoryFacts {
-    /// The file.
+    /// The file, by its absolute path.
     pub path: PathBuf,
     /// Whether a change could be written.
     pub room: Room,
@@ -84,6 +84,8 @@ pub enum Room {
     NoFolder,
     /// It cannot be written: what the system says.
     ReadOnly(String),
+    /// It cannot be read, though it may be sound.
+    Unreadable(String),
 }
 
 /// How many bytes of room a memory must find: it grows, and a database writes a change beside what it changes.
@@ -100,6 +102,8 @@ pub struct KeyFacts {
     pub exposed: bool,
     /// What else keeps it from being a member.
     pub trouble: Option<String>,
+    /// Why nothing can be written to the folder.
+    pub locked: Option<String>,
 }
 
 /// An endpoint to listen on.
@@ -236,7 +240,16 @@ fn memory(memory: &MemoryFacts, running: bool) -> Finding {
             format!("{shown}: cannot be written: {cause}"),
             lost,
             format!(
-                "sudo mount -o remount,rw {folder}; or sudo chown $USER {folder}; or learning: {{memory: \"FILE\"}} elsewhere"
+                "look as the user that the robot runs as, in the folder it starts in: sudo -u gestalt gestalt doctor FILE; or sudo mount -o remount,rw {folder}; or learning: {{memory: \"FILE\"}} elsewhere"
+            ),
+        ),
+        // Nothing says that it is lost: it is not to be moved away.
+        Room::Unreadable(cause) => Finding::failure(
+            "memory",
+            cause.clone(),
+            lost,
+            format!(
+                "sudo dmesg | tail     shows what the disk says; or learning: {{memory: \"FILE\"}} on another disk, with a copy of {shown}"
             ),
         ),
         Room::Enough if memory.held && !running => Finding::failure(
@@ -267,9 +280,19 @@ fn keys(keys: &KeyFacts, robot: RobotId) -> Finding {
             format!("chmod 600 {key}     (if nobody else was ever on this machine; else make a new key)"),
         );
     }
-    match &keys.trouble {
-        None => Finding::fine("keys", format!("{folder}: robot {robot} is on the roster with its key")),
-        Some(trouble) => Finding::failure(
+    match (&keys.trouble, &keys.locked) {
+        (None, Some(cause)) => Finding::failure(
+            "keys",
+            format!("{folder}: cannot be written: {cause}"),
+            "the number of each start and newer rosters are kept there: without, the robot draws numbers at random, and starts with an old roster",
+            format!(
+                "let the user that the robot runs as write to {folder}; a service: sudo mv {folder} /var/lib/gestalt/keys, and trust: {{keys: \"/var/lib/gestalt/keys\"}}"
+            ),
+        ),
+        (None, None) => {
+            Finding::fine("keys", format!("{folder}: robot {robot} is on the roster with its key"))
+        }
+        (Some(trouble), _) => Finding::failure(
             "keys",
             trouble.clone(),
             "a robot that is no member of its sealed swarm does not start, or none believes it",

@@ -28,6 +28,7 @@ fn well() -> RobotFacts {
             key: "keys/robot-1.key".into(),
             exposed: false,
             trouble: None,
+            locked: None,
         }),
         ports: vec![PortFacts { endpoint: "tls/0.0.0.0:7447".to_owned(), taken: None }],
         multicast: Some(Ok(())),
@@ -147,6 +148,13 @@ fn each_fault_of_a_robot_is_named_alone_with_its_fix() {
             "cannot be written",
             "remount,rw",
         ),
+        (memory(Room::Unreadable("the disk fails".to_owned())), "memory", "the disk fails", "dmesg"),
+        (
+            on(|it| it.keys.as_mut().unwrap().locked = Some("read-only file system".to_owned())),
+            "keys",
+            "read-only",
+            "let the user",
+        ),
         (
             on(|it| it.memory.as_mut().unwrap().held = true),
             "memory",
@@ -199,6 +207,11 @@ fn each_fault_of_a_robot_is_named_alone_with_its_fix() {
         (gave(Ok(Given { same: true, ..GIVEN })), "camera", "over and over", "unplug"),
     ] {
         is_named(what, robot::findings(&facts), Severity::Failure, check, what, fix);
+    }
+    // What is the service's is not to be made another's, and what may be sound is not to be moved away.
+    for room in [Room::ReadOnly("permission denied".to_owned()), Room::Unreadable("it fails".to_owned())] {
+        let fixes: String = robot::findings(&memory(room)).iter().map(|it| it.fix.clone()).collect();
+        assert!(!fixes.contains("chown") && !fixes.contains("mv "), "{fixes}");
     }
     let small = gave(Ok(Given { size: [320, 240], fps: Some(5.0), ..GIVEN }));
     is_named("size", robot::findings(&small), Severity::Warning, "camera", "320×240 at 5.0", "width_px: 320");

@@ -21,7 +21,8 @@ pub const SWARM: &str = "swarm";
 /// The key of the metadata that holds the rounds of the swarm's robots, as JSON.
 pub const ROUNDS: &str = "rounds";
 
-/// Rounds of the same count that begin further apart are no longer one showing: counts begin anew when all robots were switched off.
+/// Rounds of the same count that begin further apart are no longer one showing, nor are those of one robot in two lives: counts begin anew when all
+/// robots were switched off.
 const ONE_SHOWING: Duration = Duration::from_secs(60);
 
 /// A recorded run.
@@ -134,7 +135,7 @@ impl Run {
     fn showing(&mut self, round: RoundId, at: u64) -> &mut Showing {
         let near = |showing: &Showing| {
             at.abs_diff(showing.opened) <= ONE_SHOWING.as_nanos() as u64
-                && showing.rounds.first().is_some_and(|first| first.counter == round.counter)
+                && showing.rounds.iter().all(|known| known.may_merge(&round))
         };
         let index = match self.by_round.get(&round) {
             Some(index) => *index,

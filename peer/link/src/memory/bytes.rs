@@ -3,6 +3,7 @@
 use std::io;
 use std::ops::Bound;
 
+use redb::backends::InMemoryBackend;
 use redb::{BackendError, StorageBackend};
 
 /// Any kind of storage. (The database wants a type of its own, and a test another than a file.)
@@ -12,6 +13,14 @@ pub(crate) struct Bytes(Box<dyn StorageBackend>);
 impl Bytes {
     pub fn new(storage: impl StorageBackend) -> Self {
         Self(Box::new(storage))
+    }
+
+    /// These, in this process's memory.
+    pub fn in_memory(bytes: &[u8]) -> io::Result<Self> {
+        let memory = InMemoryBackend::new();
+        memory.set_len(bytes.len() as u64)?;
+        memory.write(0, bytes)?;
+        Ok(Self::new(memory))
     }
 }
 

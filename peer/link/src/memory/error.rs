@@ -27,6 +27,16 @@ pub enum StoreError {
         /// What the system says.
         cause: String,
     },
+    /// No right to read.
+    #[error(
+        "memory {path}: cannot be read: {cause}: let the robot's user read and write it; it is tried again"
+    )]
+    Unreadable {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
     /// The disk fails otherwise.
     #[error(
         "memory {path}: the disk fails: {cause}: check the disk, or give the robot another file; it is tried again"
@@ -95,7 +105,8 @@ impl StoreError {
     /// Whether the disk is at fault, and not what stands on it: a robot starts without, says so, and goes on trying.
     #[must_use]
     pub fn is_of_the_disk(&self) -> bool {
-        matches!(self, Self::NoFolder(_) | Self::Full(_) | Self::ReadOnly { .. } | Self::Disk { .. })
+        use StoreError::{Disk, Full, NoFolder, ReadOnly, Unreadable};
+        matches!(self, NoFolder(_) | Full(_) | ReadOnly { .. } | Unreadable { .. } | Disk { .. })
     }
 
     /// What the operating system's refusal means.
@@ -111,6 +122,14 @@ impl StoreError {
                 Self::Damaged { path, cause: cause.to_string() }
             }
             _ => Self::Disk { path, cause: cause.to_string() },
+        }
+    }
+
+    /// What the operating system's refusal means where a file is read alone.
+    pub(super) fn of_reading(path: &Path, cause: &io::Error) -> Self {
+        match Self::of_system(path, cause) {
+            Self::ReadOnly { path, cause } => Self::Unreadable { path, cause },
+            other => other,
         }
     }
 

@@ -9,7 +9,7 @@ mod place;
 mod scribe;
 mod store;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use error::StoreError;
 pub(crate) use place::{FilePlace, Place};

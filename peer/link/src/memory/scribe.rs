@@ -68,7 +68,7 @@ pub(crate) struct Assignment {
     pub robot: RobotId,
     /// The number of this life.
     pub boot: u32,
-    /// What stands in the store.
+    /// What stands in the store, or could be read where it could not be written.
     pub known: Records,
     /// `None` where the disk is not there yet.
     pub store: Option<Store>,
@@ -265,13 +265,23 @@ impl Writing {
         // Under a number that nothing was said under: until now it voted under the clock's.
         let (store, new) = Store::open(self.place.clone(), self.robot, self.boot.saturating_add(1))?;
         let memory = store.memory()?;
+        let holds = store.records()?;
         let found = if new || memory.is_empty() {
+            // One that was read while it could not be written, and has gone since.
+            let lacks = self.known.iter().filter(|(key, _)| !holds.contains_key(*key));
+            let lacks =
+                lacks.map(|(key, value)| RecordChange { key: key.clone(), value: Some(value.clone()) });
+            let lacks: Vec<RecordChange> = lacks.collect();
+            if !lacks.is_empty() {
+                store.write(&lacks, None)?;
+            }
+            self.known.extend(holds);
             None
         } else {
+            self.known = holds;
             let classifier = store.classifier()?.map(Arc::new);
             Some(Found { memory, classifier, boot: store.boot() })
         };
-        self.known = store.records()?;
         self.run = Some(store.run());
         self.store = Some(store);
         Ok(found)

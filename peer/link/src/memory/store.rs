@@ -12,6 +12,7 @@ use redb::{Builder, Database, ReadableDatabase, ReadableTable, StorageBackend, T
 use super::bytes::Bytes;
 use super::error::StoreError;
 use super::place::{FileId, Place};
+use crate::boot::step;
 use crate::identity::fresh_nonce;
 use crate::panics::said;
 
@@ -47,6 +48,7 @@ struct About {
 pub(crate) struct Store {
     database: Database,
     place: Arc<dyn Place>,
+    robot: RobotId,
     file: FileId,
     boot: u32,
     /// Differs at every start: tells this run's file from a copy put in its place.
@@ -60,22 +62,50 @@ impl Store {
     /// # Errors
     /// See [`StoreError`].
     pub fn open(place: Arc<dyn Place>, robot: RobotId, first_boot: u32) -> Result<(Self, bool), StoreError> {
+        let (mut store, new) = Self::look(place, robot)?;
+        store.count(first_boot)?;
+        Ok((store, new))
+    }
+
+    /// The same, before this start is counted: a memory that is refused counts none, and one that cannot be written can be read.
+    ///
+    /// # Errors
+    /// See [`StoreError`].
+    pub fn look(place: Arc<dyn Place>, robot: RobotId) -> Result<(Self, bool), StoreError> {
         let there = place.is_there().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
         if !there {
-            Self::make(&place, robot, first_boot)?;
+            Self::make(&place, robot)?;
         }
-        let mut store = Self::read(place, robot)?;
-        if there {
-            // Where the clock says less than the memory, the memory may be an old copy: the step is by chance.
-            let step = 1 + (fresh_nonce() >> 48) as u32;
-            store.boot = first_boot.max(store.boot.saturating_add(step));
+        let opened = place.open().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
+        Ok((Self::read(place, robot, opened)?, !there))
+    }
+
+    /// A copy of a robot's memory, in this process's memory; `None` where there is none. What is written to it is lost.
+    ///
+    /// # Errors
+    /// See [`StoreError`].
+    pub fn copy(place: Arc<dyn Place>, robot: RobotId) -> Result<Option<Self>, StoreError> {
+        let of_reading = |cause| StoreError::of_reading(place.path(), &cause);
+        if !place.is_there().map_err(of_reading)? {
+            return Ok(None);
         }
-        store.mark = fresh_nonce();
-        guarded(store.place.path(), || {
-            sign(&store.database, robot, store.boot, store.mark)?;
-            store.commit(&[], None)
+        let opened = place.copy().map_err(of_reading)?;
+        Self::read(place, robot, opened).map(Some)
+    }
+
+    /// Counts this start, so that the file is this run's. The first has number `first_boot`.
+    ///
+    /// # Errors
+    /// Those of the disk, and [`StoreError::Damaged`].
+    pub fn count(&mut self, first_boot: u32) -> Result<(), StoreError> {
+        let next = if self.boot == 0 { first_boot } else { first_boot.max(self.boot.saturating_add(step())) };
+        let mark = fresh_nonce();
+        guarded(self.place.path(), || {
+            sign(&self.database, self.robot, next, mark)?;
+            self.commit(&[], None)
         })?;
-        Ok((store, !there))
+        (self.boot, self.mark) = (next, mark);
+        Ok(())
     }
 
     /// Opens it again after it failed, or makes a new one where it was removed: see [`Reopened`].
@@ -88,7 +118,8 @@ impl Store {
             let store = Self::open(place, robot, before.boot)?.0;
             return Ok(Reopened { store, removed: true });
         }
-        let store = Self::read(place, robot)?;
+        let opened = place.open().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
+        let store = Self::read(place, robot, opened)?;
         if store.mark != before.mark {
             return Err(StoreError::Replaced(store.place.path().to_owned()));
         }
@@ -96,12 +127,12 @@ impl Store {
     }
 
     /// Makes a new file, signed.
-    fn make(place: &Arc<dyn Place>, robot: RobotId, boot: u32) -> Result<(), StoreError> {
+    fn make(place: &Arc<dyn Place>, robot: RobotId) -> Result<(), StoreError> {
         let path = place.path();
         place.make(&|bytes| {
             let signed = || {
                 let database = Builder::new().set_cache_size(CACHE).create_with_backend(bytes)?;
-                sign(&database, robot, boot, fresh_nonce())?;
+                sign(&database, robot, 0, fresh_nonce())?;
                 Ok(database.close()?)
             };
             guarded(path, signed)
@@ -109,9 +140,12 @@ impl Store {
     }
 
     /// Opens a file that is there, every byte of it checked, and owner and schema too.
-    fn read(place: Arc<dyn Place>, robot: RobotId) -> Result<Self, StoreError> {
+    fn read(
+        place: Arc<dyn Place>,
+        robot: RobotId,
+        (bytes, file): (Bytes, FileId),
+    ) -> Result<Self, StoreError> {
         let path = place.path().to_owned();
-        let (bytes, file) = place.open().map_err(|cause| StoreError::of_system(&path, &cause))?;
         check_head(&path, &bytes)?;
         let (database, about) = guarded(&path, || {
             let database = Builder::new()
@@ -131,10 +165,10 @@ impl Store {
         }
         let boot =
             u32::try_from(boot).map_err(|_| StoreError::damaged(&path, "an impossible number of starts"))?;
-        Ok(Self { database, place, file, boot, mark })
+        Ok(Self { database, place, robot, file, boot, mark })
     }
 
-    /// Which start of the robot this is: higher than at any before.
+    /// Which start of the robot this is, higher than at any before; until it is [counted](Self::count), which the last one was: 0 for none.
     #[must_use]
     pub fn boot(&self) -> u32 {
         self.boot

@@ -1,14 +1,20 @@
 //! What a robot starts with when its memory is damaged, missing, or comes late.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Gesture, Instruction, RoundId};
-use gestalt_strategies::MindConfig;
+use gestalt_protocol::{ClassId, Gesture, Instruction, RobotId, RoundId, Status};
+use gestalt_strategies::{Mind, MindConfig, RecordChange};
 use tokio::time::timeout;
 
 use super::{PATIENCE, Watched, config, learning, start, swarm, unique};
+use crate::apprentice::Prepared;
+use crate::identity;
+use crate::memory::Store;
+use crate::memory::tests::faulty::Disk;
 use crate::{Client, Event, LinkConfig, LinkError, Robot, RobotConfig, StoreError};
 
 fn with_memory(name: &str, path: &Path) -> RobotConfig {
@@ -79,6 +85,48 @@ async fn a_memory_that_comes_late_is_taken_up() {
     // And what it hears now is remembered: a correction of what it was taught before.
     teach(&robot, &name, taught, 0).await;
     timeout(PATIENCE, robot.stop()).await.expect("it stops");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_memory_that_can_be_read_and_not_written_is_known_and_no_start_has_a_number_twice() {
+    const AHEAD: u32 = 1 << 31;
+    let me = RobotId(1);
+    let folder = tempfile::tempdir().unwrap();
+    let (name, path) = (unique(), folder.path().join("memory"));
+    let mut robot = swarm(&name, 1, with_memory(&name, &path)).await.pop().unwrap();
+    let taught = robot.decide(0).await.round;
+    teach(&robot, &name, taught, 1).await;
+    let learned = samples(&robot.robot.status());
+    assert!(learned > 0);
+    robot.stop().await;
+    let mut numbers = BTreeSet::new();
+    for full in [true, false, true, false] {
+        let disk = Disk::holding(fs::read(&path).unwrap());
+        drop(Store::open(Arc::new(disk.clone()), me, AHEAD).unwrap());
+        disk.fill(full);
+        disk.lock_up(!full);
+        let mut prepared = Prepared::with_nothing(1, learning(Some(path.clone())));
+        prepared.open_at(Arc::new(disk), me).unwrap();
+        numbers.insert(prepared.boot);
+        let life = identity::life(prepared.boot, 1);
+        let mind = prepared.bring_up(Mind::new(me, life, MindConfig::default()).unwrap()).unwrap();
+        let status = Status { learning: mind.learned(), ..Status::new(me, name.clone(), 1) };
+        assert!(samples(&status) >= learned, "{status:?}");
+    }
+    assert!(numbers.len() == 4 && numbers.first() > Some(&AHEAD), "{numbers:?}");
+}
+
+#[test]
+fn a_start_that_the_memory_refuses_does_not_count() {
+    let me = RobotId(1);
+    let disk = Disk::default();
+    let store = Store::open(Arc::new(disk.clone()), me, 5).unwrap().0;
+    store.write(&[RecordChange { key: vec![200], value: Some(vec![1; 40]) }], None).unwrap();
+    drop(store);
+    let mut prepared = Prepared::with_nothing(1, learning(Some("memory".into())));
+    let error = prepared.open_at(Arc::new(disk.clone()), me).unwrap_err();
+    assert!(matches!(error, StoreError::Damaged { .. }), "{error}");
+    assert_eq!(Store::look(Arc::new(disk), me).unwrap().0.boot(), 5);
 }
 
 /// Nothing was taught, so nothing is remembered but that it was there.

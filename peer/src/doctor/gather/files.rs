@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, absolute};
 
 use gestalt_protocol::Status;
 
@@ -28,9 +28,10 @@ pub(super) fn look(subject: &Subject, config: &Config, running: bool) -> (RobotF
     (facts, mine)
 }
 
-/// What needs a model: reads it, and opens a copy of the memory with it.
+/// What needs a model: reads it, and tries a copy of the memory with it.
 #[cfg(feature = "opencv")]
 fn judge(config: &Config, facts: &mut RobotFacts, mine: &mut Status) {
+    use gestalt_link::LinkError;
     use gestalt_protocol::LearningStatus;
     use gestalt_strategies::Classify;
 
@@ -56,7 +57,12 @@ fn judge(config: &Config, facts: &mut RobotFacts, mine: &mut Status) {
     }
     // What another process writes to may be read half-written.
     if let Some(memory) = facts.memory.as_mut().filter(|memory| !memory.held && memory.room == Room::Enough) {
-        memory.trouble = crate::config::check::memory(config, &model).err().map(|error| error.to_string());
+        match crate::config::check::memory(config, &model) {
+            Err(LinkError::Memory(error)) if error.is_of_the_disk() => {
+                memory.room = Room::Unreadable(error.to_string());
+            }
+            tried => memory.trouble = tried.err().map(|error| crate::config::check::said(&error)),
+        }
     }
 }
 
@@ -66,10 +72,13 @@ fn judge(_: &Config, _: &mut RobotFacts, _: &mut Status) {}
 
 /// Whether there is room for a memory, and whether it is in use.
 fn place(path: &Path) -> MemoryFacts {
-    let folder = gestalt_file::folder(path);
-    let room = room(folder).and_then(|()| match File::options().append(true).open(path) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
+    // Named without a folder, it is another file wherever the robot starts: which one was looked at is said. The room is where a link leads.
+    let path = &absolute(path).unwrap_or_else(|_| path.to_owned());
+    let room = gestalt_file::target(path).and_then(|end| room(gestalt_file::folder(&end))).and_then(|()| {
+        match File::options().append(true).open(path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        }
     });
     let room = match room {
         Ok(()) => Room::Enough,
@@ -104,7 +113,9 @@ fn keys(config: &Config) -> Option<KeyFacts> {
     let key = key_file(&folder, config.robot.id);
     let exposed = is_exposed(&key);
     let trouble = if exposed { None } else { seal(config).err() };
-    Some(KeyFacts { exposed, trouble, folder, key })
+    // As the number of a start and a newer roster are written: beside what they replace.
+    let locked = tempfile::tempfile_in(&folder).err().map(|cause| cause.to_string());
+    Some(KeyFacts { exposed, trouble, locked, folder, key })
 }
 
 /// Whether the robot is a member of the swarm that its roster is of.
@@ -140,4 +151,39 @@ fn is_exposed(key: &Path) -> bool {
 #[cfg(not(unix))]
 fn is_exposed(_: &Path) -> bool {
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_memory_named_without_a_folder_is_said_to_be_where_it_was_looked_for() {
+        let memory = place(Path::new("robot.memory"));
+        assert!(memory.path.is_absolute() && memory.path.ends_with("robot.memory"), "{memory:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_room_for_a_memory_is_where_its_link_leads() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("robot.memory");
+        std::os::unix::fs::symlink("disk/m", &path).unwrap();
+        assert_eq!(place(&path).room, Room::NoFolder);
+        fs::create_dir(folder.path().join("disk")).unwrap();
+        assert_eq!(place(&path).room, Room::Enough);
+    }
+
+    #[test]
+    fn a_folder_of_keys_is_tried_by_a_file_without_a_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let locked = |keys: &Path| {
+            let mut config = Config::default();
+            config.trust.keys = Some(keys.to_owned());
+            super::keys(&config).unwrap().locked
+        };
+        assert_eq!(locked(folder.path()), None);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(locked(&folder.path().join("none")).is_some());
+    }
 }

@@ -28,6 +28,8 @@ struct State {
     cut_at: Option<u64>,
     /// No byte more is taken.
     full: bool,
+    /// Nothing can be opened for writing.
+    locked: bool,
 }
 
 impl Disk {
@@ -49,6 +51,16 @@ impl Disk {
         self.lock().full = full;
     }
 
+    /// A disk with these bytes on it.
+    pub fn holding(file: Vec<u8>) -> Self {
+        let state = State { cached: Some(file.clone()), synced: Some(file), ..State::default() };
+        Self(Arc::new(Mutex::new(state)))
+    }
+
+    pub fn lock_up(&self, locked: bool) {
+        self.lock().locked = locked;
+    }
+
     /// The disk as it is after its power was cut: what was synced, and of the rest each write that `kept` says, which may
     /// be only its first half.
     pub fn after_cut(&self, mut kept: impl FnMut() -> Kept) -> Self {
@@ -64,8 +76,7 @@ impl Disk {
                 put(file, *offset, bytes);
             }
         }
-        let state = State { cached: file.clone(), synced: file, ..State::default() };
-        Self(Arc::new(Mutex::new(state)))
+        file.map_or_else(Self::default, Self::holding)
     }
 }
 
@@ -162,7 +173,14 @@ impl Place for Disk {
     }
 
     fn open(&self) -> io::Result<(Bytes, FileId)> {
+        if self.lock().locked {
+            return Err(ErrorKind::ReadOnlyFilesystem.into());
+        }
         Ok((Bytes::new(OfDisk(self.clone())), FileId(0, 0)))
+    }
+
+    fn copy(&self) -> io::Result<(Bytes, FileId)> {
+        Ok((Bytes::in_memory(self.lock().file()?)?, FileId(0, 0)))
     }
 
     fn make(&self, fill: Fill<'_>) -> Result<(), StoreError> {

@@ -124,6 +124,56 @@ fn what_was_written_is_there_again_and_each_start_counts() {
 }
 
 #[test]
+fn starts_beyond_the_clock_go_on_by_little_and_by_chance() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, copy) = (folder.path().join("robot.memory"), folder.path().join("copy"));
+    let first = open(&path).unwrap().boot();
+    for _ in 0..20 {
+        drop(open(&path).unwrap());
+    }
+    fs::copy(&path, &copy).unwrap();
+    let last = open(&path).unwrap().boot();
+    assert!((first + 21..=first + 21 * 4096).contains(&last), "{last} after {first}");
+    let mut of_copies = std::collections::BTreeSet::new();
+    for _ in 0..20 {
+        let old = folder.path().join("old");
+        fs::copy(&copy, &old).unwrap();
+        of_copies.insert(open(&old).unwrap().boot());
+    }
+    assert!(of_copies.len() > 8, "{of_copies:?}");
+}
+
+#[test]
+fn a_link_to_no_file_yet_stays_and_the_file_is_made_where_it_leads() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, disk] = ["robot.memory", "disk"].map(|name| folder.path().join(name));
+    symlink("disk/m", &path).unwrap();
+    assert!(matches!(open(&path), Err(StoreError::NoFolder(_))), "and no folder either");
+    fs::create_dir(&disk).unwrap();
+    open(&path).unwrap().write(&[change(1, Some(1))], None).unwrap();
+    assert!(fs::symlink_metadata(&path).unwrap().is_symlink());
+    assert_eq!(open(&disk.join("m")).unwrap().records().unwrap().len(), 1);
+    assert_eq!(fs::read_dir(&disk).unwrap().count(), 1, "no draft is left");
+}
+
+#[test]
+fn a_copy_is_read_and_the_file_stays_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.memory");
+    assert!(Store::copy(place(&path), ME).unwrap().is_none() && !path.exists());
+    open(&path).unwrap().write(&[change(1, Some(1))], None).unwrap();
+    let before = fs::read(&path).unwrap();
+    let mut copy = Store::copy(place(&path), ME).unwrap().unwrap();
+    copy.count(1).unwrap();
+    assert_eq!(copy.records().unwrap().len(), 1);
+    drop(copy);
+    assert_eq!(fs::read(&path).unwrap(), before);
+    assert!(matches!(Store::copy(place(&path), RobotId(8)), Err(StoreError::Robot { .. })));
+    let error = Store::copy(place(folder.path()), ME).unwrap_err();
+    assert!(error.to_string().contains("no file"), "{error}");
+}
+
+#[test]
 fn records_that_are_no_memory_are_damage() {
     let folder = tempfile::tempdir().unwrap();
     let store = open(&folder.path().join("m")).unwrap();

@@ -1,7 +1,7 @@
 //! A memory on disks that fail, and in files that were touched.
 
 mod cuts;
-mod faulty;
+pub(crate) mod faulty;
 mod files;
 mod scribes;
 

@@ -28,11 +28,15 @@ struct Watched {
 }
 
 fn start(place: Arc<dyn Place>, store: Option<Store>) -> Watched {
+    let known = store.as_ref().map_or_else(Records::new, |store| store.records().unwrap());
+    start_knowing(place, store, known)
+}
+
+fn start_knowing(place: Arc<dyn Place>, store: Option<Store>, known: Records) -> Watched {
     let account = Account::new(Status::new(ME, "seven".to_owned(), 1), Instant::now());
     let (sender, events) = broadcast::channel(64);
     let supervisor = Supervisor::new(Arc::new(account), sender);
     let (tell, told) = channel();
-    let known = store.as_ref().map_or_else(Records::new, |store| store.records().unwrap());
     let assignment = Assignment { place, robot: ME, boot: 1, known, store };
     let tell = move |what| drop(tell.send(what));
     Watched { scribe: Scribe::start(assignment, supervisor.clone(), tell).unwrap(), told, supervisor, events }
@@ -123,6 +127,20 @@ fn a_disk_that_comes_late_and_empty_takes_all() {
     watched.wait_for_revision(1);
     drop(watched);
     assert_eq!(open(&late.join("m")).unwrap().records().unwrap().len(), 1);
+}
+
+#[test]
+fn what_could_be_read_alone_and_went_then_is_written_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = folder.path().join("late");
+    let known = Records::from([(vec![1], vec![1; 40])]);
+    let watched = start_knowing(place(&late.join("m")), None, known);
+    watched.scribe.remember(1, vec![change(2, Some(2))]);
+    watched.wait_for_error("its folder is not there");
+    fs::create_dir(&late).unwrap();
+    watched.wait_for_revision(1);
+    drop(watched);
+    assert_eq!(open(&late.join("m")).unwrap().records().unwrap().into_keys().collect::<Vec<_>>(), [[1], [2]]);
 }
 
 #[test]
