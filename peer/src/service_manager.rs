@@ -85,6 +85,12 @@ impl ServiceManager {
         Ok(Self { socket: Some(socket), watchdog })
     }
 
+    /// Whether there is one, which starts the program again when it ends with an error.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        self.socket.is_some()
+    }
+
     /// How often it wants to hear that the robot still runs: at half the time after which it gives it up, as sd_watchdog_enabled(3)
     /// recommends. `None` where nobody waits for that.
     #[must_use]

@@ -24,6 +24,8 @@ pub enum Part {
     Deafness,
     /// Asks who is alive after links have changed. It begins anew.
     Census,
+    /// The addresses that others find it by. Who is alone is found at none that came after the start of its program.
+    Network,
     /// In a sealed swarm, tells neighbours of its roster and hangs up who is on it no more. It begins anew.
     Roster,
     /// Lets others see that this robot is alive. It declares itself anew.
@@ -36,7 +38,7 @@ pub enum Part {
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Mind,
         Self::Classifier,
         Self::Training,
@@ -45,6 +47,7 @@ impl Part {
         Self::Links,
         Self::Deafness,
         Self::Census,
+        Self::Network,
         Self::Roster,
         Self::Presence,
         Self::Session,
@@ -63,6 +66,7 @@ impl Part {
             Self::Links => "links",
             Self::Deafness => "deafness",
             Self::Census => "census",
+            Self::Network => "network",
             Self::Roster => "roster",
             Self::Presence => "presence",
             Self::Session => "session",
@@ -79,6 +83,7 @@ impl Part {
             Self::Memory => "it is opened anew, and what waits is written then",
             Self::Speaking => "it goes on with the next; neighbours repeat what is lost",
             Self::Links | Self::Deafness | Self::Census | Self::Roster | Self::Presence => "it begins anew",
+            Self::Network => "no robot is found there: restart this program",
             Self::Session => "the robot ends: start it again, once its network is up",
             Self::Host => "the guest ends: start it again with its host",
         }

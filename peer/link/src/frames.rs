@@ -10,7 +10,7 @@ use gestalt_protocol::{
     DecodeError, FrameChallenge, FrameHeader, FrameProof, FrameTaken, ImageEncoding, Keys, MAX_FRAME,
     MAX_ROBOTS, RobotId, RoundId, Topic,
 };
-use gestalt_trust::{Distrust, Ed25519, FrameClaim, FrameGuard, FrameSigner};
+use gestalt_trust::{Distrust, Ed25519, FrameClaim, FrameGuard, FrameSigner, Scheme};
 use thiserror::Error;
 use zenoh::bytes::{Encoding, ZBytes};
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -72,6 +72,22 @@ struct Cameras {
 }
 
 impl Cameras {
+    /// Takes in a frame whose signature was checked. One that goes on beside a camera that was started later uses up nothing that the other
+    /// is asked.
+    fn admit(
+        &mut self,
+        now: Duration,
+        key: &<Ed25519 as Scheme>::Key,
+        frame: &FrameClaim,
+        at: Instant,
+    ) -> Result<(), Refusal> {
+        let senders = self.senders.get_mut(&frame.robot);
+        if senders.is_some_and(|senders| senders.refuses(frame.header.nonce, at)) {
+            return Err(Refusal::TwoSenders);
+        }
+        Ok(self.guard.admit(now, key, frame, fresh_nonce())?)
+    }
+
     /// Whether nothing that was started later streams as that robot.
     fn hears(&mut self, frame: &FrameArrival) -> bool {
         let has_room = self.senders.len() < MAX_ROBOTS || self.senders.contains_key(&frame.robot);
@@ -214,7 +230,7 @@ impl Desk {
         if !frame.is_signed::<Ed25519>(&key, &swarm) {
             return Err(Distrust::Forged.into());
         }
-        self.cameras().guard.admit(self.now(), &key, &frame, fresh_nonce())?;
+        self.cameras().admit(self.now(), &key, &frame, arrival.at)?;
         drop(picture);
         Ok(arrival)
     }
@@ -347,5 +363,44 @@ impl FrameSender {
         };
         let put = self.publisher.put(picture).encoding(encoding).attachment(attachment);
         put.await.map_err(|error| LinkError::open(&*error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::Signature;
+    use gestalt_trust::{Identity, Membership};
+
+    use super::*;
+
+    const CAMERA: RobotId = RobotId(1);
+
+    #[test]
+    fn a_camera_that_goes_on_beside_a_later_one_uses_up_nothing_that_the_other_is_asked() {
+        let identity = Identity::from_bytes(&[1; 32]);
+        let robots = [(CAMERA, identity.public_key())].into();
+        let members = Membership { swarm: "demo".to_owned(), epoch: 1, robots, ..Membership::default() };
+        let roster = members.sign(&identity).unwrap();
+        let key = roster.key(CAMERA).unwrap();
+        let (mut cameras, at) = (Cameras::default(), Instant::now());
+        let asked = |cameras: &mut Cameras| cameras.guard.challenge(Duration::ZERO, CAMERA, key, 1);
+        let see = |cameras: &mut Cameras, nonce, sequence, challenge| -> Result<(), Refusal> {
+            let (age_us, encoding, fps, camera) = (0, ImageEncoding::Jpeg, 30.0, "parrot".to_owned());
+            let header = FrameHeader { nonce, sequence, age_us, encoding, fps, camera };
+            let proof = FrameProof { challenges: vec![challenge], signature: Signature::from_bytes([0; 64]) };
+            let claim = FrameClaim { robot: CAMERA, header: &header, proof: &proof, picture: &[1] };
+            cameras.admit(Duration::ZERO, key, &claim, at)?;
+            let arrival = FrameArrival { robot: CAMERA, header, at, picture: ZBytes::new() };
+            if cameras.hears(&arrival) { Ok(()) } else { Err(Refusal::TwoSenders) }
+        };
+        let first = asked(&mut cameras);
+        assert!(see(&mut cameras, 1, 1, first).is_ok());
+        let second = asked(&mut cameras);
+        assert!(see(&mut cameras, 2, 1, second).is_ok());
+        // The earlier one has heard what is asked now, and the later one has not yet.
+        let third = asked(&mut cameras);
+        assert!(matches!(see(&mut cameras, 1, 2, third), Err(Refusal::TwoSenders)));
+        assert_eq!(asked(&mut cameras), third);
+        assert!(see(&mut cameras, 2, 2, second).is_ok());
     }
 }

@@ -56,6 +56,12 @@ pub(super) fn is_of_life(id: ZenohId, nonce: u64) -> bool {
     said >> 16 == (nonce | HIGHEST) >> 16
 }
 
+/// Whether a Zenoh id is that of a robot's session in the swarm of the robot with the session `own`, and not of the same life as that.
+pub(super) fn is_of_another(id: ZenohId, own: ZenohId) -> bool {
+    let nonce = u64::from(word(own, 12)) << 32 | u64::from(word(own, 8));
+    robot_of(id, word(own, 4)).is_some_and(|robot| robot.0 != word(own, 0) || !is_of_life(id, nonce))
+}
+
 /// The robot behind a Zenoh id; `None` for clients, routers of other kinds and other swarms.
 pub(super) fn robot_of(id: ZenohId, swarm: u32) -> Option<RobotId> {
     (word(id, 4) == swarm && word(id, 12) >> 31 == 1).then(|| RobotId(word(id, 0)))
@@ -102,6 +108,20 @@ mod tests {
             assert_ne!(relay.to_string(), zenoh_id(RobotId(7), "demo", nonce));
             assert!(is_of_life(relay, nonce) && !is_of_life(relay, nonce ^ 1 << 40));
         }
+    }
+
+    #[test]
+    fn another_life_and_another_robot_of_the_same_swarm_are_told_from_ones_own() {
+        let nonce = fresh_nonce();
+        let id = |robot, swarm, nonce| zenoh_id(RobotId(robot), swarm, nonce).parse::<ZenohId>().unwrap();
+        let own = id(7, "demo", nonce);
+        let relay = relay_id(RobotId(7), "demo", nonce, 1).parse().unwrap();
+        assert!(![own, relay, id(7, "other", !nonce)].into_iter().any(|id| is_of_another(id, own)));
+        assert!(
+            [id(7, "demo", nonce ^ 1 << 40), id(8, "demo", nonce)]
+                .into_iter()
+                .all(|id| is_of_another(id, own))
+        );
     }
 
     #[test]

@@ -21,6 +21,9 @@ const PERIOD: Duration = Duration::from_millis(500);
 const IDLE_PERIOD: Duration = Duration::from_secs(3);
 const UNREST: Duration = Duration::from_secs(10);
 
+/// Whose links so often in a row end before they are looked after hangs up by itself.
+const SEVERAL: u32 = 3;
+
 /// The task that looks after the links of one session that relays: to others that do.
 pub(super) struct Keeper {
     neighbourhood: Neighbourhood,
@@ -31,6 +34,7 @@ pub(super) struct Keeper {
     /// Whether it is the relay of a cell: then there are robots that nobody hears, for they relay for nobody.
     of_cell: bool,
     busy: BTreeSet<RobotId>,
+    brief: Brief,
     news: (mpsc::UnboundedSender<Dialled>, mpsc::UnboundedReceiver<Dialled>),
 }
 
@@ -55,6 +59,7 @@ impl Keeper {
             lookout,
             of_cell,
             busy: BTreeSet::new(),
+            brief: Brief::default(),
             news: mpsc::unbounded_channel(),
         }
     }
@@ -85,11 +90,17 @@ impl Keeper {
     fn on_dialled(&mut self, Dialled(robot, place, stands): &Dialled) {
         self.busy.remove(robot);
         self.lookout.dialled(*robot, place, *stands);
+        if *stands && self.brief.is_hung_up(*robot) && self.inbox.is_sealed() {
+            self.account.error(&format!(
+                "robot {robot} hangs up at once: it may not have this robot's key on its roster; give both the newest one"
+            ));
+        }
     }
 
     async fn look_after(&mut self) {
         let (links, heard) = (self.inbox.relays(), self.lookout.heard());
         let linked: BTreeSet<RobotId> = links.values().copied().collect();
+        self.brief.stand(&linked);
         let mut alive = self.inbox.alive();
         if self.of_cell {
             alive.retain(|robot| heard.contains_key(robot) || linked.contains(robot));
@@ -124,5 +135,40 @@ impl Keeper {
             // The keeper may be gone: then nobody needs to know.
             let _ = news.send(Dialled(robot, place, stands));
         });
+    }
+}
+
+/// How many links to each robot were made since one was seen to stand.
+#[derive(Debug, Default)]
+struct Brief(BTreeMap<RobotId, u32>);
+
+impl Brief {
+    /// One more was made; whether that one hangs up at once, as those before.
+    fn is_hung_up(&mut self, robot: RobotId) -> bool {
+        let made = self.0.entry(robot).or_default();
+        *made = made.saturating_add(1);
+        *made > SEVERAL
+    }
+
+    /// Links to these stand.
+    fn stand(&mut self, linked: &BTreeSet<RobotId>) {
+        self.0.retain(|robot, _| !linked.contains(robot));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_ends_several_links_in_a_row_before_they_are_looked_after_hangs_up_at_once() {
+        let (mut brief, one, other) = (Brief::default(), RobotId(1), RobotId(2));
+        for _ in 0..SEVERAL {
+            assert!(!brief.is_hung_up(one) && !brief.is_hung_up(other));
+            brief.stand(&[other].into());
+        }
+        assert!(brief.is_hung_up(one) && !brief.is_hung_up(other));
+        brief.stand(&[one].into());
+        assert!(!brief.is_hung_up(one));
     }
 }

@@ -40,6 +40,7 @@ mod inbox_links;
 mod inbox_question;
 mod inbox_sealed;
 mod inbox_silence;
+mod interfaces;
 mod keeper;
 mod lookout;
 mod memory;

@@ -9,10 +9,13 @@ use zenoh::config::WhatAmI;
 use zenoh::session::ZenohId;
 
 use crate::account::Account;
+use crate::failure::Part;
 use crate::identity::{is_of_life, robot_of, swarm_checksum};
 use crate::inbox::Inbox;
+use crate::interfaces::{self, Interfaces};
 use crate::reach::is_tls;
 use crate::sightings::{Place, Sightings};
+use crate::supervisor::Supervisor;
 
 /// How long answers to a call are waited for.
 const CALL: Duration = Duration::from_millis(700);
@@ -24,9 +27,11 @@ pub(crate) struct Lookout {
     swarm: u32,
     inbox: Arc<Inbox>,
     account: Arc<Account>,
+    supervisor: Arc<Supervisor>,
     scouting: zenoh::Config,
     started: Instant,
     heard: Mutex<Sightings>,
+    interfaces: Mutex<Interfaces>,
 }
 
 impl Lookout {
@@ -36,11 +41,21 @@ impl Lookout {
         swarm: &str,
         nonce: u64,
         inbox: Arc<Inbox>,
-        account: Arc<Account>,
+        supervisor: Arc<Supervisor>,
         scouting: zenoh::Config,
     ) -> Self {
-        let (swarm, started) = (swarm_checksum(swarm), Instant::now());
-        Self { me, nonce, swarm, inbox, account, scouting, started, heard: Mutex::default() }
+        Self {
+            me,
+            nonce,
+            swarm: swarm_checksum(swarm),
+            inbox,
+            account: supervisor.account().clone(),
+            supervisor,
+            scouting,
+            started: Instant::now(),
+            heard: Mutex::default(),
+            interfaces: Mutex::default(),
+        }
     }
 
     /// The time by which it says when robots were heard.
@@ -69,6 +84,7 @@ impl Lookout {
     /// Asks who is there; the answers come by themselves.
     pub async fn call(self: &Arc<Self>) {
         self.account.count("scouted");
+        self.look_at_network();
         let lookout = self.clone();
         let scouting = zenoh::scout(WhatAmI::Router, self.scouting.clone())
             .callback(move |hello| {
@@ -86,6 +102,21 @@ impl Lookout {
             Err(error) => self.account.error(&format!(
                 "cannot look for other robots: {error}: check the scouting address and interface"
             )),
+        }
+    }
+
+    /// Says where others cannot be found for Zenoh does not know it; not in the midst of a round, for the mend ends the robot.
+    fn look_at_network(&self) {
+        let is_alone = self.inbox.links().is_empty() && !self.account.lock().open;
+        let configured = self.scouting.get_json("scouting/multicast/interface").ok();
+        let configured: Option<String> = configured.and_then(|json| serde_json::from_str(&json).ok());
+        let unknown = interfaces::unknown(configured.as_deref().unwrap_or("auto"));
+        let mut interfaces = self.interfaces.lock().unwrap_or_else(PoisonError::into_inner);
+        if interfaces.is_news(self.now(), is_alone, &unknown) {
+            let unknown: Vec<String> = unknown.iter().map(ToString::to_string).collect();
+            let came = unknown.join(", ");
+            let cause = format!("{came} came after the start, and Zenoh reads the computer's addresses once");
+            self.supervisor.failed(Part::Network, &cause);
         }
     }
 

@@ -10,10 +10,12 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{Query, Queryable};
 use zenoh::sample::Locality;
+use zenoh::session::ZenohId;
 use zenoh::{Session, Wait};
 
 use crate::account::Account;
 use crate::failure::Part;
+use crate::identity::is_of_another;
 use crate::supervisor::Supervisor;
 use crate::token::keep_token;
 
@@ -42,11 +44,11 @@ impl Presence {
         supervisor: &Arc<Supervisor>,
     ) -> zenoh::Result<Self> {
         let status_key = keys.key(&Topic::Status(me));
-        let (of_status, node, own) = (account.clone(), session.zid().to_string(), status_key.clone());
-        account.lock().session.clone_from(&node);
+        let (of_status, node, own) = (account.clone(), session.zid(), status_key.clone());
+        account.lock().session = node.to_string();
         let status = session
             .declare_queryable(&status_key)
-            .callback(move |query| on_status(&of_status, &node, &own, &query))
+            .callback(move |query| on_status(&of_status, node, &own, &query))
             .await?;
         let vote = session
             .declare_publisher(keys.key(&Topic::Vote(me)))
@@ -87,10 +89,15 @@ impl Presence {
     }
 }
 
+/// Whether whoever asks for a robot's status, by its own words, asks as a robot of the same id: by a session of another life, or of a guest's host.
+fn is_twin(from: Option<&str>, node: ZenohId) -> bool {
+    from.and_then(|from| from.parse().ok()).is_some_and(|from| is_of_another(from, node))
+}
+
 /// Answers a query for the status; one that a robot of the same id sends is a twin's. Under the robot's own key, whatever was asked
 /// for: of several answers under one key Zenoh keeps one.
-fn on_status(account: &Account, node: &str, own: &str, query: &Query) {
-    if query.parameters().get("from").is_some_and(|from| from != node) {
+fn on_status(account: &Account, node: ZenohId, own: &str, query: &Query) {
+    if is_twin(query.parameters().get("from"), node) {
         account.twin();
     }
     if query.parameters().contains_key(BRIEFLY) {
@@ -121,4 +128,22 @@ async fn ask_for_twin(session: Session, status_key: String, account: Arc<Account
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identity::zenoh_id;
+
+    #[test]
+    fn whoever_says_anything_but_a_robots_session_is_no_twin() {
+        let id = |robot, nonce| zenoh_id(RobotId(robot), "demo", nonce);
+        let node = id(7, 1 << 40).parse().unwrap();
+        let strangers = [Some("x"), Some(""), Some("abc"), None];
+        assert!(!strangers.into_iter().any(|from| is_twin(from, node)));
+        assert!(!is_twin(Some(&id(7, 1 << 40)), node), "itself");
+        assert!(is_twin(Some(&id(7, 2 << 40)), node));
+        // A guest asks by its host.
+        assert!(is_twin(Some(&id(8, 1 << 40)), node));
+    }
 }

@@ -171,7 +171,7 @@ impl Robot {
         };
         let door = roll.as_ref().map(|roll| roll.door());
         let lookout =
-            Arc::new(Lookout::new(id, &swarm, nonce, inbox.clone(), account.clone(), zenoh.clone()));
+            Arc::new(Lookout::new(id, &swarm, nonce, inbox.clone(), supervisor.clone(), zenoh.clone()));
         let cell = link.cells.map(|cells| {
             let (swarm, link, door, inbox) = (swarm.clone(), link.clone(), door.clone(), inbox.clone());
             let (account, lookout, keys) = (account.clone(), lookout.clone(), keys.clone());

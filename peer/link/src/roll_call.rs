@@ -24,6 +24,9 @@ const TOLD: u32 = 3;
 /// How long after the one before.
 const AGAIN: Duration = Duration::from_millis(700);
 
+/// How long who is on it no more, and so is told by neighbours alone, is left to hear so.
+const FAREWELL: Duration = Duration::from_millis(100);
+
 /// How often it is told of one that is new besides, each time after twice as long: somebody may flood it with others meanwhile.
 const TOLD_LATER: u32 = 6;
 
@@ -64,7 +67,7 @@ async fn keep(roll: &Roll, inbox: &Inbox) {
     }
 }
 
-/// Looks through the links when there is a new roster, and tells neighbours of it.
+/// Tells neighbours when there is a new roster, those who are on it no more too, and looks through the links then.
 async fn follow(roll: &Roll, account: &Account, node: &Node, keys: &Keys, inbox: &Inbox) {
     let mut news = roll.news();
     let mut told: BTreeMap<ZenohId, Told> = BTreeMap::new();
@@ -73,10 +76,6 @@ async fn follow(roll: &Roll, account: &Account, node: &Node, keys: &Keys, inbox:
     let mut followed = first;
     loop {
         let (epoch, json) = roll.newest();
-        if epoch != followed {
-            node.look_through();
-            followed = epoch;
-        }
         let links = inbox.links();
         told.retain(|id, _| links.contains_key(id));
         let mut next: Option<Instant> = None;
@@ -95,6 +94,11 @@ async fn follow(roll: &Roll, account: &Account, node: &Node, keys: &Keys, inbox:
             if told.times < times {
                 next = Some(next.map_or(told.next, |next| next.min(told.next)));
             }
+        }
+        if epoch != followed {
+            tokio::time::sleep(FAREWELL).await;
+            node.look_through();
+            followed = epoch;
         }
         tokio::select! {
             _ = news.changed() => {}

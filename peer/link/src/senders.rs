@@ -18,13 +18,25 @@ pub(crate) struct Senders {
 }
 
 impl Senders {
-    /// Whether the one with that nonce, which sends now, is to be heard.
+    /// Whether the one with that nonce, which sends now, goes on beside one that was started later. Such a one stays known, however often
+    /// the other is started again.
+    pub fn refuses(&mut self, nonce: u64, now: Instant) -> bool {
+        let others = self.latest.filter(|(latest, _)| *latest != nonce);
+        let Some((_, at)) = others else { return false };
+        let known = self.earlier.iter().position(|earlier| *earlier == nonce);
+        let Some(known) = known.filter(|_| now.saturating_duration_since(at) < SILENT) else { return false };
+        self.earlier.remove(known);
+        self.earlier.push_front(nonce);
+        true
+    }
+
+    /// Whether the one with that nonce, which sends now, is to be heard. It is the latest then.
     pub fn hears(&mut self, nonce: u64, now: Instant) -> bool {
+        if self.refuses(nonce, now) {
+            return false;
+        }
         match self.latest {
             Some((latest, _)) if latest == nonce => {}
-            Some((_, at)) if now.saturating_duration_since(at) < SILENT && self.earlier.contains(&nonce) => {
-                return false;
-            }
             Some((latest, _)) => {
                 self.earlier.retain(|earlier| *earlier != nonce);
                 self.earlier.truncate(KNOWN - 1);
@@ -49,6 +61,16 @@ mod tests {
             let now = now + Duration::from_secs(second);
             assert!(![1, 2].into_iter().any(|nonce| senders.hears(nonce, now)) && senders.hears(3, now));
         }
+    }
+
+    #[test]
+    fn who_goes_on_stays_known_however_often_the_other_is_started_again() {
+        let (mut senders, now) = (Senders::default(), Instant::now());
+        assert!(senders.hears(0, now));
+        for nonce in 1..=3 * KNOWN as u64 {
+            assert!(senders.hears(nonce, now) && !senders.hears(0, now), "{nonce}");
+        }
+        assert_eq!(senders.earlier.len(), KNOWN);
     }
 
     #[test]

@@ -47,6 +47,11 @@ impl Supervisor {
         })
     }
 
+    /// Where what fails is told.
+    pub fn account(&self) -> &Arc<Account> {
+        &self.account
+    }
+
     /// Tells that a part failed, and goes on: who calls this begins it anew.
     pub fn failed(&self, part: Part, cause: &str) {
         let failure = Failure { part, cause: cause.to_owned() };
@@ -141,7 +146,8 @@ pub(crate) async fn run_apart<T: Send + 'static>(
     }
 }
 
-fn cause(error: JoinError) -> String {
+/// Why a task ended that nobody ended.
+pub(crate) fn cause(error: JoinError) -> String {
     match error.try_into_panic() {
         Ok(panic) => said(&*panic),
         Err(error) => error.to_string(),

@@ -15,7 +15,7 @@ use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::Config;
 use crate::service_manager::{ServiceEnvironment, ServiceManager};
-use gestalt_link::{Event, LinkConfig};
+use gestalt_link::{Event, LinkConfig, Part};
 
 /// Run one robot until Ctrl-C
 #[derive(Debug, clap::Args)]
@@ -132,7 +132,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                     }
                 }
                 event = events.recv() => match event {
-                    Ok(event) => report(args.json, &event, &names)?,
+                    Ok(event) => {
+                        report(args.json, &event, &names)?;
+                        // Where nobody starts it again, whoever works with a robot alone is better off with it.
+                        if let Some(failure) = outdated(&event).filter(|_| manager.is_there()) {
+                            break Err(failure.to_string().into());
+                        }
+                    }
                     Err(RecvError::Lagged(missed)) => lagged(missed),
                     Err(RecvError::Closed) => break Err("the robot has ended".into()),
                 },
@@ -160,6 +166,16 @@ async fn tick(schedule: &mut Option<tokio::time::Interval>) {
             schedule.tick().await;
         }
         None => std::future::pending().await,
+    }
+}
+
+/// What the program ends for, to be started anew: it has a robot alone whose network came later.
+fn outdated(event: &Event) -> Option<gestalt_link::Failure> {
+    match event {
+        Event::Failed { part: part @ Part::Network, cause } => {
+            Some(gestalt_link::Failure { part: *part, cause: cause.clone() })
+        }
+        _ => None,
     }
 }
 

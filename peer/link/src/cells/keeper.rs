@@ -56,11 +56,11 @@ impl CellKeeper {
         }
     }
 
-    /// Keeps the robot of that session in a cell. Never returns.
+    /// Keeps the robot of that session in a cell. Never returns, unless what keeps the relay's links failed: it begins anew, and so may this.
     pub async fn run(self: Arc<Self>, node: Node) -> Result<(), String> {
         let mut uplink = self.uplink.subscribe();
         loop {
-            let is_settled = self.step(&node).await;
+            let is_settled = self.step(&node).await?;
             let pause = tokio::time::sleep(if is_settled { REST } else { PERIOD });
             tokio::select! {
                 () = pause => {}
@@ -70,10 +70,11 @@ impl CellKeeper {
     }
 
     /// Does the next step; whether there has been a relay for a while.
-    async fn step(&self, node: &Node) -> bool {
+    async fn step(&self, node: &Node) -> Result<bool, String> {
         let Foundation { lookout, account, .. } = &self.foundation;
         let mut state = self.state.lock().await;
         let State { choice, relay, .. } = &mut *state;
+        relay.as_mut().map_or(Ok(()), |relay| relay.tend(&self.foundation))?;
         let uplink = *self.uplink.borrow();
         let members = relay.as_ref().map(Relay::members);
         account.set("relays_run", u64::from(relay.is_some()));
@@ -93,12 +94,10 @@ impl CellKeeper {
             Step::GiveUp => {
                 account.count("relays_given_up");
                 node.relays_by(None);
-                if let Some(relay) = state.relay.take() {
-                    relay.close().await;
-                }
+                close(&mut state.relay).await;
             }
         }
-        state.choice.is_settled(lookout.now()) && self.uplink.borrow().is_some()
+        Ok(state.choice.is_settled(lookout.now()) && self.uplink.borrow().is_some())
     }
 
     /// Whether that relay took a link of the robot's session.
@@ -126,12 +125,16 @@ impl CellKeeper {
         match self.foundation.found(state.founded).await {
             Ok(relay) => {
                 account.count("relays_founded");
-                if let Err(error) = inbox.ways.begin(relay.node().session(), keys).await {
-                    account.error(&error);
-                }
                 tracing::info!("runs the relay {} of a cell", relay.id());
+                // At once: whoever ends this while it waits for something ends a relay that is known.
+                let session = relay.node().session().clone();
                 node.relays_by(Some(relay.node().clone()));
                 state.relay = Some(relay);
+                // The roster may have changed while it began.
+                node.look_through();
+                if let Err(error) = inbox.ways.begin(&session, keys).await {
+                    account.error(&error);
+                }
             }
             Err(error) => account.error(&format!("no relay could be founded, and none was found: {error}")),
         }
@@ -139,8 +142,14 @@ impl CellKeeper {
 
     /// Ends the relay, if the robot runs one.
     pub async fn close(&self) {
-        if let Some(relay) = self.state.lock().await.relay.take() {
-            relay.close().await;
-        }
+        close(&mut self.state.lock().await.relay).await;
     }
+}
+
+/// Ends a relay. It is there until it has ended: who stops waiting for that can begin it once more.
+async fn close(relay: &mut Option<Relay>) {
+    if let Some(relay) = relay {
+        relay.close().await;
+    }
+    *relay = None;
 }

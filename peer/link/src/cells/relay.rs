@@ -16,6 +16,7 @@ use crate::keeper::Keeper;
 use crate::lookout::Lookout;
 use crate::session::{Far, Guard, Node, Room};
 use crate::sightings::Place;
+use crate::supervisor::cause;
 use crate::tls::Door;
 
 /// What relays of a robot are founded on.
@@ -39,7 +40,7 @@ pub(super) struct Relay {
     inbox: Arc<Inbox>,
     links: Arc<Mutex<BTreeSet<Far>>>,
     /// Keeps the links to other relays.
-    _keeper: JoinSet<Result<(), String>>,
+    keeper: JoinSet<Result<(), String>>,
 }
 
 impl Foundation {
@@ -48,7 +49,7 @@ impl Foundation {
     /// # Errors
     /// [`LinkError::Start`] when its endpoints are taken, as for any session.
     pub(super) async fn found(&self, count: u16) -> Result<Relay, LinkError> {
-        let Self { me, swarm, nonce, link, cells, door, inbox, account, lookout, .. } = self;
+        let Self { me, swarm, nonce, link, cells, door, inbox, account, .. } = self;
         let config = link.relay(*me, swarm, *nonce, count)?;
         let checksum = swarm_checksum(swarm);
         let door = door.clone();
@@ -70,11 +71,9 @@ impl Foundation {
             }
         };
         let node = Node::open(config, guard, Some(room), on_link).await?;
-        let (of_links, heard, counts, around) =
-            (node.clone(), inbox.clone(), account.clone(), lookout.clone());
-        let mut keeper = JoinSet::new();
-        keeper.spawn(Keeper::new(*me, link.max_links, of_links, heard, counts, around, true).run());
-        Ok(Relay { node, inbox: inbox.clone(), links, _keeper: keeper })
+        let mut relay = Relay { node, inbox: inbox.clone(), links, keeper: JoinSet::new() };
+        relay.keep_links(self);
+        Ok(relay)
     }
 }
 
@@ -97,8 +96,25 @@ impl Relay {
         self.node.members()
     }
 
-    /// Ends it: all who hung on it look for another.
-    pub async fn close(self) {
+    fn keep_links(&mut self, on: &Foundation) {
+        let (node, inbox, account) = (self.node.clone(), self.inbox.clone(), on.account.clone());
+        let (max_links, lookout) = (on.link.max_links, on.lookout.clone());
+        self.keeper.spawn(Keeper::new(on.me, max_links, node, inbox, account, lookout, true).run());
+    }
+
+    /// Whether its links to other relays are kept; where that has ended, it begins anew.
+    ///
+    /// # Errors
+    /// What ended it.
+    pub fn tend(&mut self, on: &Foundation) -> Result<(), String> {
+        let Some(ended) = self.keeper.try_join_next() else { return Ok(()) };
+        self.keep_links(on);
+        Err(ended.map_or_else(cause, |ended| ended.err().unwrap_or_default()))
+    }
+
+    /// Ends it: all who hung on it look for another. Where nobody waits for that to the end, it is to be done once more.
+    pub async fn close(&mut self) {
+        self.keeper.abort_all();
         let id = self.node.id();
         self.node.close().await;
         self.inbox.ways.end(id);
@@ -107,5 +123,54 @@ impl Relay {
         for far in links {
             self.inbox.on_link(far, false);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use gestalt_protocol::Status;
+    use tokio::sync::broadcast;
+    use tokio::time::{sleep, timeout};
+
+    use super::*;
+    use crate::Scouting;
+    use crate::supervisor::Supervisor;
+
+    const ME: RobotId = RobotId(1);
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    fn foundation() -> Foundation {
+        let (swarm, keys, nonce) = ("relay".to_owned(), Keys::new("relay").unwrap(), 1);
+        let scouting = Scouting { interface: "lo".to_owned(), ..Scouting::default() };
+        let cells = Cells::default();
+        let link = LinkConfig { scouting: Some(scouting), cells: Some(cells), ..LinkConfig::default() };
+        let account = Arc::new(Account::new(Status::new(ME, "one".to_owned(), 1), Instant::now()));
+        let supervisor = Supervisor::new(account.clone(), broadcast::channel(1).0);
+        let checksum = swarm_checksum(&swarm);
+        let inbox = Arc::new(Inbox::new(ME, checksum, keys.clone(), account.clone(), 0.0, None));
+        let zenoh = link.to_zenoh(ME, &swarm, nonce).unwrap();
+        let lookout = Arc::new(Lookout::new(ME, &swarm, nonce, inbox.clone(), supervisor, zenoh));
+        Foundation { me: ME, swarm, keys, nonce, link, cells, door: None, inbox, account, lookout }
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn what_keeps_its_links_begins_anew_when_it_has_ended_and_to_end_twice_is_to_end_once() {
+        let foundation = foundation();
+        let mut relay = foundation.found(1).await.unwrap();
+        assert_eq!(relay.tend(&foundation), Ok(()));
+        relay.keeper.abort_all();
+        let noticed = async {
+            while relay.tend(&foundation).is_ok() {
+                sleep(Duration::from_millis(10)).await;
+            }
+        };
+        timeout(PATIENCE, noticed).await.expect("its end is noticed");
+        assert_eq!((relay.tend(&foundation), relay.keeper.len()), (Ok(()), 1));
+        for _ in 0..2 {
+            timeout(PATIENCE, relay.close()).await.expect("it ends");
+        }
+        assert!(relay.node.session().is_closed());
     }
 }
