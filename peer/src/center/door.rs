@@ -1,4 +1,4 @@
-//! Who is served: robots come with their first frame, and are let go when they have been silent for long.
+//! Who is served: robots come with their first frames, and are let go when they have been silent for long.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
@@ -10,10 +10,11 @@ use tokio::sync::{Mutex, mpsc};
 use tokio::task::JoinSet;
 use tokio::time::MissedTickBehavior;
 
-use super::Frames;
 use super::frame_queue::Put;
 use super::pace::Paces;
 use super::seat::Seat;
+use super::waiting::{Waiting, turn};
+use super::{Frames, MAX_WAITING};
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
 use gestalt_link::{FrameArrival, GuestConfig, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
 use gestalt_vision::model::RobotModel;
@@ -36,11 +37,12 @@ const LEASE: Duration = Duration::from_secs(10);
 #[derive(Debug, Error)]
 enum Refusal {
     #[error(
-        "robot {0} streams, but a robot of that id runs elsewhere: stop one of the two, or give it an id of its own"
+        "robot {0} streams, but a robot of that id runs elsewhere: stop one of the two, or give it an id of its own; where another centre serves it, \
+         stop one of the centres, for a swarm has one"
     )]
     Elsewhere(RobotId),
     #[error(
-        "robot {0} streams, but {1} are served already: raise center.max_robots, or start another centre"
+        "robot {0} streams, but {1} are served already: raise center.max_robots, up to 256. A swarm has one centre: for more cameras make two swarms"
     )]
     TooMany(RobotId, usize),
     #[error("robot {0}: {1}")]
@@ -102,9 +104,20 @@ impl Door {
     async fn serve(&self, calls: &mut Calls) {
         let mut rounds = tokio::time::interval(PERIOD);
         rounds.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut waiting = Waiting::new(turn(self.config.robot.id), MAX_WAITING);
         loop {
+            let due = waiting.due();
+            let wait = async {
+                match due {
+                    Some(due) => tokio::time::sleep_until(due.into()).await,
+                    None => std::future::pending().await,
+                }
+            };
             tokio::select! {
-                Some(frame) = calls.knocks.recv() => self.open(frame).await,
+                Some(frame) = calls.knocks.recv() => self.knock(frame, &mut waiting),
+                () = wait => if let Some(frame) = waiting.next(Instant::now()) {
+                    self.open(frame).await;
+                },
                 _ = rounds.tick() => self.look_after().await,
                 _ = calls.left.recv() => break,
             }
@@ -120,6 +133,14 @@ impl Door {
     }
 
     /// A frame of a robot that is not served, or was not when it arrived.
+    fn knock(&self, frame: FrameArrival, waiting: &mut Waiting<FrameArrival>) {
+        let Put::Unknown(frame) = self.queue.put(frame.robot, frame) else { return };
+        if !waiting.come(frame.robot, frame, Instant::now()) {
+            self.robot.count("refused_frame_full");
+        }
+    }
+
+    /// The turn of a robot that has waited.
     async fn open(&self, frame: FrameArrival) {
         let Put::Unknown(frame) = self.queue.put(frame.robot, frame) else { return };
         match self.admit(&frame).await {
@@ -160,7 +181,7 @@ impl Door {
 
     async fn start(&self, id: RobotId, name: String) -> Result<Robot, LinkError> {
         // Grows from one admission to the next, also when the centre was killed between them.
-        let boot = self.config.trust.boot(id, SystemTime::now());
+        let boot = self.config.trust.boot_at(self.config.robot.id, id, SystemTime::now());
         match self.config.center.fuse {
             Fuse::Central => {
                 // Read now: it may have been enrolled, or given another key, while the centre runs.
@@ -209,6 +230,20 @@ impl Door {
                 drop(self.queue.dismiss(robot));
                 seat.leave().await;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nobody_is_told_to_start_a_second_centre() {
+        for refusal in [Refusal::TooMany(RobotId(7), 64), Refusal::Elsewhere(RobotId(7))] {
+            let words = refusal.to_string();
+            assert!(words.contains("robot 7 streams, but") && words.contains("swarm has one"), "{words}");
+            assert!(!words.contains("start another"), "{words}");
         }
     }
 }

@@ -15,6 +15,7 @@ mod frame_queue;
 mod pace;
 mod seat;
 mod service;
+mod waiting;
 mod workers;
 
 use std::sync::{Arc, Weak};
@@ -34,7 +35,7 @@ use gestalt_vision::sight::one_thread_per_frame;
 use seat::Seat;
 use workers::{Work, Workers, cores};
 
-/// How many frames of robots not served yet wait at the door.
+/// How many frames of robots not served yet wait at the door; and how many before it, to be taken in.
 const MAX_WAITING: usize = 64;
 
 /// How many frames of each worker wait or are on their way: their way takes longer than looking at them.

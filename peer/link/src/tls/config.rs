@@ -15,7 +15,7 @@ const HANDSHAKE: &str = "#tls_handshake_timeout_ms=2000";
 pub(super) const PENDING: usize = 32;
 
 /// The most sessions that a robot has: those that find a [`Seat`](super::Seat), and those that are being hung up again.
-pub(super) const MAX_SESSIONS: usize = 256;
+pub(super) const MAX_SESSIONS: usize = 576;
 
 /// That of a robot.
 pub(crate) fn robot(credentials: &Credentials, keys: &Keys) -> Value {

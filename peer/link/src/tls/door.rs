@@ -43,7 +43,12 @@ pub(crate) enum Stranger {
     NoClient(Bearer),
     #[error("a link of {0}, which is no robot: dial one that is")]
     NoRobot(Seat),
-    #[error("one link more of {0} than there may be: end some of its programs")]
+    #[error(
+        "one link more of {0} than there is room for, {of_holder} of each and {of_kind} of all of its kind: end some of its programs if it has {of_holder}, \
+         or else some of the others of that kind",
+        of_holder = .0.bounds().of_holder,
+        of_kind = .0.bounds().of_kind
+    )]
     TooMany(Seat),
 }
 
@@ -206,6 +211,17 @@ mod tests {
         assert_eq!(refused(Visitor { is_client: true, ..desk }), "no_robot");
         let authority = visitor(Bearer::Authority, 100, None);
         assert_eq!(refused(Visitor { is_client: true, ..authority }), "no_robot");
+    }
+
+    #[test]
+    fn who_is_one_too_many_is_told_both_bounds() {
+        let told = |holder| Stranger::TooMany(Seat::Client(holder)).to_string();
+        let camera = told(Bearer::Robot(RobotId(7)));
+        assert!(
+            camera.contains("a program of robot 7") && camera.contains("8 of each and 320 of all"),
+            "{camera}"
+        );
+        assert!(told(Bearer::Client("desk".parse().unwrap())).contains("8 of each and 64 of all"));
     }
 
     #[test]

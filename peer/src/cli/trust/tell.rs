@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use gestalt_link::{Client, Credentials, LinkConfig, Scouting};
+use gestalt_link::{Client, Credentials, Heard, LinkConfig, News, Scouting};
 use gestalt_protocol::{RobotId, Status};
 use gestalt_trust::Roster;
 use thiserror::Error;
@@ -83,8 +83,46 @@ enum Refused {
     Contradicts { robots: BTreeSet<RobotId>, told: u64 },
 }
 
-/// Which of its robots go by that roster, and which do not yet. Who is no member any more need not agree.
-fn judge(statuses: &[Status], roster: &Roster) -> Result<(BTreeSet<RobotId>, BTreeSet<RobotId>), Refused> {
+/// How far a roster has come among its robots.
+#[derive(Debug, PartialEq)]
+struct Progress {
+    /// They go by it.
+    done: BTreeSet<RobotId>,
+    /// They do not yet.
+    left: BTreeSet<RobotId>,
+    /// They are alive, and do not say.
+    silent: BTreeSet<RobotId>,
+}
+
+impl Progress {
+    /// Whether all that are there go by it.
+    fn is_complete(&self) -> bool {
+        self.left.is_empty() && self.silent.is_empty() && !self.done.is_empty()
+    }
+
+    /// What is still to be done, when it was waited for long enough.
+    fn missing(&self) -> String {
+        let named = |robots: &BTreeSet<RobotId>, what: &str| {
+            (!robots.is_empty()).then(|| format!("robots {} {what}", show::robots(robots)))
+        };
+        let left = named(
+            &self.left,
+            "do not go by it yet: they are told by their neighbours as soon as they can be reached",
+        );
+        let silent = named(
+            &self.silent,
+            "are alive and did not answer whether they go by it: if they run, `gestalt trust tell` says it again",
+        );
+        let missing: Vec<String> = left.into_iter().chain(silent).collect();
+        if missing.is_empty() {
+            return "the roster is written, but no robot answered: is one running there? `gestalt trust tell` says it again".to_owned();
+        }
+        format!("the roster is written, but {}", missing.join("; "))
+    }
+}
+
+/// How far that roster has come among its robots that answered or are alive. Who is no member any more need not agree.
+fn judge(statuses: &[Status], alive: &BTreeSet<RobotId>, roster: &Roster) -> Result<Progress, Refused> {
     let told = roster.members().epoch;
     let members = statuses.iter().filter(|status| roster.members().robots.contains_key(&status.robot));
     let held = members.map(|status| {
@@ -103,33 +141,54 @@ fn judge(statuses: &[Status], roster: &Roster) -> Result<(BTreeSet<RobotId>, BTr
     if !robots.is_empty() {
         return Err(Refused::Contradicts { robots, told });
     }
+    let answered: BTreeSet<RobotId> = held.iter().map(|(robot, ..)| *robot).collect();
+    let silent = alive.difference(&answered).copied();
+    let silent = silent.filter(|robot| roster.members().robots.contains_key(robot)).collect();
     let (done, left): (Vec<_>, Vec<_>) = held.into_iter().partition(|(_, epoch, _)| *epoch == Some(told));
     let robots = |of: Vec<(RobotId, _, _)>| of.into_iter().map(|(robot, ..)| robot).collect();
-    Ok((robots(done), robots(left)))
+    Ok(Progress { done: robots(done), left: robots(left), silent })
+}
+
+/// Takes in for a while which robots come and go; those that were there are the first that come.
+async fn follow(news: &mut News, alive: &mut BTreeSet<RobotId>, pause: Duration) {
+    let follow = async {
+        while let Some(heard) = news.next().await {
+            note(alive, &heard);
+        }
+        // The session has ended: the next question says so.
+        std::future::pending().await
+    };
+    let _: Result<(), _> = tokio::time::timeout(pause, follow).await;
+}
+
+fn note(alive: &mut BTreeSet<RobotId>, heard: &Heard) {
+    match heard {
+        Heard::Came(robot) => {
+            alive.insert(*robot);
+        }
+        Heard::Left(robot) => {
+            alive.remove(robot);
+        }
+        Heard::Decided(_) | Heard::Held(..) | Heard::Asked(_) => {}
+    }
 }
 
 async fn told(client: &Client, roster: &Roster) -> Result<(), Failure> {
     let (began, epoch) = (Instant::now(), roster.members().epoch);
+    let (mut news, mut alive) = (client.news().await?, BTreeSet::new());
     loop {
         client.tell_roster(roster).await?;
-        tokio::time::sleep(AGAIN).await;
-        let (done, left) = judge(&client.statuses(super::super::ANSWER).await?, roster)?;
-        if left.is_empty() && !done.is_empty() {
+        follow(&mut news, &mut alive, AGAIN).await;
+        let progress = judge(&client.statuses(super::super::ANSWER).await?, &alive, roster)?;
+        if progress.is_complete() {
             return super::say(&format!(
                 "epoch {epoch} is gone by at robots {} after {:.1} s",
-                show::robots(&done),
+                show::robots(&progress.done),
                 began.elapsed().as_secs_f64()
             ));
         }
         if began.elapsed() > PATIENCE {
-            return Err(match left.is_empty() {
-                true => "the roster is written, but no robot answered: is one running there? `gestalt trust tell` says it again".to_owned(),
-                false => format!(
-                    "the roster is written, but robots {} do not go by it yet: they are told by their neighbours as soon as they can be reached",
-                    show::robots(&left)
-                ),
-            }
-            .into());
+            return Err(progress.missing().into());
         }
     }
 }
@@ -162,9 +221,11 @@ mod tests {
     fn robots_that_refused_a_roster_do_not_go_by_it() {
         let told = roster(&[1, 2]);
         let sum = Some(told.checksum());
-        let of = |first, second| judge(&[first, second, status(3, 9, None)], &told);
-        assert_eq!(of(status(1, 4, sum), status(2, 3, Some(7))), Ok((set(&[1]), set(&[2]))));
-        assert_eq!(of(status(1, 4, sum), status(2, 4, None)), Ok((set(&[1, 2]), set(&[]))));
+        let of = |first, second| judge(&[first, second, status(3, 9, None)], &set(&[1, 2, 3]), &told);
+        let progress =
+            |done: &[u32], left: &[u32]| Ok(Progress { done: set(done), left: set(left), silent: set(&[]) });
+        assert_eq!(of(status(1, 4, sum), status(2, 3, Some(7))), progress(&[1], &[2]));
+        assert_eq!(of(status(1, 4, sum), status(2, 4, None)), progress(&[1, 2], &[]));
         let newer = of(status(1, 4, sum), status(2, 5, Some(7)));
         assert_eq!(newer, Err(Refused::Older { robots: set(&[2]), held: 5, told: 4 }));
         let words = newer.unwrap_err().to_string();
@@ -172,5 +233,31 @@ mod tests {
         let other = Some(roster(&[1, 2, 3]).checksum());
         let contradicts = of(status(1, 4, other), status(2, 4, other));
         assert_eq!(contradicts, Err(Refused::Contradicts { robots: set(&[1, 2]), told: 4 }));
+    }
+    #[test]
+    fn a_member_that_is_alive_and_does_not_answer_is_waited_for_and_named() {
+        let told = roster(&[1, 2, 5]);
+        let sum = Some(told.checksum());
+        let mut alive = BTreeSet::new();
+        // Robot 3 is a member no more; robot 5 is off.
+        for robot in [1, 2, 3] {
+            note(&mut alive, &Heard::Came(RobotId(robot)));
+        }
+        let quiet = judge(&[status(1, 4, sum)], &alive, &told).unwrap();
+        assert_eq!(quiet, Progress { done: set(&[1]), left: set(&[]), silent: set(&[2]) });
+        assert!(!quiet.is_complete());
+        let words = quiet.missing();
+        assert!(
+            words.contains("robots 2 are alive and did not answer") && !words.contains("robots 1"),
+            "{words}"
+        );
+        let both = judge(&[status(1, 3, Some(7))], &alive, &told).unwrap().missing();
+        assert!(
+            both.contains("robots 1 do not go by it yet") && both.contains("robots 2 are alive"),
+            "{both}"
+        );
+        note(&mut alive, &Heard::Left(RobotId(2)));
+        assert!(judge(&[status(1, 4, sum)], &alive, &told).unwrap().is_complete());
+        assert!(judge(&[], &set(&[]), &told).unwrap().missing().contains("no robot answered"));
     }
 }
