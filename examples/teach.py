@@ -9,22 +9,27 @@ Teaching is a put of JSON on `gestalt/<swarm>/instructor/<name>/feedback`; answe
 import argparse
 import collections
 import json
+import sys
 import time
 
 import zenoh
 
 
-def waiting(subscriber):
-    """The messages that have come, as JSON, one by one."""
+def waiting(subscriber, read):
+    """What has come, as `read` takes it from JSON, one by one."""
     while (sample := subscriber.try_recv()) is not None:
-        yield json.loads(sample.payload.to_string())
+        try:
+            yield read(json.loads(sample.payload.to_bytes().decode(errors="replace")))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            # In an open swarm anybody may say anything there.
+            print(f"passed over on {sample.key_expr}: {error!r}", file=sys.stderr, flush=True)
 
 
-def wait_for(subscriber, patience: float, is_it):
-    """The first message that is the one, as JSON, or None when the time is up."""
+def wait_for(subscriber, patience: float, read, is_it):
+    """The first that is the one, as `read` takes it from JSON, or None when the time is up."""
     end = time.monotonic() + patience
     while time.monotonic() < end:
-        message = next(waiting(subscriber), None)
+        message = next(waiting(subscriber, read), None)
         if message is None:
             time.sleep(0.02)
         elif is_it(message):
@@ -32,12 +37,21 @@ def wait_for(subscriber, patience: float, is_it):
     return None
 
 
-def named(decision: dict) -> str:
-    """The gesture that was decided."""
-    if decision["class"] is None:
-        return "no decision"
+def decided(decision: dict) -> dict:
+    """A decision: of which round, and in words."""
     # Whoever says it may have another vocabulary, and no label for it.
-    return decision["label"] or f"class {decision['class']}"
+    gesture = "no decision" if decision["class"] is None else decision["label"] or f"class {decision['class']}"
+    return {"round": decision["round"], "words": f"round {decision['round']['counter']}: {gesture}"}
+
+
+def asked(question: dict) -> dict:
+    """A question: about which round, and in words."""
+    return {"round": question["round"], "words": f"{question['ask']['kind']} {' or '.join(question['labels'])}"}
+
+
+def answered(answer: dict) -> dict:
+    """An answer: to which word, and in words."""
+    return {"to": answer["to"], "words": f"{answer['outcome']}, {answer['samples']} samples of it"}
 
 
 def main() -> None:
@@ -76,19 +90,19 @@ def main() -> None:
             # Half a second after a round began, a request to open is taken for an echo of the one before.
             time.sleep(1)
             # What others had decided meanwhile is not what the next word is about.
-            known.extend(other["round"] for other in waiting(decisions))
+            known.extend(other["round"] for other in waiting(decisions, decided))
             session.put(feedback, json.dumps({"say": "open"}))
-            decision = wait_for(decisions, 15, lambda decided: decided["round"] not in known)
+            decision = wait_for(decisions, 15, decided, lambda decision: decision["round"] not in known)
             if decision is None:
                 print("no decision: is a robot alive?")
                 return
             known.append(decision["round"])
-            print(f"round {decision['round']['counter']}: {named(decision)}", flush=True)
+            print(decision["words"], flush=True)
             if told is None:
                 # The swarm asks a second after a round that is worth it; any word on the round answers.
-                question = wait_for(questions, 2.5, lambda asked: asked["round"] == decision["round"])
+                question = wait_for(questions, 2.5, asked, lambda question: question["round"] == decision["round"])
                 if question is not None:
-                    print(f"  the swarm asks: {question['ask']['kind']} {' or '.join(question['labels'])}", flush=True)
+                    print(f"  the swarm asks: {question['words']}", flush=True)
             gesture = said or input("it was (empty to end): ").strip()
             if not gesture:
                 return
@@ -96,8 +110,8 @@ def main() -> None:
             word = {"say": "was", "round": decision["round"], "class": gesture}
             session.put(feedback, json.dumps(word))
             # Others may say something under the same name: the answer names its word.
-            answer = wait_for(answers, 10, lambda answer: answer["to"] == word)
-            print("no answer" if answer is None else f"  {answer['outcome']}, {answer['samples']} samples of it", flush=True)
+            answer = wait_for(answers, 10, answered, lambda answer: answer["to"] == word)
+            print("no answer" if answer is None else f"  {answer['words']}", flush=True)
 
 
 if __name__ == "__main__":

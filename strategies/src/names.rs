@@ -238,14 +238,12 @@ impl NameBook {
         self.only_in_use(label)
     }
 
-    /// The gesture that an instructor means who says that it was shown: what is retired is not, where there is another of that label that is in use.
+    /// The gesture that an instructor means who says that it was shown: not what is retired, or merged into another, where there is one of that
+    /// label that is in use, for that one is shown under it.
     #[must_use]
     pub fn find_shown(&self, label: &str, by: &InstructorId) -> Option<ClassId> {
         let found = self.find(label, by);
-        found
-            .filter(|gesture| self.stands_for(*gesture).is_some())
-            .or_else(|| self.only_in_use(label))
-            .or(found)
+        found.filter(|gesture| self.is_in_use(*gesture)).or_else(|| self.only_in_use(label)).or(found)
     }
 
     fn only_in_use(&self, label: &str) -> Option<ClassId> {

@@ -29,5 +29,5 @@ pub use door::{Address, Door, Limits, Token};
 pub use error::DeskError;
 pub use foxglove::{Foxglove, Viewing, Visits};
 pub use tap::Tap;
-pub use view::{APART, Event, Input, SHOWN, View};
+pub use view::{APART, Event, Input, SHOWN, View, gesture_asked};
 pub use word::Word;

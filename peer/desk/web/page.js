@@ -338,10 +338,16 @@ function showGestures() {
     button.type = "button";
     button.addEventListener("click", () => {
       $("was").open = false;
-      say({ say: "was", round: state.decision.round, class: label });
+      say({ say: "was", round: state.decision.round, class: meant(label) });
     });
     return button;
   }, () => {});
+}
+
+// The gesture that is shown under a label: of those that were named it is that one, whoever else named another so.
+function meant(label) {
+  const k = state.swarm ? state.swarm.vocabulary.indexOf(label) : -1;
+  return k < 0 ? label : state.swarm.gestures[k];
 }
 
 // A question is answered with a word on its round, whatever was decided since. "Neither" leaves it to "That was…" to say which.
@@ -352,14 +358,17 @@ function showQuestion() {
   text("asks", `Round ${it.round.counter}, robot ${it.robot} asks: ${it.words}`);
   const known = state.swarm ? state.swarm.vocabulary : [];
   const asked = it.kind === "again" ? [] : it.kind === "between" ? it.gestures : known;
-  const gestures = asked.map((label) => ({ label, word: { say: "was", round: it.round, class: label } }));
+  const gestures = asked.map((label, k) => ({ label, answer: it.kind === "between" ? it.answers[k] : meant(label) }));
   const neither = it.kind === "between" ? known.filter((label) => !it.gestures.includes(label)) : [];
   const replies = [...gestures, ...(it.kind === "between" ? [{ label: "Neither", of: neither }] : [])];
   const of = `${it.round.counter}@${it.round.opener}-${it.round.life}`;
   sync($("replies"), replies, (reply) => `${of} ${reply.label}`, (reply) => {
     const button = make("button", "", reply.label);
     button.type = "button";
-    button.addEventListener("click", () => (reply.word ? say(reply.word) : chooseOther(it, reply.of)));
+    button.addEventListener("click", () => {
+      if (reply.of) chooseOther(it, reply.of);
+      else say({ say: "was", round: it.round, class: reply.answer });
+    });
     return button;
   }, () => {});
   buttons();
@@ -370,14 +379,19 @@ function chooseOther(it, others) {
   const replies = others.map((label) => {
     const button = make("button", "", label);
     button.type = "button";
-    button.addEventListener("click", () => say({ say: "was", round: it.round, class: label }));
+    button.addEventListener("click", () => say({ say: "was", round: it.round, class: meant(label) }));
     return button;
   });
   $("replies").replaceChildren(...replies);
   buttons();
 }
 
-async function say(word) {
+// What is answered to words that are no refusals.
+const HEEDED = ["learned", "known", "nothing_seen"];
+
+// Says it, with `before` in front of what comes of it. Gives whether the swarm heeds it.
+async function say(word, before = "") {
+  let heeded = false;
   waiting = true;
   // Also what nobody answers may have arrived.
   said = word.round ?? said;
@@ -392,12 +406,23 @@ async function say(word) {
     const samples = told.answer ? `; robot ${told.answer.robot} learns from ${counted(told.answer.samples, "sample")} of it` : "";
     const round = word.round ? `Round ${word.round.counter}: ` : "";
     const words = round + told.words + (told.answer && told.answer.samples ? samples : "");
-    reply(`${words[0].toUpperCase()}${words.slice(1)}.`, false);
+    reply(`${before}${words[0].toUpperCase()}${words.slice(1)}.`, false);
+    heeded = !told.answer || HEEDED.includes(told.answer.outcome);
   } catch (error) {
-    reply(`That did not arrive: ${error.message}`, true);
+    reply(`${before}That did not arrive: ${error.message}`, true);
   }
   waiting = false;
   buttons();
+  return heeded;
+}
+
+// Names a gesture, and then says that the round shown last showed it, unless somebody has said which gesture that did.
+async function nameNew(label) {
+  const round = settled && state.decision ? state.decision.round : null;
+  if (!(await say({ say: "new", label })) || !round) return;
+  const known = state.rounds && state.rounds.rounds.find((it) => same(it.round, round));
+  if (known && known.truth !== null) reply(`“${label}” is named. Round ${round.counter} was ${known.truth}, somebody has said.`, false);
+  else await say({ say: "new", label, round }, `“${label}” is named. `);
 }
 
 function reply(words, failed) {
@@ -522,8 +547,7 @@ $("new").addEventListener("submit", (event) => {
   if (!label) return;
   $("new-label").value = "";
   $("naming").open = false;
-  const it = state.decision;
-  say(it && settled ? { say: "new", label, round: it.round } : { say: "new", label });
+  nameNew(label);
 });
 $("undo").addEventListener("click", () => say({ say: "retract", round: said ?? state.decision.round }));
 $("certificate").addEventListener("click", save);

@@ -51,14 +51,15 @@ mod web;
 mod without_eyes;
 
 use std::io::{self, IsTerminal, Write};
+use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Parser, Subcommand};
-use gestalt_protocol::{Announcement, Instruction, InstructorId};
+use gestalt_protocol::{Announcement, Answer, Instruction, InstructorId};
 use tracing_subscriber::EnvFilter;
 
-use gestalt_link::{Client, News};
+use gestalt_link::{Client, LinkError, News};
 
 pub use show::clean;
 
@@ -224,7 +225,7 @@ fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
 }
 
 /// Has a round opened in the name of an instructor, and waits for the decision of one after `before`; `None` when there
-/// is none within `timeout`.
+/// is none within `timeout`. Who may not open one is told so, and waits no longer.
 async fn open_round(
     client: &Client,
     news: &mut News,
@@ -232,8 +233,25 @@ async fn open_round(
     before: Option<u32>,
     timeout: Duration,
 ) -> Result<Option<Announcement>, Failure> {
-    client.instruct(instructor, &Instruction::Open).await?;
-    next_decision(news, before, timeout).await
+    let decided = pin!(next_decision(news, before, timeout));
+    // Nothing answers it but a refusal.
+    let refused = client.teach(instructor, &Instruction::Open, timeout);
+    first_of(decided, refused).await
+}
+
+/// The decision, or an error by a refusal that came before it.
+async fn first_of(
+    mut decided: impl Future<Output = Result<Option<Announcement>, Failure>> + Unpin,
+    refused: impl Future<Output = Result<Option<Answer>, LinkError>>,
+) -> Result<Option<Announcement>, Failure> {
+    tokio::select! {
+        biased;
+        decided = &mut decided => decided,
+        answer = refused => match answer?.filter(|answer| answer.outcome.is_refusal()) {
+            Some(answer) => Err(answer.outcome.describe().into()),
+            None => decided.await,
+        },
+    }
 }
 
 /// Waits for the decision of a round after `before`; `None` when there is none within `timeout`.
@@ -349,6 +367,7 @@ fn duration(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
+    use gestalt_protocol::{Outcome, RobotId};
 
     use super::*;
 
@@ -362,6 +381,22 @@ mod tests {
             let error = duration(text).unwrap_err();
             assert!(error.contains(cause), "{error}");
         }
+    }
+
+    #[tokio::test]
+    async fn who_may_not_open_a_round_is_told_so_before_the_time_is_up() {
+        let (robot, to) = (RobotId(1), Instruction::Open);
+        let outcome = Outcome::NotAllowed;
+        let answer = Answer { robot, at: 1, to, outcome, class: None, looks_like: None, samples: 0 };
+        let refused = std::future::ready(Ok(Some(answer)));
+        let refused = first_of(Box::pin(std::future::pending()), refused).await;
+        assert!(refused.unwrap_err().to_string().starts_with("not allowed"));
+        // Nobody answers what is done.
+        let decided = Box::pin(async {
+            tokio::task::yield_now().await;
+            Ok(None)
+        });
+        assert!(first_of(decided, std::future::ready(Ok(None))).await.unwrap().is_none());
     }
 
     /// The words of a line as a shell takes them apart; enough for examples.

@@ -119,11 +119,15 @@ impl Mind {
                 Outcome::NotAllowed
             }
             LessonReceipt::New if again => Outcome::Known,
+            // It is kept all the same: who says so may have been heard elsewhere.
+            LessonReceipt::New if word == Word::Retracted && latest.is_none() => Outcome::Known,
             LessonReceipt::New if word != Word::Retracted && !learning.has_seen(round) => {
                 Outcome::NothingSeen
             }
             LessonReceipt::New => Outcome::Learned,
-            LessonReceipt::Known => Outcome::Known,
+            LessonReceipt::Known if again => Outcome::Known,
+            // One that was counted higher stands.
+            LessonReceipt::Known => Outcome::NotAllowed,
             LessonReceipt::Unproven => Outcome::NotAllowed,
             LessonReceipt::Full | LessonReceipt::FarAhead => Outcome::UnknownRound,
         }
@@ -141,6 +145,8 @@ impl Mind {
             return;
         }
         let wait = match outcome {
+            // What is taken back another may have heard.
+            Outcome::Known if matches!(instruction, Instruction::Retract { .. }) => KNOWS_NOTHING,
             Outcome::Learned | Outcome::Known | Outcome::NotAllowed => Duration::ZERO,
             Outcome::NothingSeen => SAW_NOTHING,
             Outcome::UnknownRound | Outcome::UnknownGesture | Outcome::NoRoom | Outcome::NotLearning => {
@@ -149,10 +155,13 @@ impl Mind {
         };
         let (mut class, mut samples, mut revision, mut looks_like) = (named, 0, 0, None);
         if let (Some(learning), Some(round)) = (&self.learning, instruction.round()) {
-            class = match learning.verdict(round) {
-                Verdict::Class(class) => Some(class),
-                _ => None,
-            };
+            // What a round shows may be another gesture than the one that was named with it.
+            if !matches!(instruction, Instruction::New { .. }) {
+                class = match learning.verdict(round) {
+                    Verdict::Class(class) => Some(class),
+                    _ => None,
+                };
+            }
             samples = u32::try_from(learning.held_of(round)).unwrap_or(u32::MAX);
             looks_like = named.and_then(|gesture| self.looked_like(round, Some(gesture)));
         }

@@ -152,7 +152,6 @@ impl Learning {
             return (Outcome::Known, Some(gesture));
         }
         let again = known.is_some_and(|known| known.fate == fate);
-        let is_later = known.is_none_or(|known| known.count < *at);
         let count = match known {
             _ if said.is_some() => *at,
             Some(_) if again => return (Outcome::Known, Some(gesture)),
@@ -166,8 +165,8 @@ impl Learning {
         }
         match self.hear_naming(&naming) {
             NamingReceipt::New if !again => (Outcome::Learned, Some(gesture)),
-            // Somebody with a key has spoken of it, and this one has none.
-            NamingReceipt::Known if !again && is_later => (Outcome::NotAllowed, None),
+            // Somebody with a key has spoken of it, and this one has none; or what was said before has the higher count.
+            NamingReceipt::Known if !again => (Outcome::NotAllowed, None),
             NamingReceipt::New | NamingReceipt::Known => (Outcome::Known, Some(gesture)),
             NamingReceipt::Unproven => (Outcome::NotAllowed, None),
             NamingReceipt::Full | NamingReceipt::FarAhead => (Outcome::NoRoom, None),

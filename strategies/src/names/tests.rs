@@ -87,6 +87,15 @@ fn what_was_shown_is_in_use_and_what_is_restored_is_not() {
     assert_eq!(book.find("circle", &who("ana")), Some(anas));
     book.hear(&naming("ana", "circle", 2, Fate::InUse));
     assert_eq!(book.find_shown("circle", &who("ana")), Some(anas));
+    // Merged into another: the label is that of bob's from then on.
+    book.hear(&naming("ana", "circle", 3, Fate::Same(ClassId(3))));
+    assert_eq!(
+        (book.titles(&[])[&bobs].as_str(), book.find_shown("circle", &who("ana"))),
+        ("circle", Some(bobs))
+    );
+    assert_eq!(book.find_shown("circle (ana)", &who("ana")), Some(anas));
+    book.hear(&naming("bob", "circle", 2, Fate::Retired));
+    assert_eq!(book.find_shown("circle", &who("ana")), Some(anas), "there is no other");
 }
 
 /// What a gesture is by now, as the words on it read.

@@ -18,13 +18,14 @@ use std::time::Duration;
 
 use gestalt_link::Heard;
 use gestalt_protocol::{
-    Announcement, Answer, Holding, InstructorId, MAX_ROBOTS, Question, RobotId, RoundId, Status, VocabularyId,
+    Announcement, Answer, Gesture, Holding, InstructorId, MAX_ROBOTS, Question, RobotId, RoundId, Status,
+    VocabularyId,
 };
 use gestalt_strategies::Vocabulary;
 use serde::Serialize;
 
 pub use decision::{DecisionView, Share, VoteView};
-pub use question::{APART, QuestionView, SHOWN};
+pub use question::{APART, QuestionView, SHOWN, gesture_asked};
 pub use robot::{LearningView, RobotView};
 pub use round::{CurvePoint, MAX_ROUNDS, RoundView, Verdict};
 pub use said::{MAX_SAID, SaidView};
@@ -94,6 +95,8 @@ pub struct SwarmView {
     pub robots: Vec<RobotView>,
     /// The labels of the gestures: those that the latest decision chose from, or else those that most robots know.
     pub vocabulary: Vec<String>,
+    /// The same as an instructor's words name them.
+    pub gestures: Vec<Gesture>,
     /// What keeps this view from being true, with the fix.
     pub trouble: Option<String>,
 }
@@ -131,8 +134,11 @@ impl View {
     #[must_use]
     pub fn swarm(&self, now: Duration) -> SwarmView {
         let robots = self.present().map(|(id, robot)| robot.view(*id, now)).collect();
-        let vocabulary = self.vocabulary().map(Vocabulary::shown).unwrap_or_default();
-        SwarmView { robots, vocabulary, trouble: self.trouble(now) }
+        let known = self.vocabulary();
+        let vocabulary = known.map(Vocabulary::shown).unwrap_or_default();
+        let class = |label: &str| known.and_then(|known| known.class(label));
+        let gestures = vocabulary.iter().map(|label| question::gesture_called(label, class(label))).collect();
+        SwarmView { robots, vocabulary, gestures, trouble: self.trouble(now) }
     }
 
     /// The decision of the newest round with its reasons.

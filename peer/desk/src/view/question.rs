@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{Outcome, Question, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Gesture, Outcome, Question, RobotId, RoundId};
 use serde::Serialize;
 
 use super::text::{clipped, finite};
@@ -25,6 +25,8 @@ pub struct QuestionView {
     pub words: String,
     /// What the gestures are called that it names.
     pub gestures: Vec<String>,
+    /// The same as the words that answer it name them.
+    pub answers: Vec<Gesture>,
     /// Who asks.
     pub robot: RobotId,
     /// See [`Question::entropy`].
@@ -71,6 +73,7 @@ impl From<&Question> for QuestionView {
             kind: question.ask.kind(),
             words: clipped(&question.to_string()),
             gestures: question.names().iter().map(|name| clipped(name)).collect(),
+            answers: question.names().iter().map(|name| gesture_asked(question, name)).collect(),
             robot: question.robot,
             entropy: finite(question.entropy),
             disagreement: finite(question.disagreement),
@@ -78,9 +81,28 @@ impl From<&Question> for QuestionView {
     }
 }
 
+/// The gesture that a word names which answers a question by what it calls one. Of those that were named it is the one that was asked about:
+/// whoever answers may have named another so.
+#[must_use]
+pub fn gesture_asked(question: &Question, name: &str) -> Gesture {
+    let mut named = question.names().into_iter().zip(question.ask.classes());
+    let class = named.find(|(known, _)| known == name).map(|(_, class)| class);
+    // Without labels its names are numbers.
+    match class.filter(|_| question.labels.is_empty()) {
+        Some(class) => Gesture::Class(class),
+        None => gesture_called(name, class),
+    }
+}
+
+/// A gesture as a word names it: one of the list by its label, which means the same whatever list a robot has; one that was named by its number, for
+/// another can bear its label.
+pub(super) fn gesture_called(label: &str, class: Option<ClassId>) -> Gesture {
+    class.filter(|class| class.is_named()).map_or_else(|| Gesture::Label(label.to_owned()), Gesture::Class)
+}
+
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Ask, ClassId, Stamp};
+    use gestalt_protocol::{Ask, Stamp};
 
     use super::*;
 
@@ -95,6 +117,18 @@ mod tests {
             stamp: Stamp::default(),
             signature: None,
         }
+    }
+
+    #[test]
+    fn it_is_answered_by_the_gestures_that_it_asks_about() {
+        let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
+        let ask = Ask::Between { classes: [ClassId(2), circle] };
+        let asked = Question { ask, labels: vec!["two".to_owned(), "circle".to_owned()], ..question(5) };
+        let two = Gesture::Label("two".to_owned());
+        assert_eq!(QuestionView::from(&asked).answers, [two, Gesture::Class(circle)]);
+        let unnamed = Question { labels: vec![], ..asked.clone() };
+        assert_eq!(gesture_asked(&unnamed, "2"), Gesture::Class(ClassId(2)));
+        assert_eq!(gesture_asked(&asked, "2"), Gesture::Label("2".to_owned()));
     }
 
     #[test]

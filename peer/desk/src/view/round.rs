@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use gestalt_protocol::{
-    Answer, ClassId, Decision, Gesture, Instruction, InstructorId, Outcome, Rank, RoundId, VocabularyId,
+    Answer, ClassId, Decision, Gesture, Instruction, InstructorId, Outcome, Rank, RoundId, RoundOutcome,
+    VocabularyId,
 };
-use gestalt_strategies::Vocabulary;
+use gestalt_strategies::{MindConfig, Vocabulary, outcome};
 use serde::Serialize;
 
 use super::text::{clipped, finite, gesture};
@@ -26,6 +27,8 @@ pub struct RoundView {
     pub round: RoundId,
     /// The gesture that was decided; `None` for "no decision".
     pub label: Option<String>,
+    /// What it came to: `gesture`, `unknown` or `undecided`.
+    pub outcome: RoundOutcome,
     /// The fused probability, `0.0..=1.0`.
     pub confidence: f64,
     /// What instructors said of it.
@@ -64,8 +67,9 @@ pub(super) struct Rounds(BTreeMap<RoundId, Round>);
 #[derive(Clone, Debug, Default)]
 struct Round {
     ended: Option<Ended>,
-    /// The latest word of each instructor, with the time it was said at.
-    words: BTreeMap<InstructorId, (u64, Word)>,
+    /// The latest word of each instructor, with the time it was said at, and the gesture that the round showed by all that had been said by then,
+    /// as the swarm answered.
+    words: BTreeMap<InstructorId, (u64, Word, Option<ClassId>)>,
 }
 
 /// What is kept of a decision.
@@ -75,6 +79,7 @@ struct Ended {
     is_final: bool,
     class: Option<ClassId>,
     label: Option<String>,
+    outcome: RoundOutcome,
     confidence: f64,
     vocabulary: VocabularyId,
     /// How many votes each gesture got.
@@ -112,7 +117,8 @@ impl Rounds {
 
     /// Takes in what an instructor said of a round, and was answered.
     pub fn answer(&mut self, id: RoundId, by: InstructorId, answer: &Answer) {
-        if matches!(answer.outcome, Outcome::UnknownRound | Outcome::UnknownGesture) {
+        // Of robots that do not learn whoever says what was shown is refused, and right all the same.
+        if answer.outcome.is_refusal() && answer.outcome != Outcome::NotLearning {
             return;
         }
         let Some(word) = Word::of(answer) else { return };
@@ -120,7 +126,7 @@ impl Rounds {
         if round.words.len() >= MAX_INSTRUCTORS && !round.words.contains_key(&by) {
             return;
         }
-        let said = (answer.at, word);
+        let said = (answer.at, word, answer.class);
         let known = round.words.entry(by).or_insert_with(|| said.clone());
         if *known < said {
             *known = said;
@@ -156,6 +162,7 @@ impl Rounds {
             RoundView {
                 round: *id,
                 label: ended.class.map(name),
+                outcome: ended.outcome,
                 confidence: ended.confidence,
                 verdict: ended.verdict(&truth),
                 truth: if let Truth::Class(class) = truth { Some(name(class)) } else { None },
@@ -207,11 +214,16 @@ impl Rounds {
 }
 
 impl Round {
-    /// What instructors say: the latest of all their words.
+    /// What instructors say: what all their words come to by the latest answer, or else the latest of those that stand.
     fn truth(&self, vocabulary: Option<&Vocabulary>) -> Truth {
-        let latest = self.words.iter().max_by_key(|(by, (at, _))| (*at, *by));
+        let words = || self.words.iter().map(|(by, (at, word, comes_to))| (*at, by, word, comes_to));
+        let latest = words().max_by_key(|(at, by, ..)| (*at, *by));
+        if let Some(comes_to) = latest.and_then(|(.., comes_to)| *comes_to) {
+            return Truth::Class(comes_to);
+        }
+        let standing = words().filter(|(_, _, word, _)| **word != Word::TakenBack);
         let class = |label: &str| vocabulary.and_then(|vocabulary| vocabulary.class(label));
-        let truth = match latest.map(|(_, (_, word))| word) {
+        let truth = match standing.max_by_key(|(at, by, ..)| (*at, *by)).map(|(_, _, word, _)| word) {
             Some(Word::Class(it)) => Some(Truth::Class(*it)),
             Some(Word::Label(label)) => class(label).map(Truth::Class),
             Some(Word::Not(it)) => Some(Truth::Not(*it)),
@@ -228,11 +240,13 @@ impl Ended {
         for counted in &decision.certificate.votes {
             *votes.entry(counted.class).or_default() += 1;
         }
+        let config = MindConfig { rule: decision.certificate.rule, ..MindConfig::default() };
         Self {
             rank: decision.rank(),
             is_final: decision.is_final,
             class: decision.class,
             label: label.map(clipped),
+            outcome: outcome(decision, &config).0,
             confidence: finite(decision.confidence),
             vocabulary: decision.certificate.vocabulary,
             votes,

@@ -1,8 +1,8 @@
 //! One sentence of the view each, and that order and repetition change nothing.
 
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, FusionRule, Gesture, Heeded, Instruction, LearningStatus,
-    Outcome, Reported, Stamp, Terms, Vote,
+    Certificate, ClassId, CountedVote, Decision, FusionRule, Heeded, Instruction, LearningStatus,
+    NamedGesture, Outcome, Reported, RoundOutcome, Stamp, Terms, Vote,
 };
 use proptest::prelude::*;
 
@@ -189,6 +189,61 @@ fn the_latest_word_judges_a_round_and_a_word_taken_back_does_not() {
     assert_eq!(verdict(vec![wrong, answered((by, undo))]), (Verdict::Unknown, None, vec![]));
     let unknown = answered(was(1, "one", 8, Outcome::UnknownGesture));
     assert_eq!(verdict(vec![unknown]).0, Verdict::Unknown, "the swarm did not take it");
+}
+
+#[test]
+fn what_a_round_showed_is_what_the_swarm_heeds() {
+    let truth = |words: &[(&str, Instruction, Outcome, Option<u32>)]| {
+        let known = [reported(status(1)), Input::Came(RobotId(1)), decision(decided(1, Some(2), &[2, 2, 1]))];
+        let answers = (5..).zip(words).map(|(at, (by, to, outcome, class))| {
+            let class = class.map(ClassId);
+            let answer = Answer { to: to.clone(), outcome: *outcome, class, ..was(1, "", at, *outcome).1 };
+            answered((by.parse().unwrap(), answer))
+        });
+        let view = after(known.into_iter().chain(answers));
+        let shown = view.rounds().pop().unwrap();
+        (shown.truth, shown.verdict, view.curve().len())
+    };
+    let was = |label: &str| was(1, label, 0, Outcome::Learned).1.to;
+    let wrong = |class| Instruction::Wrong { round: round(1), of: Gesture::Class(ClassId(class)) };
+    let undo = || Instruction::Retract { round: round(1) };
+    let ana = ("ana", was("palm"), Outcome::Learned, Some(2));
+    let palm = (Some("palm".to_owned()), Verdict::Right, 1);
+    let none = (None, Verdict::Unknown, 0);
+    for outcome in [Outcome::NotAllowed, Outcome::NoRoom, Outcome::UnknownGesture] {
+        assert_eq!(truth(&[("bob", was("one"), outcome, None)]), none, "{outcome:?}");
+        assert_eq!(truth(&[ana.clone(), ("bob", was("one"), outcome, Some(2))]), palm, "{outcome:?}");
+    }
+    // Bob takes back what bob said.
+    for class in [Some(2), None] {
+        assert_eq!(truth(&[ana.clone(), ("bob", undo(), Outcome::Known, class)]), palm);
+    }
+    assert_eq!(truth(&[ana.clone(), ("ana", undo(), Outcome::Learned, None)]), none);
+    let denied = ("bob", wrong(1), Outcome::Learned, Some(2));
+    assert_eq!(truth(&[ana, denied]), palm, "what is said of another gesture denies nothing");
+    // Robots that do not learn refuse all of it.
+    assert_eq!(truth(&[("bob", was("palm"), Outcome::NotLearning, None)]), palm);
+}
+
+#[test]
+fn a_round_says_what_it_came_to_also_without_a_gesture() {
+    let outcome = |counter, class| after([decision(decided(counter, class, &[2, 2, 1]))]).rounds()[0].outcome;
+    assert_eq!([outcome(1, Some(2)), outcome(2, None)], [RoundOutcome::Gesture, RoundOutcome::Undecided]);
+    let mut unlike = decided(3, None, &[2, 2, 1]);
+    unlike.decision.certificate.unknown = Some(0.99);
+    assert_eq!(after([decision(unlike)]).rounds()[0].outcome, RoundOutcome::Unknown);
+}
+
+#[test]
+fn what_was_named_is_meant_by_its_number_and_what_is_listed_by_its_label() {
+    let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
+    let named = vec![NamedGesture { class: circle, label: "circle".to_owned(), samples: 0 }];
+    let learning = LearningStatus { named, ..LearningStatus::default() };
+    let view = after([Input::Came(RobotId(1)), reported(Status { learning: Some(learning), ..status(1) })]);
+    let swarm = view.swarm(NOW);
+    assert_eq!(swarm.vocabulary, ["fist", "one", "palm", "circle"]);
+    let listed = labels().into_iter().map(Gesture::Label);
+    assert_eq!(swarm.gestures, listed.chain([Gesture::Class(circle)]).collect::<Vec<_>>());
 }
 
 #[test]

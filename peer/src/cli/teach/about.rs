@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use gestalt_protocol::{ClassId, Decision, Instruction, Question, RoundId};
+use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, Question, RoundId};
 
-use gestalt_desk::{APART, SHOWN, Word};
+use gestalt_desk::{APART, SHOWN, Word, gesture_asked};
 
 /// What was heard and said so far, as far as the next word may be about it.
 #[derive(Debug, Default)]
@@ -30,8 +30,8 @@ pub(super) struct About {
 pub(super) enum Typed {
     /// A word, of the round that was decided last or of none.
     Word(Word),
-    /// The answer to a question.
-    Answer(Question, String),
+    /// The answer to a question: this gesture.
+    Answer(Question, Gesture),
     /// That it is none of the gestures of a question; which one, the next line may say.
     Neither,
 }
@@ -103,7 +103,7 @@ impl About {
     pub fn read(&mut self, now: Instant, words: &[&str]) -> Result<Typed, String> {
         let typed = words.join(" ");
         let Some(question) = self.question(now).cloned() else { return Word::read(words).map(Typed::Word) };
-        let is_asked = question.labels.contains(&typed);
+        let is_asked = question.names().contains(&typed);
         match Word::read(words) {
             Ok(word) if !is_asked => Ok(Typed::Word(word)),
             Err(_) if !is_asked && typed == "neither" => {
@@ -111,16 +111,23 @@ impl About {
                 Ok(Typed::Neither)
             }
             _ => {
-                self.asked = None;
-                Ok(Typed::Answer(question, typed))
+                // Until the swarm has taken the answer: it may be typed wrong.
+                self.asked = Some((question.clone(), now));
+                let gesture = gesture_asked(&question, &typed);
+                Ok(Typed::Answer(question, gesture))
             }
         }
+    }
+
+    /// The swarm has taken an answer to the question about that round.
+    pub fn settle(&mut self, round: RoundId) {
+        self.asked.take_if(|(question, _)| question.round == round);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::{Ask, Gesture, RobotId, Stamp};
+    use gestalt_protocol::{Ask, RobotId, Stamp};
     use serde_json::json;
 
     use super::*;
@@ -143,6 +150,10 @@ mod tests {
             is_final,
             certificate,
         }
+    }
+
+    fn called(label: &str) -> Gesture {
+        Gesture::Label(label.to_owned())
     }
 
     fn question(counter: u32, labels: [&str; 2]) -> Question {
@@ -221,24 +232,44 @@ mod tests {
             now += APART;
             assert!(about.ask(now, &left_or_right));
             assert!(!about.ask(now, &left_or_right), "shown once");
-            let answer = Typed::Answer(left_or_right.clone(), label.to_owned());
+            let answer = Typed::Answer(left_or_right.clone(), called(label));
             assert_eq!(about.read(now, &[label]), Ok(answer));
+            about.settle(round(5));
         }
         assert_eq!(about.read(now, &["right"]), Ok(Typed::Word(Word::Right)), "it was answered");
         now += APART;
         assert!(about.ask(now, &left_or_right));
         assert_eq!(about.read(now, &["wrong"]), Ok(Typed::Word(Word::Wrong)));
         assert_eq!(about.read(now, &["neither"]), Ok(Typed::Neither));
-        let circle = Typed::Answer(left_or_right, "big circle".to_owned());
+        let circle = Typed::Answer(left_or_right, called("big circle"));
         assert_eq!(about.read(now, &["big", "circle"]), Ok(circle));
+        about.settle(round(5));
         let odd = question(6, ["neither", "undo"]);
         now += APART;
         assert!(about.ask(now, &odd));
-        assert_eq!(about.read(now, &["neither"]), Ok(Typed::Answer(odd.clone(), "neither".to_owned())));
+        assert_eq!(about.read(now, &["neither"]), Ok(Typed::Answer(odd.clone(), called("neither"))));
+        about.settle(round(6));
         now += APART;
         assert!(about.ask(now, &odd));
         assert_eq!(about.read(now + SHOWN, &["undo"]), Ok(Typed::Word(Word::Undo)), "nobody waits any more");
         assert!(about.read(now + SHOWN, &["circle"]).is_err());
+    }
+
+    #[test]
+    fn a_question_waits_until_an_answer_was_taken_and_its_gestures_are_those_that_it_asked_about() {
+        let (now, mut about) = (Instant::now(), About::new(None, Some(&decided(5, 3, true))));
+        let loop_of_ana = ClassId::named(&"ana".parse().unwrap(), "loop");
+        let ask = Ask::Between { classes: [ClassId(2), loop_of_ana] };
+        let asked = Question { ask, ..question(5, ["two", "loop"]) };
+        assert!(about.ask(now, &asked));
+        let answers = [("tow", called("tow")), ("loop", Gesture::Class(loop_of_ana)), ("two", called("two"))];
+        for (typed, gesture) in answers {
+            assert_eq!(about.read(now, &[typed]), Ok(Typed::Answer(asked.clone(), gesture)));
+        }
+        about.settle(round(4));
+        assert!(about.read(now, &["two"]).is_ok(), "another round was spoken of");
+        about.settle(round(5));
+        assert!(about.read(now, &["two"]).is_err());
     }
 
     #[test]

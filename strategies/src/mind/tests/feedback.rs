@@ -82,6 +82,33 @@ fn what_is_taken_back_is_forgotten_and_what_is_said_then_counts() {
 }
 
 #[test]
+fn who_takes_back_what_they_did_not_say_is_told_so_by_all_that_know_of_no_word() {
+    let mut swarm = Swarm::new(3, config(3, 1.0), 16);
+    let round = swarm.show(1);
+    swarm.was(round, 1);
+    for _ in 0..2 {
+        let at = swarm.say("bob", Instruction::Retract { round });
+        assert_eq!(swarm.outcome(at), Outcome::Known);
+    }
+    for mind in &swarm.minds {
+        assert_eq!(mind.training_set().unwrap().class_count(ClassId(1)), 9, "what another said stands");
+    }
+    // One robot alone heard what is taken back: it answers for all.
+    swarm.loss = 1.0;
+    let at = swarm.now.as_millis() as u64;
+    let said = |at, instruction| {
+        Input::Instructed(Instructed { by: "cyn".parse().unwrap(), at, instruction, said: None })
+    };
+    swarm.input(2, said(at, Instruction::Was { round, class: Gesture::Class(ClassId(1)) }));
+    (0..3).for_each(|i| swarm.input(i, said(at + 1, Instruction::Retract { round })));
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!(swarm.outcome(at + 1), Outcome::Learned);
+    swarm.loss = 0.0;
+    swarm.pass(Duration::from_secs(10));
+    swarm.check();
+}
+
+#[test]
 fn right_and_wrong_are_about_the_decision() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 8);
     let round = swarm.show(3);

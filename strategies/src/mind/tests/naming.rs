@@ -2,7 +2,9 @@
 
 use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, MAX_NAMED, Naming, Namings};
 
+use super::believing::was;
 use super::*;
+use crate::believe::Standing;
 use crate::names::NameBook;
 
 fn new(label: &str) -> Instruction {
@@ -125,6 +127,62 @@ fn a_word_on_what_was_shown_means_what_is_in_use() {
     assert_eq!(swarm.trained_as(ClassId::named(&"bob".parse().unwrap(), "circle")), [4; 2]);
     swarm.say("ana", Instruction::Restore { class: called("circle") });
     assert_eq!(swarm.names(0).in_use(64).len(), 3, "her own is restored");
+}
+
+#[test]
+fn a_label_that_is_shown_means_the_gesture_that_is_shown_under_it() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 70);
+    for by in ["ana", "bob"] {
+        swarm.say(by, new("loop"));
+    }
+    swarm.say("bob", Instruction::Same { class: called("loop"), of: called("3") });
+    let round = swarm.show(2);
+    let word = swarm.say("bob", Instruction::Was { round, class: called("loop") });
+    assert_eq!(swarm.outcome(word), Outcome::Learned);
+    assert_eq!((swarm.trained_as(anas("loop")), swarm.trained_as(ClassId(3))), (vec![4; 2], vec![0; 2]));
+}
+
+#[test]
+fn of_a_round_the_answer_to_a_name_says_which_gesture_was_named_and_none_where_none_was() {
+    let with = |label: &str, round| Instruction::New { label: label.to_owned(), round: Some(round) };
+    let answer = |swarm: &Swarm, at| {
+        let answer = swarm.answers.iter().find(|answer| answer.at == at).unwrap();
+        (answer.outcome, answer.class)
+    };
+    let mut swarm = Swarm::new(2, config(2, 1.0), 73);
+    let unknown = RoundId { counter: 77, opener: RobotId(9), life: 1 };
+    let named = swarm.say("ana", with("triangle", unknown));
+    assert_eq!(answer(&swarm, named), (Outcome::UnknownRound, Some(anas("triangle"))));
+    let round = swarm.show(2);
+    swarm.was(round, 3);
+    let refused = swarm.say("ana", with("ok (left)", round));
+    assert_eq!(answer(&swarm, refused), (Outcome::NoRoom, None), "though the round shows 3");
+
+    let mut swarm = Swarm::sealed(74);
+    let round = swarm.show(1);
+    swarm.hear(0, "ada", 700, &was(round, 3));
+    swarm.pass(Duration::from_secs(3));
+    swarm.hear(0, "bob", 800, &with("circle", round));
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!(answer(&swarm, 800), (Outcome::NotAllowed, None));
+}
+
+#[test]
+fn a_word_on_a_name_that_another_of_a_higher_count_goes_before_is_not_answered_as_known() {
+    let mut swarm = Swarm::sealed(75);
+    swarm.believe(&[("ana", Standing::Teaches), ("bob", Standing::Teaches)]);
+    let retire = Instruction::Retire { class: called("square") };
+    let restore = Instruction::Restore { class: called("square") };
+    for (who, count, word, outcome) in [
+        ("ana", 900, new("square"), Outcome::Learned),
+        ("bob", 800, retire.clone(), Outcome::NotAllowed),
+        ("bob", 810, restore, Outcome::Known),
+        ("bob", 910, retire, Outcome::Learned),
+    ] {
+        (0..3).for_each(|i| swarm.hear(i, who, count, &word));
+        swarm.pass(Duration::from_secs(10));
+        assert_eq!(swarm.outcome(count), outcome, "{word:?}");
+    }
 }
 
 #[test]
