@@ -6,9 +6,8 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 use gestalt_ros::NodeName;
 use gestalt_vision::camera_model::CameraModel;
-use gestalt_vision::config::{DeviceSettings, LayerConfig, MotionConfig, Schedule};
+use gestalt_vision::config::{DeviceSettings, Glove, LayerConfig, MotionConfig, Schedule};
 use gestalt_vision::pose::Pose;
-use gestalt_vision::config::Glove;
 use serde::{Deserialize, Serialize};
 
 use super::ConfigError;
