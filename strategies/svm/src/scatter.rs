@@ -58,6 +58,16 @@ impl Covariance {
         Self { width, diagonal, sums, freedom: PRIOR_SHOWINGS }
     }
 
+    /// Sums of squares alone, without what is believed.
+    pub fn of_nothing(width: usize) -> Self {
+        Self { width, diagonal: is_wide(width), sums: vec![0.0; entries(width)], freedom: 0.0 }
+    }
+
+    /// The sums of squares as they lie here.
+    pub fn into_sums(self) -> Vec<f64> {
+        self.sums
+    }
+
     /// Counts degrees of freedom.
     pub fn free(&mut self, degrees: f64) {
         self.freedom += degrees;

@@ -28,8 +28,10 @@ pub(crate) struct OfClass {
     pub name: usize,
     /// The mean of its showings, whitened.
     pub mean: Vec<f64>,
-    /// The mean of each showing, whitened.
-    pub showings: Vec<Vec<f64>>,
+    /// The mean of each showing, whitened, and what it weighs.
+    pub showings: Vec<(Vec<f64>, f64)>,
+    /// What all of them weigh.
+    pub weight: f64,
 }
 
 /// All classes with a sample.
@@ -49,7 +51,9 @@ pub(crate) struct Seen {
     /// Its class and its showing, by their places here.
     pub class: usize,
     pub showing: usize,
-    /// What it weighs: all of a showing together weigh 1.
+    /// Its part of its showing: all of one together are 1.
+    pub part: f64,
+    /// That part of what its showing weighs.
     pub weight: f64,
     pub white: Vec<f64>,
 }
@@ -63,35 +67,52 @@ impl Scatter {
         }
         let mut covariance = Covariance::new(spread);
         for showings in by_class.values() {
-            let center = center(showings.iter().map(|(mean, _)| mean.as_slice()), width);
+            let center = center(showings.iter().map(|(mean, _)| (mean.as_slice(), 1.0)), width);
             covariance.free(showings.len().saturating_sub(1) as f64);
             for (_, samples) in showings {
                 let weight = 1.0 / samples.len() as f64;
                 samples.iter().for_each(|(_, vector)| covariance.add(weight, vector, &center));
             }
         }
-        Some(Self::whitened(by_class, width, covariance.whitening()))
+        Some(Self::whitened(by_class, width, covariance.whitening(), |_| 1.0))
     }
 
-    /// The same in a space of that width, where the covariance is known.
-    pub fn by(samples: &[Shown<'_>], width: usize, whitening: Vec<f32>) -> Option<Self> {
+    /// The same in a space of that width, where the covariance is known; and what the showing of each sample weighs, by the place of the sample.
+    pub fn by(
+        samples: &[Shown<'_>],
+        width: usize,
+        whitening: Vec<f32>,
+        weigh: impl Fn(usize) -> f64,
+    ) -> Option<Self> {
         let by_class = by_class(samples, width);
-        (!by_class.is_empty() && width > 0).then(|| Self::whitened(by_class, width, whitening))
+        (!by_class.is_empty() && width > 0).then(|| Self::whitened(by_class, width, whitening, weigh))
     }
 
-    fn whitened(by_class: ByClass<'_>, width: usize, whitening: Vec<f32>) -> Self {
+    fn whitened(
+        by_class: ByClass<'_>,
+        width: usize,
+        whitening: Vec<f32>,
+        weigh: impl Fn(usize) -> f64,
+    ) -> Self {
         let mut whitened = Vec::new();
-        let classes = by_class.into_iter().enumerate().map(|(class, (name, showings))| {
-            let mut means = Vec::with_capacity(showings.len());
-            for (showing, (_, samples)) in showings.into_iter().enumerate() {
-                let weight = 1.0 / samples.len() as f64;
+        let classes = by_class.into_iter().enumerate().map(|(class, (name, of_class))| {
+            let mut showings = Vec::with_capacity(of_class.len());
+            for (showing, (_, samples)) in of_class.into_iter().enumerate() {
+                let of_showing = samples.first().map_or(0.0, |(sample, _)| weigh(*sample));
+                let part = 1.0 / samples.len() as f64;
+                let weight = of_showing * part;
                 let white: Vec<(usize, Vec<f64>)> =
                     samples.iter().map(|(sample, vector)| (*sample, whiten(&whitening, vector))).collect();
-                means.push(center(white.iter().map(|(_, white)| white.as_slice()), width));
-                let of_sample = |(sample, white)| Seen { sample, class, showing, weight, white };
+                showings.push((
+                    center(white.iter().map(|(_, white)| (white.as_slice(), 1.0)), width),
+                    of_showing,
+                ));
+                let of_sample = |(sample, white)| Seen { sample, class, showing, part, weight, white };
                 whitened.extend(white.into_iter().map(of_sample));
             }
-            OfClass { name, mean: center(means.iter().map(Vec::as_slice), width), showings: means }
+            let weight = showings.iter().map(|(_, weight)| weight).sum();
+            let mean = center(showings.iter().map(|(mean, weight)| (mean.as_slice(), *weight)), width);
+            OfClass { name, mean, showings, weight }
         });
         let classes = classes.collect();
         Self { width, whitening, classes, samples: whitened }
@@ -104,7 +125,7 @@ impl Scatter {
             .classes
             .iter()
             .enumerate()
-            .flat_map(|(class, of)| of.showings.iter().map(move |showing| (class, showing)))
+            .flat_map(|(class, of)| of.showings.iter().map(move |(showing, _)| (class, showing)))
             .collect();
         let firsts: Vec<usize> = self
             .classes
@@ -120,8 +141,7 @@ impl Scatter {
             Some((seen.weight, white.collect::<Vec<f64>>()))
         });
         let score = |(weight, white): (f64, Vec<f64>)| {
-            let to =
-                |of: &OfClass| a_coordinate(squared(&of.mean, &white), self.width, of.showings.len() as f64);
+            let to = |of: &OfClass| a_coordinate(squared(&of.mean, &white), self.width, of.weight);
             let score = Score::of(self.classes.iter().map(to))?;
             Some((Score { margin: margin_of(&plain.logs_at(&plain.spot(&white))), ..score }, weight))
         };
@@ -134,7 +154,7 @@ impl Scatter {
     }
 
     pub fn showings(&self) -> Vec<u32> {
-        self.classes.iter().map(|class| class.showings.len() as u32).collect()
+        self.classes.iter().map(|class| class.weight.round().max(1.0) as u32).collect()
     }
 
     /// The discriminant of the classes, of so many.
@@ -145,11 +165,13 @@ impl Scatter {
 
     /// What a discriminant says of each sample that is not all of its class, without its showing: by its place here.
     pub fn logs_left_out(&self, plain: &Discriminant) -> LogsLeftOut {
-        let spots = |class: &OfClass| class.showings.iter().map(|mean| plain.spot(mean)).collect();
-        let showings: Vec<Vec<Spot>> = self.classes.iter().map(spots).collect();
+        let spots = |class: &OfClass| {
+            class.showings.iter().map(|(mean, weight)| (plain.spot(mean), *weight)).collect()
+        };
+        let showings: Vec<Vec<(Spot, f64)>> = self.classes.iter().map(spots).collect();
         let logs = |seen: &Seen| {
-            let own = &showings[seen.class][seen.showing];
-            plain.logs_without(&plain.spot(&seen.white), self.classes[seen.class].name, own)
+            let (own, weight) = &showings[seen.class][seen.showing];
+            plain.logs_without(&plain.spot(&seen.white), self.classes[seen.class].name, (own, *weight))
         };
         self.samples.iter().map(logs).collect()
     }
@@ -159,15 +181,16 @@ impl Scatter {
         let (mut known, mut unknown) = (Vec::new(), Vec::new());
         for (place, Seen { class, showing, weight, white, .. }) in self.samples.iter().enumerate() {
             let to = |(k, of_class): (usize, &OfClass)| {
-                let n = of_class.showings.len() as f64;
+                let all = of_class.weight;
                 if k != *class {
-                    return Some((k, a_coordinate(squared(&of_class.mean, white), self.width, n)));
+                    return Some((k, a_coordinate(squared(&of_class.mean, white), self.width, all)));
                 }
                 // Without its own showing.
-                let own = &of_class.showings[*showing];
-                let rest = |(mean, own): (&f64, &f64)| (mean * n - own) / (n - 1.0);
-                let mean: Vec<f64> = of_class.mean.iter().zip(own).map(rest).collect();
-                (n > 1.0).then(|| (k, a_coordinate(squared(&mean, white), self.width, n - 1.0)))
+                let (own, weight) = &of_class.showings[*showing];
+                let rest = all - weight;
+                let without = |(mean, own): (&f64, &f64)| (mean * all - weight * own) / rest;
+                let mean: Vec<f64> = of_class.mean.iter().zip(own).map(without).collect();
+                (all > *weight).then(|| (k, a_coordinate(squared(&mean, white), self.width, rest)))
             };
             let distances: Vec<(usize, f64)> = self.classes.iter().enumerate().filter_map(to).collect();
             let others = distances.iter().filter(|(k, _)| k != class).map(|(_, distance)| *distance);
@@ -219,13 +242,14 @@ fn mean(samples: &[(usize, &[f32])], width: usize) -> Vec<f64> {
     sum
 }
 
-fn center<'a>(points: impl Iterator<Item = &'a [f64]>, width: usize) -> Vec<f64> {
+/// The mean of points that weigh so much.
+fn center<'a>(points: impl Iterator<Item = (&'a [f64], f64)>, width: usize) -> Vec<f64> {
     let mut sum = vec![0.0; width];
-    let mut count = 0.0;
-    for point in points {
-        sum.iter_mut().zip(point).for_each(|(sum, x)| *sum += x);
-        count += 1.0;
+    let mut all = 0.0;
+    for (point, weight) in points {
+        sum.iter_mut().zip(point).for_each(|(sum, x)| *sum += weight * x);
+        all += weight;
     }
-    sum.iter_mut().for_each(|sum| *sum /= f64::max(count, 1.0));
+    sum.iter_mut().for_each(|sum| *sum /= f64::max(all, f64::MIN_POSITIVE));
     sum
 }

@@ -166,14 +166,19 @@ impl Discriminant {
         self.classes.iter().map(log).collect()
     }
 
-    /// The same with one showing of a class left out, that has its whitened mean there; `None` where it is the only one.
-    pub(crate) fn logs_without(&self, spot: &Spot, class: usize, showing: &Spot) -> Option<Vec<f64>> {
-        let left = self.classes.get(class)?.as_ref().filter(|class| class.showings > 1.0)?;
-        let n = left.showings;
-        let mean =
-            left.mean.iter().zip(&showing.along).map(|(mean, own)| (mean * n - own) / (n - 1.0)).collect();
+    /// The same with one showing of a class left out, that has its whitened mean there and weighs so much; `None` where it is the only one.
+    pub(crate) fn logs_without(
+        &self,
+        spot: &Spot,
+        class: usize,
+        (showing, weight): (&Spot, f64),
+    ) -> Option<Vec<f64>> {
+        let left = self.classes.get(class)?.as_ref().filter(|class| class.showings > weight)?;
+        let rest = left.showings - weight;
+        let without = |(mean, own): (&f64, &f64)| (mean * left.showings - weight * own) / rest;
+        let mean = left.mean.iter().zip(&showing.along).map(without).collect();
         let mut logs = self.logs_at(spot);
-        logs[class] = self.log(spot, &self.class(mean, n - 1.0));
+        logs[class] = self.log(spot, &self.class(mean, rest));
         Some(logs)
     }
 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::samples::{KernelMatrix, Key};
+use super::samples::{KernelMatrix, Key, Place};
+use super::start::Start;
 use crate::familiarity::{Familiarity, LogsLeftOut, Scatter, Seen};
 use crate::feature_space::FeatureSpace;
 use crate::head::{Few, Shown, Sums, Teach, sharpness};
@@ -15,6 +16,8 @@ pub(super) type LeftOut = Option<(f64, Vec<f64>)>;
 #[derive(Debug)]
 pub(super) struct FewShowings {
     pub sums: Sums<Key>,
+    /// What it began with.
+    start: Start,
     /// Of which showing each inserted sample is.
     showings: BTreeMap<u64, u64>,
     pub own: Option<Arc<dyn Teach>>,
@@ -24,7 +27,18 @@ pub(super) struct FewShowings {
 impl FewShowings {
     pub fn new(space: &FeatureSpace) -> Self {
         let sharpness = sharpness(std::iter::empty());
-        Self { sums: Sums::new(space.spread()), showings: BTreeMap::new(), own: None, sharpness }
+        let (sums, start) = (Sums::new(space.spread()), Start::default());
+        Self { sums, start, showings: BTreeMap::new(), own: None, sharpness }
+    }
+
+    /// Begins with these samples in place of others, each a showing of its own.
+    pub fn begin(&mut self, samples: &[(usize, &[f32])]) {
+        self.start = Start::of(samples, self.sums.spread().len());
+    }
+
+    /// How many showings it knows of a class, also of those that it began with.
+    pub fn known(&self, class: usize) -> usize {
+        self.sums.showings(class) + self.start.count(class)
     }
 
     /// Notes of which showing a sample is.
@@ -55,8 +69,16 @@ impl FewShowings {
 
     /// How the classes lie; `None` where there is no sample.
     pub fn scatter(&self, samples: &KernelMatrix) -> Option<Scatter> {
-        let whitening = self.sums.covariance(&self.sums.clouds()).whitening();
-        Scatter::by(&self.shown(samples), self.sums.spread().len(), whitening)
+        let clouds = self.sums.clouds();
+        let shown = clouds.iter().map(|cloud| cloud.showings as usize).sum();
+        let mut covariance = self.sums.covariance(&clouds);
+        self.start.add_to(&mut covariance, shown);
+        let keys: Vec<(&Key, &Place)> = samples.places().iter().collect();
+        let weigh = |sample: usize| match keys[sample] {
+            (Key::Inserted(_), _) => 1.0,
+            (Key::Support(_), place) => self.start.weight(place.class, shown),
+        };
+        Scatter::by(&self.shown(samples), self.sums.spread().len(), covariance.whitening(), weigh)
     }
 
     /// What is familiar, of so many classes; with the margins of the discriminant, where that is the head, and what that says of each sample without its showing.
@@ -113,13 +135,13 @@ impl FewShowings {
                 for (seen, mut logs) in all {
                     let place = places[seen.sample];
                     logs.iter_mut().for_each(|log| *log *= self.sharpness);
-                    by_place[place.class][place.position] = Some((seen.weight, logs));
+                    by_place[place.class][place.position] = Some((seen.part, logs));
                 }
             }
             None => {
                 let Some(own) = &self.own else { return by_place };
                 let shown = self.shown(samples);
-                let fold = |place: &super::Place| folds[place.class][place.position];
+                let fold = |place: &Place| folds[place.class][place.position];
                 let count = folds.iter().flatten().max().map_or(0, |last| last + 1);
                 for left in 0..count {
                     let rest = shown.iter().zip(&places).filter(|(_, place)| fold(place) != left);
@@ -136,7 +158,7 @@ impl FewShowings {
                 for seen in &scatter.samples {
                     let place = places[seen.sample];
                     if let Some((weight, _)) = &mut by_place[place.class][place.position] {
-                        *weight = seen.weight;
+                        *weight = seen.part;
                     }
                 }
             }

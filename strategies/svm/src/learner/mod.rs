@@ -11,6 +11,7 @@ mod samples;
 mod shared;
 mod simd;
 mod solution;
+mod start;
 #[cfg(test)]
 mod tests;
 
@@ -111,7 +112,8 @@ impl Learner {
     }
 
     /// Starts from what a classifier knows: its support vectors, with their classes, are kept as samples of their
-    /// own, which nothing removes but another call.
+    /// own, which nothing removes but another call. They keep their weight in the machines; the head for few showings, and what is unknown, go by what is
+    /// shown here as soon as there is some, and take them for a few showings more.
     ///
     /// N. A. Syed, H. Liu, K. K. Sung, "Incremental learning with support vector machines", IJCAI workshop on
     /// support vector machines (1999).
@@ -141,6 +143,9 @@ impl Learner {
             self.put(Key::Support(self.supports), class.index(), vector.into());
             self.supports += 1;
         }
+        let vectors: Vec<(usize, &[f32])> =
+            classifier.vectors().map(|(class, vector)| (class.index(), vector)).collect();
+        self.few.begin(&vectors);
         Ok(())
     }
 
@@ -328,7 +333,7 @@ impl Learner {
         let of_class = |class: usize| {
             let sides = self.trained().flat_map(|pair| pair.classes.iter().zip(&pair.losses));
             let sides = sides.filter(|(of, _)| **of == class).map(|(_, losses)| losses);
-            let young = self.few.sums.showings(class) < YOUNG;
+            let young = self.few.known(class) < YOUNG;
             (!young).then(|| Losses::share(sides, met.saturating_sub(1)))
         };
         let of_classes: Vec<Option<f64>> = self.classes().map(of_class).collect();
@@ -407,7 +412,9 @@ impl Learner {
     }
 
     fn put(&mut self, key: Key, class: usize, vector: Arc<[f32]>) {
-        self.few.sums.insert(key, class, self.few.showing(key), &vector);
+        if matches!(key, Key::Inserted(_)) {
+            self.few.sums.insert(key, class, self.few.showing(key), &vector);
+        }
         let place = self.samples.insert(key, class, vector);
         self.join(place);
     }

@@ -1,0 +1,117 @@
+//! Learning on the spot from what was learned elsewhere: of other people, before other cameras.
+
+use std::sync::Arc;
+
+use gestalt_protocol::ClassId;
+use gestalt_rounds::{Classify, Vocabulary};
+use gestalt_svm::{Classifier, Components, FeatureSpace, Learner, LearnerOptions, ScalingMethod};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const CLASSES: usize = 5;
+const FEATURES: usize = 10;
+/// Of the classes, the last is not taught.
+const UNTAUGHT: usize = 1;
+const SEEDS: u64 = 10;
+
+/// About a standard normal variable: the sum of twelve uniform ones.
+fn normal(rng: &mut impl Rng) -> f32 {
+    (0..12).map(|_| rng.random_range(-0.5_f32..0.5)).sum()
+}
+
+/// Where each gesture lies.
+struct World(Vec<Vec<f32>>);
+
+impl World {
+    fn new(rng: &mut impl Rng) -> Self {
+        let class = |_| (0..FEATURES).map(|_| normal(rng)).collect();
+        Self((0..CLASSES + UNTAUGHT).map(class).collect())
+    }
+
+    /// The same gestures of other people, before another camera.
+    fn elsewhere(&self, far: f32, rng: &mut impl Rng) -> Self {
+        let class = |class: &Vec<f32>| class.iter().map(|x| x + far * normal(rng)).collect();
+        Self(self.0.iter().map(class).collect())
+    }
+
+    /// Views of a showing.
+    fn show(&self, class: usize, views: usize, rng: &mut impl Rng) -> Vec<Vec<f32>> {
+        let shown: Vec<f32> = self.0[class].iter().map(|x| x + 0.5 * normal(rng)).collect();
+        (0..views).map(|_| shown.iter().map(|x| x + 0.3 * normal(rng)).collect()).collect()
+    }
+}
+
+fn learner(space: &Arc<FeatureSpace>) -> Learner {
+    let vocabulary = Vocabulary::new((0..CLASSES).map(|k| k.to_string())).unwrap();
+    Learner::new(space.clone(), vocabulary, LearnerOptions::default()).unwrap()
+}
+
+fn show(learner: &mut Learner, world: &World, showings: usize, views: usize, rng: &mut impl Rng) {
+    for showing in 0..showings * CLASSES {
+        let class = showing % CLASSES;
+        for (view, raw) in world.show(class, views, rng).iter().enumerate() {
+            let vector = learner.space().project(raw).unwrap();
+            let class = ClassId(class as u32);
+            learner.insert_shown((showing * views + view) as u64, class, &vector, showing as u64).unwrap();
+        }
+    }
+}
+
+/// Which part of single views of further showings is judged rightly; and how often one of the untaught gesture looks less known than one of a taught one.
+fn judged(classifier: &Classifier, world: &World, rng: &mut impl Rng) -> [f64; 2] {
+    let (mut right, mut known, mut unknown) = (0, Vec::new(), Vec::new());
+    for n in 0..300 {
+        let class = n % (CLASSES + UNTAUGHT);
+        let view = world.show(class, 1, rng).remove(0);
+        let judgement = classifier.judge(&view).unwrap();
+        let p = &judgement.probabilities;
+        let best = (0..CLASSES).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap();
+        right += usize::from(best == class);
+        if class < CLASSES { &mut known } else { &mut unknown }.push(judgement.unknown.unwrap());
+    }
+    let wins = unknown.iter().flat_map(|u| known.iter().map(move |k| u.total_cmp(k)));
+    let wins: f64 = wins.map(|order| f64::midpoint(order as i8 as f64, 1.0)).sum();
+    [right as f64 / known.len() as f64, wins / (known.len() * unknown.len()) as f64]
+}
+
+/// The means over seeds of what is judged by who starts from what was learned elsewhere and learns nothing, from that and learns, and from nothing.
+fn compared(far: f32, showings: usize) -> [[f64; 2]; 3] {
+    let mut sums = [[0.0; 2]; 3];
+    for seed in 0..SEEDS {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let there = World::new(rng);
+        let here = there.elsewhere(far, rng);
+        let rows: Vec<Vec<f32>> =
+            (0..60).flat_map(|n| there.show(n % (CLASSES + UNTAUGHT), 2, rng)).collect();
+        let rows = rows.iter().map(Vec::as_slice);
+        let kept = Components::Count(FEATURES);
+        let space = Arc::new(FeatureSpace::fit("toy-1", rows, ScalingMethod::PerComponent, kept, rng));
+        let mut teacher = learner(&space);
+        show(&mut teacher, &there, 100, 1, rng);
+        let start = teacher.learn().unwrap();
+        let (mut begun, mut fresh) = (learner(&space), learner(&space));
+        begun.build_on(&start).unwrap();
+        let mut same = rng.clone();
+        show(&mut begun, &here, showings, 12, rng);
+        show(&mut fresh, &here, showings, 12, &mut same);
+        let all = [start, begun.learn().unwrap(), fresh.learn().unwrap()];
+        for (sum, classifier) in sums.iter_mut().zip(all) {
+            let judged = judged(&classifier, &here, &mut rng.clone());
+            sum.iter_mut().zip(judged).for_each(|(sum, x)| *sum += x / SEEDS as f64);
+        }
+    }
+    sums
+}
+
+#[test]
+fn what_was_learned_elsewhere_helps_and_does_not_hold_back() {
+    for far in [0.0, 0.4, 0.8, 1.5] {
+        for showings in [1, 3, 8] {
+            let [start, begun, fresh] = compared(far, showings);
+            let figures = format!("{far} away, {showings} showings: {start:.3?}, {begun:.3?}, {fresh:.3?}");
+            println!("{figures}");
+            assert!(begun[0] > f64::max(start[0], fresh[0]) - 0.01, "{figures}");
+            assert!(begun[1] > f64::max(start[1], fresh[1]) - 0.03, "{figures}");
+        }
+    }
+}
