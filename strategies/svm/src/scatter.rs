@@ -68,6 +68,11 @@ impl Covariance {
         self.sums
     }
 
+    #[cfg(test)]
+    pub fn freedom(&self) -> f64 {
+        self.freedom
+    }
+
     /// Counts degrees of freedom.
     pub fn free(&mut self, degrees: f64) {
         self.freedom += degrees;

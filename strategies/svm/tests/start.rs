@@ -74,6 +74,18 @@ fn judged(classifier: &Classifier, world: &World, rng: &mut impl Rng) -> [f64; 2
     [right as f64 / known.len() as f64, wins / (known.len() * unknown.len()) as f64]
 }
 
+/// A space, and what a classifier knows that was taught in this world.
+fn learned(there: &World, rng: &mut ChaCha8Rng) -> (Arc<FeatureSpace>, Arc<Classifier>) {
+    let rows: Vec<Vec<f32>> = (0..60).flat_map(|n| there.show(n % (CLASSES + UNTAUGHT), 2, rng)).collect();
+    let rows = rows.iter().map(Vec::as_slice);
+    let kept = Components::Count(FEATURES);
+    let space = Arc::new(FeatureSpace::fit("toy-1", rows, ScalingMethod::PerComponent, kept, rng));
+    let mut teacher = learner(&space);
+    show(&mut teacher, there, 100, 1, rng);
+    let start = teacher.learn().unwrap();
+    (space, start)
+}
+
 /// The means over seeds of what is judged by who starts from what was learned elsewhere and learns nothing, from that and learns, and from nothing.
 fn compared(far: f32, showings: usize) -> [[f64; 2]; 3] {
     let mut sums = [[0.0; 2]; 3];
@@ -81,14 +93,7 @@ fn compared(far: f32, showings: usize) -> [[f64; 2]; 3] {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let there = World::new(rng);
         let here = there.elsewhere(far, rng);
-        let rows: Vec<Vec<f32>> =
-            (0..60).flat_map(|n| there.show(n % (CLASSES + UNTAUGHT), 2, rng)).collect();
-        let rows = rows.iter().map(Vec::as_slice);
-        let kept = Components::Count(FEATURES);
-        let space = Arc::new(FeatureSpace::fit("toy-1", rows, ScalingMethod::PerComponent, kept, rng));
-        let mut teacher = learner(&space);
-        show(&mut teacher, &there, 100, 1, rng);
-        let start = teacher.learn().unwrap();
+        let (space, start) = learned(&there, rng);
         let (mut begun, mut fresh) = (learner(&space), learner(&space));
         begun.build_on(&start).unwrap();
         let mut same = rng.clone();
@@ -114,4 +119,78 @@ fn what_was_learned_elsewhere_helps_and_does_not_hold_back() {
             assert!(begun[1] > f64::max(start[1], fresh[1]) - 0.03, "{figures}");
         }
     }
+}
+
+#[test]
+fn a_gesture_that_is_not_shown_here_is_not_lost() {
+    let (mut before, mut after) = ([0.0; 2], [0.0; 2]);
+    for seed in 0..2 * SEEDS {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let there = World::new(rng);
+        let here = there.elsewhere(0.6, rng);
+        let (space, start) = learned(&there, rng);
+        let mut begun = learner(&space);
+        begun.build_on(&start).unwrap();
+        let shown = CLASSES - 2;
+        for showing in 0..8 * shown {
+            for (view, raw) in here.show(showing % shown, 8, rng).iter().enumerate() {
+                let (class, vector) = (ClassId((showing % shown) as u32), space.project(raw).unwrap());
+                begun.insert_shown((showing * 8 + view) as u64, class, &vector, showing as u64).unwrap();
+            }
+            begun.learn().unwrap();
+        }
+        let learned = begun.learn().unwrap();
+        for n in 0..100 {
+            let class = n % CLASSES;
+            let view = here.show(class, 1, rng).remove(0);
+            for (sums, classifier) in [(&mut before, &start), (&mut after, &learned)] {
+                let p = classifier.probabilities(&view).unwrap();
+                let best = (0..CLASSES).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap();
+                let (of, all) = if class < shown { (0, 1200.0) } else { (1, 800.0) };
+                sums[of] += f64::from(u8::from(best == class)) / all;
+            }
+        }
+    }
+    println!("shown, and not: {before:.3?}, {after:.3?}");
+    assert!(after[0] > before[0] && after[1] > before[1] - 0.03, "{before:.3?}, {after:.3?}");
+}
+
+#[test]
+fn whoever_learns_with_each_showing_is_no_worse_for_it_and_who_forgets_all_is_where_it_began() {
+    let (mut with_each, mut at_once) = (0.0, 0.0);
+    for seed in 0..SEEDS {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let there = World::new(rng);
+        let here = there.elsewhere(1.0, rng);
+        let (space, start) = learned(&there, rng);
+        let (mut begun, mut late) = (learner(&space), learner(&space));
+        for learner in [&mut begun, &mut late] {
+            learner.build_on(&start).unwrap();
+        }
+        let began = begun.learn().unwrap();
+        let mut keys = 0;
+        for showing in 0..4 * CLASSES {
+            let class = ClassId((showing % CLASSES) as u32);
+            for raw in here.show(showing % CLASSES, 6, rng) {
+                let vector = space.project(&raw).unwrap();
+                for learner in [&mut begun, &mut late] {
+                    learner.insert_shown(keys, class, &vector, showing as u64).unwrap();
+                }
+                keys += 1;
+            }
+            begun.learn().unwrap();
+        }
+        for (sum, learner) in [(&mut with_each, &mut begun), (&mut at_once, &mut late)] {
+            let [right, _] = judged(&learner.learn().unwrap(), &here, &mut rng.clone());
+            *sum += right / SEEDS as f64;
+        }
+        (0..keys).for_each(|key| assert!(begun.remove(key)));
+        let after = begun.learn().unwrap();
+        let alike = |view: &Vec<f32>| {
+            let [one, other] = [&began, &after].map(|known| known.probabilities(view).unwrap());
+            one.iter().zip(&other).all(|(one, other)| (one - other).abs() < 0.02)
+        };
+        assert!((0..CLASSES).all(|class| there.show(class, 4, rng).iter().all(alike)), "seed {seed}");
+    }
+    assert!(with_each > at_once - 0.01, "{with_each} and {at_once}");
 }

@@ -9,7 +9,7 @@ use crate::familiarity::{Familiarity, LogsLeftOut, Scatter, Seen};
 use crate::feature_space::FeatureSpace;
 use crate::head::{Few, Shown, Sums, Teach, sharpness};
 
-/// What the head for few says of a sample, not having met its showing; and what the sample weighs.
+/// What the head for few says of a sample, not having met its showing; and which part of that the sample is.
 pub(super) type LeftOut = Option<(f64, Vec<f64>)>;
 
 /// The sums that the discriminant rests on, and a researcher's head in its place.
@@ -18,6 +18,8 @@ pub(super) struct FewShowings {
     pub sums: Sums<Key>,
     /// What it began with.
     start: Start,
+    /// How often the least shown of its gestures had been shown here when it was last asked whether that [weighs anew](Self::weighs_anew).
+    weighed: u32,
     /// Of which showing each inserted sample is.
     showings: BTreeMap<u64, u64>,
     pub own: Option<Arc<dyn Teach>>,
@@ -28,10 +30,10 @@ impl FewShowings {
     pub fn new(space: &FeatureSpace) -> Self {
         let sharpness = sharpness(std::iter::empty());
         let (sums, start) = (Sums::new(space.spread()), Start::default());
-        Self { sums, start, showings: BTreeMap::new(), own: None, sharpness }
+        Self { sums, start, weighed: 0, showings: BTreeMap::new(), own: None, sharpness }
     }
 
-    /// Begins with these samples in place of others, each a showing of its own.
+    /// Begins with these samples in place of others. Each is left out by itself.
     pub fn begin(&mut self, samples: &[(usize, &[f32])]) {
         self.start = Start::of(samples, self.sums.spread().len());
     }
@@ -39,6 +41,19 @@ impl FewShowings {
     /// How many showings it knows of a class, also of those that it began with.
     pub fn known(&self, class: usize) -> usize {
         self.sums.showings(class) + self.start.count(class)
+    }
+
+    /// How often the least shown gesture of what it began with was shown here, once all is settled.
+    fn shown_here(&self) -> u32 {
+        let showings: Vec<(usize, u32)> =
+            self.sums.clouds().iter().map(|cloud| (cloud.class, cloud.showings)).collect();
+        self.start.shown(&showings)
+    }
+
+    /// Whether what it began with has come to weigh otherwise since this was last asked, so that all pairs are to be calibrated again.
+    pub fn weighs_anew(&mut self) -> bool {
+        let now = self.shown_here();
+        self.start.differs(std::mem::replace(&mut self.weighed, now), now)
     }
 
     /// Notes of which showing a sample is.
@@ -69,9 +84,8 @@ impl FewShowings {
 
     /// How the classes lie; `None` where there is no sample.
     pub fn scatter(&self, samples: &KernelMatrix) -> Option<Scatter> {
-        let clouds = self.sums.clouds();
-        let shown = clouds.iter().map(|cloud| cloud.showings as usize).sum();
-        let mut covariance = self.sums.covariance(&clouds);
+        let mut covariance = self.sums.covariance(&self.sums.clouds());
+        let shown = self.shown_here();
         self.start.add_to(&mut covariance, shown);
         let keys: Vec<(&Key, &Place)> = samples.places().iter().collect();
         let weigh = |sample: usize| match keys[sample] {

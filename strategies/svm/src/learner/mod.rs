@@ -112,8 +112,8 @@ impl Learner {
     }
 
     /// Starts from what a classifier knows: its support vectors, with their classes, are kept as samples of their
-    /// own, which nothing removes but another call. They keep their weight in the machines; the head for few showings, and what is unknown, go by what is
-    /// shown here as soon as there is some, and take them for a few showings more.
+    /// own, which nothing removes but another call. They keep their weight in the machines. The head for few showings, and what is unknown, go by what is
+    /// shown here as soon as each of their gestures was, and take them for a few showings more; a [head of one's own](Self::with_head) is taught all of them.
     ///
     /// N. A. Syed, H. Liu, K. K. Sung, "Incremental learning with support vector machines", IJCAI workshop on
     /// support vector machines (1999).
@@ -295,6 +295,9 @@ impl Learner {
         }
         let present = self.present();
         self.few.sums.settle();
+        if self.few.weighs_anew() {
+            self.pairs.iter_mut().for_each(|pair| pair.grow_stale(&self.samples));
+        }
         let scatter = self.few.scatter(&self.samples);
         let found = scatter.as_ref().map(|scatter| self.few.familiarity(scatter, self.touched.len()));
         let (familiarity, said) = found.unzip();

@@ -119,6 +119,11 @@ impl Pair {
         self.changes as f64 / count as f64
     }
 
+    /// Takes all its samples for changed since the calibration.
+    pub fn grow_stale(&mut self, samples: &KernelMatrix) {
+        self.changes = self.classes.iter().map(|class| samples.of(*class).len()).sum();
+    }
+
     /// Whether one of the classes has no samples.
     pub fn is_empty(&self, samples: &KernelMatrix) -> bool {
         self.classes.iter().any(|class| samples.of(*class).is_empty())

@@ -2,8 +2,8 @@
 
 use crate::scatter::Covariance;
 
-/// So many showings of a gesture the samples of it that a learner began with are worth together, however many they are, once much was shown here. They
-/// are of other people, before other cameras: what was shown here tells better where a gesture lies, and is soon more than a few.
+/// So many showings of a gesture the samples of it that a learner began with are worth together, however many they are, once all its gestures were shown
+/// here. They are of other people, before other cameras: what was shown here tells better where a gesture lies, and is soon more than a few.
 ///
 /// Support vectors of the shipped model, each a showing of its own, were a hundred and more for each gesture, which thirty showings on the spot could not
 /// move: see `docs/results.md`.
@@ -43,19 +43,85 @@ impl Start {
         self.0.get(class).map_or(0, |of_class| of_class.count)
     }
 
-    /// What each of a class weighs once so much was shown here: as much as a showing where nothing was, and less with each.
-    pub fn weight(&self, class: usize, shown: usize) -> f64 {
+    /// How often the gesture of it was shown here that was shown least, given the showings of each.
+    ///
+    /// All go by that one: a gesture that was shown would lie where it lies here, one that was not where it lay elsewhere, and the first would be taken
+    /// for the second. Who is told no more than that it is right is never told of what it takes for another, and would lose it for good.
+    pub fn shown(&self, showings: &[(usize, u32)]) -> u32 {
+        let of_class =
+            |class: usize| showings.iter().find(|(of, _)| *of == class).map_or(0, |(_, showings)| *showings);
+        let known = (0..self.0.len()).filter(|class| self.count(*class) > 0);
+        known.map(of_class).min().unwrap_or(0)
+    }
+
+    /// What each of a class weighs once so much of all was shown here: as much as a showing where nothing was. Together they weigh whole showings.
+    pub fn weight(&self, class: usize, shown: u32) -> f64 {
         let count = self.count(class).max(1) as f64;
-        let worth = f64::max(WORTH, count / (1.0 + shown as f64).powi(2));
+        let worth = f64::max(WORTH, (count / (1.0 + f64::from(shown)).powi(4)).round());
         f64::min(worth / count, 1.0)
     }
 
-    /// Counts how they scatter, once so much was shown here.
-    pub fn add_to(&self, covariance: &mut Covariance, shown: usize) {
+    /// Counts how they scatter about where they lie themselves: how far that is from where gestures lie here is no scatter of showings.
+    pub fn add_to(&self, covariance: &mut Covariance, shown: u32) {
         for (class, of_class) in self.0.iter().enumerate() {
             let weight = self.weight(class, shown);
             covariance.add_squares(of_class.squares.iter().map(|square| weight * square));
-            covariance.free((weight * of_class.count as f64 - 1.0).max(0.0));
+            covariance.free(weight * of_class.count.saturating_sub(1) as f64);
         }
+    }
+
+    /// Whether any class weighs otherwise than it did.
+    pub fn differs(&self, before: u32, now: u32) -> bool {
+        (0..self.0.len()).any(|class| (self.weight(class, before) - self.weight(class, now)).abs() > 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn start(counts: &[usize]) -> Start {
+        let vectors: Vec<[f32; 2]> = (0..120).map(|n| [(n % 7) as f32, (n % 5) as f32]).collect();
+        let of_class = |(class, count): (usize, &usize)| {
+            vectors.iter().take(*count).map(move |vector| (class, vector.as_slice())).collect::<Vec<_>>()
+        };
+        let samples: Vec<(usize, &[f32])> = counts.iter().enumerate().flat_map(of_class).collect();
+        Start::of(&samples, 2)
+    }
+
+    #[test]
+    fn the_more_was_shown_here_the_less_a_start_weighs_down_to_three_showings() {
+        let start = start(&[0, 1, 3, 120]);
+        let mut before = 120.0;
+        for shown in 0..12 {
+            assert_eq!([1, 2].map(|class| start.weight(class, shown)), [1.0, 1.0], "few are showings");
+            let worth = 120.0 * start.weight(3, shown);
+            assert!(worth <= before && (worth - worth.round()).abs() < 1e-9, "{worth} after {before}");
+            before = worth;
+        }
+        assert!((before - 3.0).abs() < 1e-9, "{before}");
+    }
+
+    #[test]
+    fn it_keeps_its_weight_until_all_its_gestures_were_shown() {
+        let start = start(&[120, 0, 120, 120]);
+        assert_eq!(start.shown(&[]), 0);
+        assert_eq!(start.shown(&[(0, 40), (2, 40)]), 0, "3 was never shown here");
+        assert_eq!(start.shown(&[(0, 40), (1, 7), (4, 9)]), 0, "what it does not know does not count");
+        assert_eq!(start.shown(&[(0, 4), (2, 2), (3, 9)]), 2);
+    }
+
+    #[test]
+    fn where_nothing_was_shown_it_scatters_as_showings_do_and_later_as_many_as_it_is_worth() {
+        let start = start(&[0, 1, 60, 120]);
+        let scatter = |shown| {
+            let mut covariance = Covariance::of_nothing(2);
+            start.add_to(&mut covariance, shown);
+            (covariance.freedom(), covariance.into_sums()[0])
+        };
+        let (freedom, all) = scatter(0);
+        assert_eq!(freedom, 59.0 + 119.0);
+        let (fewer, some) = scatter(30);
+        assert!(fewer < 6.0 && (some / fewer / (all / freedom) - 1.0).abs() < 0.05, "{some} of {fewer}");
     }
 }
