@@ -33,6 +33,11 @@ pub(crate) fn whiten(whitening: &[f32], vector: &[f32]) -> Vec<f64> {
         .collect()
 }
 
+/// The mean that rests on this much, without one that weighs so much of it.
+pub(crate) fn mean_without((mean, all): (&[f64], f64), (own, weight): (&[f64], f64)) -> Vec<f64> {
+    mean.iter().zip(own).map(|(mean, own)| (mean * all - weight * own) / (all - weight)).collect()
+}
+
 /// The covariance about the classes, shrunk towards what is believed of it: the more, the less is known.
 #[derive(Clone, Debug)]
 pub(crate) struct Covariance {

@@ -46,15 +46,24 @@ fn learner(space: &Arc<FeatureSpace>) -> Learner {
     Learner::new(space.clone(), vocabulary, LearnerOptions::default()).unwrap()
 }
 
+/// Shows each class so often, in turn.
 fn show(learner: &mut Learner, world: &World, showings: usize, views: usize, rng: &mut impl Rng) {
     for showing in 0..showings * CLASSES {
-        let class = showing % CLASSES;
-        for (view, raw) in world.show(class, views, rng).iter().enumerate() {
-            let vector = learner.space().project(raw).unwrap();
-            let class = ClassId(class as u32);
-            learner.insert_shown((showing * views + view) as u64, class, &vector, showing as u64).unwrap();
-        }
+        let seen = world.show(showing % CLASSES, views, rng);
+        teach(learner, showing, showing % CLASSES, &seen);
     }
+}
+
+/// Takes in what was seen of a showing.
+fn teach(learner: &mut Learner, showing: usize, class: usize, seen: &[Vec<f32>]) {
+    for (view, raw) in seen.iter().enumerate() {
+        let (key, vector) = ((showing * seen.len() + view) as u64, learner.space().project(raw).unwrap());
+        learner.insert_shown(key, ClassId(class as u32), &vector, showing as u64).unwrap();
+    }
+}
+
+fn best(p: &[f64]) -> usize {
+    (0..p.len()).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap()
 }
 
 /// Which part of single views of further showings is judged rightly; and how often one of the untaught gesture looks less known than one of a taught one.
@@ -64,9 +73,7 @@ fn judged(classifier: &Classifier, world: &World, rng: &mut impl Rng) -> [f64; 2
         let class = n % (CLASSES + UNTAUGHT);
         let view = world.show(class, 1, rng).remove(0);
         let judgement = classifier.judge(&view).unwrap();
-        let p = &judgement.probabilities;
-        let best = (0..CLASSES).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap();
-        right += usize::from(best == class);
+        right += usize::from(best(&judgement.probabilities) == class);
         if class < CLASSES { &mut known } else { &mut unknown }.push(judgement.unknown.unwrap());
     }
     let wins = unknown.iter().flat_map(|u| known.iter().map(move |k| u.total_cmp(k)));
@@ -133,10 +140,7 @@ fn a_gesture_that_is_not_shown_here_is_not_lost() {
         begun.build_on(&start).unwrap();
         let shown = CLASSES - 2;
         for showing in 0..8 * shown {
-            for (view, raw) in here.show(showing % shown, 8, rng).iter().enumerate() {
-                let (class, vector) = (ClassId((showing % shown) as u32), space.project(raw).unwrap());
-                begun.insert_shown((showing * 8 + view) as u64, class, &vector, showing as u64).unwrap();
-            }
+            teach(&mut begun, showing, showing % shown, &here.show(showing % shown, 8, rng));
             begun.learn().unwrap();
         }
         let learned = begun.learn().unwrap();
@@ -144,10 +148,9 @@ fn a_gesture_that_is_not_shown_here_is_not_lost() {
             let class = n % CLASSES;
             let view = here.show(class, 1, rng).remove(0);
             for (sums, classifier) in [(&mut before, &start), (&mut after, &learned)] {
-                let p = classifier.probabilities(&view).unwrap();
-                let best = (0..CLASSES).max_by(|a, b| p[*a].total_cmp(&p[*b])).unwrap();
+                let right = best(&classifier.probabilities(&view).unwrap()) == class;
                 let (of, all) = if class < shown { (0, 1200.0) } else { (1, 800.0) };
-                sums[of] += f64::from(u8::from(best == class)) / all;
+                sums[of] += f64::from(u8::from(right)) / all;
             }
         }
     }
@@ -168,15 +171,10 @@ fn whoever_learns_with_each_showing_is_no_worse_for_it_and_who_forgets_all_is_wh
             learner.build_on(&start).unwrap();
         }
         let began = begun.learn().unwrap();
-        let mut keys = 0;
         for showing in 0..4 * CLASSES {
-            let class = ClassId((showing % CLASSES) as u32);
-            for raw in here.show(showing % CLASSES, 6, rng) {
-                let vector = space.project(&raw).unwrap();
-                for learner in [&mut begun, &mut late] {
-                    learner.insert_shown(keys, class, &vector, showing as u64).unwrap();
-                }
-                keys += 1;
+            let seen = here.show(showing % CLASSES, 6, rng);
+            for learner in [&mut begun, &mut late] {
+                teach(learner, showing, showing % CLASSES, &seen);
             }
             begun.learn().unwrap();
         }
@@ -184,7 +182,8 @@ fn whoever_learns_with_each_showing_is_no_worse_for_it_and_who_forgets_all_is_wh
             let [right, _] = judged(&learner.learn().unwrap(), &here, &mut rng.clone());
             *sum += right / SEEDS as f64;
         }
-        (0..keys).for_each(|key| assert!(begun.remove(key)));
+        (0..24 * CLASSES as u64).for_each(|key| assert!(begun.remove(key)));
+        assert!(begun.is_empty());
         let after = begun.learn().unwrap();
         let alike = |view: &Vec<f32>| {
             let [one, other] = [&began, &after].map(|known| known.probabilities(view).unwrap());

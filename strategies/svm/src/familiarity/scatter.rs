@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Score, Shown};
 use crate::head::{Discriminant, Spot, margin_of};
-use crate::scatter::{Covariance, whiten};
+use crate::scatter::{Covariance, mean_without, whiten};
 
 /// The mean of a showing, and its samples, each with its place among all.
 type Showing<'a> = (Vec<f64>, Views<'a>);
@@ -187,10 +187,10 @@ impl Scatter {
                 }
                 // Without its own showing.
                 let (own, weight) = &of_class.showings[*showing];
-                let rest = all - weight;
-                let without = |(mean, own): (&f64, &f64)| (mean * all - weight * own) / rest;
-                let mean: Vec<f64> = of_class.mean.iter().zip(own).map(without).collect();
-                (all > *weight).then(|| (k, a_coordinate(squared(&mean, white), self.width, rest)))
+                (all > *weight).then(|| {
+                    let mean = mean_without((&of_class.mean, all), (own, *weight));
+                    (k, a_coordinate(squared(&mean, white), self.width, all - weight))
+                })
             };
             let distances: Vec<(usize, f64)> = self.classes.iter().enumerate().filter_map(to).collect();
             let others = distances.iter().filter(|(k, _)| k != class).map(|(_, distance)| *distance);

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::Head;
-use crate::scatter::{PRIOR_SHOWINGS, whiten};
+use crate::scatter::{PRIOR_SHOWINGS, mean_without, whiten};
 
 /// What is believed of how far the means of classes scatter before any is known: that part of the scatter within a class, as firmly as so many classes
 /// would tell.
@@ -174,11 +174,9 @@ impl Discriminant {
         (showing, weight): (&Spot, f64),
     ) -> Option<Vec<f64>> {
         let left = self.classes.get(class)?.as_ref().filter(|class| class.showings > weight)?;
-        let rest = left.showings - weight;
-        let without = |(mean, own): (&f64, &f64)| (mean * left.showings - weight * own) / rest;
-        let mean = left.mean.iter().zip(&showing.along).map(without).collect();
+        let mean = mean_without((&left.mean, left.showings), (&showing.along, weight));
         let mut logs = self.logs_at(spot);
-        logs[class] = self.log(spot, &self.class(mean, rest));
+        logs[class] = self.log(spot, &self.class(mean, left.showings - weight));
         Some(logs)
     }
 }

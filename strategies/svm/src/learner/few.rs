@@ -19,7 +19,7 @@ pub(super) struct FewShowings {
     /// What it began with.
     start: Start,
     /// How often the least shown of its gestures had been shown here when it was last asked whether that [weighs anew](Self::weighs_anew).
-    weighed: u32,
+    weighed: usize,
     /// Of which showing each inserted sample is.
     showings: BTreeMap<u64, u64>,
     pub own: Option<Arc<dyn Teach>>,
@@ -43,11 +43,9 @@ impl FewShowings {
         self.sums.showings(class) + self.start.count(class)
     }
 
-    /// How often the least shown gesture of what it began with was shown here, once all is settled.
-    fn shown_here(&self) -> u32 {
-        let showings: Vec<(usize, u32)> =
-            self.sums.clouds().iter().map(|cloud| (cloud.class, cloud.showings)).collect();
-        self.start.shown(&showings)
+    /// How often the least shown gesture of what it began with was shown here.
+    fn shown_here(&self) -> usize {
+        self.start.shown(|class| self.sums.showings(class))
     }
 
     /// Whether what it began with has come to weigh otherwise since this was last asked, so that all pairs are to be calibrated again.

@@ -47,22 +47,20 @@ impl Start {
     ///
     /// All go by that one: a gesture that was shown would lie where it lies here, one that was not where it lay elsewhere, and the first would be taken
     /// for the second. Who is told no more than that it is right is never told of what it takes for another, and would lose it for good.
-    pub fn shown(&self, showings: &[(usize, u32)]) -> u32 {
-        let of_class =
-            |class: usize| showings.iter().find(|(of, _)| *of == class).map_or(0, |(_, showings)| *showings);
+    pub fn shown(&self, showings: impl Fn(usize) -> usize) -> usize {
         let known = (0..self.0.len()).filter(|class| self.count(*class) > 0);
-        known.map(of_class).min().unwrap_or(0)
+        known.map(showings).min().unwrap_or(0)
     }
 
     /// What each of a class weighs once so much of all was shown here: as much as a showing where nothing was. Together they weigh whole showings.
-    pub fn weight(&self, class: usize, shown: u32) -> f64 {
+    pub fn weight(&self, class: usize, shown: usize) -> f64 {
         let count = self.count(class).max(1) as f64;
-        let worth = f64::max(WORTH, (count / (1.0 + f64::from(shown)).powi(4)).round());
+        let worth = f64::max(WORTH, (count / (1.0 + shown as f64).powi(4)).round());
         f64::min(worth / count, 1.0)
     }
 
     /// Counts how they scatter about where they lie themselves: how far that is from where gestures lie here is no scatter of showings.
-    pub fn add_to(&self, covariance: &mut Covariance, shown: u32) {
+    pub fn add_to(&self, covariance: &mut Covariance, shown: usize) {
         for (class, of_class) in self.0.iter().enumerate() {
             let weight = self.weight(class, shown);
             covariance.add_squares(of_class.squares.iter().map(|square| weight * square));
@@ -71,7 +69,7 @@ impl Start {
     }
 
     /// Whether any class weighs otherwise than it did.
-    pub fn differs(&self, before: u32, now: u32) -> bool {
+    pub fn differs(&self, before: usize, now: usize) -> bool {
         (0..self.0.len()).any(|class| (self.weight(class, before) - self.weight(class, now)).abs() > 0.0)
     }
 }
@@ -105,10 +103,11 @@ mod tests {
     #[test]
     fn it_keeps_its_weight_until_all_its_gestures_were_shown() {
         let start = start(&[120, 0, 120, 120]);
-        assert_eq!(start.shown(&[]), 0);
-        assert_eq!(start.shown(&[(0, 40), (2, 40)]), 0, "3 was never shown here");
-        assert_eq!(start.shown(&[(0, 40), (1, 7), (4, 9)]), 0, "what it does not know does not count");
-        assert_eq!(start.shown(&[(0, 4), (2, 2), (3, 9)]), 2);
+        let shown = |showings: [usize; 5]| start.shown(|class| showings[class]);
+        assert_eq!(shown([0; 5]), 0);
+        assert_eq!(shown([40, 0, 40, 0, 0]), 0, "3 was never shown here");
+        assert_eq!(shown([40, 7, 0, 0, 9]), 0, "what it does not know does not count");
+        assert_eq!(shown([4, 0, 2, 9, 0]), 2);
     }
 
     #[test]
