@@ -2,7 +2,7 @@
 
 use super::few::LeftOut;
 use super::samples::{KernelMatrix, Place};
-use super::solution::Solution;
+use super::solution::{PASSING, Solution, TOLERANCE};
 use crate::head::{Losses, blended};
 use crate::sigmoid::Sigmoid;
 
@@ -45,7 +45,7 @@ impl Pair {
             return;
         }
         let classes = self.classes;
-        self.solution.solve(cost, &rows(samples, classes), |_, _| false);
+        self.solution.solve((cost, TOLERANCE), &rows(samples, classes), |_, _| false);
     }
 
     /// Fits the sigmoid to what machines say of samples that they have not seen, and weighs the machine against the head for few showings by what both
@@ -101,7 +101,7 @@ impl Pair {
                 continue;
             }
             machine.clone_from(&self.solution);
-            machine.solve(cost, &rows, |side, position| folds[side][position] == fold);
+            machine.solve((cost, PASSING), &rows, |side, position| folds[side][position] == fold);
             for (side, decisions) in decisions.iter_mut().enumerate() {
                 for (position, decision) in decisions.iter_mut().enumerate() {
                     if folds[side][position] == fold {
@@ -205,7 +205,7 @@ mod tests {
                 };
                 let expected = sum(0) + sum(1) - alone.solution.offset();
                 let found = held_out[place.class][place.position].unwrap();
-                assert!((found - expected).abs() < 5e-3, "{found} for {expected}");
+                assert!((found - expected).abs() < 2e-2, "{found} for {expected}");
             }
         }
     }
