@@ -1,6 +1,6 @@
 //! The counter: what a hand shows, as a vector and as fingers.
 
-use super::convolution::{Convolution, Shape};
+use super::convolution::{Convolution, Shape, Workspace};
 use super::dense::Dense;
 use super::feature_map::FeatureMap;
 use super::pooling::halve_by_maximum;
@@ -48,7 +48,7 @@ pub struct Counter {
     fingers: Dense,
     hand: Dense,
     spare: [FeatureMap; 2],
-    patches: Vec<f32>,
+    work: Workspace,
 }
 
 impl Counter {
@@ -76,7 +76,7 @@ impl Counter {
             fingers: Dense::decode((EMBEDDING, 5), false, tensors)?,
             hand: Dense::decode((EMBEDDING, 1), false, tensors)?,
             spare: Default::default(),
-            patches: Vec::new(),
+            work: Workspace::default(),
         })
     }
 
@@ -87,13 +87,13 @@ impl Counter {
     /// When the picture has another shape.
     pub fn run(&mut self, picture: &FeatureMap) -> Count {
         assert_eq!(picture.shape(), (2, Self::SIDE, Self::SIDE), "the picture's shape");
-        let Self { layers: [first, second, third, fourth], spare: [a, b], patches, .. } = self;
-        first.run(picture, a, patches);
+        let Self { layers: [first, second, third, fourth], spare: [a, b], work, .. } = self;
+        first.run(picture, a, work);
         halve_by_maximum(a, b);
-        second.run(b, a, patches);
+        second.run(b, a, work);
         halve_by_maximum(a, b);
-        third.run(b, a, patches);
-        fourth.run(a, b, patches);
+        third.run(b, a, work);
+        fourth.run(a, b, work);
         halve_by_maximum(b, a);
         let mut hidden = [0.0; 96];
         self.dense.run(a.values(), &mut hidden);

@@ -1,6 +1,6 @@
 //! What finder and refiner have in common: from many channels of few pixels up to maps of the picture.
 
-use super::convolution::{Convolution, Shape};
+use super::convolution::{Convolution, Shape, Workspace};
 use super::feature_map::FeatureMap;
 use super::tensors::{Tensors, WeightsError};
 use super::trunk::Trunk;
@@ -42,22 +42,22 @@ impl Decoder {
     }
 
     /// The maps, as large as the trunk's finest result. They take the place of its others.
-    pub fn run(&mut self, trunk: &mut Trunk, patches: &mut Vec<f32>) -> &FeatureMap {
+    pub fn run(&mut self, trunk: &mut Trunk, work: &mut Workspace) -> &FeatureMap {
         let Self { low, high, .. } = self;
-        self.to_middle.0.run(&trunk.coarse, low, patches);
+        self.to_middle.0.run(&trunk.coarse, low, work);
         trunk.middle.add_doubled_and_rectify(low);
-        self.to_middle.1.run(&trunk.middle, high, patches);
-        self.to_fine.0.run(high, low, patches);
+        self.to_middle.1.run(&trunk.middle, high, work);
+        self.to_fine.0.run(high, low, work);
         let fine = match &self.fine {
             Some(matched) => {
-                matched.run(&trunk.fine, high, patches);
+                matched.run(&trunk.fine, high, work);
                 high
             }
             None => &mut trunk.fine,
         };
         fine.add_doubled_and_rectify(low);
-        self.to_fine.1.run(fine, low, patches);
-        self.head.run(low, &mut self.maps, patches);
+        self.to_fine.1.run(fine, low, work);
+        self.head.run(low, &mut self.maps, work);
         &self.maps
     }
 }

@@ -1,6 +1,6 @@
 //! The finder: where hands may be in a whole frame.
 
-use super::convolution::Shape;
+use super::convolution::{Shape, Workspace};
 use super::decoder::Decoder;
 use super::feature_map::FeatureMap;
 use super::tensors::{Tensors, WeightsError};
@@ -13,7 +13,7 @@ const TENSORS: usize = 26;
 pub struct Finder {
     trunk: Trunk,
     decoder: Decoder,
-    patches: Vec<f32>,
+    work: Workspace,
 }
 
 impl Finder {
@@ -26,7 +26,7 @@ impl Finder {
         Ok(Self {
             trunk: Trunk::decode([3, 12, 24, 48, 64], Shape::halving, tensors)?,
             decoder: Decoder::decode((64, 48, 32), Some(24), 5, tensors)?,
-            patches: Vec::new(),
+            work: Workspace::default(),
         })
     }
 
@@ -40,7 +40,7 @@ impl Finder {
     pub fn run(&mut self, picture: &FeatureMap) -> &FeatureMap {
         let (channels, height, width) = picture.shape();
         assert!(channels == 3 && height * width > 0, "a picture of {channels}×{height}×{width}");
-        self.trunk.run(picture, &mut self.patches);
-        self.decoder.run(&mut self.trunk, &mut self.patches)
+        self.trunk.run(picture, &mut self.work);
+        self.decoder.run(&mut self.trunk, &mut self.work)
     }
 }

@@ -5,10 +5,9 @@
 //!                                                             48×48 of the hand ─► Counter ─► embedding, fingers
 //! ```
 //!
-//! They are convolutions with their batch normalisation folded in (S. Ioffe and C. Szegedy, 2015); each is a product of
-//! matrices, which nalgebra computes with the widest instructions of the machine. Weights are [`shipped`] with the program.
-//! What a picture must be like that goes in, and what comes out, is said at each network. All buffers are kept from one
-//! picture to the next.
+//! They are convolutions with their batch normalisation folded in (S. Ioffe and C. Szegedy, 2015), computed with the
+//! widest instructions of the machine. Weights are [`shipped`] with the program. What a picture must be like that goes
+//! in, and what comes out, is said at each network. All buffers are kept from one picture to the next.
 
 mod convolution;
 mod counter;

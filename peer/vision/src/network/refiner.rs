@@ -1,6 +1,6 @@
 //! The refiner: whether a square of the frame shows a hand, where exactly, and its pixels.
 
-use super::convolution::{Convolution, Shape};
+use super::convolution::{Convolution, Shape, Workspace};
 use super::decoder::Decoder;
 use super::dense::Dense;
 use super::feature_map::FeatureMap;
@@ -37,7 +37,7 @@ pub struct Refiner {
     decoder: Decoder,
     squeezed: FeatureMap,
     mask: FeatureMap,
-    patches: Vec<f32>,
+    work: Workspace,
 }
 
 impl Refiner {
@@ -58,7 +58,7 @@ impl Refiner {
             decoder: Decoder::decode((64, 40, 24), None, 4, tensors)?,
             squeezed: FeatureMap::default(),
             mask: FeatureMap::default(),
-            patches: Vec::new(),
+            work: Workspace::default(),
         })
     }
 
@@ -68,8 +68,8 @@ impl Refiner {
     /// When the picture has another shape.
     pub fn run(&mut self, picture: &FeatureMap) -> Refinement {
         assert_eq!(picture.shape(), (3, Self::SIDE, Self::SIDE), "the picture's shape");
-        self.trunk.run(picture, &mut self.patches);
-        self.squeeze.run(&self.trunk.coarse, &mut self.squeezed, &mut self.patches);
+        self.trunk.run(picture, &mut self.work);
+        self.squeeze.run(&self.trunk.coarse, &mut self.squeezed, &mut self.work);
         let (mut hidden, mut said) = ([0.0; 32], [0.0; 6]);
         self.dense.run(self.squeezed.values(), &mut hidden);
         self.head.run(&hidden, &mut said);
@@ -83,7 +83,7 @@ impl Refiner {
     /// As [`Self::run`].
     pub fn run_with_mask(&mut self, picture: &FeatureMap) -> (Refinement, &[f32]) {
         let said = self.run(picture);
-        shuffle_four(self.decoder.run(&mut self.trunk, &mut self.patches), &mut self.mask);
+        shuffle_four(self.decoder.run(&mut self.trunk, &mut self.work), &mut self.mask);
         (said, self.mask.values())
     }
 }

@@ -4,7 +4,7 @@ use half::f16;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-use super::convolution::{Convolution, Shape};
+use super::convolution::{Convolution, Shape, Workspace};
 use super::dense::Dense;
 use super::feature_map::FeatureMap;
 use super::pooling::{halve_by_maximum, shuffle_four};
@@ -195,7 +195,9 @@ proptest! {
         let input = picture(from, height, width, seed ^ 1);
         let mut output = picture(3, 5, 7, seed ^ 2);
         let layer = Convolution::decode(shape, &mut Tensors::decode(&file(&tensors), 2).unwrap()).unwrap();
-        layer.run(&input, &mut output, &mut vec![f32::NAN; 11]);
+        let mut used = Workspace::default();
+        layer.run(&picture(from, width, height, seed ^ 3), &mut output, &mut used);
+        layer.run(&input, &mut output, &mut used);
         let plain = Plain(tensors.iter()).convolve(shape, &input);
         prop_assert_eq!(output.shape(), plain.shape());
         assert_near(output.values(), plain.values());

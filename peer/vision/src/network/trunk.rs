@@ -1,6 +1,6 @@
 //! What finder and refiner have in common: from a picture down to many channels of few pixels.
 
-use super::convolution::{Convolution, Shape};
+use super::convolution::{Convolution, Shape, Workspace};
 use super::feature_map::FeatureMap;
 use super::tensors::{Tensors, WeightsError};
 
@@ -39,15 +39,15 @@ impl Trunk {
     }
 
     /// Computes the three results.
-    pub fn run(&mut self, picture: &FeatureMap, patches: &mut Vec<f32>) {
+    pub fn run(&mut self, picture: &FeatureMap, work: &mut Workspace) {
         let Self { layers: [first, second, third, fourth, fifth, sixth, seventh], spare, .. } = self;
-        first.run(picture, spare, patches);
-        second.run(spare, &mut self.fine, patches);
-        third.run(&self.fine, spare, patches);
-        fourth.run(spare, &mut self.middle, patches);
-        fifth.run(&self.middle, &mut self.coarse, patches);
+        first.run(picture, spare, work);
+        second.run(spare, &mut self.fine, work);
+        third.run(&self.fine, spare, work);
+        fourth.run(spare, &mut self.middle, work);
+        fifth.run(&self.middle, &mut self.coarse, work);
         for residual in [sixth, seventh] {
-            residual.run(&self.coarse, spare, patches);
+            residual.run(&self.coarse, spare, work);
             self.coarse.add(spare);
         }
     }
