@@ -1,6 +1,6 @@
 //! What perception costs per frame, beside the plain OpenCV calls that the same job takes.
 //!
-//! `cargo bench -p gestalt-peer --bench perception`: one core, a drawn hand in a frame of 640×360. The plain
+//! `cargo bench -p gestalt-vision --bench perception`: one core, a drawn hand in a frame of 640×360. The plain
 //! calls look for one known colour, at the same sizes and with the same buffers kept; learning the colour,
 //! judging whether there is a hand, and everything else that is not a call of OpenCV is what perception adds.
 
