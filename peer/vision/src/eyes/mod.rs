@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! frame ─► glance ─► candidates ─► close looks ─► one more, with mask ─► reading ─► Look
-//!          160×120   at most 3     64×64 each                            48×48
+//!          160×120   at most 3     64×64 each      and of its mirror image   48×48
 //! ```
 //!
 //! Where the hand was in the last frame, one close look replaces all before the reading; from time to time a glance is taken all
@@ -80,6 +80,8 @@ pub struct Eyes {
     glance: Glance,
     square: Mat,
     picture: FeatureMap,
+    mirrored: FeatureMap,
+    logits: Vec<f32>,
     mask: HandMask,
     reading: Reading,
     warped: Mat,
@@ -105,6 +107,7 @@ struct Search {
 }
 
 /// What one close look found.
+#[derive(Debug)]
 struct Closeup {
     hand: f32,
     view: Place,
@@ -133,6 +136,8 @@ impl Eyes {
             glance: Glance::default(),
             square: Mat::default(),
             picture: FeatureMap::default(),
+            mirrored: FeatureMap::default(),
+            logits: Vec::new(),
             mask: HandMask::new()?,
             reading: Reading::new()?,
             warped: Mat::default(),
@@ -246,12 +251,20 @@ impl Eyes {
         Ok(Closeup::new(view, self.refiner.run(&self.picture)))
     }
 
-    /// The same, and takes the hand's mask.
+    /// The same of the place and of its mirror image, which shows as much of a hand; and takes the hand's mask.
     fn close_up_with_mask(&mut self, frame: &Mat, view: Place) -> Result<Closeup, opencv::Error> {
         self.cut(frame, view)?;
         let (said, logits) = self.refiner.run_with_mask(&self.picture);
-        self.mask.take(logits)?;
-        Ok(Closeup::new(view, said))
+        self.logits.clear();
+        self.logits.extend_from_slice(logits);
+        self.mirrored.mirror(&self.picture);
+        let (mirrored, logits) = self.refiner.run_with_mask(&self.mirrored);
+        let rows = self.logits.chunks_exact_mut(Refiner::SIDE).zip(logits.chunks_exact(Refiner::SIDE));
+        for (logit, other) in rows.flat_map(|(row, other)| row.iter_mut().zip(other.iter().rev())) {
+            *logit = f32::midpoint(*logit, *other);
+        }
+        self.mask.take(&self.logits)?;
+        Ok(Closeup::new(view, said.mean(mirrored)))
     }
 
     fn cut(&mut self, frame: &Mat, view: Place) -> Result<(), opencv::Error> {

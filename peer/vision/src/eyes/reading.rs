@@ -63,13 +63,7 @@ impl Reading {
 
     /// What was cut out last, left to right.
     pub fn mirrored(&mut self) -> &FeatureMap {
-        let (channels, height, width) = self.picture.shape();
-        self.mirrored.reshape(channels, height, width);
-        let rows = self.picture.values().chunks_exact(width.max(1));
-        for (to, from) in self.mirrored.values_mut().chunks_exact_mut(width.max(1)).zip(rows) {
-            to.copy_from_slice(from);
-            to.reverse();
-        }
+        self.mirrored.mirror(&self.picture);
         &self.mirrored
     }
 }

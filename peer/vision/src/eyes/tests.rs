@@ -1,7 +1,7 @@
 //! What holds whatever the weights say.
 
 use opencv::core::Point;
-use opencv::core::{CV_8UC3, Vec3b};
+use opencv::core::{CV_8UC3, Vec3b, flip};
 use opencv::imgproc::{FILLED, LINE_8, circle};
 use opencv::prelude::*;
 use proptest::prelude::*;
@@ -94,6 +94,27 @@ fn a_hand_that_is_still_there_is_read_where_it_was() {
     assert_eq!(*mask.at_2d::<u8>(0, 96).unwrap(), 0);
     assert_eq!((eyes.crop().cols(), eyes.crop().rows()), (48, 48));
     assert!(*eyes.crop().at_2d::<u8>(24, 24).unwrap() > 100);
+}
+
+#[test]
+fn a_hand_and_its_mirror_image_are_looked_at_alike() {
+    let (mut eyes, frame) = (Eyes::shipped().unwrap(), hands(&[true, false]));
+    let mut mirrored = Mat::default();
+    flip(&frame, &mut mirrored, 1).unwrap();
+    let last = (frame.cols() - 1) as f32;
+    let view = eyes.look(&frame, None).unwrap().place;
+    let seen = eyes.close_up_with_mask(&frame, view).unwrap();
+    let mask = eyes.mask.values().unwrap().to_vec();
+    eyes.pyramid.clear();
+    let other = eyes.close_up_with_mask(&mirrored, Place { x: last - view.x, up: -view.up, ..view }).unwrap();
+    // Squares are cut out to a thirty-second of a pixel, in 8 bits.
+    let near = |a: f32, b: f32| assert!((a - b).abs() < 0.02 * (1.0 + a.abs()), "{seen:?} and {other:?}");
+    let (place, found) = (seen.place, other.place);
+    let pairs =
+        [(seen.hand, other.hand), (place.x, last - found.x), (place.y, found.y), (place.side, found.side)];
+    pairs.into_iter().chain([(place.up, -found.up)]).for_each(|(a, b)| near(a, b));
+    let rows = mask.chunks_exact(Refiner::SIDE).zip(eyes.mask.values().unwrap().chunks_exact(Refiner::SIDE));
+    rows.flat_map(|(row, other)| row.iter().zip(other.iter().rev())).for_each(|(a, b)| near(*a, *b));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A convolution, with the widest instructions of the machine.
+//! A convolution, with vectors as the machine has them: AVX2, NEON, SSE4.2, or one value at a time.
 //!
 //! Zeros are put around the picture, and of a stride of s its pixels are dealt to s × s planes. What one weight is multiplied by then lies in one
 //! piece for all pixels of the result, from some place on, and a channel of the result is the sum of such pieces. What lies between the
@@ -11,7 +11,8 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 use super::feature_map::FeatureMap;
 use super::tensors::{Tensors, WeightsError};
 
-/// Channels that are added up side by side, two registers of pixels each: twelve sums and what is added leave three of AVX's sixteen registers for pixels and weights.
+/// Channels that are added up side by side, two registers of pixels each: twelve sums, two of pixels and a weight are fifteen of sixteen registers, and where products are
+/// added in a step of their own they take the last.
 const CHANNELS: usize = 6;
 
 /// Pixels of which all channels are worked out before the next: what is read for them stays in the cache meanwhile. Whole pairs of registers of any machine.
@@ -187,8 +188,8 @@ impl Convolution {
     }
 }
 
-/// A convolution of a picture that is laid out. `FUSED`: whether products are added in one step each, with one rounding. A machine that cannot do that takes a
-/// hundred for it.
+/// A convolution of a picture that is laid out. `FUSED`: whether products are added in one step each, with one rounding. A machine that cannot does it in
+/// software, in a hundred.
 struct Run<'a, const FUSED: bool> {
     convolution: &'a Convolution,
     values: &'a [f32],

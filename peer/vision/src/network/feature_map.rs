@@ -51,6 +51,16 @@ impl FeatureMap {
         &self.values[channel * area..][..area]
     }
 
+    /// Makes it the mirror image of another, left to right.
+    pub fn mirror(&mut self, other: &Self) {
+        self.reshape(other.channels, other.height, other.width);
+        let rows = other.values.chunks_exact(other.width.max(1));
+        for (to, from) in self.values.chunks_exact_mut(other.width.max(1)).zip(rows) {
+            to.copy_from_slice(from);
+            to.reverse();
+        }
+    }
+
     /// Adds a map of the same shape.
     pub(super) fn add(&mut self, other: &Self) {
         debug_assert_eq!(self.shape(), other.shape());

@@ -5,8 +5,8 @@
 //!                                                             48×48 of the hand ─► Counter ─► embedding, fingers
 //! ```
 //!
-//! They are convolutions with their batch normalisation folded in (S. Ioffe and C. Szegedy, 2015), computed with the
-//! widest instructions of the machine. Weights are [`shipped`] with the program. What a picture must be like that goes
+//! They are convolutions with their batch normalisation folded in (S. Ioffe and C. Szegedy, 2015), computed with
+//! vectors as the machine has them. Weights are [`shipped`] with the program. What a picture must be like that goes
 //! in, and what comes out, is said at each network. All buffers are kept from one picture to the next.
 
 mod convolution;

@@ -28,6 +28,21 @@ pub struct Refinement {
     pub cosine: f32,
 }
 
+impl Refinement {
+    /// Between what is said of a picture, and of its mirror image.
+    #[must_use]
+    pub fn mean(self, mirrored: Self) -> Self {
+        Self {
+            hand: f32::midpoint(self.hand, mirrored.hand),
+            right: f32::midpoint(self.right, -mirrored.right),
+            down: f32::midpoint(self.down, mirrored.down),
+            larger: f32::midpoint(self.larger, mirrored.larger),
+            sine: f32::midpoint(self.sine, -mirrored.sine),
+            cosine: f32::midpoint(self.cosine, mirrored.cosine),
+        }
+    }
+}
+
 /// Looks closely at one place.
 pub struct Refiner {
     trunk: Trunk,

@@ -9,8 +9,8 @@ use super::simd::{Greatest, curvature, partner, shift};
 
 /// LIBSVM's stopping tolerance: how far the residuals of two samples may be apart that could be brought together.
 pub(super) const TOLERANCE: f32 = 1e-3;
-/// The same for a machine that is asked about what was held out and then let go: a sigmoid is fitted to its decisions, which a hundredth of the margin hardly
-/// moves, and it takes half the steps.
+/// The same for a machine that is asked about what was held out and then let go: a sigmoid is fitted to its decisions, which at usual costs a hundredth of the
+/// margin hardly moves, and it takes half the steps.
 pub(super) const PASSING: f32 = 1e-2;
 /// Residuals are kept in f32, and each step of length δ blurs them by about δ · 10⁻⁷. After steps of this length
 /// together they are no longer sure to a tenth of the tolerance, and are computed anew.
