@@ -58,6 +58,22 @@ fn observe_shape_in_a_room_known_empty(bencher: Bencher<'_, '_>) {
     });
 }
 
+/// By the background that a robot has learned, which is small.
+#[divan::bench]
+fn observe_shape_in_a_room_it_has_watched(bencher: Bencher<'_, '_>) {
+    let (frame, room) = (frame(), scene(None));
+    let mut detector = MotionDetector::new(MotionConfig::watching()).expect("the defaults are valid");
+    for number in 0..200 {
+        detector.watch(&room, number * Duration::from_millis(33)).expect("it is a frame");
+    }
+    let background = detector.background().expect("seven seconds show an empty room");
+    let mut perception =
+        Perception::new(FeatureSet::Shape, HandConfig::default()).expect("the defaults are valid");
+    bencher.bench_local(|| {
+        perception.observe_before(black_box(&frame), Some(background)).expect("the frame shows a hand")
+    });
+}
+
 /// Nobody there, and a hand.
 #[divan::bench(args = [None, Some(3)])]
 fn watch_for_motion(bencher: Bencher<'_, '_>, gesture: Option<u8>) {
