@@ -44,9 +44,13 @@ impl Occasion<'_> {
 
     /// So many nats, the less the more was said of the gestures in doubt.
     fn discounted(&self, nats: f64, config: &QuestionsConfig) -> f64 {
+        nats / (1.0 + self.least() as f64 / config.familiar)
+    }
+
+    /// The labels of that of the two likeliest gestures that has fewer.
+    fn least(&self) -> usize {
         let likeliest = self.doubt.map_or(&[][..], |doubt| &doubt.gestures);
-        let least = likeliest.iter().take(2).map(|class| self.labels_of(*class)).min().unwrap_or(0);
-        nats / (1.0 + least as f64 / config.familiar)
+        likeliest.iter().take(2).map(|class| self.labels_of(*class)).min().unwrap_or(0)
     }
 
     fn labels_of(&self, class: ClassId) -> usize {
@@ -59,10 +63,12 @@ impl Occasion<'_> {
 /// | a label is worth it | robots | it looks unknown | it asks |
 /// |---|---|---|---|
 /// | yes | – | likelier than not, and something did before, lately | "a new gesture? its name?" |
-/// | yes | disagree, or it may be unknown | less likely than not | "two or three?" |
-/// | yes | are as unsure as each other | hardly | "show it again, nearer" |
+/// | yes | disagree, it may be unknown, or one of the two was told seldom | less likely than not | "two or three?" |
+/// | yes | are as unsure as each other, of gestures that were told often | hardly | "show it again, nearer" |
 /// | no | disagree | less likely than not | "two or three?", where nothing was asked for long |
 /// | no | agree | – | nothing |
+///
+/// Often is [`familiar`](QuestionsConfig::familiar) times. Before, doubt comes from knowing little, which no better view mends and a label does.
 ///
 /// It is worth it from [`worth`](QuestionsConfig::worth) on, and if at most a third of the rounds before were worth more: questions are few, and how unknown things
 /// look falls with all that was learned.
@@ -83,8 +89,9 @@ pub fn worth_asking(occasion: &Occasion<'_>, config: &QuestionsConfig) -> Option
         _ => Ask::Name { nearest },
     };
     let disagree = disagreement >= config.disagreement;
+    let told_often = occasion.least() as f64 >= config.familiar;
     match is_worth {
-        true if disagree || unknown >= PERHAPS_UNKNOWN => Some(between),
+        true if disagree || unknown >= PERHAPS_UNKNOWN || !told_often => Some(between),
         true => Some(Ask::Again { nearest: nearest? }),
         false => {
             let dissent = occasion.discounted(disagreement, config) >= config.disagreement;
@@ -128,7 +135,8 @@ mod tests {
         let torn = doubt(0.65, 0.4, 0.02);
         assert_eq!(ask(&torn, 0, false, 1), BETWEEN);
         let dim = doubt(0.65, 0.02, 0.02);
-        assert_eq!(ask(&dim, 0, false, 1), Some(Ask::Again { nearest: TWO }));
+        assert_eq!(ask(&dim, 0, false, 1), BETWEEN, "a label teaches more than a better view");
+        assert_eq!(ask(&dim, 4, false, 1), Some(Ask::Again { nearest: TWO }));
         let perhaps_new = doubt(0.05, 0.02, 0.3);
         assert_eq!(ask(&perhaps_new, 9, false, 1), BETWEEN, "a label may be its gesture's first");
         let new = doubt(0.1, 0.0, 0.97);

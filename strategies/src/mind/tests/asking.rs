@@ -195,11 +195,23 @@ fn a_question_is_of_the_newest_round_by_whichever_of_its_names() {
 }
 
 #[test]
-fn robots_that_are_as_unsure_as_each_other_ask_to_be_shown_again() {
-    let mut swarm = swarm(3, QuestionsConfig::default());
+fn robots_that_are_as_unsure_as_each_other_ask_to_be_shown_again_what_they_were_told_often() {
+    let mut swarm = swarm(3, QuestionsConfig { familiar: 1.0, ..QuestionsConfig::default() });
+    for class in [2, 3] {
+        let round = show(&mut swarm, class, &SURE);
+        swarm.was(round, class.into());
+    }
     rest(&mut swarm);
     show(&mut swarm, 2, &[0.5; 3]);
     assert_eq!(last(&swarm).ask, Ask::Again { nearest: ClassId(2) });
+}
+
+#[test]
+fn robots_that_are_as_unsure_as_each_other_ask_which_it_is_of_what_they_were_hardly_told() {
+    let mut swarm = swarm(3, QuestionsConfig::default());
+    rest(&mut swarm);
+    show(&mut swarm, 2, &[0.5; 3]);
+    assert_eq!(last(&swarm).ask, Ask::Between { classes: [ClassId(2), ClassId(3)] });
 }
 
 #[test]
