@@ -48,30 +48,29 @@ fn observe_hog(bencher: Bencher<'_, '_>) {
     observe(bencher, FeatureSet::Hog);
 }
 
-#[divan::bench]
-fn observe_shape_in_a_room_known_empty(bencher: Bencher<'_, '_>) {
-    let (frame, room) = (frame(), scene(None));
-    let mut perception =
-        Perception::new(FeatureSet::Shape, HandConfig::default()).expect("the defaults are valid");
-    bencher.bench_local(|| {
-        perception.observe_before(black_box(&frame), Some(&room)).expect("the frame shows a hand")
-    });
-}
-
-/// By the background that a robot has learned, which is small.
-#[divan::bench]
-fn observe_shape_in_a_room_it_has_watched(bencher: Bencher<'_, '_>) {
-    let (frame, room) = (frame(), scene(None));
-    let mut detector = MotionDetector::new(MotionConfig::watching()).expect("the defaults are valid");
-    for number in 0..200 {
-        detector.watch(&room, number * Duration::from_millis(33)).expect("it is a frame");
-    }
-    let background = detector.background().expect("seven seconds show an empty room");
+fn observe_before(bencher: Bencher<'_, '_>, background: &Mat) {
+    let frame = frame();
     let mut perception =
         Perception::new(FeatureSet::Shape, HandConfig::default()).expect("the defaults are valid");
     bencher.bench_local(|| {
         perception.observe_before(black_box(&frame), Some(background)).expect("the frame shows a hand")
     });
+}
+
+#[divan::bench]
+fn observe_shape_in_a_room_known_empty(bencher: Bencher<'_, '_>) {
+    observe_before(bencher, &scene(None));
+}
+
+/// By the background that a robot has learned, which is small.
+#[divan::bench]
+fn observe_shape_in_a_room_it_has_watched(bencher: Bencher<'_, '_>) {
+    let room = scene(None);
+    let mut detector = MotionDetector::new(MotionConfig::watching()).expect("the defaults are valid");
+    for number in 0..200 {
+        detector.watch(&room, number * Duration::from_millis(33)).expect("it is a frame");
+    }
+    observe_before(bencher, detector.background().expect("seven seconds show an empty room"));
 }
 
 /// Nobody there, and a hand.

@@ -42,7 +42,7 @@ pub enum QuestionsConfigError {
 /// | `repeated` | 60s | within which what is unknown must be shown again for its name to be asked | ≤ 1 day |
 /// | `worth` | 0.15 | least worth of a label, see [`worth_asking`](crate::worth_asking) | 0–8 |
 /// | `disagreement` | 0.1 | from how many nats on robots see different things | 0–8 |
-/// | `familiar` | 4 | labels of a gesture after which a doubt about it counts half | > 0 |
+/// | `familiar` | 4 | labels of a gesture after which a doubt about it counts half, and a better view of it may be asked for | > 0 |
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QuestionsConfig {
@@ -66,7 +66,7 @@ pub struct QuestionsConfig {
     pub worth: f64,
     /// From how many nats on robots see different things.
     pub disagreement: f64,
-    /// The labels of a gesture after which a doubt about it counts half: the more was said of it, the less another label teaches.
+    /// The labels of a gesture after which a doubt about it counts half, and a better view of it may be asked for: the more was said of it, the less another label teaches.
     pub familiar: f64,
 }
 

@@ -255,8 +255,7 @@ impl Eyes {
     fn close_up_with_mask(&mut self, frame: &Mat, view: Place) -> Result<Closeup, opencv::Error> {
         self.cut(frame, view)?;
         let (said, logits) = self.refiner.run_with_mask(&self.picture);
-        self.logits.clear();
-        self.logits.extend_from_slice(logits);
+        logits.clone_into(&mut self.logits);
         self.mirrored.mirror(&self.picture);
         let (mirrored, logits) = self.refiner.run_with_mask(&self.mirrored);
         let rows = self.logits.chunks_exact_mut(Refiner::SIDE).zip(logits.chunks_exact(Refiner::SIDE));
