@@ -5,6 +5,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+/// In so many shares each thread gets its part of the work: the last ones even out what takes longer.
+const SHARES: usize = 16;
+
 /// Threads that stay, for work that comes a thousand times a second: to start some each time takes as long as a little work, and what threads leave of the
 /// memory that they had is a tenth of all.
 ///
@@ -37,11 +40,16 @@ impl Crew {
             return all.into_iter().for_each(work);
         }
         let others = self.threads.min(all.len()) - 1;
+        // Several at a time, where there are many: of a little work waiting for each other would be the most.
+        let share = (all.len() / (SHARES * self.threads)).max(1);
         let left = Mutex::new(all.into_iter());
-        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let next =
+            || left.lock().unwrap_or_else(PoisonError::into_inner).by_ref().take(share).collect::<Vec<T>>();
         let work_on = || {
-            while let Some(one) = next() {
-                work(one);
+            let mut some = next();
+            while !some.is_empty() {
+                some.into_iter().for_each(&work);
+                some = next();
             }
         };
         self.others().in_place_scope(|scope| {

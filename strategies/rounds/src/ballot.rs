@@ -46,9 +46,17 @@ impl Scale {
 pub struct Ballot {
     /// Robots that live in one process may hold one copy of each: see [`Follow::keep`](crate::Follow::keep).
     votes: BTreeMap<RobotId, Arc<HeldVote>>,
-    /// How many votes there are of each vocabulary and number of gestures: asked at every input, in a swarm of thousands too.
-    scales: BTreeMap<(u32, usize), usize>,
+    counts: Counts,
     changes: Changes,
+}
+
+/// What is asked of the votes at every input, in a swarm of thousands too.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Counts {
+    /// How many there are of each vocabulary and number of gestures.
+    of_scale: BTreeMap<(u32, usize), usize>,
+    /// How many know gestures that were named.
+    with_named: usize,
 }
 
 /// How often a ballot has changed: no part of what it is.
@@ -80,13 +88,13 @@ impl Ballot {
         match self.votes.entry(held.robot) {
             Entry::Occupied(known) if known.get().stamp >= held.stamp => Cast::Known,
             Entry::Occupied(mut known) => {
-                count(&mut self.scales, &held);
-                discount(&mut self.scales, &known.insert(held));
+                self.counts.add(&held.vote);
+                self.counts.remove(&known.insert(held).vote);
                 Cast::Counted
             }
             Entry::Vacant(_) if full => Cast::Full,
             Entry::Vacant(place) => {
-                count(&mut self.scales, &held);
+                self.counts.add(&held.vote);
                 place.insert(held);
                 Cast::Counted
             }
@@ -97,7 +105,7 @@ impl Ballot {
     pub fn strike(&mut self, robots: &BTreeSet<RobotId>) {
         for robot in robots {
             if let Some(struck) = self.votes.remove(robot) {
-                discount(&mut self.scales, &struck);
+                self.counts.remove(&struck.vote);
                 self.changes.0 += 1;
             }
         }
@@ -149,7 +157,7 @@ impl Ballot {
     /// The scale most votes with evidence are on; of equals the one of the smaller vocabulary, then of fewer classes.
     #[must_use]
     pub fn prevailing_scale(&self) -> Option<Scale> {
-        let with_evidence = self.scales.iter().filter(|((_, classes), _)| *classes > 0);
+        let with_evidence = self.counts.of_scale.iter().filter(|((_, classes), _)| *classes > 0);
         // Reversed, because of equal maxima the last one is returned.
         let (&(vocabulary, classes), _) = with_evidence.rev().max_by_key(|(_, votes)| **votes)?;
         Some(Scale { vocabulary: VocabularyId(vocabulary), classes })
@@ -158,13 +166,15 @@ impl Ballot {
     /// How many robots gave evidence on that scale.
     #[must_use]
     pub fn contributors(&self, scale: Scale) -> usize {
-        self.scales.get(&(scale.vocabulary.0, scale.classes)).copied().unwrap_or_default()
+        self.counts.of_scale.get(&(scale.vocabulary.0, scale.classes)).copied().unwrap_or_default()
     }
 
     /// The gestures that the votes on that scale are evidence for: those of the list, and all that were named and any of the robots knows.
     #[must_use]
     pub fn columns(&self, scale: Scale) -> Columns {
-        Columns::of(scale.classes, self.on(scale).map(|held| &held.vote))
+        // Mostly nobody knows any.
+        let know_more = (self.counts.with_named > 0).then(|| self.on(scale)).into_iter().flatten();
+        Columns::of(scale.classes, know_more.map(|held| &held.vote))
     }
 
     /// How many of these robots take part, seeing or not; and how many of them gave evidence on that scale.
@@ -247,27 +257,31 @@ pub(crate) fn weight(rule: &dyn Fuse, clip: f64, vote: &Vote) -> f32 {
     if weight.is_finite() && weight >= 0.0 { weight } else { 0.0 }
 }
 
-fn scale_of(held: &HeldVote) -> (u32, usize) {
-    (held.vote.vocabulary.0, held.vote.listed())
-}
+impl Counts {
+    fn add(&mut self, vote: &Vote) {
+        *self.of_scale.entry(scale_of(vote)).or_default() += 1;
+        self.with_named += usize::from(!vote.named.is_empty());
+    }
 
-fn count(scales: &mut BTreeMap<(u32, usize), usize>, held: &HeldVote) {
-    *scales.entry(scale_of(held)).or_default() += 1;
-}
-
-fn discount(scales: &mut BTreeMap<(u32, usize), usize>, held: &HeldVote) {
-    if let Entry::Occupied(mut votes) = scales.entry(scale_of(held)) {
-        *votes.get_mut() -= 1;
-        if *votes.get() == 0 {
-            votes.remove();
+    /// Of a vote that was added.
+    fn remove(&mut self, vote: &Vote) {
+        self.with_named -= usize::from(!vote.named.is_empty());
+        if let Entry::Occupied(mut votes) = self.of_scale.entry(scale_of(vote)) {
+            *votes.get_mut() -= 1;
+            if *votes.get() == 0 {
+                votes.remove();
+            }
         }
     }
 }
 
+fn scale_of(vote: &Vote) -> (u32, usize) {
+    (vote.vocabulary.0, vote.listed())
+}
+
 #[cfg(test)]
 mod tests {
-    use gestalt_protocol::FusionRule;
-    use gestalt_protocol::RoundId;
+    use gestalt_protocol::{ClassId, FusionRule, RoundId};
     use proptest::prelude::*;
 
     use super::*;
@@ -345,6 +359,28 @@ mod tests {
         assert_eq!(ballot.cast(held(RobotId(u32::MAX), stamp(1, 1), vote(&[]))), Cast::Full);
         assert_eq!(ballot.cast(held(RobotId(0), stamp(1, 2), vote(&[]))), Cast::Counted);
         assert_eq!(ballot.len(), MAX_ROBOTS);
+    }
+
+    #[test]
+    fn gestures_that_were_named_come_and_go_with_the_votes_that_know_them() {
+        let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
+        let knows = || Vote { named: vec![circle], ..vote(&[3.0, 0.0, 0.0, 1.0]) };
+        let mut ballot = Ballot::default();
+        let named = |ballot: &Ballot| ballot.columns(SCALE).named().to_vec();
+        for (robot, sequence, said, expected) in [
+            (1, 1, vote(&[3.0, 0.0, 0.0]), vec![]),
+            (2, 1, knows(), vec![circle]),
+            (3, 1, knows(), vec![circle]),
+            (2, 2, vote(&[3.0, 0.0, 0.0]), vec![circle]),
+            (2, 1, knows(), vec![circle]),
+            (3, 2, vote(&[3.0, 0.0, 0.0]), vec![]),
+            (1, 2, knows(), vec![circle]),
+        ] {
+            ballot.cast(held(RobotId(robot), stamp(1, sequence), said));
+            assert_eq!(named(&ballot), expected, "{robot} {sequence}");
+        }
+        ballot.strike(&[RobotId(1)].into());
+        assert_eq!(named(&ballot), []);
     }
 
     /// Votes as the authors say them: what carries one stamp is one vote.

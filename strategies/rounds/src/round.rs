@@ -376,8 +376,10 @@ impl Round {
                 })
         };
         let convinces = |fusion: &&Fusion| {
+            // Where nobody is expected to lie nothing withstands that is not as likely at first: of most votes that is all that is asked.
+            let may = config.liars > 0 || config.convinces(fusion.probabilities[fusion.top.index()]);
             let withstands = |rows: &Rows<'_>| rows.withstands(rule, config.clip, fusion, config.liars);
-            rows.as_ref().is_some_and(|rows| config.convinces(withstands(rows))) && suffice()
+            may && rows.as_ref().is_some_and(|rows| config.convinces(withstands(rows))) && suffice()
         };
         let of_place = |place: usize| columns.as_ref().and_then(|columns| columns.class(place));
         let class = fusion.as_ref().filter(convinces).and_then(|fusion| of_place(fusion.top.index()));
