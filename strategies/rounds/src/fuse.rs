@@ -68,7 +68,7 @@ pub trait Fuse: Debug + Send + Sync {
     /// no liars that of the fusion, and 0 where another class is as likely. By default all of it where the margin exceeds their number, and else 0.
     fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
         let _ = (clip, votes);
-        if fusion.margin > f64::from(liars) { fusion.probabilities[fusion.top.index()] } else { 0.0 }
+        if fusion.margin > f64::from(liars) { fusion.greatest() } else { 0.0 }
     }
 
     /// The parameters of a correlated pool, for the certificate; `None` for any other rule.

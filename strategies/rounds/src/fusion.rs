@@ -22,6 +22,11 @@ pub struct Fusion {
 }
 
 impl Fusion {
+    /// The probability of the likeliest class.
+    pub(crate) fn greatest(&self) -> f64 {
+        self.probabilities[self.top.index()]
+    }
+
     /// Whether it is over so many classes, and every value is one that a decision may carry.
     pub(crate) fn is_sound(&self, classes: usize) -> bool {
         self.probabilities.len() == classes

@@ -120,7 +120,7 @@ fn holds(decision: &Decision, rule: Option<&dyn Fuse>, suffice: Option<bool>, st
     if !votes.iter().all(weighs) || !is_of(certificate, &fusion, close) {
         return false;
     }
-    let greatest = fusion.probabilities[fusion.top.index()];
+    let greatest = fusion.greatest();
     let withstands = || rows.withstands(rule, terms.clip, &fusion, terms.liars);
     let claimed = decision.class.map(|class| {
         let place = certificate.place(class);

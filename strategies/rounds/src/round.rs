@@ -377,7 +377,7 @@ impl Round {
         };
         let convinces = |fusion: &&Fusion| {
             // Where nobody is expected to lie nothing withstands that is not as likely at first: of most votes that is all that is asked.
-            let may = config.liars > 0 || config.convinces(fusion.probabilities[fusion.top.index()]);
+            let may = config.liars > 0 || config.convinces(fusion.greatest());
             let withstands = |rows: &Rows<'_>| rows.withstands(rule, config.clip, fusion, config.liars);
             may && rows.as_ref().is_some_and(|rows| config.convinces(withstands(rows))) && suffice()
         };
@@ -390,7 +390,7 @@ impl Round {
         let counted = scale.filter(|_| fusion.is_some());
         let votes = counted.map_or(Vec::new(), |scale| self.ballot.counted(rule, config.clip, scale));
         let (mut probabilities, confidence) = fusion.map_or((Vec::new(), 0.0), |fusion| {
-            let confidence = fusion.probabilities[fusion.top.index()];
+            let confidence = fusion.greatest();
             (fusion.probabilities, confidence)
         });
         let gestures = columns.as_ref().map_or(0, Columns::len);

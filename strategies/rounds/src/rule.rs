@@ -18,7 +18,7 @@ impl Fuse for FusionRule {
 
     fn withstands(&self, clip: f64, votes: &[&[f32]], fusion: &Fusion, liars: u32) -> f64 {
         match liars {
-            0 if fusion.margin > 0.0 => fusion.probabilities[fusion.top.index()],
+            0 if fusion.margin > 0.0 => fusion.greatest(),
             0 => 0.0,
             liars => withstand::least(*self, clip, votes, fusion, liars as usize),
         }
