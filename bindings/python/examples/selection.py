@@ -84,6 +84,8 @@ def main():
     arguments.add_argument("--runs", type=int, default=8)
     arguments.add_argument("--rounds", type=int, default=18)
     chosen = arguments.parse_args()
+    if chosen.runs < 2:
+        arguments.error("--runs: one run has no interval; choose 2 or more")
     began = time.monotonic()
     rules = {**{name: name for name in SELECTION_RULES}, "farthest_from_all (own)": farthest_from_all}
     for broken in (0.0, 0.4):

@@ -1,6 +1,7 @@
 //! Whether a round is worth a question, and which.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::LN_2;
 
 use gestalt_protocol::{Ask, ClassId};
 use gestalt_rounds::Doubt;
@@ -23,6 +24,8 @@ pub struct Occasion<'a> {
     pub doubt: Option<&'a Doubt>,
     /// By class, of how many rounds it is known that they showed that gesture.
     pub labels: &'a BTreeMap<ClassId, usize>,
+    /// The gestures that were asked about as the likeliest, since anybody said of a round what it showed.
+    pub unanswered: &'a BTreeSet<ClassId>,
     /// The worth of the rounds before, as far as nobody said what they showed.
     pub before: &'a [f64],
     /// Whether something unknown was shown before, lately.
@@ -35,11 +38,22 @@ impl Occasion<'_> {
     /// What a label of the round would be worth: u + (1 − u) h / (1 + n / [`familiar`](QuestionsConfig::familiar)), with u the probability of something that
     /// nobody was taught, h the entropy over the gestures that were if it is one of them, in nats, and n the labels of that of the two likeliest that has
     /// fewer. The first label of a gesture teaches most; what another one teaches falls with those before.
+    ///
+    /// Before anybody said of a round that it showed the likeliest gesture, h is at least ln 2, that of a coin: a model made elsewhere may be wrong here, and sure.
+    /// Not once that gesture was asked about and nobody says anything.
     #[must_use]
     pub fn worth(&self, config: &QuestionsConfig) -> f64 {
         self.doubt.map_or(1.0, |doubt| {
-            doubt.unknown + (1.0 - doubt.unknown) * self.discounted(doubt.among_gestures, config)
+            let least = if self.is_hearsay(doubt) { LN_2 } else { 0.0 };
+            let among_gestures = self.discounted(doubt.among_gestures.max(least), config);
+            doubt.unknown + (1.0 - doubt.unknown) * among_gestures
         })
+    }
+
+    /// Whether robots know the likeliest gesture from a model alone, and somebody may say whether that holds here.
+    fn is_hearsay(&self, doubt: &Doubt) -> bool {
+        let likeliest = doubt.gestures.first();
+        likeliest.is_some_and(|class| self.labels_of(*class) == 0 && !self.unanswered.contains(class))
     }
 
     /// So many nats, the less the more was said of the gestures in doubt.
@@ -63,12 +77,13 @@ impl Occasion<'_> {
 /// | a label is worth it | robots | it looks unknown | it asks |
 /// |---|---|---|---|
 /// | yes | – | likelier than not, and something did before, lately | "a new gesture? its name?" |
-/// | yes | disagree, it may be unknown, or one of the two was told seldom | less likely than not | "two or three?" |
+/// | yes | disagree, it may be unknown, or one of the two was told seldom or never | less likely than not | "two or three?" |
 /// | yes | are as unsure as each other, of gestures that were told often | hardly | "show it again, nearer" |
 /// | no | disagree | less likely than not | "two or three?", where nothing was asked for long |
 /// | no | agree | – | nothing |
 ///
-/// Often is [`familiar`](QuestionsConfig::familiar) times. Before, doubt comes from knowing little, which no better view mends and a label does.
+/// Often is [`familiar`](QuestionsConfig::familiar) times. Before, doubt comes from knowing little, which no better view mends and a label does. A gesture that is known
+/// from a model alone is asked about however sure all are, until a round is said to have shown it; once only where nobody says anything.
 ///
 /// It is worth it from [`worth`](QuestionsConfig::worth) on, and if at most a third of the rounds before were worth more: questions are few, and how unknown things
 /// look falls with all that was learned.
@@ -112,6 +127,7 @@ mod tests {
 
     const TWO: ClassId = ClassId(2);
     const THREE: ClassId = ClassId(3);
+    const NONE: &BTreeSet<ClassId> = &BTreeSet::new();
 
     fn doubt(among_gestures: f64, disagreement: f64, unknown: f64) -> Doubt {
         let gestures = vec![TWO, THREE, ClassId(0)];
@@ -122,7 +138,8 @@ mod tests {
     fn ask(doubt: &Doubt, labels: usize, repeated: bool, quiet: u32) -> Option<Ask> {
         let mut labels: BTreeMap<ClassId, usize> = (0..6).map(|class| (ClassId(class), labels)).collect();
         labels.entry(TWO).and_modify(|labels| *labels *= 2);
-        let occasion = Occasion { doubt: Some(doubt), labels: &labels, before: &[], repeated, quiet };
+        let occasion =
+            Occasion { doubt: Some(doubt), labels: &labels, unanswered: NONE, before: &[], repeated, quiet };
         worth_asking(&occasion, &QuestionsConfig::default())
     }
 
@@ -131,11 +148,11 @@ mod tests {
     #[test]
     fn each_line_of_the_table() {
         let sure = doubt(0.05, 0.01, 0.02);
-        assert_eq!(ask(&sure, 0, false, 2), None);
+        assert_eq!(ask(&sure, 1, false, 2), None);
         let torn = doubt(0.65, 0.4, 0.02);
-        assert_eq!(ask(&torn, 0, false, 1), BETWEEN);
+        assert_eq!(ask(&torn, 1, false, 1), BETWEEN);
         let dim = doubt(0.65, 0.02, 0.02);
-        assert_eq!(ask(&dim, 0, false, 1), BETWEEN, "a label teaches more than a better view");
+        assert_eq!(ask(&dim, 1, false, 1), BETWEEN, "a label teaches more than a better view");
         assert_eq!(ask(&dim, 4, false, 1), Some(Ask::Again { nearest: TWO }));
         let perhaps_new = doubt(0.05, 0.02, 0.3);
         assert_eq!(ask(&perhaps_new, 9, false, 1), BETWEEN, "a label may be its gesture's first");
@@ -143,8 +160,8 @@ mod tests {
         assert_eq!(ask(&new, 9, true, 1), Some(Ask::Name { nearest: Some(TWO) }));
         assert_eq!(ask(&new, 9, false, 1), None, "once is not often enough");
         let overruled = doubt(0.1, 0.3, 0.02);
-        assert_eq!(ask(&overruled, 0, false, 1), None);
-        assert_eq!(ask(&overruled, 0, false, 2), BETWEEN);
+        assert_eq!(ask(&overruled, 1, false, 1), None);
+        assert_eq!(ask(&overruled, 1, false, 2), BETWEEN);
     }
 
     #[test]
@@ -155,18 +172,41 @@ mod tests {
         assert!(!asked[58], "for ever");
         // The rarer of the two counts: 2 has labels enough, 3 has none.
         let labels = [(TWO, 99)].into();
-        let occasion =
-            Occasion { doubt: Some(&torn), labels: &labels, before: &[], repeated: false, quiet: 1 };
+        let occasion = Occasion {
+            doubt: Some(&torn),
+            labels: &labels,
+            unanswered: NONE,
+            before: &[],
+            repeated: false,
+            quiet: 1,
+        };
         assert_eq!(worth_asking(&occasion, &QuestionsConfig::default()), BETWEEN);
+    }
+
+    #[test]
+    fn what_is_known_from_a_model_alone_is_as_doubtful_as_a_coin_unless_nobody_answers() {
+        let (config, sure) = (QuestionsConfig::default(), doubt(0.05, 0.01, 0.02));
+        let worth = |labels: &BTreeMap<ClassId, usize>, unanswered: &BTreeSet<ClassId>| {
+            let doubt = Some(&sure);
+            let occasion = Occasion { doubt, labels, unanswered, before: &[], repeated: false, quiet: 2 };
+            (occasion.worth(&config), worth_asking(&occasion, &config))
+        };
+        let (known, unknown) = (0.98 * 0.05, 0.02);
+        let (never, once) = (BTreeMap::new(), [(TWO, 1)].into());
+        assert_eq!(worth(&never, NONE), (unknown + 0.98 * LN_2, BETWEEN));
+        assert_eq!(worth(&never, &[THREE].into()), (unknown + 0.98 * LN_2, BETWEEN));
+        assert_eq!(worth(&never, &[TWO].into()), (unknown + known, None));
+        assert_eq!(worth(&once, NONE), (unknown + known, None), "the second likeliest is no matter");
     }
 
     #[test]
     fn what_is_worth_less_than_the_rounds_before_waits_for_better() {
         let config = QuestionsConfig::default();
         let torn = doubt(0.4, 0.4, 0.02);
+        let labels = [(TWO, 1), (THREE, 1)].into();
         let asks = |before: &[f64]| {
-            let occasion =
-                Occasion { doubt: Some(&torn), labels: &BTreeMap::new(), before, repeated: false, quiet: 1 };
+            let (doubt, labels) = (Some(&torn), &labels);
+            let occasion = Occasion { doubt, labels, unanswered: NONE, before, repeated: false, quiet: 1 };
             worth_asking(&occasion, &config).is_some()
         };
         assert!(asks(&[]) && asks(&[0.1, 0.2]) && asks(&[0.9, 0.1, 0.1]));
@@ -177,8 +217,14 @@ mod tests {
     fn who_knows_nothing_asks_for_a_name_when_it_is_shown_again() {
         let config = QuestionsConfig::default();
         let labels = BTreeMap::new();
-        let occasion =
-            |repeated| Occasion { doubt: None, labels: &labels, before: &[1.0], repeated, quiet: 1 };
+        let occasion = |repeated| Occasion {
+            doubt: None,
+            labels: &labels,
+            unanswered: NONE,
+            before: &[1.0],
+            repeated,
+            quiet: 1,
+        };
         assert_eq!(worth_asking(&occasion(false), &config), None);
         assert_eq!(worth_asking(&occasion(true), &config), Some(Ask::Name { nearest: None }));
         // One gesture is known: there are no two to choose from.
@@ -186,6 +232,7 @@ mod tests {
         let occasion = Occasion {
             doubt: Some(&one),
             labels: &[(TWO, 1)].into(),
+            unanswered: NONE,
             before: &[],
             repeated: false,
             quiet: 1,

@@ -1,15 +1,18 @@
 //! What this robot knows of the swarm's questions.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use gestalt_protocol::{Question, RobotId, RoundId};
+use gestalt_protocol::{ClassId, Question, RobotId, RoundId};
 use gestalt_rounds::{Input as AboutRounds, Output as OfRounds};
 
 use crate::asking::{QuestionBudget, QuestionsConfig};
 
 /// With how many rounds before it a round is compared.
 const COMPARED: usize = 6;
+
+/// Of at most so many gestures is remembered that they were asked about.
+const MOST_UNANSWERED: usize = 1024;
 
 /// What came of one input for the rounds that this robot lives through.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,6 +55,8 @@ pub(super) struct Asks {
     pub due: Option<Duration>,
     /// The question that waits for its answer, and until when.
     pub open: Option<(Question, Duration)>,
+    /// The gestures that were asked about as the likeliest, since anybody said of a round what it showed.
+    pub unanswered: BTreeSet<ClassId>,
     /// When something unknown was last shown.
     pub unknown: Option<Duration>,
     /// What labels of the latest rounds were worth of which nobody said what they showed: at most [`COMPARED`].
@@ -95,6 +100,9 @@ impl Asks {
         self.budget.spend(now);
         self.due = None;
         self.out_of_turn = self.speaker != Some(question.robot);
+        if self.unanswered.len() < MOST_UNANSWERED {
+            self.unanswered.extend(question.ask.classes().first());
+        }
         self.open = Some((question, now.saturating_add(config.gone)));
     }
 

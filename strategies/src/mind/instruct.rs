@@ -29,6 +29,10 @@ impl Mind {
         if self.is_preceded(&instructed) {
             return self.on_disallowed(now, instructed);
         }
+        // Somebody is there who says what is shown.
+        if instructed.instruction.round().is_some() {
+            self.asks.unanswered.clear();
+        }
         let (outcome, named) = self.heed(&instructed);
         self.share();
         self.prepare_answer(now, instructed, outcome, named);

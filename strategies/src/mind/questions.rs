@@ -97,7 +97,9 @@ impl Mind {
         }
         let repeated = is_unknown(doubt.as_ref()) && self.asks.repeats(now, config.repeated);
         let (labels, quiet) = (learning.label_counts(), self.asks.budget.quiet(config));
-        let occasion = Occasion { doubt: doubt.as_ref(), labels: &labels, before: &[], repeated, quiet };
+        let unanswered = &self.asks.unanswered.clone();
+        let occasion =
+            Occasion { doubt: doubt.as_ref(), labels: &labels, unanswered, before: &[], repeated, quiet };
         let before = self.asks.compare(occasion.worth(config));
         if !self.asks.budget.allows(now, config) || !self.asks.is_turn_of(self.rounds.me()) {
             return None;

@@ -58,7 +58,16 @@ fn rest(swarm: &mut Swarm) {
     for _ in 0..2 {
         show(swarm, 1, &SURE);
     }
-    assert_eq!(swarm.asked, [], "nobody asks about what all are sure of");
+    assert_eq!(swarm.asked, [], "it is too soon");
+}
+
+/// Until a question may be asked, and two gestures are known from more than a model.
+fn tell_two(swarm: &mut Swarm) {
+    for class in [1, 2] {
+        let round = show(swarm, class, &SURE);
+        swarm.was(round, class.into());
+    }
+    assert_eq!(swarm.asked, [], "it is too soon");
 }
 
 fn last(swarm: &Swarm) -> &Question {
@@ -68,7 +77,7 @@ fn last(swarm: &Swarm) -> &Question {
 #[test]
 fn robots_that_disagree_ask_between_two_once_and_not_again_for_three_rounds() {
     let mut swarm = swarm(3, QuestionsConfig::default());
-    rest(&mut swarm);
+    tell_two(&mut swarm);
     let round = show(&mut swarm, 2, &SPLIT);
     let question = last(&swarm).clone();
     assert_eq!((question.round, question.robot), (round, RobotId(1)), "the spokesrobot, once");
@@ -197,19 +206,64 @@ fn a_question_is_of_the_newest_round_by_whichever_of_its_names() {
 #[test]
 fn robots_that_are_as_unsure_as_each_other_ask_to_be_shown_again_what_they_were_told_often() {
     let mut swarm = swarm(3, QuestionsConfig { familiar: 1.0, ..QuestionsConfig::default() });
-    for class in [2, 3] {
+    for class in [2, 3, 1] {
         let round = show(&mut swarm, class, &SURE);
         swarm.was(round, class.into());
     }
+    swarm.asked.clear();
+    rest(&mut swarm);
     rest(&mut swarm);
     show(&mut swarm, 2, &[0.5; 3]);
     assert_eq!(last(&swarm).ask, Ask::Again { nearest: ClassId(2) });
 }
 
 #[test]
-fn robots_that_are_as_unsure_as_each_other_ask_which_it_is_of_what_they_were_hardly_told() {
+fn what_is_known_from_a_model_alone_is_asked_about_until_it_was_said_once() {
     let mut swarm = swarm(3, QuestionsConfig::default());
     rest(&mut swarm);
+    for (class, asked) in [(1, 1), (2, 2)] {
+        for _ in 0..3 {
+            show(&mut swarm, class, &SURE);
+        }
+        assert_eq!(swarm.asked.len(), asked, "{:?}", swarm.asked);
+        let Ask::Between { classes: [first, _] } = last(&swarm).ask else { panic!("{:?}", last(&swarm)) };
+        assert_eq!(first, ClassId(class.into()));
+        let round = last(&swarm).round;
+        swarm.was(round, class.into());
+    }
+    for class in [1, 2].repeat(6) {
+        show(&mut swarm, class, &SURE);
+    }
+    assert_eq!(swarm.asked.len(), 2, "{:?}", swarm.asked);
+}
+
+#[test]
+fn where_nobody_answers_a_sure_swarm_asks_about_each_gesture_once() {
+    let mut swarm = swarm(3, QuestionsConfig::default());
+    for class in [1, 2].repeat(12) {
+        show(&mut swarm, class, &SURE);
+    }
+    let first = |ask: &Ask| ask.classes()[0];
+    let asked: Vec<ClassId> = swarm.asked.iter().map(|(_, question)| first(&question.ask)).collect();
+    assert_eq!(asked.len(), 2, "{:?}", swarm.asked);
+    assert_ne!(asked[0], asked[1]);
+    // Somebody speaks of a third: whoever that is may know of those two.
+    for _ in 0..2 {
+        show(&mut swarm, 3, &SURE);
+    }
+    let round = last(&swarm).round;
+    swarm.was(round, 3);
+    for class in [1, 2].repeat(12) {
+        show(&mut swarm, class, &SURE);
+    }
+    let asked: Vec<ClassId> = swarm.asked.iter().map(|(_, question)| first(&question.ask)).collect();
+    assert_eq!(asked.len(), 5, "{:?}", swarm.asked);
+}
+
+#[test]
+fn robots_that_are_as_unsure_as_each_other_ask_which_it_is_of_what_they_were_hardly_told() {
+    let mut swarm = swarm(3, QuestionsConfig::default());
+    tell_two(&mut swarm);
     show(&mut swarm, 2, &[0.5; 3]);
     assert_eq!(last(&swarm).ask, Ask::Between { classes: [ClassId(2), ClassId(3)] });
 }
