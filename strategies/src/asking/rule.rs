@@ -134,12 +134,16 @@ mod tests {
         Doubt { entropy: among_gestures, among_gestures, disagreement, unknown, gestures }
     }
 
+    /// With so many labels, the first time and in time.
+    fn occasion<'a>(doubt: Option<&'a Doubt>, labels: &'a BTreeMap<ClassId, usize>) -> Occasion<'a> {
+        Occasion { doubt, labels, unanswered: NONE, before: &[], repeated: false, quiet: 1 }
+    }
+
     /// After so many labels of each gesture, of which 2 has twice as many.
     fn ask(doubt: &Doubt, labels: usize, repeated: bool, quiet: u32) -> Option<Ask> {
         let mut labels: BTreeMap<ClassId, usize> = (0..6).map(|class| (ClassId(class), labels)).collect();
         labels.entry(TWO).and_modify(|labels| *labels *= 2);
-        let occasion =
-            Occasion { doubt: Some(doubt), labels: &labels, unanswered: NONE, before: &[], repeated, quiet };
+        let occasion = Occasion { repeated, quiet, ..occasion(Some(doubt), &labels) };
         worth_asking(&occasion, &QuestionsConfig::default())
     }
 
@@ -172,23 +176,14 @@ mod tests {
         assert!(!asked[58], "for ever");
         // The rarer of the two counts: 2 has labels enough, 3 has none.
         let labels = [(TWO, 99)].into();
-        let occasion = Occasion {
-            doubt: Some(&torn),
-            labels: &labels,
-            unanswered: NONE,
-            before: &[],
-            repeated: false,
-            quiet: 1,
-        };
-        assert_eq!(worth_asking(&occasion, &QuestionsConfig::default()), BETWEEN);
+        assert_eq!(worth_asking(&occasion(Some(&torn), &labels), &QuestionsConfig::default()), BETWEEN);
     }
 
     #[test]
     fn what_is_known_from_a_model_alone_is_as_doubtful_as_a_coin_unless_nobody_answers() {
         let (config, sure) = (QuestionsConfig::default(), doubt(0.05, 0.01, 0.02));
         let worth = |labels: &BTreeMap<ClassId, usize>, unanswered: &BTreeSet<ClassId>| {
-            let doubt = Some(&sure);
-            let occasion = Occasion { doubt, labels, unanswered, before: &[], repeated: false, quiet: 2 };
+            let occasion = Occasion { unanswered, quiet: 2, ..occasion(Some(&sure), labels) };
             (occasion.worth(&config), worth_asking(&occasion, &config))
         };
         let (known, unknown) = (0.98 * 0.05, 0.02);
@@ -205,8 +200,7 @@ mod tests {
         let torn = doubt(0.4, 0.4, 0.02);
         let labels = [(TWO, 1), (THREE, 1)].into();
         let asks = |before: &[f64]| {
-            let (doubt, labels) = (Some(&torn), &labels);
-            let occasion = Occasion { doubt, labels, unanswered: NONE, before, repeated: false, quiet: 1 };
+            let occasion = Occasion { before, ..occasion(Some(&torn), &labels) };
             worth_asking(&occasion, &config).is_some()
         };
         assert!(asks(&[]) && asks(&[0.1, 0.2]) && asks(&[0.9, 0.1, 0.1]));
@@ -217,26 +211,15 @@ mod tests {
     fn who_knows_nothing_asks_for_a_name_when_it_is_shown_again() {
         let config = QuestionsConfig::default();
         let labels = BTreeMap::new();
-        let occasion = |repeated| Occasion {
-            doubt: None,
-            labels: &labels,
-            unanswered: NONE,
-            before: &[1.0],
-            repeated,
-            quiet: 1,
-        };
-        assert_eq!(worth_asking(&occasion(false), &config), None);
-        assert_eq!(worth_asking(&occasion(true), &config), Some(Ask::Name { nearest: None }));
+        let shown = |repeated| Occasion { before: &[1.0], repeated, ..occasion(None, &labels) };
+        assert_eq!(worth_asking(&shown(false), &config), None);
+        assert_eq!(worth_asking(&shown(true), &config), Some(Ask::Name { nearest: None }));
         // One gesture is known: there are no two to choose from.
         let one = Doubt { gestures: vec![TWO], ..doubt(0.0, 0.0, 0.4) };
-        let occasion = Occasion {
-            doubt: Some(&one),
-            labels: &[(TWO, 1)].into(),
-            unanswered: NONE,
-            before: &[],
-            repeated: false,
-            quiet: 1,
-        };
-        assert_eq!(worth_asking(&occasion, &config), Some(Ask::Name { nearest: Some(TWO) }));
+        let labels = [(TWO, 1)].into();
+        assert_eq!(
+            worth_asking(&occasion(Some(&one), &labels), &config),
+            Some(Ask::Name { nearest: Some(TWO) })
+        );
     }
 }

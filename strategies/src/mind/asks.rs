@@ -111,13 +111,11 @@ impl Asks {
         self.unknown.replace(now).is_some_and(|before| now <= before.saturating_add(within))
     }
 
-    /// Notes what a label of a round is worth; says what those of the rounds before were.
-    pub fn compare(&mut self, worth: f64) -> Vec<f64> {
-        let before = self.worth.iter().copied().collect();
+    /// Notes what a label of a round is worth.
+    pub fn note_worth(&mut self, worth: f64) {
         self.worth.push_back(worth);
         if self.worth.len() > COMPARED {
             self.worth.pop_front();
         }
-        before
     }
 }

@@ -97,14 +97,21 @@ impl Mind {
         }
         let repeated = is_unknown(doubt.as_ref()) && self.asks.repeats(now, config.repeated);
         let (labels, quiet) = (learning.label_counts(), self.asks.budget.quiet(config));
-        let unanswered = &self.asks.unanswered.clone();
-        let occasion =
-            Occasion { doubt: doubt.as_ref(), labels: &labels, unanswered, before: &[], repeated, quiet };
-        let before = self.asks.compare(occasion.worth(config));
+        let before: Vec<f64> = self.asks.worth.iter().copied().collect();
+        let occasion = Occasion {
+            doubt: doubt.as_ref(),
+            labels: &labels,
+            unanswered: &self.asks.unanswered,
+            before: &before,
+            repeated,
+            quiet,
+        };
+        let (worth, ask) = (occasion.worth(config), worth_asking(&occasion, config));
+        self.asks.note_worth(worth);
         if !self.asks.budget.allows(now, config) || !self.asks.is_turn_of(self.rounds.me()) {
             return None;
         }
-        let ask = worth_asking(&Occasion { before: &before, ..occasion }, config)?;
+        let ask = ask?;
         let [entropy, disagreement] = doubt.map_or([0.0; 2], |doubt| [doubt.entropy, doubt.disagreement]);
         Some(Asked { round, ask, labels: labels_of(learning, ask), entropy, disagreement })
     }

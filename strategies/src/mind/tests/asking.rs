@@ -70,6 +70,11 @@ fn tell_two(swarm: &mut Swarm) {
     assert_eq!(swarm.asked, [], "it is too soon");
 }
 
+/// The likeliest gesture of each question.
+fn asked_about(swarm: &Swarm) -> Vec<ClassId> {
+    swarm.asked.iter().map(|(_, question)| question.ask.classes()[0]).collect()
+}
+
 fn last(swarm: &Swarm) -> &Question {
     &swarm.asked.last().expect("it asks").1
 }
@@ -243,8 +248,7 @@ fn where_nobody_answers_a_sure_swarm_asks_about_each_gesture_once() {
     for class in [1, 2].repeat(12) {
         show(&mut swarm, class, &SURE);
     }
-    let first = |ask: &Ask| ask.classes()[0];
-    let asked: Vec<ClassId> = swarm.asked.iter().map(|(_, question)| first(&question.ask)).collect();
+    let asked = asked_about(&swarm);
     assert_eq!(asked.len(), 2, "{:?}", swarm.asked);
     assert_ne!(asked[0], asked[1]);
     // Somebody speaks of a third: whoever that is may know of those two.
@@ -256,8 +260,7 @@ fn where_nobody_answers_a_sure_swarm_asks_about_each_gesture_once() {
     for class in [1, 2].repeat(12) {
         show(&mut swarm, class, &SURE);
     }
-    let asked: Vec<ClassId> = swarm.asked.iter().map(|(_, question)| first(&question.ask)).collect();
-    assert_eq!(asked.len(), 5, "{:?}", swarm.asked);
+    assert_eq!(asked_about(&swarm).len(), 5, "{:?}", swarm.asked);
 }
 
 #[test]
