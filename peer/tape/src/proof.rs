@@ -85,7 +85,7 @@ impl Proof {
         for (class, (recorded, drawn)) in recorded.iter().zip(probabilities).enumerate() {
             same.bits(&format!("the probability of class {class}"), *recorded, *drawn)?;
         }
-        let confidence = drawn.fusion.as_ref().map_or(0.0, |fusion| fusion.probabilities[fusion.top.index()]);
+        let confidence = drawn.fusion.as_ref().map_or(0.0, |fusion| fusion.greatest());
         same.bits("the confidence", decision.confidence, confidence)?;
         same.check("the number of votes counted", "", certificate.votes.len(), drawn.counted.len())?;
         for (recorded, drawn) in certificate.votes.iter().zip(&drawn.counted) {

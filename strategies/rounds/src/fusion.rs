@@ -23,7 +23,11 @@ pub struct Fusion {
 
 impl Fusion {
     /// The probability of the likeliest class.
-    pub(crate) fn greatest(&self) -> f64 {
+    ///
+    /// # Panics
+    /// If [`top`](Self::top) is the place of no class.
+    #[must_use]
+    pub fn greatest(&self) -> f64 {
         self.probabilities[self.top.index()]
     }
 

@@ -66,7 +66,7 @@ fn decision(evidence: &[Vec<f32>], rule: &dyn Fuse) -> Decision {
     Decision {
         round,
         class: Some(fusion.top),
-        confidence: fusion.probabilities[fusion.top.index()],
+        confidence: fusion.greatest(),
         author: RobotId(0),
         is_final: false,
         certificate: Certificate {

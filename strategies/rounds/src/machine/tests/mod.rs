@@ -151,9 +151,8 @@ fn decided(round: RoundId, class: Option<u32>, votes: Vec<CountedVote>, author: 
     let rows = votes.iter().map(|counted| counted.vote.evidence.as_slice());
     let RoundsConfig { rule, clip, .. } = adding_up();
     let fused = fuse(rule, clip, 3, rows);
-    let (probabilities, confidence) = fused.map_or((Vec::new(), 0.0), |fused| {
-        (fused.probabilities.clone(), fused.probabilities[fused.top.index()])
-    });
+    let (probabilities, confidence) =
+        fused.map_or((Vec::new(), 0.0), |fused| (fused.probabilities.clone(), fused.greatest()));
     let robots = votes.len() as u32;
     Decision {
         round,
