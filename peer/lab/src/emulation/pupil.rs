@@ -12,6 +12,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::school::School;
 
+/// How often one robot holds a vector that is to be trained on: among its samples, and in what is due.
+const ITS_OWN: usize = 2;
+
 /// One robot that learns: its disk outlives it.
 #[derive(Debug, Default)]
 pub(super) struct Pupil {
@@ -99,9 +102,6 @@ impl Pupil {
 
     /// Gets ready to learn anew, from the samples that its mind holds.
     fn gather(&mut self, mind: Option<&Mind>, school: &School) {
-        let samples = mind.and_then(Mind::training_set).into_iter().flat_map(|set| set.iter());
-        // Of a shared sample all robots hold one vector: its kernel with the others is worked out once for all of them.
-        samples.filter(|sample| sample.id.is_some()).for_each(|sample| school.kernel().hold(&sample.vector));
         self.due = mind.map_or(Vec::new(), Mind::training);
         let mut learner = new_learner(school);
         learner.make_room(self.due.iter().filter_map(|change| match change {
@@ -132,10 +132,21 @@ impl Pupil {
 
     /// Whether it has anything to learn; gets ready to.
     pub fn prepare(&mut self, mind: Option<&Mind>, school: &School) -> bool {
-        if self.is_behind && self.learner.is_none() {
+        if !self.is_behind {
+            return false;
+        }
+        if self.learner.is_none() {
             self.gather(mind, school);
         }
-        self.is_behind
+        // Of a shared sample all robots hold one vector: its kernel with the others is worked out once for all of them.
+        for change in &self.due {
+            if let TrainingChange::Insert { vector, .. } = change
+                && Arc::strong_count(vector) > ITS_OWN
+            {
+                school.kernel().hold(vector);
+            }
+        }
+        true
     }
 
     /// Brings the classifier up to date, once it is [prepared](Self::prepare).
