@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::decision::{Certificate, Decision};
+use crate::decode::DecodeError;
 use crate::id::{ClassId, RobotId, RoundId, Stamp};
+use crate::naming::MAX_TITLE;
 use crate::signature::Signature;
 
 /// A decision as a robot announces it for the swarm: the JSON on `decision`.
@@ -40,6 +42,34 @@ struct Spelt {
     announcer: RobotId,
     stamp: Stamp,
     signature: Option<Signature>,
+}
+
+impl Announcement {
+    /// Whether it is one that a robot may make.
+    ///
+    /// # Errors
+    /// [`DecodeError::Impossible`] names what is wrong.
+    pub fn check(&self) -> Result<(), DecodeError> {
+        check(&self.decision, self.label.as_deref())
+    }
+}
+
+impl Announced {
+    /// As [`Announcement::check`].
+    ///
+    /// # Errors
+    /// [`DecodeError::Impossible`] names what is wrong.
+    pub fn check(&self) -> Result<(), DecodeError> {
+        check(&self.decision, self.label.as_deref())
+    }
+}
+
+/// A label of any length would make of a lie what is too long to be evidence.
+fn check(decision: &Decision, label: Option<&str>) -> Result<(), DecodeError> {
+    if label.is_some_and(|label| label.len() > MAX_TITLE) {
+        return Err(DecodeError::Impossible("a label of no gesture: at most 99 bytes"));
+    }
+    decision.check()
 }
 
 impl From<Spelt> for Announcement {

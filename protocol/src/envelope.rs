@@ -142,7 +142,7 @@ impl Message {
                 give.holders.iter().try_for_each(|holder| holder.holding.check())
             }
             Self::Holding(holding) => holding.check(),
-            Self::Announced(announced) => announced.decision.check(),
+            Self::Announced(announced) => announced.check(),
             Self::Namings(namings) => namings.check(),
             Self::Asked(asked) => asked.check(),
         }

@@ -51,6 +51,11 @@ impl FromStr for RobotId {
 #[serde(try_from = "String", into = "String")]
 pub struct InstructorId(String);
 
+impl InstructorId {
+    /// The most characters of one.
+    pub const MAX_LENGTH: usize = 32;
+}
+
 impl fmt::Display for InstructorId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
@@ -61,7 +66,7 @@ impl FromStr for InstructorId {
     type Err = IdError;
 
     fn from_str(text: &str) -> Result<Self, IdError> {
-        let fits = (1..=32).contains(&text.len())
+        let fits = (1..=Self::MAX_LENGTH).contains(&text.len())
             && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
         if fits { Ok(Self(text.to_owned())) } else { Err(IdError::NotAName(text.chars().take(40).collect())) }
     }

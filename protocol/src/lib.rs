@@ -57,7 +57,7 @@ pub use key::{Keys, SwarmNameError, Topic};
 pub use lesson::{Lesson, MAX_ATTACHMENT, MAX_LESSONS, MAX_WORD, SignedWord, Word};
 pub use limits::{MAX_ALLOCATION, MAX_CLASSES, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, PROTOCOL_VERSION};
 pub use message::{Give, Have, Message};
-pub use naming::{Fate, MAX_LABEL, MAX_NAMED, Naming, Namings};
+pub use naming::{Fate, MAX_LABEL, MAX_NAMED, MAX_TITLE, Naming, Namings};
 pub use pool::Pool;
 pub use question::{Ask, Asked, Question};
 pub use round_outcome::{Reason, RoundOutcome};

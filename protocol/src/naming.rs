@@ -13,6 +13,9 @@ pub const MAX_NAMED: usize = 256;
 /// The longest label, in bytes.
 pub const MAX_LABEL: usize = 64;
 
+/// The most bytes of what a gesture is called: its label, and where another has the same, in brackets who named it.
+pub const MAX_TITLE: usize = MAX_LABEL + " ()".len() + InstructorId::MAX_LENGTH;
+
 /// A gesture that somebody named, and what was said of it last. Nothing of it is ever taken out: what was retired can be restored.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Naming {

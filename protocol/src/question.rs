@@ -7,13 +7,11 @@ use serde::{Deserialize, Serialize};
 use crate::bounded;
 use crate::decode::DecodeError;
 use crate::id::{ClassId, RobotId, RoundId, Stamp};
+use crate::naming::MAX_TITLE;
 use crate::signature::Signature;
 
 /// The most gestures that a question names.
 const MAX_NAMED: usize = 2;
-
-/// The longest name of a gesture in a question, in bytes: that of a label.
-const MAX_LABEL: usize = 64;
 
 /// More nats than this no distribution over the largest vocabulary has.
 const MAX_NATS: f64 = 8.0;
@@ -239,8 +237,8 @@ fn check(ask: &Ask, labels: &[String], nats: [f64; 2]) -> Result<(), DecodeError
     if !(labels.is_empty() || labels.len() == named.len()) {
         return Err(DecodeError::Impossible("other labels than of the gestures in question"));
     }
-    if !labels.iter().all(|label| (1..=MAX_LABEL).contains(&label.len())) {
-        return Err(DecodeError::Impossible("a label of no gesture: 1 to 64 bytes"));
+    if !labels.iter().all(|label| (1..=MAX_TITLE).contains(&label.len())) {
+        return Err(DecodeError::Impossible("a label of no gesture: 1 to 99 bytes"));
     }
     if !nats.iter().all(|nats| (0.0..=MAX_NATS).contains(nats)) {
         return Err(DecodeError::Impossible("nats that no distribution has"));
@@ -284,8 +282,11 @@ mod tests {
         let between = Ask::Between { classes: [ClassId(2), ClassId(3)] };
         let good = question(between, &["two", "three"]);
         assert_eq!(good.check(), Ok(()));
+        // Two who named gestures alike.
+        let title = format!("{} ({})", "x".repeat(64), "i".repeat(32));
+        assert_eq!(question(between, &["two", &title]).check(), Ok(()));
         let itself = Ask::Between { classes: [ClassId(2), ClassId(2)] };
-        let long = "x".repeat(65);
+        let long = "x".repeat(MAX_TITLE + 1);
         for bad in [
             question(itself, &[]),
             question(between, &["two"]),

@@ -1,12 +1,12 @@
 //! Reading is total and bounded: any bytes give a value or a typed error.
 
 use gestalt_protocol::{
-    Announced, Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest, Envelope,
-    FeatureSpaceId, FusionRule, Give, Have, HeldBatch, HeldVote, Holder, Holding, Instruction, Know, Known,
-    Lesson, Lessons, MAX_ALLOCATION, MAX_ATTACHMENT, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON, MAX_MESSAGE,
-    MAX_ROBOTS, MAX_SAMPLES, MAX_WORD, Message, PROTOCOL_VERSION, Rank, RobotId, RoundId, SampleId,
-    SampleSeries, Samples, SharedSample, SignedWord, Stamp, Terms, Vector, VocabularyId, Vote, Word,
-    decode_json,
+    Announced, Announcement, Batches, Certificate, ClassId, CountedVote, Decision, DecodeError, Digest,
+    Envelope, FeatureSpaceId, FusionRule, Give, Have, HeldBatch, HeldVote, Holder, Holding, Instruction,
+    Know, Known, Lesson, Lessons, MAX_ALLOCATION, MAX_ATTACHMENT, MAX_CLASSES, MAX_COMPONENTS, MAX_JSON,
+    MAX_MESSAGE, MAX_ROBOTS, MAX_SAMPLES, MAX_TITLE, MAX_WORD, Message, PROTOCOL_VERSION, Rank, RobotId,
+    RoundId, SampleId, SampleSeries, Samples, SharedSample, SignedWord, Stamp, Terms, Vector, VocabularyId,
+    Vote, Word, decode_json,
 };
 use proptest::prelude::*;
 
@@ -143,8 +143,8 @@ fn message() -> impl Strategy<Value = Message> {
         votes,
         holders,
     });
-    let announced =
-        (decision(), any::<Option<String>>()).prop_map(|(decision, label)| Announced { decision, label });
+    let announced = (decision(), prop::option::of("[a-zäöü() ]{0,40}"))
+        .prop_map(|(decision, label)| Announced { decision, label });
     prop_oneof![
         decision().prop_map(|held| Message::Holding(held.holding(held.is_final))),
         announced.prop_map(Message::Announced),
@@ -538,6 +538,20 @@ fn a_decision_that_contradicts_itself_is_refused() {
     assert!(broken(&|d| d.certificate.votes[0].vote.evidence.push(0.0)).contains("other classes"));
     assert!(broken(&|d| d.certificate.votes[0].vote.evidence[0] = f32::NAN).contains("not finite"));
     assert!(broken(&|d| d.certificate.others[0].vote.looks = -1.0).contains("looks"));
+
+    // The longest that a gesture is called, and a byte more.
+    for (length, is_one) in [(MAX_TITLE, true), (MAX_TITLE + 1, false)] {
+        let said = Announced { decision: sound.clone(), label: Some("x".repeat(length)) };
+        let envelope = Envelope {
+            author: RobotId(1),
+            stamp: Stamp::default(),
+            message: Message::Announced(said.clone()),
+            signature: None,
+        };
+        assert_eq!(said.check().is_ok(), is_one);
+        assert_eq!(Announcement::of(envelope.clone()).unwrap().check().is_ok(), is_one);
+        assert_eq!(Envelope::decode(&envelope.encode()).is_ok(), is_one);
+    }
 }
 
 /// The bytes that one value takes on the wire, at least.

@@ -119,10 +119,19 @@ impl LessonBook {
         standing: Option<Standing>,
         lived: impl Fn(RoundId) -> bool,
     ) -> (LessonReceipt, Option<RoundId>) {
-        let highest = match self.highest_count([lesson.round]) {
-            0 => FIRST_COUNT,
-            known => known.saturating_add(COUNT_LEAP),
-        };
+        let known = self.highest_count([lesson.round]);
+        self.hear_after(known, lesson, standing, lived)
+    }
+
+    /// The same where the highest count known is not that of its round by this name alone.
+    pub(crate) fn hear_after(
+        &mut self,
+        known: u64,
+        lesson: &Lesson,
+        standing: Option<Standing>,
+        lived: impl Fn(RoundId) -> bool,
+    ) -> (LessonReceipt, Option<RoundId>) {
+        let highest = if known == 0 { FIRST_COUNT } else { known.saturating_add(COUNT_LEAP) };
         if standing.is_none() && lesson.count > highest {
             return (LessonReceipt::FarAhead, None);
         }

@@ -185,7 +185,7 @@ impl PortableMind {
             }
             Topic::Decision => {
                 let announcement: Announcement = decode_json(payload).map_err(refused)?;
-                announcement.decision.check().map_err(refused)?;
+                announcement.check().map_err(refused)?;
                 Input::Announced(announcement)
             }
             Topic::Question => {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::{DecodeError, InstructorId, Reported, RobotId, Status};
+use gestalt_protocol::{DecodeError, InstructorId, MAX_ROBOTS, Reported, RobotId, Status};
 use gestalt_strategies::Vocabulary;
 use gestalt_trust::{Distrust, EvidenceError, Lie, RosterError};
 
@@ -150,6 +150,8 @@ pub(super) enum Refusal {
     Kind,
     #[error("the queue is full; neighbours will repeat what matters")]
     Full,
+    #[error("as many robots are there already as a swarm has at most: {MAX_ROBOTS}")]
+    Crowd,
     #[error("another robot of the swarm has this robot's id: give each its own, then restart one")]
     Twin,
     #[error(transparent)]
@@ -184,6 +186,7 @@ impl Refusal {
             Self::Author => "author",
             Self::Kind => "kind",
             Self::Full => "full",
+            Self::Crowd => "too_many",
             Self::Twin => "twin",
             Self::Evidence(_) => "false",
             Self::Roster(RosterError::Older { .. }) => "older",

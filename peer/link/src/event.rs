@@ -22,7 +22,7 @@ pub enum Event {
     Closed(RoundId),
     /// It now holds that decision.
     Held(Decision),
-    /// That decision was announced for the swarm, by this robot or another.
+    /// That decision was announced for the swarm, by this robot, or by another and this one found nothing against it.
     Announced(Announcement),
     /// That was asked in the name of the swarm, by this robot or another.
     Asked(Question),

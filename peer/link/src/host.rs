@@ -89,8 +89,13 @@ impl Host {
     }
 
     fn step(&mut self, input: Input) {
-        if let Some(input) = self.note(input) {
-            self.take_in(input);
+        let Some(input) = self.note(input) else { return };
+        let announced =
+            if let Input::Announced(announcement) = &input { Some(announcement.clone()) } else { None };
+        self.take_in(input);
+        // Whoever acts on it is told of none that this robot refuses.
+        if let Some(announcement) = announced.filter(|_| self.mind.announcement_stands()) {
+            self.effector.tell(Event::Announced(announcement));
         }
     }
 
@@ -137,7 +142,6 @@ impl Host {
                 self.effector.account.lock().neighbours = neighbours.iter().copied().collect();
                 self.effector.tell(Event::Neighbours(neighbours.clone()));
             }
-            Input::Announced(announcement) => self.effector.tell(Event::Announced(announcement.clone())),
             Input::Asked(question) => self.effector.tell(Event::Asked(question.clone())),
             Input::Learned(classifier) => {
                 let guarded = self.sight.guard(classifier.clone())?;

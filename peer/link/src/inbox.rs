@@ -33,7 +33,7 @@ use super::words::{Vouched, Words};
 pub(super) struct Inbox {
     pub(super) me: RobotId,
     pub(super) swarm: u32,
-    keys: Keys,
+    pub(super) keys: Keys,
     pub(super) account: Arc<Account>,
     state: Mutex<State>,
     /// In a sealed swarm: who lets in what its members said, what is done about its roster, and by which right instructors speak.
@@ -45,6 +45,8 @@ pub(super) struct Inbox {
     chance: Mutex<ChaCha8Rng>,
     pub(super) ready: Notify,
     checks: Checks,
+    /// Held while it is said who is believed from now on, before anything else is.
+    pub(super) expelling: Mutex<()>,
     pub(super) unrest: Notify,
     pub(super) lost_links: watch::Sender<u64>,
 }
@@ -110,6 +112,7 @@ impl Inbox {
             chance: Mutex::new(ChaCha8Rng::seed_from_u64(u64::from(me.0))),
             ready: Notify::new(),
             checks: Checks::default(),
+            expelling: Mutex::default(),
             unrest: Notify::new(),
             lost_links: watch::Sender::new(0),
         }
@@ -181,10 +184,14 @@ impl Inbox {
 
     /// Whatever arrives under a key of the swarm.
     pub(super) fn on_sample(&self, sample: &Sample) {
-        if sample.kind() != SampleKind::Put || self.is_lost() {
+        if self.is_lost() {
             return;
         }
         let key = sample.key_expr().as_str();
+        // Nothing that is said in a swarm can be deleted.
+        if sample.kind() != SampleKind::Put {
+            return self.account.refused("deletion", key, 0, &Refusal::Kind);
+        }
         let expulsions = self.lock().waiting.expulsions();
         let topic = self.keys.parse(key);
         // Whose word it is stands in the key of what a robot says to all.
@@ -315,7 +322,7 @@ impl Inbox {
 
     fn on_decision(&self, sample: &Sample, expulsions: u64) -> Result<(), Refusal> {
         let announcement: Announcement = decode_json(&payload(sample, MAX_JSON)?)?;
-        announcement.decision.check()?;
+        announcement.check()?;
         self.judged(|judge, now| judge.announcement(now, &announcement)).unwrap_or(Ok(()))?;
         self.queue(Input::Announced(announcement), sample, expulsions)
     }
@@ -377,57 +384,6 @@ impl Inbox {
         let mut state = self.lock();
         let expulsions = state.waiting.expulsions();
         state.waiting.add(input, sample.payload().len(), expulsions)
-    }
-
-    /// A robot's liveliness token came or went.
-    pub(super) fn on_liveliness(&self, sample: &Sample) {
-        let Some(Topic::Alive(id)) = self.keys.parse(sample.key_expr().as_str()) else {
-            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Key);
-        };
-        if self.is_stranger(id) {
-            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Distrust::Stranger.into());
-        }
-        let mut state = self.lock();
-        state.silence.changed(id);
-        let changed = match sample.kind() {
-            SampleKind::Put => state.alive.len() < MAX_ROBOTS && state.alive.insert(id),
-            SampleKind::Delete => {
-                state.silence.lost(Instant::now());
-                state.alive.remove(&id)
-            }
-        };
-        if changed {
-            // Whoever comes listens before it says that it is there.
-            if sample.kind() == SampleKind::Put {
-                self.judged(|judge, _| judge.tell_again());
-                self.ways.speaker(id);
-            }
-            state.alive_changed = true;
-            self.ready.notify_one();
-            self.unrest.notify_one();
-        }
-    }
-
-    /// Corrects who is alive: those who answered a census are, those who stayed away twice are not.
-    pub(super) fn on_census(&self, present: &BTreeSet<RobotId>, gone: &BTreeSet<RobotId>) {
-        let mut state = self.lock();
-        let before = state.alive.clone();
-        state.alive.retain(|id| !gone.contains(id));
-        for robot in present {
-            if state.alive.len() < MAX_ROBOTS && !self.is_stranger(*robot) && !state.silence.is_gone(*robot) {
-                state.alive.insert(*robot);
-            }
-        }
-        if state.alive != before {
-            self.account.count("census_corrections");
-            state.alive_changed = true;
-            self.ready.notify_one();
-        }
-    }
-
-    /// The robots alive by liveliness.
-    pub(super) fn tokens(&self) -> BTreeSet<RobotId> {
-        self.lock().alive.clone()
     }
 }
 

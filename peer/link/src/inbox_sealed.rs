@@ -202,6 +202,8 @@ impl Inbox {
 
     /// Nothing counts that these said, in the midst of a round; nor are they there, unless they are members under another key.
     fn expel(&self, gone: BTreeSet<RobotId>) {
+        // Of two threads with a roster each the one whose believer is older would otherwise come last.
+        let _in_turn = self.expelling.lock().unwrap_or_else(PoisonError::into_inner);
         // Before the state is held: whoever vouches for a word comes to that with the words held, which this asks for.
         let believer = self.believer();
         let mut state = self.lock();

@@ -36,6 +36,7 @@ mod hearing;
 mod host;
 mod identity;
 mod inbox;
+mod inbox_alive;
 mod inbox_links;
 mod inbox_question;
 mod inbox_sealed;

@@ -169,7 +169,7 @@ impl Listener {
     fn on_sample(&self, sample: &Sample) {
         let bytes = sample.payload().to_bytes();
         let heard = match self.keys.parse(sample.key_expr()) {
-            Some(Topic::Decision) => decode_json(&bytes).map(Heard::Decided),
+            Some(Topic::Decision) => decided(&bytes).map(Heard::Decided),
             Some(Topic::Question) => question(&bytes).map(Heard::Asked),
             Some(Topic::RobotDecision(robot)) => {
                 held(robot, &bytes).map(|holding| Heard::Held(robot, holding))
@@ -203,6 +203,13 @@ impl Listener {
             self.tell(heard);
         }
     }
+}
+
+/// What was announced, as it is claimed.
+fn decided(bytes: &[u8]) -> Result<Announcement, DecodeError> {
+    let announcement: Announcement = decode_json(bytes)?;
+    announcement.check()?;
+    Ok(announcement)
 }
 
 /// What is asked, as it is claimed.

@@ -192,7 +192,14 @@ impl Roll {
     /// Writes evidence to the folder beside the roster: a robot that starts again must not believe again who was convicted. Says whether it is there now.
     pub async fn keep_evidence(&self, evidence: Vec<(RobotId, Evidence)>) -> bool {
         let Some(folder) = self.convicted() else { return true };
-        let write = move || evidence.iter().try_for_each(|(robot, evidence)| evidence.keep(&folder, *robot));
+        // One that cannot be written keeps no other off the disk.
+        let write = move || {
+            let mut all = Ok(());
+            for (robot, evidence) in &evidence {
+                all = all.and(evidence.keep(&folder, *robot));
+            }
+            all
+        };
         self.write("who was convicted counts no more", "evidence_unkept", write).await
     }
 

@@ -33,7 +33,7 @@ pub fn view(topic: &Topic, payload: &[u8]) -> Result<Value, DecodeError> {
         Topic::RobotDecision(robot) => holding(*robot, payload)?,
         Topic::Decision => {
             let announced: Announcement = decode_json(payload)?;
-            announced.decision.check()?;
+            announced.check()?;
             let mut view = plain(&announced)?;
             // A rule of somebody's own is an object in JSON; a viewer wants one type.
             view["certificate"]["rule"] = json!(announced.decision.certificate.rule.name());

@@ -19,7 +19,7 @@ const TOO_LONG: u64 = Evidence::MAX_LENGTH as u64 + 1;
 pub struct KeptEvidence {
     /// What could be read, by the names of the files.
     pub evidence: Vec<Evidence>,
-    /// What the system did not let be read, with its reason.
+    /// What could not be read, as the system did not let it be or as it is no evidence, and what there was too much of, with the reason.
     pub unread: Vec<(PathBuf, io::Error)>,
 }
 
@@ -35,9 +35,8 @@ impl Evidence {
         gestalt_file::replace(&path, &self.encode())
     }
 
-    /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What cannot be read as evidence is passed over, and what it
-    /// proves today is found by [`Evidence::check`]: nothing against whoever has a new key. What the system does not let be read is passed over too,
-    /// and named, with its reason.
+    /// All evidence in that folder, none if there is no such folder; at most 16 MiB of it. What it proves today is found by [`Evidence::check`]: nothing against
+    /// whoever has a new key. What cannot be read, or read as evidence, is passed over and named, with its reason, as is what is beyond the 16 MiB.
     ///
     /// # Errors
     /// Those of the file system, where the folder cannot be read.
@@ -60,9 +59,15 @@ impl Evidence {
             };
             bytes += read.len();
             if bytes > KEPT_BYTES {
+                let much =
+                    "the evidence before it in that folder takes 16 MiB: move away what is no longer needed";
+                kept.unread.push((path, io::Error::other(much)));
                 break;
             }
-            kept.evidence.extend(Self::decode(&read));
+            match Self::decode(&read) {
+                Ok(evidence) => kept.evidence.push(evidence),
+                Err(error) => kept.unread.push((path, io::Error::other(error))),
+            }
         }
         Ok(kept)
     }
@@ -98,9 +103,16 @@ mod tests {
     }
 
     fn kept_in(folder: &Path) -> Vec<Evidence> {
-        let KeptEvidence { evidence: kept, unread } = Evidence::kept_in(folder).unwrap();
+        let (kept, unread) = kept_and_unread(folder);
         assert!(unread.is_empty(), "{unread:?}");
         kept
+    }
+
+    /// And the names of the files that are named.
+    fn kept_and_unread(folder: &Path) -> (Vec<Evidence>, Vec<String>) {
+        let KeptEvidence { evidence: kept, unread } = Evidence::kept_in(folder).unwrap();
+        let name = |(path, _): &(PathBuf, io::Error)| path.file_name().unwrap().to_str().unwrap().to_owned();
+        (kept, unread.iter().map(name).collect())
     }
 
     #[test]
@@ -154,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_evidence_is_passed_over_and_so_is_too_much() {
+    fn what_is_no_evidence_is_passed_over_and_named_and_so_is_too_much() {
         let folder = tempfile::tempdir().unwrap();
         evidence(1).keep(folder.path(), RobotId(1)).unwrap();
         let whole = fs::read(folder.path().join("robot-1.evidence")).unwrap();
@@ -162,19 +174,20 @@ mod tests {
         fs::write(folder.path().join("robot-2.evidence"), vec![2; Evidence::MAX_LENGTH + 9]).unwrap();
         // Left by a power cut.
         fs::write(folder.path().join("robot-3.evidence.77-0.new"), &whole).unwrap();
-        assert_eq!(kept_in(folder.path()), [evidence(1)]);
-        for name in ["robot-0.evidence", "robot-2.evidence"] {
-            fs::remove_file(folder.path().join(name)).unwrap();
-        }
+        let none = ["robot-0.evidence", "robot-2.evidence"];
+        assert_eq!(kept_and_unread(folder.path()), (vec![evidence(1)], none.map(str::to_owned).to_vec()));
+        none.iter().for_each(|name| fs::remove_file(folder.path().join(name)).unwrap());
         let before = |name: &str, length| {
             fs::write(folder.path().join(format!("robot-0{name}.evidence")), vec![2; length]).unwrap();
         };
         let room = KEPT_BYTES - whole.len();
         (0..room / Evidence::MAX_LENGTH).for_each(|n| before(&n.to_string(), Evidence::MAX_LENGTH));
         before("rest", room % Evidence::MAX_LENGTH);
-        assert_eq!(kept_in(folder.path()), [evidence(1)], "16 MiB, with what comes before it");
+        assert_eq!(kept_and_unread(folder.path()).0, [evidence(1)], "16 MiB, with what comes before it");
         before("rest", room % Evidence::MAX_LENGTH + 1);
-        assert_eq!(kept_in(folder.path()), [], "one byte more");
+        let (kept, unread) = kept_and_unread(folder.path());
+        assert_eq!(kept, [], "one byte more");
+        assert_eq!(unread.last().map(String::as_str), Some("robot-1.evidence"));
         assert!(Evidence::kept_in(&folder.path().join("robot-1.evidence")).is_err(), "no folder");
     }
 

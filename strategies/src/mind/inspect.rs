@@ -44,6 +44,12 @@ impl Mind {
         self.rounds.held()
     }
 
+    /// Whether what another robot announced last stands, see [`Rounds::announcement_stands`](gestalt_rounds::Rounds::announcement_stands).
+    #[must_use]
+    pub fn announcement_stands(&self) -> bool {
+        self.rounds.announcement_stands()
+    }
+
     /// What the gesture of a decision is called, see [`Rounds::label_of`](gestalt_rounds::Rounds::label_of).
     #[must_use]
     pub fn label_of(&self, decision: &Decision) -> Option<&str> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use gestalt_protocol::{Keys, RobotId, Topic};
+use gestalt_protocol::{Keys, MAX_ROBOTS, RobotId, Topic};
 
 use super::*;
 
@@ -36,4 +36,25 @@ async fn who_does_not_answer_is_not_alive_whatever_zenoh_says() {
     for robot in robots {
         robot.stop().await;
     }
+}
+
+/// What is no message, and more robots than there can be.
+#[tokio::test(flavor = "multi_thread")]
+async fn deletions_and_robots_beyond_all_that_a_swarm_has_are_refused_by_name() {
+    let name = unique();
+    let robot = start(config(1, &name, &[])).await;
+    let keys = Keys::new(&name).unwrap();
+    let link = LinkConfig { connect: robot.robot.locators().to_vec(), ..LinkConfig::default() };
+    let crowd = zenoh::open(link.client().unwrap()).await.unwrap();
+    crowd.delete(keys.key(&Topic::Vote(RobotId(2)))).await.unwrap();
+    robot.status("it is counted", |status| status.counters.contains_key("refused_deletion_kind")).await;
+    let mut tokens = Vec::new();
+    for id in 2..=MAX_ROBOTS as u32 + 1 {
+        tokens.push(crowd.liveliness().declare_token(keys.key(&Topic::Alive(RobotId(id)))).await.unwrap());
+    }
+    let refused = |status: &Status| status.counters.get("refused_alive_too_many") == Some(&1);
+    robot.status("one is too many, with this robot itself", refused).await;
+    assert!(robot.robot.status().errors.iter().any(|error| error.what.contains("at most")));
+    crowd.close().await.unwrap();
+    robot.stop().await;
 }

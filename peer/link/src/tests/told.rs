@@ -3,6 +3,8 @@
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
+use gestalt_protocol::{Announcement, Keys, Topic};
+
 use super::*;
 use crate::GuestConfig;
 
@@ -23,6 +25,40 @@ impl Classify for Slow {
         self.is_asked.store(true, Ordering::Relaxed);
         let _open = self.gate.lock().unwrap_or_else(PoisonError::into_inner);
         self.fixed.probabilities(features)
+    }
+}
+
+/// Whoever acts on what is announced acts on nothing that its robot refuses.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_announced_under_a_false_label_is_not_told() {
+    let name = unique();
+    let mut robots = swarm(&name, 2, config(1, &name, &[])).await;
+    robots[0].decide(0).await;
+    let is_announced = |event: &Event| match event {
+        Event::Announced(announcement) if announcement.decision.class.is_some() => Some(announcement.clone()),
+        _ => None,
+    };
+    let mut announced = Vec::new();
+    for watched in &mut robots {
+        announced.push(watched.event("it is announced", is_announced).await);
+    }
+    let [said, _] = &announced[..] else { unreachable!() };
+    assert!(announced.iter().all(|other| other.label == said.label), "each is told, by whichever of them");
+    let mut forged = Announcement { label: Some("left".to_owned()), announcer: RobotId(2), ..said.clone() };
+    forged.stamp.sequence += 1000;
+    assert_ne!(forged.label, said.label);
+    let link = LinkConfig { connect: robots[0].robot.locators().to_vec(), ..LinkConfig::default() };
+    let liar = zenoh::open(link.client().unwrap()).await.unwrap();
+    let key = Keys::new(&name).unwrap().key(&Topic::Decision);
+    liar.put(key, serde_json::to_string(&forged).unwrap()).await.unwrap();
+    let refused = |status: &Status| status.counters.contains_key("refused_decision_label");
+    robots[0].status("it is refused", refused).await;
+    while let Ok(event) = robots[0].events.try_recv() {
+        assert!(is_announced(&event).is_none_or(|told| told.label != forged.label), "{event:?}");
+    }
+    liar.close().await.unwrap();
+    for robot in robots {
+        robot.stop().await;
     }
 }
 

@@ -13,6 +13,7 @@ use crate::refusal::Refusal;
 impl Rounds {
     pub(super) fn on_announced(&mut self, announcement: Announcement, effects: &mut Effects<'_>) {
         let Announcement { decision, announcer, label, .. } = announcement;
+        self.announcement_stands = false;
         if !self.may_hear(&decision, announcer, false) {
             return;
         }
@@ -24,13 +25,21 @@ impl Rounds {
         // Who has no list of gestures announces without a label, and a liar may do so to keep it from all clients: who knows one still says it in its turn.
         let lacks_its_label = label.is_none() && self.label_of(&decision).is_some();
         // What nobody would decide, nobody announced.
-        if self.hear_decision(decision, announcer, effects) != Heard::Refused
-            && !lacks_its_label
+        self.announcement_stands =
+            self.hear_decision(decision, announcer, effects) != Heard::Refused && !lacks_its_label;
+        if self.announcement_stands
             && self.is_this_round(id)
             && let Some(round) = &mut self.round
         {
             round.agreement.note_announced(self.now, class, is_final);
         }
+    }
+
+    /// Whether what another robot [announced](crate::machine::Input::Announced) last stands: this robot found nothing against it, and it is no older than what it
+    /// is in. What does not is to be told to nobody who acts on it.
+    #[must_use]
+    pub fn announcement_stands(&self) -> bool {
+        self.announcement_stands
     }
 
     /// How long this robot leaves to those before it whatever one robot is to say for all: the live robot of the smallest

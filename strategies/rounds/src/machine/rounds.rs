@@ -132,6 +132,8 @@ pub struct Rounds {
     pub(super) began: (u32, Option<Duration>),
     /// Whether this robot has lived before, and has been in no round since from its beginning.
     pub(super) afresh: bool,
+    /// Whether what another robot announced last was one that this robot found nothing against.
+    pub(super) announcement_stands: bool,
     pub(super) electorate: Electorate,
     /// Who votes in the newest round, where not all do.
     pub(super) committee: Option<Committee>,
@@ -195,6 +197,7 @@ impl Rounds {
             counted_elsewhere: None,
             began: (0, None),
             afresh: false,
+            announcement_stands: false,
             electorate: Electorate::new(config.all_vote_up_to()),
             committee: None,
             wanted: None,

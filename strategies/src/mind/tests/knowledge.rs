@@ -1,6 +1,7 @@
 //! What all know together, whatever is lost or restarted.
 
 use super::*;
+use crate::lessons::LessonReceipt;
 
 #[test]
 fn what_half_of_a_line_learned_is_known_at_its_end_in_less_than_a_busy_period_a_robot() {
@@ -182,6 +183,28 @@ fn what_is_said_of_a_round_holds_for_all_its_names() {
     assert_eq!(swarm.outcome(at), Outcome::Learned, "of what is held under the other name");
     assert_eq!(swarm.count(4), [0; 3]);
     assert!(swarm.count(5).iter().all(|n| *n > 3));
+}
+
+#[test]
+fn a_word_that_counts_far_under_one_name_of_a_round_is_corrected_under_another() {
+    let (mut swarm, alias, round) = merged(3, 13);
+    (0..3).for_each(|_| swarm.look());
+    let forged = Lesson {
+        round: alias,
+        instructor: "eve".parse().unwrap(),
+        count: u64::MAX / 2,
+        at: 1,
+        word: Word::Was(ClassId(5)),
+        said: None,
+    };
+    for i in 0..3 {
+        let learning = swarm.minds[i].learning.as_mut().unwrap();
+        assert_eq!(learning.hear(&forged), LessonReceipt::New);
+    }
+    let at = swarm.was(round, 4);
+    assert_eq!(swarm.outcome(at), Outcome::Learned);
+    assert_eq!(swarm.count(5), [0; 3]);
+    assert!(swarm.count(4).iter().all(|n| *n > 0));
 }
 
 #[test]

@@ -222,7 +222,7 @@ impl Port {
 
     fn on_decision(&mut self, now: Duration, bytes: &[u8]) -> Result<Option<Input>, Refusal> {
         let announcement: Announcement = json(bytes)?;
-        announcement.decision.check()?;
+        announcement.check()?;
         if let Some(judge) = &mut self.judge {
             judge.announcement(now, &announcement)?;
         }

@@ -126,7 +126,7 @@ impl Inbox {
             }
             Topic::Decision => {
                 let mut announcement: Announcement = bounded(payload, || decode_json(payload)).ok()?;
-                announcement.decision.check().ok()?;
+                announcement.check().ok()?;
                 if seal {
                     swarm::seal_decision(&mut announcement.decision, 0xff);
                     swarm::seal_announcement(&mut announcement);

@@ -20,7 +20,7 @@ pub fn run(bytes: &[u8]) {
         survives(&answer);
     }
     if let Ok(announcement) = bounded(bytes, || decode_json::<Announcement>(bytes))
-        && announcement.decision.check().is_ok()
+        && announcement.check().is_ok()
     {
         survives(&announcement);
         // Who signed it signed the same bytes.

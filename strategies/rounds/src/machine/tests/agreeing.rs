@@ -59,6 +59,7 @@ fn a_decision_under_a_false_label_or_without_its_own_was_not_announced() {
         let label = label.map(str::to_owned);
         mind.handle(ms(100), Input::Announced(Announcement { label, ..said }));
         let refused = mind.refusals().count(Refusal::Label);
+        let stands = mind.announcement_stands();
         let all = live(&mut mind, ms(20_000));
         let said = all.iter().find_map(|(_, output)| match output {
             Output::Announce(said) => Some(said.label.clone()),
@@ -66,16 +67,16 @@ fn a_decision_under_a_false_label_or_without_its_own_was_not_announced() {
         });
         // It is taken in all the same: what nobody lies about is held.
         assert_eq!(mind.held().map(|held| held.class), Some(Some(ClassId(0))));
-        (refused, said)
+        (refused, stands, said)
     };
-    assert_eq!(announces_at(mind(9), Some("one")), (0, None));
+    assert_eq!(announces_at(mind(9), Some("one")), (0, true, None));
     let own = Some(Some("one".to_owned()));
     for false_label in ["two", "stop", "", "one (ana)"] {
-        assert_eq!(announces_at(mind(9), Some(false_label)), (1, own.clone()), "{false_label}");
+        assert_eq!(announces_at(mind(9), Some(false_label)), (1, false, own.clone()), "{false_label}");
     }
     // Whoever has no list of gestures is no liar; but who knows the label says it.
-    assert_eq!(announces_at(mind(9), None), (0, own));
-    assert_eq!(announces_at(blind(9), None), (0, None), "nor does this one know it");
+    assert_eq!(announces_at(mind(9), None), (0, false, own));
+    assert_eq!(announces_at(blind(9), None), (0, true, None), "nor does this one know it");
 }
 
 #[test]

@@ -250,7 +250,7 @@ impl World {
                 Err(_) => return,
             },
             Said::Announced(announcement) => {
-                let sound = announcement.decision.check().is_ok();
+                let sound = announcement.check().is_ok();
                 if !sound || gate.announcement(self.now, &announcement).is_err() {
                     return;
                 }
