@@ -1,5 +1,6 @@
 //! What an experiment is made from, beside its file.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -34,10 +35,22 @@ impl Materials {
     /// That what robots see was not taught to the model that they start from.
     ///
     /// # Errors
-    /// [`ExperimentError::Dataset`] where both are one folder, or one is not there.
+    /// [`ExperimentError::Dataset`] where both are one folder, or one is not there; [`ExperimentError::Setting`] where pictures of one are copies of pictures
+    /// of the other; [`ExperimentError::Read`].
     pub fn check(&self) -> Result<(), ExperimentError> {
         let folders: Vec<PathBuf> = [&self.dataset, &self.start].into_iter().flatten().cloned().collect();
-        Ok(each_once(&folders)?)
+        each_once(&folders)?;
+        let [seen, taught] = &folders[..] else { return Ok(()) };
+        let known: BTreeSet<u64> = pictures(taught)?.into_iter().map(|(_, content)| content).collect();
+        let common = pictures(seen)?.iter().filter(|(_, content)| known.contains(content)).count();
+        if common == 0 {
+            return Ok(());
+        }
+        Err(ExperimentError::Setting(format!(
+            "{common} pictures of {} are in {} too, byte for byte, and robots would be judged by what they start from: take them out of one of the two",
+            seen.display(),
+            taught.display()
+        )))
     }
 
     /// What is in the folders now.
@@ -45,27 +58,37 @@ impl Materials {
     /// # Errors
     /// [`ExperimentError::Read`].
     pub fn contents(&self) -> Result<Contents, ExperimentError> {
-        let of = |folder: &Option<PathBuf>| folder.as_deref().map(pictures).transpose();
+        let of = |folder: &Option<PathBuf>| folder.as_deref().map(checksum).transpose();
         Ok(Contents { dataset: of(&self.dataset)?, start: of(&self.start)? })
     }
 }
 
-/// All pictures of a dataset's folders, whether or not their gestures are shown.
-fn pictures(folder: &Path) -> Result<u32, ExperimentError> {
+/// Of the names and bytes of all pictures of a dataset's folders.
+fn checksum(folder: &Path) -> Result<u32, ExperimentError> {
     let mut all = crc32fast::Hasher::new();
+    for (path, content) in pictures(folder)? {
+        // No file name has a zero in it.
+        all.update(path.strip_prefix(folder).unwrap_or(&path).as_os_str().as_encoded_bytes());
+        all.update(&[0]);
+        all.update(&content.to_le_bytes());
+    }
+    Ok(all.finalize())
+}
+
+/// All pictures of a dataset's folders, whether or not their gestures are shown, and what tells their bytes from others.
+fn pictures(folder: &Path) -> Result<Vec<(PathBuf, u64)>, ExperimentError> {
+    let mut all = Vec::new();
     let gestures = entries(folder)?.into_iter().filter(|path| path.is_dir());
     for gesture in gestures {
         for path in entries(&gesture)?.into_iter().filter(|path| has_image_name(path)) {
-            // No file name has a zero in it.
-            all.update(path.strip_prefix(folder).unwrap_or(&path).as_os_str().as_encoded_bytes());
-            all.update(&[0]);
             let image = LabelledImage { path, class: ClassId(0), person: None };
             let content = image.fingerprint();
-            let content = content.map_err(|source| ExperimentError::Read { path: image.path, source })?;
-            all.update(&content.to_le_bytes());
+            let content =
+                content.map_err(|source| ExperimentError::Read { path: image.path.clone(), source })?;
+            all.push((image.path, content));
         }
     }
-    Ok(all.finalize())
+    Ok(all)
 }
 
 /// What is in a folder, by name.
@@ -90,7 +113,17 @@ mod tests {
         fs::create_dir(&other).unwrap();
         let of = |dataset: Option<PathBuf>, start: Option<PathBuf>| Materials { dataset, start }.check();
         assert!(of(Some(one.clone()), Some(one.join("../one"))).is_err());
-        assert!(of(Some(one.clone()), Some(other)).is_ok());
+        assert!(of(Some(one.clone()), Some(other.clone())).is_ok());
+        let write = |set: &Path, name: &str, bytes: &str| {
+            fs::create_dir_all(set.join("1")).unwrap();
+            fs::write(set.join("1").join(name), bytes).unwrap();
+        };
+        write(&one, "a.png", "a hand");
+        write(&other, "b.png", "another");
+        assert!(of(Some(one.clone()), Some(other.clone())).is_ok());
+        write(&other, "c.png", "a hand");
+        let refused = of(Some(one.clone()), Some(other)).unwrap_err().to_string();
+        assert!(refused.contains("1 pictures"), "{refused}");
         assert!(of(Some(one.clone()), None).is_ok() && of(None, Some(one)).is_ok() && of(None, None).is_ok());
     }
 

@@ -16,7 +16,7 @@ use super::error::ExperimentError;
 use super::plan::{Experiment, Hands};
 use super::setting::Drift;
 use gestalt_vision::camera_model::CameraModel;
-use gestalt_vision::dataset::Dataset;
+use gestalt_vision::dataset::{Dataset, leave_out_copies};
 use gestalt_vision::model::{self, ModelError};
 use gestalt_vision::perception::{FeatureSet, HandConfig, Perception};
 use gestalt_vision::pose::Pose;
@@ -191,6 +191,8 @@ fn pictured(hands: &Hands, drift: Drift, folder: &Path) -> Result<(Vec<String>, 
     // Counts of fingers where there are any, as of the rendered hands; else whatever there is.
     let counts: Vec<String> = fingers.into_iter().filter(|label| folder.join(label).is_dir()).collect();
     let mut dataset = Dataset::list(folder, (counts.len() > 1).then_some(&counts[..]))?;
+    // A copy would be taught by one name and judged by the other.
+    leave_out_copies(std::slice::from_mut(&mut dataset));
     if hands.features == FeatureSet::Embedding {
         // What the eyes were made with is no test of what they see.
         dataset.images = model::hands().map_err(ModelError::from)?.origin.unseen(dataset.images);
