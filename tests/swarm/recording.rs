@@ -131,6 +131,8 @@ pub async fn a_run_with_faults_is_recorded_whole_proven_and_counted_otherwise() 
         vec!["--rule", "majority,mean_probability,log_pool,confidence_weighted,correlated_pool", "--quorum"];
     let quorums = QUORUMS.join(",");
     words.push(&quorums);
+    let (_, content) = replay(&file, &["--quorum", "0", "--sweep", "alpha"]);
+    assert!(!content, "what is asked for by name is no combination to be left out");
     let began = Instant::now();
     let (told, content) = replay(&file, &words);
     let took = began.elapsed();

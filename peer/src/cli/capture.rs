@@ -64,7 +64,7 @@ pub struct Args {
 /// The quality of the JPEG files.
 const QUALITY: i32 = 95;
 
-/// For how long, and for how many pictures, none may be worth keeping before it is given up.
+/// For how long none of a camera's may be worth keeping before it is given up, and how many that are drawn: files end by themselves.
 const PATIENCE: Duration = Duration::from_secs(60);
 const MOST_IN_VAIN: u32 = 500;
 
@@ -206,7 +206,12 @@ impl Session<'_> {
                     break;
                 }
             }
-            if in_vain >= MOST_IN_VAIN || matches!(feed, Feed::Live(..)) && since.elapsed() > PATIENCE {
+            let is_in_vain = match (&*feed, &self.args.source) {
+                (Feed::Live(..), _) => since.elapsed() > PATIENCE,
+                (_, SourceArg::Rendered(_)) => in_vain >= MOST_IN_VAIN,
+                _ => false,
+            };
+            if is_in_vain {
                 eprintln!("note: no picture was worth keeping for a while; it is given up");
                 break;
             }

@@ -36,7 +36,7 @@ pub struct Args {
     /// Number of seeds, from 0 [default: as in the file]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     seeds: Option<u32>,
-    /// Print JSON Lines instead of the table, one object per fusion rule
+    /// Print JSON Lines instead of the table of a scenario, one object per fusion rule
     #[arg(long)]
     json: bool,
     /// Write a trace of seed 0 to this file (JSON Lines)
@@ -138,6 +138,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 #[cfg(feature = "opencv")]
 fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
+    if args.json {
+        return Err("--json is of a scenario: an experiment leaves its rows in --out (results.csv)".into());
+    }
     let path = &args.scenario;
     let text =
         std::fs::read_to_string(path).map_err(|source| EmulateError::Read { path: path.clone(), source })?;
@@ -151,6 +154,13 @@ fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
         bar.set_position(done as u64);
     };
     let table = if Recognition::is_one(&text) {
+        if args.dataset.is_some() || args.start_dataset.is_some() {
+            return Err(format!(
+                "{} is about drawn hands alone: leave out --dataset and --start-dataset, or see configs/experiments/ for others",
+                path.display()
+            )
+            .into());
+        }
         recognition::conduct((&text, path), folder, args.seeds, report)?
     } else if Experiment::is_one(&text) {
         let materials = Materials { dataset: args.dataset.clone(), start: args.start_dataset.clone() };

@@ -121,8 +121,9 @@ impl Lesson<'_> {
         let (lines, mut keyboard) = mpsc::channel(16);
         // Reading from a terminal cannot be broken off, so it has a thread that ends with the program.
         std::thread::spawn(move || {
-            for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-                if lines.blocking_send(line).is_err() {
+            // Of a line in another encoding the words can be read that are in this one.
+            for line in std::io::stdin().lock().split(b'\n').map_while(Result::ok) {
+                if lines.blocking_send(String::from_utf8_lossy(&line).into_owned()).is_err() {
                     break;
                 }
             }

@@ -225,7 +225,8 @@ fn learn(
         .into());
     }
 
-    mirror::vary(args, vocabulary, std::slice::from_mut(&mut survey), perception);
+    let mirror = mirror::are_mirrored(args, vocabulary, &[&survey], perception);
+    mirror::vary(args, mirror, std::slice::from_mut(&mut survey), perception);
 
     let started = Instant::now();
     let trained = fit(args, vocabulary, &lessons(&[&survey]))?;

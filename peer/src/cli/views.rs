@@ -1,7 +1,6 @@
 //! `gestalt views`: what a camera sees of drawn hands from many places, for simulators without a renderer.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -83,9 +82,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             args.out.display()
         )
     };
-    let file = std::fs::File::create(&args.out).map_err(unwritable)?;
-    let mut file = std::io::BufWriter::new(file);
-    file.write_all(heading(features).as_bytes()).map_err(unwritable)?;
+    gestalt_file::check(&args.out).map_err(unwritable)?;
+    let mut table = heading(features);
     let (mut chance, mut found) = (ChaCha8Rng::seed_from_u64(args.seed), 0);
     let shown = progress::bar("views", views);
     for hand in 0..args.hands {
@@ -93,12 +91,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let place =
                 Place { hand, pose: *pose, camera: model.specimen(&mut chance), seed: chance.random() };
             let (lines, hands) = place.look(features, args)?;
-            file.write_all(lines.as_bytes()).map_err(unwritable)?;
+            table.push_str(&lines);
             found += hands;
             shown.inc(per_place as u64);
         }
     }
-    file.flush().map_err(unwritable)?;
+    gestalt_file::write(&args.out, table.as_bytes()).map_err(unwritable)?;
     shown.finish_and_clear();
     let (set, out) = (features.name(), args.out.display());
     say(&format!("{views} views, a hand found in {found}, features: {set} → {out}\n"))

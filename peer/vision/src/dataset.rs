@@ -292,7 +292,9 @@ fn number_people_through(sets: &mut [Dataset]) {
 
 /// NNN of a file name `sNNN_…`.
 fn person(path: &Path) -> Option<u32> {
-    let (prefix, _) = path.file_name()?.to_str()?.split_once('_')?;
-    let digits = prefix.strip_prefix('s')?;
-    digits.bytes().all(|b| b.is_ascii_digit()).then(|| digits.parse().ok())?
+    // What follows may be in any encoding.
+    let name = path.file_name()?.as_encoded_bytes();
+    let digits = name.split(|byte| *byte == b'_').next()?.strip_prefix(b"s")?;
+    let is_number = digits.len() + 1 < name.len() && digits.iter().all(u8::is_ascii_digit);
+    is_number.then(|| std::str::from_utf8(digits).ok()?.parse().ok())?
 }

@@ -52,8 +52,8 @@ pub(super) struct Variant {
     pub config: MindConfig,
 }
 
-/// All combinations of what is asked for. What a sweep comes by that no robot could be configured to is left out; what is asked for by
-/// name is an error.
+/// All combinations of what is asked for. Those that no robot could be configured to are left out of a sweep; a value that was asked for by name is an error
+/// where nothing is left of it.
 pub(super) fn variants(args: &Args, run: &Run, was: &MindConfig) -> Result<Vec<Variant>, Failure> {
     let robots = run.robots();
     let n = u32::try_from(robots.len()).unwrap_or(u32::MAX);
@@ -79,7 +79,7 @@ pub(super) fn variants(args: &Args, run: &Run, was: &MindConfig) -> Result<Vec<V
     if count > MOST {
         return Err(format!("{count} combinations, at most {MOST} are counted at once: sweep less").into());
     }
-    let mut variants = Vec::with_capacity(count);
+    let (mut variants, mut refused) = (Vec::with_capacity(count), Vec::new());
     for rule in &rules {
         for quorum in &quorums {
             for alpha in &alphas {
@@ -91,8 +91,7 @@ pub(super) fn variants(args: &Args, run: &Run, was: &MindConfig) -> Result<Vec<V
                             let what = WhatIf { rule, quorum, alpha, liars, without, until };
                             match what.config(was) {
                                 Ok(config) => variants.push(Variant { what, config }),
-                                Err(_) if !args.sweep.is_empty() => {}
-                                Err(error) => return Err(format!("{what}: {error}").into()),
+                                Err(error) => refused.push((what, error)),
                             }
                         }
                     }
@@ -100,9 +99,22 @@ pub(super) fn variants(args: &Args, run: &Run, was: &MindConfig) -> Result<Vec<V
             }
         }
     }
+    let lost = refused.iter().find(|(what, _)| args.sweep.is_empty() || is_lost(args, what, &variants));
+    if let Some((what, error)) = lost {
+        return Err(format!("{what}: {error}").into());
+    }
     // As it was is the first line of the table already.
     variants.retain(|variant| variant.what != WhatIf::default());
     Ok(variants)
+}
+
+/// Whether nothing is left of a value in it that was asked for by name.
+fn is_lost(args: &Args, refused: &WhatIf, left: &[Variant]) -> bool {
+    let is_left = |has: &dyn Fn(&WhatIf) -> bool| left.iter().any(|variant| has(&variant.what));
+    !args.rule.is_empty() && !is_left(&|left| left.rule == refused.rule)
+        || !args.quorum.is_empty() && !is_left(&|left| left.quorum == refused.quorum)
+        || !args.alpha.is_empty() && !is_left(&|left| left.alpha == refused.alpha)
+        || !args.liars.is_empty() && !is_left(&|left| left.liars == refused.liars)
 }
 
 /// The values asked for; all of them in a sweep; else nothing, which leaves it as it was.

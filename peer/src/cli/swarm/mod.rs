@@ -153,7 +153,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let keys = (!args.open).then(|| args.keys.clone().unwrap_or_else(|| beside.join("keys")));
     let configs = plan::configs(args, keys.as_deref())?;
     if let Some(keys) = &keys {
-        let mut authority = Authority::open_or_create(keys, &args.swarm)?;
+        let mut authority = Authority::open_or_create(keys, Some(&args.swarm))?;
         configs.iter().try_for_each(|config| authority.enrol_here(config.robot.id))?;
         authority.save()?;
     }

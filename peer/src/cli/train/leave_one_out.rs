@@ -33,9 +33,11 @@ pub(super) fn compare(
         args.dataset.iter().zip(sets).map(unseen).collect::<Result<_, Failure>>()?;
     let mut surveys: Vec<Survey> = sets.iter().map(|set| look(&set.images, perception)).collect();
     surveys.iter().for_each(report::rejected);
-    if let Some(set) = sets.first() {
-        mirror::vary(args, &set.vocabulary, &mut surveys, perception);
-    }
+    // What is left out has no say in whether the others are mirrored.
+    let mirrored: Vec<bool> = (0..sets.len())
+        .map(|left| mirror::are_mirrored(args, &sets[left].vocabulary, &but(&surveys, left), perception))
+        .collect();
+    let mut varied = None;
     let mut scores = Vec::new();
     for (left, (folder, set)) in args.dataset.iter().zip(sets).enumerate() {
         let none = eyes.unseen_none(&set.none);
@@ -48,8 +50,11 @@ pub(super) fn compare(
             scores.push(Score::new(folder, &Evaluation::new(1), &surveys[left], alarms));
             continue;
         }
-        let others = surveys.iter().enumerate().filter(|(other, _)| *other != left);
-        let lessons = lessons(&others.map(|(_, survey)| survey).collect::<Vec<_>>());
+        if varied != Some(mirrored[left]) {
+            mirror::vary(args, mirrored[left], &mut surveys, perception);
+            varied = Some(mirrored[left]);
+        }
+        let lessons = lessons(&but(&surveys, left));
         let taught = Taught::by(&lessons, &set.vocabulary);
         let vocabulary = Vocabulary::new(taught.labels(&set.vocabulary))
             .map_err(|error| format!("nothing to train on without {}: {error}", folder.display()))?;
@@ -61,6 +66,12 @@ pub(super) fn compare(
         scores.push(Score::new(folder, &evaluation, &known, alarms));
     }
     Ok(scores)
+}
+
+/// All but that one.
+fn but(surveys: &[Survey], left: usize) -> Vec<&Survey> {
+    let others = surveys.iter().enumerate().filter(|(other, _)| *other != left);
+    others.map(|(_, survey)| survey).collect()
 }
 
 fn say_left_out(folder: &Path, images: usize, which: &str) {

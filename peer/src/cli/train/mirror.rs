@@ -20,24 +20,30 @@ const FEWEST: u64 = 4;
 const COST: f64 = 4.0;
 const GAMMA: f64 = 0.5;
 
-/// Looks at so many variations of each image as the arguments say; mirrored ones too, unless they say otherwise or the mirror
-/// image of one gesture is another.
-pub(super) fn vary(
+/// Whether mirrored variations of these are learned too: unless the arguments say otherwise, or the mirror image of one gesture is another.
+pub(super) fn are_mirrored(
     args: &Args,
     vocabulary: &Vocabulary,
-    surveys: &mut [Survey],
+    surveys: &[&Survey],
     perception: &mut Perception,
-) {
-    if args.augment == 0 {
-        return;
+) -> bool {
+    if args.augment == 0 || args.no_mirror {
+        return false;
     }
-    let twins = if args.no_mirror { None } else { twins(args, vocabulary, surveys, perception) };
+    let twins = twins(args, vocabulary, surveys, perception);
     if let Some([one, other]) = twins.map(|twins| twins.map(|class| &vocabulary.labels()[class.index()])) {
         eprintln!(
             "note: nothing is mirrored in training: mirrored images of \"{one}\" are taken for \"{other}\", and the other way round"
         );
     }
-    let mirror = !args.no_mirror && twins.is_none();
+    twins.is_none()
+}
+
+/// Looks at so many variations of each image as the arguments say.
+pub(super) fn vary(args: &Args, mirror: bool, surveys: &mut [Survey], perception: &mut Perception) {
+    if args.augment == 0 {
+        return;
+    }
     let bar = progress::bar("variations", surveys.iter().map(|survey| survey.seen.len()).sum());
     for survey in surveys {
         survey.vary(perception, (usize::from(args.augment), mirror), args.seed, || bar.inc(1));
@@ -50,10 +56,10 @@ pub(super) fn vary(
 fn twins(
     args: &Args,
     vocabulary: &Vocabulary,
-    surveys: &[Survey],
+    surveys: &[&Survey],
     perception: &mut Perception,
 ) -> Option<[ClassId; 2]> {
-    let mut samples = lessons(&surveys.iter().collect::<Vec<_>>());
+    let mut samples = lessons(surveys);
     // Where several folders are compared, some gestures may be there once or not at all.
     let mut counts = vec![0; vocabulary.classes()];
     samples.iter().for_each(|sample| counts[sample.class.index()] += 1);
@@ -145,7 +151,7 @@ mod tests {
             let set = Dataset::list_several(&args.dataset, args.naming(), labels).unwrap().remove(0);
             let mut perception = Perception::new(args.features, HandConfig::default()).unwrap();
             let mut survey = look(&set.images, &mut perception);
-            let found = twins(&args, &set.vocabulary, std::slice::from_ref(&survey), &mut perception);
+            let found = twins(&args, &set.vocabulary, &[&survey], &mut perception);
             let found = found.map(|twins| twins.map(|class| set.vocabulary.labels()[class.index()].as_str()));
             assert_eq!(found, expected, "{features}: {classes}");
 
@@ -157,8 +163,9 @@ mod tests {
             assert!(with != without);
             for no_mirror in [true, false] {
                 let args = Args { no_mirror, ..args.clone() };
-                vary(&args, &set.vocabulary, std::slice::from_mut(&mut survey), &mut perception);
-                let mirrors = !no_mirror && expected.is_none();
+                let mirrors = are_mirrored(&args, &set.vocabulary, &[&survey], &mut perception);
+                assert_eq!(mirrors, !no_mirror && expected.is_none());
+                vary(&args, mirrors, std::slice::from_mut(&mut survey), &mut perception);
                 assert!(survey.samples() == if mirrors { with.clone() } else { without.clone() });
             }
         }

@@ -89,23 +89,25 @@ impl Authority {
         Ok(authority)
     }
 
-    /// Opens the folder, or makes a swarm there.
+    /// Opens the folder, or makes a swarm there: of that name, else of the usual one.
     ///
     /// # Errors
     /// As [`Authority::create`] and [`Authority::open`]; a folder of another swarm.
-    pub fn open_or_create(folder: &Path, swarm: &str) -> Result<Self, Failure> {
+    pub fn open_or_create(folder: &Path, swarm: Option<&str>) -> Result<Self, Failure> {
         if !folder.join(ROSTER_FILE).exists() {
             // Whoever works on a robot's own computer could as well show it gestures.
-            return Self::create(folder, swarm, Roles::up_to(Role::Teach));
+            return Self::create(folder, swarm.unwrap_or("gestalt"), Roles::up_to(Role::Teach));
         }
         let authority = Self::open(folder)?;
-        if authority.members.swarm != swarm {
-            let of = &authority.members.swarm;
-            return Err(
-                format!("{} is of the swarm \"{of}\": choose another folder", folder.display()).into()
-            );
+        let of = &authority.members.swarm;
+        match swarm {
+            Some(other) if other != of => Err(format!(
+                "{} is of the swarm \"{of}\": say --swarm {of}, or choose another folder",
+                folder.display()
+            )
+            .into()),
+            _ => Ok(authority),
         }
-        Ok(authority)
     }
 
     /// The authority's own key.

@@ -70,9 +70,9 @@ struct Enrol {
     /// Ids of the robots
     #[arg(long, value_delimiter = ',', value_name = "ID,…")]
     robots: Vec<u32>,
-    /// Name of the swarm
-    #[arg(long, default_value = "gestalt", value_name = "NAME")]
-    swarm: String,
+    /// Name of the swarm, where --local makes one [default: that of the folder, else gestalt]
+    #[arg(long, value_name = "NAME", requires = "local")]
+    swarm: Option<String>,
     /// Make a client a member, and all that it needs in a folder of its own (client-NAME): a Zenoh configuration for any language, a key to speak with
     #[arg(long, value_name = "NAME", conflicts_with = "request")]
     client: Option<InstructorId>,
@@ -227,7 +227,7 @@ fn enrol(args: &Enrol) -> Result<(), Failure> {
         return Err("robots have no roles: whoever works on their computer has those of `gestalt trust new --local-role`".into());
     }
     let mut authority = match args.local {
-        true => Authority::open_or_create(&args.folder, &args.swarm)?,
+        true => Authority::open_or_create(&args.folder, args.swarm.as_deref())?,
         false => Authority::open(&args.folder)?,
     };
     let mut print = None;

@@ -1,6 +1,7 @@
 //! The folders of a dataset: which gesture each shows, and the images in it.
 
 use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -73,6 +74,11 @@ impl Folders {
     pub fn read(folder: &Path, naming: Naming) -> Result<Self, DatasetError> {
         let mut found = Self::default();
         for (name, images) in folders_with_images(folder)? {
+            let Some(name) = name.to_str().map(str::to_owned) else {
+                let label = name.to_string_lossy().into_owned();
+                found.ignored.push(Ignored { images: images.len(), label });
+                continue;
+            };
             match naming.gesture(&name) {
                 _ if name == NONE => found.none = images,
                 Some(label) => found.gestures.entry(label.to_owned()).or_default().extend(images),
@@ -95,7 +101,7 @@ impl Folders {
 }
 
 /// The images of each sub-folder that has any, by file name.
-fn folders_with_images(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>, DatasetError> {
+fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Vec<PathBuf>>, DatasetError> {
     let entries = |path: &Path| -> Result<Vec<PathBuf>, DatasetError> {
         let failed = |source| DatasetError::Io { path: path.to_owned(), source };
         let entries = fs::read_dir(path).map_err(failed)?;
@@ -104,12 +110,9 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>, 
     let mut found = BTreeMap::new();
     let mut count = 0;
     for path in entries(folder)? {
-        let Some(label) = path.file_name().and_then(|name| name.to_str()).map(str::to_owned) else {
+        let Some(label) = path.file_name().map(OsStr::to_owned).filter(|_| path.is_dir()) else {
             continue;
         };
-        if !path.is_dir() {
-            continue;
-        }
         let mut images = entries(&path)?;
         images.retain(|path| has_image_name(path));
         images.sort();

@@ -19,6 +19,28 @@ fn strings(labels: &[&str]) -> Vec<String> {
     labels.iter().map(|label| (*label).to_owned()).collect()
 }
 
+#[cfg(unix)]
+#[test]
+fn a_name_in_another_encoding_hides_no_folder_and_no_person() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = dataset(&["a/s001_1.png", "b/s002_1.png"]);
+    let latin = OsStr::from_bytes(b"s007_k\xfche.png");
+    fs::write(folder.path().join("a").join(latin), "").unwrap();
+    let hidden = folder.path().join(OsStr::from_bytes(b"k\xfche"));
+    fs::create_dir(&hidden).unwrap();
+    fs::write(hidden.join("s001_1.png"), "").unwrap();
+    let listed = Dataset::list(folder.path(), None).unwrap();
+    assert_eq!(listed.people(), [1, 2, 7].into());
+    assert_eq!(listed.ignored.iter().map(|ignored| ignored.images).collect::<Vec<_>>(), [1]);
+    let of = |name: &str| person(Path::new(name));
+    assert_eq!(
+        ["s001_x", "s12_", "s_x", "x001_x", "s1x_y", "s001", "s99999999999_x"].map(of),
+        [Some(1), Some(12), None, None, None, None, None]
+    );
+}
+
 #[test]
 fn a_folder_of_other_gestures_is_not_called_empty() {
     let folder = dataset(&["fist/1.png", "palm/2.png"]);

@@ -8,7 +8,7 @@ fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("keys");
     let enrol = |robots: &[u32]| {
-        let mut authority = Authority::open_or_create(&folder, "demo").unwrap();
+        let mut authority = Authority::open_or_create(&folder, Some("demo")).unwrap();
         robots.iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
         authority.save().unwrap()
     };
@@ -17,8 +17,9 @@ fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
     let (first, second) = (first.members(), second.members());
     assert_eq!((first.robots.len(), second.robots.len()), (2, 3));
     assert_eq!(first.robots[&RobotId(2)], second.robots[&RobotId(2)]);
-    let other = Authority::open_or_create(&folder, "other").map(drop).unwrap_err().to_string();
-    assert!(other.contains("choose another folder"), "{other}");
+    let other = Authority::open_or_create(&folder, Some("other")).map(drop).unwrap_err().to_string();
+    assert!(other.contains("say --swarm demo, or choose another folder"), "{other}");
+    assert_eq!(Authority::open_or_create(&folder, None).unwrap().members.swarm, "demo");
     let trust = TrustSection { keys: Some(folder), ..TrustSection::default() };
     let seal = trust.seal(RobotId(3)).unwrap().unwrap();
     assert_eq!(seal.identity.public_key(), second.robots[&RobotId(3)]);
