@@ -107,24 +107,13 @@ pub struct LessonBook {
 impl LessonBook {
     /// Takes in one lesson, as in an open swarm. Of two words of one count and time the greater counts, so that all robots keep the same.
     pub fn hear(&mut self, lesson: &Lesson) -> LessonReceipt {
-        self.hear_among(lesson, None, |_| false).0
+        self.hear_among(self.highest_count([lesson.round]), lesson, None, |_| false).0
     }
 
     /// The same for a robot that lived through some rounds: rounds of which somebody with a key spoke are kept before others, and of these those it lived through, so
-    /// that made-up rounds keep nobody from teaching. Says also which round was forgotten for it. In a sealed swarm a word has a `standing`, and its count
-    /// was signed.
+    /// that made-up rounds keep nobody from teaching. Says also which round was forgotten for it. `known` is the highest count known of its round, by whichever
+    /// name. In a sealed swarm a word has a `standing`, and its count was signed.
     pub fn hear_among(
-        &mut self,
-        lesson: &Lesson,
-        standing: Option<Standing>,
-        lived: impl Fn(RoundId) -> bool,
-    ) -> (LessonReceipt, Option<RoundId>) {
-        let known = self.highest_count([lesson.round]);
-        self.hear_after(known, lesson, standing, lived)
-    }
-
-    /// The same where the highest count known is not that of its round by this name alone.
-    pub(crate) fn hear_after(
         &mut self,
         known: u64,
         lesson: &Lesson,

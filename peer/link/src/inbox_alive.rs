@@ -13,17 +13,18 @@ use crate::inbox::Inbox;
 impl Inbox {
     /// A robot's liveliness token came or went.
     pub(super) fn on_liveliness(&self, sample: &Sample) {
-        let Some(Topic::Alive(id)) = self.keys.parse(sample.key_expr().as_str()) else {
-            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Key);
+        let key = sample.key_expr().as_str();
+        let Some(Topic::Alive(id)) = self.keys.parse(key) else {
+            return self.account.refused("alive", key, 0, &Refusal::Key);
         };
         if self.is_stranger(id) {
-            return self.account.refused("alive", sample.key_expr().as_str(), 0, &Distrust::Stranger.into());
+            return self.account.refused("alive", key, 0, &Distrust::Stranger.into());
         }
         let mut state = self.lock();
         state.silence.changed(id);
         let changed = match sample.kind() {
             SampleKind::Put if state.alive.len() >= MAX_ROBOTS && !state.alive.contains(&id) => {
-                return self.account.refused("alive", sample.key_expr().as_str(), 0, &Refusal::Crowd);
+                return self.account.refused("alive", key, 0, &Refusal::Crowd);
             }
             SampleKind::Put => state.alive.insert(id),
             SampleKind::Delete => {

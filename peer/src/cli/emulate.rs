@@ -95,6 +95,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.out.is_some() && args.trace.is_some() {
         return Err("--trace is of a scenario: an experiment leaves its rows in --out".into());
     }
+    if args.out.is_some() && args.json {
+        return Err("--json is of a scenario: an experiment leaves its rows in --out (results.csv)".into());
+    }
     #[cfg(feature = "opencv")]
     if let Some(folder) = &args.out {
         return conduct(args, folder);
@@ -138,9 +141,6 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 #[cfg(feature = "opencv")]
 fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
-    if args.json {
-        return Err("--json is of a scenario: an experiment leaves its rows in --out (results.csv)".into());
-    }
     let path = &args.scenario;
     let text =
         std::fs::read_to_string(path).map_err(|source| EmulateError::Read { path: path.clone(), source })?;

@@ -275,7 +275,7 @@ impl Learning {
         // By all names of the round, as whoever speaks counts on by all.
         let known = self.lessons.highest_count(recent.names(lesson.round));
         let lived = |round| recent.contains(round);
-        let (heard, forgotten) = self.lessons.hear_after(known, lesson, standing, lived);
+        let (heard, forgotten) = self.lessons.hear_among(known, lesson, standing, lived);
         if heard == LessonReceipt::New {
             self.judged.doubt();
             self.doubt_samples();

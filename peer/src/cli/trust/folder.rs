@@ -12,7 +12,7 @@ use gestalt_protocol::{InstructorId, Keys, RobotId};
 use gestalt_trust::{Applicant, Identity, Instructor, Membership, PublicKey, Role, Roles, Roster};
 
 use super::super::Failure;
-use crate::config::{ROSTER_FILE, certificate_file, client_key_file, key_file};
+use crate::config::{ROSTER_FILE, SwarmName, certificate_file, client_key_file, key_file};
 
 /// The secret of whoever may change the roster.
 const AUTHORITY_FILE: &str = "authority.key";
@@ -96,7 +96,8 @@ impl Authority {
     pub fn open_or_create(folder: &Path, swarm: Option<&str>) -> Result<Self, Failure> {
         if !folder.join(ROSTER_FILE).exists() {
             // Whoever works on a robot's own computer could as well show it gestures.
-            return Self::create(folder, swarm.unwrap_or("gestalt"), Roles::up_to(Role::Teach));
+            let usual = SwarmName::default().0;
+            return Self::create(folder, swarm.unwrap_or(&usual), Roles::up_to(Role::Teach));
         }
         let authority = Self::open(folder)?;
         let of = &authority.members.swarm;

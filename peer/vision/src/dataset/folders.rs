@@ -74,15 +74,13 @@ impl Folders {
     pub fn read(folder: &Path, naming: Naming) -> Result<Self, DatasetError> {
         let mut found = Self::default();
         for (name, images) in folders_with_images(folder)? {
-            let Some(name) = name.to_str().map(str::to_owned) else {
-                let label = name.to_string_lossy().into_owned();
-                found.ignored.push(Ignored { images: images.len(), label });
-                continue;
-            };
-            match naming.gesture(&name) {
+            match name.to_str().and_then(|name| naming.gesture(name)) {
                 _ if name == NONE => found.none = images,
                 Some(label) => found.gestures.entry(label.to_owned()).or_default().extend(images),
-                None => found.ignored.push(Ignored { images: images.len(), label: name }),
+                None => {
+                    let label = name.to_string_lossy().into_owned();
+                    found.ignored.push(Ignored { images: images.len(), label });
+                }
             }
         }
         Ok(found)
