@@ -41,8 +41,18 @@ pub(crate) async fn look(
         report.expect(zero.elapsed());
     }
     let rounds = Rounds { now: None, reader, human, watches, live, inlet };
-    let mut eye =
-        Looking { rounds, report, sight: Some(sight), describe, period, zero, seen, replaced: 0, window };
+    let mut eye = Looking {
+        rounds,
+        report,
+        sight: Some(sight),
+        describe,
+        period,
+        zero,
+        seen,
+        replaced: 0,
+        paused: false,
+        window,
+    };
     let mut tick = tokio::time::interval(camera_report::INTERVAL);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -97,6 +107,8 @@ struct Looking {
     seen: Arc<Mutex<Option<Seen>>>,
     /// How many frames were replaced by newer ones, as far as its sight knows.
     replaced: u64,
+    /// Whether frames were passed by since the last one that was taken in.
+    paused: bool,
     window: Option<Arc<Window>>,
 }
 
@@ -123,6 +135,7 @@ impl Looking {
             }
             None => {
                 reader.want(watches.then(Scene::default));
+                self.paused |= !*watches;
                 if !(*watches || *live) {
                     self.report.rest();
                 }
@@ -135,6 +148,7 @@ impl Looking {
             return;
         }
         if !(self.rounds.watches || self.round().is_some()) {
+            self.paused = true;
             if let Some(window) = &self.window {
                 window.offer(&frame.image, frame.at, || Found::NotLooked);
             }
@@ -143,15 +157,17 @@ impl Looking {
         let Some(mut sight) = self.sight.take() else { unreachable!("frames are judged one by one") };
         // What was taken before the round opened may show the gesture of the round before. A camera may have been about to
         // take its next picture.
-        let fresh = |(_, since): &(RoundId, Duration)| frame.at + self.period >= *since;
+        let fresh = |(_, since): &(RoundId, Duration)| frame.at.saturating_add(self.period) >= *since;
         let round = self.rounds.now.filter(fresh).map(|(round, _)| round);
         let (seen, window) = (self.seen.clone(), self.window.clone());
         let replaced = self.rounds.reader.dropped();
         let passed_over = replaced - std::mem::replace(&mut self.replaced, replaced);
+        let resumes = std::mem::take(&mut self.paused);
         let stated = self.rounds.inlet.as_ref().and_then(|inlet| inlet.fps());
         let judged = tokio::task::spawn_blocking(move || {
             let rate = |sight: &mut Sight| match stated {
                 Some(fps) => sight.rate_is(fps),
+                None if resumes => sight.resume(),
                 None => sight.passed_over(passed_over),
             };
             let taken = judge(&mut sight, frame, round, rate, &seen, window.as_deref());

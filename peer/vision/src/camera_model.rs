@@ -6,6 +6,11 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// The least and the most of [`CameraModel::noise_sigma`], of [`CameraModel::blur_sigma_px`], and of gain and casts.
+const NOISE: (f64, f64) = (0.0, 64.0);
+const BLUR: (f64, f64) = (0.0, 16.0);
+const FACTOR: (f64, f64) = (0.1, 4.0);
+
 /// A camera that cannot be.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("camera '{camera}': {field} is {value}, set it within {low}..={high}")]
@@ -122,11 +127,12 @@ impl CameraModel {
         let wear = rng.random::<f64>().powi(2);
         // Blur in proportion to the image, as the optics make it.
         let blur_px = 2.5 * wear * f64::from(self.width_px) / 384.0;
+        let within = |value: f64, (least, most): (f64, f64)| value.clamp(least, most);
         Self {
-            noise_sigma: self.noise_sigma + 12.0 * wear * rng.random::<f64>(),
-            blur_sigma_px: self.blur_sigma_px + blur_px * rng.random::<f64>(),
-            gain: self.gain * rng.random_range(1.0 - 0.4 * wear..1.15),
-            cast_bgr: self.cast_bgr.map(|factor| factor * rng.random_range(0.93..1.07)),
+            noise_sigma: within(self.noise_sigma + 12.0 * wear * rng.random::<f64>(), NOISE),
+            blur_sigma_px: within(self.blur_sigma_px + blur_px * rng.random::<f64>(), BLUR),
+            gain: within(self.gain * rng.random_range(1.0 - 0.4 * wear..1.15), FACTOR),
+            cast_bgr: self.cast_bgr.map(|factor| within(factor * rng.random_range(0.93..1.07), FACTOR)),
             ..self.clone()
         }
     }
@@ -142,12 +148,12 @@ impl CameraModel {
             ("height_px", f64::from(self.height_px), 16.0, 4096.0),
             ("fps", self.fps, 0.1, 240.0),
             ("horizontal_fov_deg", self.horizontal_fov_deg, 10.0, 150.0),
-            ("noise_sigma", self.noise_sigma, 0.0, 64.0),
-            ("blur_sigma_px", self.blur_sigma_px, 0.0, 16.0),
-            ("gain", self.gain, 0.1, 4.0),
-            ("cast_bgr (blue)", blue, 0.1, 4.0),
-            ("cast_bgr (green)", green, 0.1, 4.0),
-            ("cast_bgr (red)", red, 0.1, 4.0),
+            ("noise_sigma", self.noise_sigma, NOISE.0, NOISE.1),
+            ("blur_sigma_px", self.blur_sigma_px, BLUR.0, BLUR.1),
+            ("gain", self.gain, FACTOR.0, FACTOR.1),
+            ("cast_bgr (blue)", blue, FACTOR.0, FACTOR.1),
+            ("cast_bgr (green)", green, FACTOR.0, FACTOR.1),
+            ("cast_bgr (red)", red, FACTOR.0, FACTOR.1),
             ("vignetting", self.vignetting, 0.0, 1.0),
         ];
         for (field, value, low, high) in fields {
@@ -198,6 +204,14 @@ mod tests {
             assert_eq!(specimen.focal_px(), model.focal_px());
         }
         assert!(specimens.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+
+    #[test]
+    fn a_specimen_of_a_camera_that_can_be_can_be() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let wide = CameraModel { width_px: 4096, noise_sigma: 60.0, gain: 4.0, ..CameraModel::laptop() };
+        let bright = CameraModel { cast_bgr: [4.0, 0.1, 4.0], ..wide };
+        assert!((0..200).all(|_| bright.specimen(&mut rng).validate().is_ok()));
     }
 
     #[test]

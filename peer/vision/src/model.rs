@@ -68,7 +68,7 @@ impl RobotModel {
     /// # Errors
     /// See [`ModelError`].
     pub fn hands() -> Result<Self, ModelError> {
-        Self::new(hands()?.classifier, "trained on many hands".to_owned(), PathBuf::from("hands"))
+        Self::new(hands()?, "trained on many hands".to_owned(), PathBuf::from("hands"))
     }
 
     /// The model of rendered hands: gestures `0` to `5`, trained on synthetic hands.
@@ -76,7 +76,7 @@ impl RobotModel {
     /// # Errors
     /// See [`ModelError`].
     pub fn rendered() -> Result<Self, ModelError> {
-        Self::new(rendered()?.classifier, "trained on synthetic hands".to_owned(), PathBuf::from("rendered"))
+        Self::new(rendered()?, "trained on synthetic hands".to_owned(), PathBuf::from("rendered"))
     }
 
     /// The model in a file that `gestalt train` wrote.
@@ -84,7 +84,7 @@ impl RobotModel {
     /// # Errors
     /// See [`ModelError`].
     pub fn read(path: &Path) -> Result<Self, ModelError> {
-        Self::new(Model::read(path)?.classifier, path.display().to_string(), path.to_owned())
+        Self::new(Model::read(path)?, path.display().to_string(), path.to_owned())
     }
 
     /// Writes its classifier to a file.
@@ -96,10 +96,11 @@ impl RobotModel {
         Ok(Model { classifier: Classifier::clone(&self.classifier), origin }.write(path)?)
     }
 
-    fn new(classifier: Classifier, name: String, path: PathBuf) -> Result<Self, ModelError> {
-        let features =
-            classifier.space().feature_set().parse().map_err(|cause| ModelError::Features { path, cause })?;
-        Ok(Self { classifier: Arc::new(classifier), features, name })
+    fn new(model: Model, name: String, path: PathBuf) -> Result<Self, ModelError> {
+        let features = model.classifier.space().feature_set().parse();
+        let features: FeatureSet = features.map_err(|cause| ModelError::Features { path, cause })?;
+        model.check_features(features.name(), features.length())?;
+        Ok(Self { classifier: Arc::new(model.classifier), features, name })
     }
 }
 
@@ -216,6 +217,24 @@ mod tests {
         assert_eq!(model.classifier.vocabulary().labels(), ["0", "1", "2", "3", "4", "5"]);
         model.check_features(FeatureSet::Embedding.name(), FeatureSet::Embedding.length()).unwrap();
         assert_eq!(RobotModel::hands().unwrap().features, FeatureSet::Embedding);
+    }
+
+    #[test]
+    fn a_model_for_features_of_another_name_or_number_is_refused() {
+        let sample = |n: u8| {
+            LabelledFeatures::new(vec![f32::from(n % 2), f32::from(n)], ClassId((n % 2).into()), None)
+        };
+        let samples: Vec<LabelledFeatures> = (0..20).map(sample).collect();
+        let vocabulary = Vocabulary::new(["fist", "palm"]).unwrap();
+        // The set's own name, and the name without a version.
+        for name in [FeatureSet::Shape.name(), "shape"] {
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            let trained =
+                train(name, &vocabulary, &samples, &TrainOptions::default(), &mut rng, |_| ()).unwrap();
+            let model = Model { classifier: trained.classifier, origin: Origin::default() };
+            let error = RobotModel::new(model, String::new(), PathBuf::new()).unwrap_err();
+            assert!(matches!(error, ModelError::File(ModelFileError::FeatureSet { .. })), "{error}");
+        }
     }
 
     #[test]

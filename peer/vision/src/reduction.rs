@@ -1,4 +1,5 @@
-//! A frame, reduced to as many pixels as show where something is: once, for motion and for the first look at a hand.
+//! A frame, reduced to as many pixels as show where something is: once, for motion and for the first look at a hand (learned
+//! eyes have a first look of their own, of the size that their networks learned from).
 
 use opencv::core::{Mat, Size};
 use opencv::imgproc::{INTER_AREA, resize};

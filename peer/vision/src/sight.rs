@@ -65,6 +65,8 @@ pub struct Sight {
     /// The frame at hand, for both.
     reduction: Reduction,
     mismatch: Mismatch,
+    /// What motion could not be watched for, as it was said last.
+    unwatched: Option<String>,
     /// When a hand was looked for last; `None` since a frame that was not to be judged.
     looked: Option<Duration>,
 }
@@ -94,6 +96,7 @@ impl Sight {
             detector: motion.enabled.then(|| MotionDetector::new(motion)).transpose()?,
             reduction: Reduction::default(),
             mismatch: Mismatch::new(camera),
+            unwatched: None,
             looked: None,
             layer,
             features,
@@ -130,7 +133,7 @@ impl Sight {
 
     /// Takes in a frame that is of size `whole`, or was before it was reduced to what is enough; then it shows what moves, and no hand.
     pub fn take_reduced(&mut self, frame: &Frame, whole: Size, judge: bool) -> Taken {
-        let mut trouble = self.adapt_to(frame.at, whole);
+        let adapted = self.adapt_to(frame.at, whole);
         // Learned eyes look at the frame itself.
         let is_read = self.detector.is_some() || judge && self.features != FeatureSet::Embedding;
         let reduced = is_read && self.reduce(&frame.image, whole);
@@ -138,10 +141,13 @@ impl Sight {
             true => detector.watch_reduced(&self.reduction.image, whole, frame.at),
             false => detector.watch(&frame.image, frame.at),
         });
-        let change = change.unwrap_or(Ok(None)).unwrap_or_else(|error: MotionError| {
-            trouble = Some(error.to_string());
-            None
-        });
+        let (change, unwatched) = match change.unwrap_or(Ok(None)) {
+            Ok(change) => (change, None),
+            Err(error) => (None, Some(error.to_string())),
+        };
+        let told = std::mem::replace(&mut self.unwatched, unwatched.clone());
+        let trouble: Vec<String> =
+            adapted.into_iter().chain(unwatched.filter(|new| told.as_ref() != Some(new))).collect();
         let is_whole = frame.image.size().is_ok_and(|size| size == whole);
         let looks = is_whole && self.looks_closely(judge);
         self.forget_what_is_over(frame.at, judge, looks);
@@ -152,6 +158,7 @@ impl Sight {
                 false => self.perception.observe_before(&frame.image, background),
             }
         });
+        let trouble = (!trouble.is_empty()).then(|| trouble.join("; "));
         Taken { at: frame.at, change, observation, trouble }
     }
 
@@ -203,6 +210,11 @@ impl Sight {
         self.mismatch.passed_over(frames);
     }
 
+    /// Frames are taken in again after a time in which none were, as between rounds where motion is not watched.
+    pub fn resume(&mut self) {
+        self.mismatch.resume();
+    }
+
     /// Reads frames as what they are when they are not what the configuration says. Says so, once.
     fn adapt_to(&mut self, at: Duration, whole: Size) -> Option<String> {
         let rate = self.mismatch.notice_rate(at);
@@ -223,6 +235,23 @@ impl Sight {
 mod tests {
     use super::*;
     use crate::eyes::tests::hands;
+
+    #[test]
+    fn what_is_wrong_with_the_frames_is_said_once_and_hides_nothing_else() {
+        let motion = MotionConfig { enabled: true, ..MotionConfig::default() };
+        let config = SightConfig { camera: CameraModel::laptop(), layer: LayerConfig::ALL, motion };
+        let mut sight = Sight::new(config, FeatureSet::Shape).unwrap();
+        let mut trouble = |side: i32, at: u64| {
+            let white = opencv::core::Scalar::all(255.0);
+            let image = Mat::new_rows_cols_with_default(side, side, opencv::core::CV_8UC3, white).unwrap();
+            sight.take(&Frame { image, at: Duration::from_millis(at) }, false).trouble
+        };
+        let said = trouble(8, 0).unwrap();
+        assert!(said.contains("frames of 8×8 pixels") && said.contains("cannot be watched"), "{said}");
+        assert_eq!(trouble(8, 33), None);
+        assert_eq!(trouble(64, 66), None);
+        assert!(trouble(8, 99).unwrap().contains("cannot be watched"));
+    }
 
     #[test]
     fn a_hand_is_not_followed_into_another_round_nor_over_a_pause() {

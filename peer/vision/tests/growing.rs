@@ -171,6 +171,15 @@ fn mean(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (mean, quantile * (variance / n).sqrt())
 }
 
+/// What comes of each, in their order, by a thread each.
+fn side_by_side<T: Send, R: Send>(of: impl IntoIterator<Item = T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+    let work = &work;
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = of.into_iter().map(|of| scope.spawn(move || work(of))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    })
+}
+
 fn new_gestures_are_learned_from_few_showings() {
     let model = RobotModel::hands().unwrap();
     let heights = [
@@ -180,8 +189,8 @@ fn new_gestures_are_learned_from_few_showings() {
         ("phone_home", 0.35),
         ("subhi_hands", 0.5),
     ];
-    let sets: BTreeMap<&str, Set> =
-        heights.iter().map(|(name, height)| (*name, look(name, *height, &model))).collect();
+    let looked = side_by_side(heights, |(name, height)| (name, look(name, height, &model)));
+    let sets: BTreeMap<&str, Set> = looked.into_iter().collect();
     let seeds = std::env::var("GESTALT_SEEDS").ok().and_then(|seeds| seeds.parse().ok()).unwrap_or(4_u64);
     let grown: [(&str, &[&str]); 3] = [
         ("asl-digits", &["6", "7", "8", "9"]),
@@ -192,7 +201,7 @@ fn new_gestures_are_learned_from_few_showings() {
     eprintln!("set | showings each | by | recall of the new | of the known | change of the known");
     for (at, new) in grown {
         for shows in [1, 3, 5] {
-            let all: Vec<[Outcome; 3]> = (0..seeds).map(|seed| grow(&sets, at, new, shows, seed)).collect();
+            let all = side_by_side(0..seeds, |seed| grow(&sets, at, new, shows, seed));
             let of = |by: usize, value: &dyn Fn(&Outcome) -> f64| mean(all.iter().map(|run| value(&run[by])));
             for (by, name) in JUDGES.iter().enumerate() {
                 let (recall, known) = (of(by, &|o| o.new), of(by, &|o| o.after));

@@ -124,7 +124,8 @@ impl MotionDetector {
     }
 
     /// Takes in the next frame (BGR, 8 bits), taken at that time, and says what has begun or ended with it. A frame that
-    /// is no newer than the last one tells nothing. Frames of another size start everything anew.
+    /// is no newer than the last one tells nothing. Frames of another shape, or smaller than what all are
+    /// reduced to, start everything anew.
     ///
     /// # Errors
     /// [`MotionError::Frame`] or [`MotionError::OpenCv`]; the detector is ready for the next frame.

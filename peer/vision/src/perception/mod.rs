@@ -282,12 +282,12 @@ impl Perception {
             Some(reduced) => self.glance.look_at_reduced((reduced, bgr.size()?), before)?,
             None => self.glance.look(bgr, before, whole)?,
         }
-        self.colours.learn(&self.glance)?;
+        // Of a frame in which nothing stands out no pixels are left that another one had.
+        self.colours.learn(&self.glance).inspect_err(|_| self.glance.mask = Mat::default())?;
         self.colours.mark(&mut self.glance)?;
         let found = self.finder.locate(&self.glance)?;
         self.region = if self.layer.geometry { found } else { whole };
         self.close.look(bgr, before, self.region)?;
-        let scale = self.close.scale() * scale;
         self.resolution.even_out(bgr, &mut self.close, scale)?;
         self.colours.mark(&mut self.close)?;
         let hand = self.finder.find(&self.close)?;
@@ -339,8 +339,8 @@ impl Perception {
         &self.glance.mask
     }
 
-    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192, with a
-    /// margin of one pixel. Empty before the first hand.
+    /// The pixels of the last hand observed (255; elsewhere 0): [`Self::region`], scaled to fit 192×192 (in the
+    /// frame's own pixels where a stage of the layer that scales is off), with a margin of one pixel. Empty before the first hand.
     #[must_use]
     pub fn mask(&self) -> &Mat {
         self.learned.as_ref().map_or(self.finder.mask(), Learned::mask)

@@ -40,13 +40,15 @@ impl Resolution {
         Self { enabled, optics, noise, smoothed: Mat::default() }
     }
 
-    /// Smooths a view of the frame as much as it needs; `scale`: pixels of the view per pixel of the camera.
+    /// Smooths a view of the frame as much as it needs; `scale`: pixels of the frame per pixel of the camera.
     pub fn even_out(&mut self, frame: &Mat, view: &mut View, scale: f32) -> Result<(), opencv::Error> {
         if !self.enabled {
             return Ok(());
         }
-        let noise = noise(frame, view.region)?.max(self.noise);
-        let sigma = self.smoothing(view.frame.width as f32, noise, scale);
+        let of_frame = view.scale();
+        let of_camera = of_frame * scale;
+        let noise = (noise(frame, view.region)? * of_frame).max(self.noise * of_camera);
+        let sigma = self.smoothing(view.frame.width as f32 / scale, noise, of_camera);
         if sigma < LEAST {
             return Ok(());
         }
@@ -57,14 +59,15 @@ impl Resolution {
         Ok(())
     }
 
-    /// The standard deviation of the Gaussian that is still missing, in pixels of the view.
-    fn smoothing(&self, frame_width: f32, noise: f32, scale: f32) -> f32 {
+    /// The standard deviation of the Gaussian that is still missing, in pixels of the view; `width`: of the camera's image; `noise`: grey levels,
+    /// times the pixels of the view per pixel that they were measured in; `scale`: pixels of the view per pixel of the camera.
+    fn smoothing(&self, width: f32, noise: f32, scale: f32) -> f32 {
         // Of the same optics before another sensor, the blur is a share of the image's width.
-        let blur = self.optics.map_or(0.0, |(width, blur)| blur * frame_width / width);
+        let blur = self.optics.map_or(0.0, |(of_model, blur)| blur * width / of_model);
         let own = blur.hypot(PIXEL) * scale;
         let to_the_measure = (BLUR * BLUR - own * own).max(0.0).sqrt();
-        // White noise of the camera's pixels, enlarged, behind a Gaussian: σ scale / (2 √π σ_Gauss).
-        let against_noise = noise * scale / (2.0 * PI.sqrt() * NOISE);
+        // White noise of pixels, enlarged, behind a Gaussian: σ scale / (2 √π σ_Gauss).
+        let against_noise = noise / (2.0 * PI.sqrt() * NOISE);
         to_the_measure.max(against_noise).min(MOST)
     }
 }
@@ -132,9 +135,26 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_that_was_reduced_before_is_smoothed_as_one_that_is_reduced_by_the_view() {
+        let camera = CameraModel { blur_sigma_px: 3.0, noise_sigma: 0.0, ..CameraModel::laptop() };
+        let (frame, half) = (noisy(0.0), Size::new(150, 100));
+        let mut canvas = Mat::default();
+        opencv::imgproc::resize(&frame, &mut canvas, half, 0.0, 0.0, opencv::imgproc::INTER_AREA).unwrap();
+        let evened = |frame: &Mat, limit: Option<Size>, scale: f32| {
+            let mut view = View::new(limit);
+            view.look(frame, None, Rect::new(0, 0, frame.cols(), frame.rows())).unwrap();
+            Resolution::new(true, Some(&camera)).even_out(frame, &mut view, scale).unwrap();
+            view.image
+        };
+        let (once, before) = (evened(&frame, Some(half), 1.0), evened(&canvas, None, 0.5));
+        assert_eq!(opencv::core::norm2_def(&once, &before).unwrap(), 0.0);
+        assert!(opencv::core::norm2_def(&once, &canvas).unwrap() > 0.0, "there was something to smooth");
+    }
+
+    #[test]
     fn the_sharper_the_camera_the_more_it_is_smoothed_and_noise_asks_for_more() {
         let smoothing = |camera: Option<&CameraModel>, noise, scale| {
-            Resolution::new(true, camera).smoothing(640.0, noise, scale)
+            Resolution::new(true, camera).smoothing(640.0, noise * scale, scale)
         };
         let parrot = CameraModel::parrot();
         assert!(smoothing(None, 0.0, 1.0) > smoothing(Some(&parrot), 0.0, 1.0));

@@ -61,6 +61,12 @@ impl Mismatch {
         self.passed_over = self.passed_over.saturating_add(frames);
     }
 
+    /// Nobody took in frames for a while: the time until the next one is none between two frames.
+    pub fn resume(&mut self) {
+        self.last = None;
+        self.passed_over = 0;
+    }
+
     /// Another size than the configuration says; said once.
     pub fn notice_size(&mut self, frame: Size) -> Option<String> {
         let size = (frame.width, frame.height);
@@ -164,6 +170,19 @@ mod tests {
         for at in 0..100 {
             mismatch.passed_over(2);
             assert_eq!(notice(&mut mismatch, frame(640, 360, at * 100)), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn the_time_in_which_nobody_looks_is_none_between_two_frames() {
+        let mut mismatch = Mismatch::new(CameraModel::footbot());
+        for round in 0..60 {
+            mismatch.passed_over(3);
+            mismatch.resume();
+            for at in [0, 500] {
+                let at = frame(384, 288, 5000 * round + at);
+                assert_eq!(notice(&mut mismatch, at), Vec::<String>::new());
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::os::fd::{AsRawFd, RawFd};
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -45,7 +46,8 @@ impl Device {
     ) -> Result<Self, SourceError> {
         let wishes = wishes(model, settings)?;
         let about = fs::metadata(path).map_err(|cause| SourceError::io(path, cause))?;
-        if about.is_file() || about.is_dir() {
+        // A pipe would wait for whoever writes to it.
+        if !about.file_type().is_char_device() {
             return Err(SourceError::NotADevice(path.into()));
         }
         let file = fs::File::open(path).map_err(|cause| SourceError::io(path, cause))?;
@@ -173,7 +175,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("video0");
         fs::write(&file, "not a camera").unwrap();
-        for path in [folder.path(), &file, Path::new("/dev/null")] {
+        // Nobody writes to it.
+        let pipe = folder.path().join("video1");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [folder.path(), &file, &pipe, Path::new("/dev/null")] {
             let error = open(path);
             assert!(matches!(error, SourceError::NotADevice(_)), "{error}");
             assert!(error.to_string().contains(&path.display().to_string()), "{error}");

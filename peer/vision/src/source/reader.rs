@@ -17,6 +17,9 @@ pub type Opener<F = Frame> = Box<dyn FnMut() -> Result<Box<dyn Source<F>>, Sourc
 /// After this many errors in a row a file's source is opened anew, unless they are each of one picture.
 const TOLERATED: u32 = 8;
 
+/// Between two frames no more time is waited for than this, whatever a source says its period is.
+const LONGEST: Duration = Duration::from_secs(3600);
+
 /// A source being read. Dropping it ends the thread as soon as its read returns.
 pub struct Reader<F = Frame> {
     shared: Arc<Shared<F>>,
@@ -168,7 +171,7 @@ impl<F> Reading<F> {
                 }
             }
             // One that fell behind drops frames; it never hurries to make up for them.
-            turn = Instant::now().max(turn + period);
+            turn = Instant::now().max(turn + period.min(LONGEST));
         }
     }
 

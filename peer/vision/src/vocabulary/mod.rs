@@ -135,9 +135,13 @@ impl GestureBook {
     /// See [`GestureBookError`].
     pub fn read(path: &Path) -> Result<Self, GestureBookError> {
         let unreadable = |cause| GestureBookError::Unreadable { path: path.to_owned(), cause };
-        let size = std::fs::metadata(path).map_err(unreadable)?.len();
-        if size > MAX_FILE as u64 {
-            return Err(GestureBookError::TooLarge { path: path.to_owned(), size });
+        let about = std::fs::metadata(path).map_err(unreadable)?;
+        // A device tells no length, and a pipe would never end.
+        if !about.is_file() {
+            return Err(unreadable(std::io::Error::other("it is not a regular file")));
+        }
+        if about.len() > MAX_FILE as u64 {
+            return Err(GestureBookError::TooLarge { path: path.to_owned(), size: about.len() });
         }
         let text = std::fs::read_to_string(path).map_err(unreadable)?;
         Self::parse(&text, &path.display().to_string())
