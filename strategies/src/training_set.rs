@@ -241,6 +241,16 @@ impl TrainingSet {
         vector: impl Into<Arc<[f32]>>,
         rng: &mut dyn Rng,
     ) -> SampleReceipt {
+        let mut receipt = self.note(id, round);
+        if let SampleReceipt::New(changes) = &mut receipt {
+            changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
+        }
+        receipt
+    }
+
+    /// The same of a sample of which it is not known yet what it shows: from now on it is known, and none is held for it. [`Self::take_back`]
+    /// takes it in.
+    pub fn note(&mut self, id: SampleId, round: RoundId) -> SampleReceipt {
         if let Err(error) = self.may_receive(id, round) {
             return SampleReceipt::Refused(error);
         }
@@ -251,7 +261,6 @@ impl TrainingSet {
             Ok(Some(others)) => changes.extend(others.into_iter().map(SetChange::Seen)),
         }
         self.lives.note(id.series(), round.counter, &self.seen, &self.samples);
-        changes.extend(self.add(self.part_of(id), Some(id), class, round, vector.into(), rng));
         SampleReceipt::New(changes)
     }
 
@@ -364,7 +373,7 @@ impl TrainingSet {
         self.samples.iter().filter(move |sample| sample.round == round)
     }
 
-    fn part_of(&self, id: SampleId) -> SetPart {
+    pub(crate) fn part_of(&self, id: SampleId) -> SetPart {
         if id.author == self.me() { SetPart::Shared } else { SetPart::External }
     }
 

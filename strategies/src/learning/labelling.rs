@@ -2,19 +2,57 @@
 
 use std::collections::BTreeSet;
 
-use gestalt_protocol::{ClassId, RoundId};
+use gestalt_protocol::{ClassId, FeatureSpaceId, RoundId, SharedSample};
 use gestalt_rounds::Classify;
 
 use super::changes::{TrainingChange, inserted_as};
 use super::memory::Item;
-use super::state::Learning;
+use super::state::{Declined, Learning};
 use super::unresolved::{self, UnresolvedSample};
 use crate::candidates::Candidates;
 use crate::lessons::Verdict;
 use crate::sample::{HeldSample, SetPart};
-use crate::training_set::SetChange;
+use crate::training_set::{SampleReceipt, SetChange};
+use crate::vector_codec::{VectorError, decode_vector};
 
 impl Learning {
+    /// Takes in a sample that another robot shared. Says whether it was news.
+    pub fn receive(&mut self, space: FeatureSpaceId, sample: &SharedSample) -> Result<bool, Declined> {
+        if space != self.space_id {
+            return Err(Declined::Vector(VectorError::Space { found: space, expected: self.space_id }));
+        }
+        if !sample.class.is_named() && self.vocabulary.place(sample.class).is_none() {
+            return Err(Declined::Class);
+        }
+        let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
+        let SharedSample { id, round, .. } = *sample;
+        let vector = self.shelf.vector(id, vector);
+        let verdict = self.verdict(round);
+        let class = match verdict {
+            Verdict::Class(class) => Some(class),
+            Verdict::Unsaid => Some(sample.class),
+            // It waits aside, and takes no other sample's place.
+            Verdict::Among(_) | Verdict::Retracted => None,
+        };
+        let receipt = match class {
+            Some(class) => self.set.receive(id, class, round, vector.clone(), &mut *self.rng),
+            None => self.set.note(id, round),
+        };
+        match receipt {
+            SampleReceipt::New(changes) => {
+                self.dirty.insert(Item::Seen(id.series()));
+                self.absorb(changes);
+                if class.is_none() {
+                    let (part, shared) = (self.set.part_of(id), Some(id));
+                    self.put_aside(UnresolvedSample { part, shared, round, vector, guess: None });
+                }
+                Ok(true)
+            }
+            SampleReceipt::Known => Ok(false),
+            SampleReceipt::Refused(_) => Err(Declined::Number),
+        }
+    }
+
     /// Does to all samples of a round what instructors said of it: nothing but that decides, so that robots that heard
     /// it in another order come to the same.
     pub(super) fn apply_to_round(&mut self, round: RoundId) {

@@ -7,7 +7,7 @@ use std::hash::Hasher;
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{Digest, FeatureSpaceId, Lesson, RobotId, RoundId, SampleId, SharedSample};
+use gestalt_protocol::{Digest, FeatureSpaceId, Lesson, RobotId, RoundId, SampleId};
 use gestalt_rounds::Vocabulary;
 use gestalt_svm::FeatureSpace;
 use rand::Rng;
@@ -29,8 +29,8 @@ use crate::lessons::{LessonBook, LessonReceipt, Verdict};
 use crate::names::NameBook;
 use crate::sample::Batches;
 use crate::scrutiny::{PoisonDefence, Scrutiny};
-use crate::training_set::{SampleReceipt, SetChange, TrainingSet};
-use crate::vector_codec::{VectorError, decode_vector};
+use crate::training_set::{SetChange, TrainingSet};
+use crate::vector_codec::VectorError;
 
 /// The most times that a robot shares before the disk has kept up.
 pub(super) const MAX_UNSENT: usize = 64;
@@ -288,34 +288,6 @@ impl Learning {
             self.apply_to_round(lesson.round);
         }
         heard
-    }
-
-    /// Takes in a sample that another robot shared. Says whether it was news.
-    pub fn receive(&mut self, space: FeatureSpaceId, sample: &SharedSample) -> Result<bool, Declined> {
-        if space != self.space_id {
-            return Err(Declined::Vector(VectorError::Space { found: space, expected: self.space_id }));
-        }
-        if !sample.class.is_named() && self.vocabulary.place(sample.class).is_none() {
-            return Err(Declined::Class);
-        }
-        let vector = decode_vector(&sample.vector, &self.space).map_err(Declined::Vector)?;
-        let SharedSample { id, round, .. } = *sample;
-        let vector = self.shelf.vector(id, vector);
-        let verdict = self.verdict(round);
-        let class = if let Verdict::Class(class) = verdict { class } else { sample.class };
-        match self.set.receive(id, class, round, vector, &mut *self.rng) {
-            SampleReceipt::New(changes) => {
-                self.dirty.insert(Item::Seen(id.series()));
-                self.absorb(changes);
-                // A class is what it was taken under; anything else concerns all samples of the round.
-                if matches!(verdict, Verdict::Among(_) | Verdict::Retracted) {
-                    self.apply_to_round(round);
-                }
-                Ok(true)
-            }
-            SampleReceipt::Known => Ok(false),
-            SampleReceipt::Refused(_) => Err(Declined::Number),
-        }
     }
 
     /// Notes what changed in the training set, for training and memory.

@@ -288,9 +288,12 @@ pub struct Machines<'a>(&'a Classifier);
 impl Head for Machines<'_> {
     fn logs(&self, coordinates: &[f32]) -> Vec<f64> {
         let mut logs = vec![f64::NEG_INFINITY; self.0.learned.len()];
+        let met = self.0.met().count();
+        if met == 0 {
+            return logs;
+        }
         let mut decisions = Vec::with_capacity(self.0.machine.offsets.len());
         self.0.machine.decide(coordinates, &mut decisions);
-        let met = self.0.met().count();
         for (class, p) in self.0.met().zip(self.0.calibration.probabilities(&decisions, met)) {
             logs[class] = p.ln();
         }

@@ -215,3 +215,34 @@ fn what_others_share_of_a_round_leaves_what_this_robot_saw_in_it_until_its_gestu
     assert_eq!(swarm.sizes(0), [2, 0, most as usize - 2]);
     swarm.check();
 }
+
+#[test]
+fn what_waits_for_its_name_takes_no_samples_place() {
+    let mut swarm = Swarm::new(1, LearningConfig { capacity: 4, ..config(2, 0.0) }, 15);
+    for class in [1, 2] {
+        let round = swarm.show(class);
+        swarm.was(round, class);
+    }
+    let taken_back = RoundId { counter: 2, opener: RobotId(9), life: 3 };
+    let lesson = Lesson {
+        round: taken_back,
+        instructor: "ada".parse().unwrap(),
+        count: 1,
+        at: 9,
+        word: Word::Retracted,
+        said: None,
+    };
+    swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
+    let sample = SharedSample {
+        id: SampleId { author: RobotId(9), life: 5, number: 1 },
+        class: ClassId(3),
+        round: taken_back,
+        vector: Vector::F32(vec![0.5; 4]),
+    };
+    let message = Message::Samples(Samples { space: space().id(), samples: vec![sample] });
+    let stamp = Stamp { boot: 1, sequence: 1 };
+    swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+    assert_eq!((swarm.sizes(0), swarm.minds[0].learned().unwrap().aside), ([4, 0, 0], 1));
+    swarm.restart(0);
+    assert_eq!((swarm.sizes(0), swarm.minds[0].learned().unwrap().aside), ([4, 0, 0], 1));
+}

@@ -71,7 +71,7 @@ impl Search {
         Self { truths, samples: samples.len(), classes, folds, folding }
     }
 
-    /// The pair with the least log loss. Calls `step` after each fold.
+    /// The pair with the least log loss. Calls `step` for each fold.
     ///
     /// Along γ with the middle C, then along C: the loss is flat in C where γ is right, so the full grid finds no
     /// better pair in twice the time.
@@ -98,11 +98,15 @@ impl Search {
     ) -> Result<(), SvmError> {
         let mut decisions = vec![Vec::new(); self.truths.len()];
         for fold in &self.folds {
+            step();
+            // Of fewer people than folds, some folds hold nobody out.
+            if fold.held_out.is_empty() {
+                continue;
+            }
             let machine = fold.fit(cost, gamma)?;
             for &index in &fold.held_out {
                 machine.decide(&fold.rows[index], &mut decisions[index]);
             }
-            step();
         }
         let held_out = HeldOut::new(&decisions, &self.truths, self.samples, self.classes);
         let least = best.as_ref().map_or(f64::INFINITY, |best| best.held_out.log_loss);
