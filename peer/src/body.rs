@@ -1,7 +1,7 @@
 //! A whole robot: a link to the swarm, and an eye.
 
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::CameraState;
 use gestalt_strategies::Classify;
@@ -152,10 +152,18 @@ impl Body {
             // Aborted is what it was meant to become.
             let _ = looking.await;
         }
-        match Arc::try_unwrap(self.robot) {
-            Ok(robot) => robot.stop().await,
-            Err(_) => tracing::error!("the robot is still in use, and leaves the swarm when that ends"),
+        alone(self.robot).await.stop().await;
+    }
+}
+
+/// What others may use for a moment longer, once they are done with it.
+pub(crate) async fn alone<T>(mut shared: Arc<T>) -> T {
+    loop {
+        match Arc::try_unwrap(shared) {
+            Ok(own) => return own,
+            Err(again) => shared = again,
         }
+        tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
 

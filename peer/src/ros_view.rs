@@ -9,6 +9,7 @@ use gestalt_protocol::RobotId;
 use gestalt_ros::message::{CompressedImage, Header};
 use gestalt_ros::{Node, NodeConfig, NodeName, Publisher, Qos, RosError};
 use gestalt_vision::source::encode_jpeg;
+use gestalt_vision::steady::caught;
 use thiserror::Error;
 
 use crate::config::RosNodeSection;
@@ -113,14 +114,16 @@ impl Shower {
     }
 
     fn publish(&self, to: &Publisher<CompressedImage>, glimpse: &Glimpse) -> Result<(), ViewError> {
-        let Some(robot) = self.robot.upgrade() else { return Ok(()) };
+        // Who leaves the swarm waits for nobody who draws.
+        let Some(classifier) = self.robot.upgrade().map(|robot| robot.classifier()) else { return Ok(()) };
         let (hand, judged) = match &glimpse.found {
             Found::Hand { region, mask, features } => {
-                let classifier = robot.classifier();
-                let opinion = classifier.and_then(|by| opinion(by.as_ref(), features, Duration::ZERO));
-                let judged = opinion
-                    .map(|opinion| (opinion.gesture, f64::from(opinion.probability)))
-                    .ok_or_else(|| "a hand; no classifier".to_owned());
+                let judge = || classifier.and_then(|by| opinion(by.as_ref(), features, Duration::ZERO));
+                let judged = match caught(judge) {
+                    Ok(Some(opinion)) => Ok((opinion.gesture, f64::from(opinion.probability))),
+                    Ok(None) => Err("a hand; no classifier".to_owned()),
+                    Err(panic) => Err(format!("a hand; the classifier panicked ({panic})")),
+                };
                 (Some((*region, mask)), judged)
             }
             Found::NoHand(cause) => (None, Err(cause.clone())),
@@ -137,7 +140,9 @@ impl Shower {
             frame: format!("gestalt_camera_{}", self.id),
         };
         to.publish(&CompressedImage { header, format: "jpeg".to_owned(), data }, clock)?;
-        robot.count("views_shown");
+        if let Some(robot) = self.robot.upgrade() {
+            robot.count("views_shown");
+        }
         Ok(())
     }
 }

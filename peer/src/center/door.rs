@@ -7,7 +7,7 @@ use gestalt_protocol::RobotId;
 use gestalt_strategies::Classify;
 use thiserror::Error;
 use tokio::sync::{Mutex, mpsc};
-use tokio::task::JoinSet;
+use tokio::task::{JoinSet, block_in_place};
 use tokio::time::MissedTickBehavior;
 
 use super::frame_queue::Put;
@@ -17,6 +17,7 @@ use super::waiting::{Waiting, turn};
 use super::{Frames, MAX_WAITING};
 use crate::config::{CameraChoice, CameraSection, Config, Fuse};
 use gestalt_link::{FrameArrival, GuestConfig, LinkConfig, LinkError, Robot, RobotConfig, fresh_nonce};
+use gestalt_trust::Identity;
 use gestalt_vision::model::RobotModel;
 
 use gestalt_vision::sight::{Sight, SightError};
@@ -161,14 +162,16 @@ impl Door {
         if self.robot.status().alive.contains(&id) {
             return Err(Refusal::Elsewhere(id));
         }
+        // Read now: it may have been enrolled, or given another key, while the centre runs. A camera without one knocks again and again.
+        let identity = self.config.trust.identity(id).map_err(|cause| Refusal::Link(id, cause))?;
         let about = self.config.center.robots.get(&id).cloned().unwrap_or_default();
         let stated = CameraChoice::named(&frame.header.camera);
         let model = about.camera.or(stated).unwrap_or_else(|| self.config.camera.model.clone());
         let name = about.name.unwrap_or_else(|| format!("{}-{id}", model.properties().name));
         let camera = CameraSection { model, ..self.config.camera.clone() };
-        let sight = Sight::steady(camera.sight(), self.model.features)
+        let sight = block_in_place(|| Sight::steady(camera.sight(), self.model.features))
             .map_err(|cause| Refusal::Perception(id, cause))?;
-        let robot = self.start(id, name).await.map_err(|cause| Refusal::Link(id, cause))?;
+        let robot = self.start(id, name, identity).await.map_err(|cause| Refusal::Link(id, cause))?;
         // Nobody reads them, so none need be kept.
         drop(robot.events());
         robot.learned(self.model.classifier.clone(), &self.model.name);
@@ -179,15 +182,16 @@ impl Door {
         Ok(())
     }
 
-    async fn start(&self, id: RobotId, name: String) -> Result<Robot, LinkError> {
+    async fn start(
+        &self,
+        id: RobotId,
+        name: String,
+        identity: Option<Arc<Identity>>,
+    ) -> Result<Robot, LinkError> {
         // Grows from one admission to the next, also when the centre was killed between them.
-        let boot = self.config.trust.boot_at(self.config.robot.id, id, SystemTime::now());
+        let boot = block_in_place(|| self.config.trust.boot_at(self.config.robot.id, id, SystemTime::now()));
         match self.config.center.fuse {
-            Fuse::Central => {
-                // Read now: it may have been enrolled, or given another key, while the centre runs.
-                let identity = self.config.trust.identity(id)?;
-                self.robot.guest(GuestConfig { id, name, boot, identity }).await
-            }
+            Fuse::Central => self.robot.guest(GuestConfig { id, name, boot, identity }).await,
             Fuse::Swarm => {
                 let locators = self.robot.locators();
                 let here = loopback(self.config.trust.keys.is_some()).trim_end_matches('0');

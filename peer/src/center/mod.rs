@@ -26,6 +26,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 use tokio::sync::mpsc;
 
+use crate::body::alone;
 use crate::config::{Config, Fuse};
 use door::{Calls, Door};
 use frame_queue::{FrameQueue, Put, Turn};
@@ -106,9 +107,7 @@ impl Center {
             Ok(center) => Ok(center),
             Err(error) => {
                 // Nothing is left running.
-                if let Some(robot) = Arc::into_inner(robot) {
-                    robot.stop().await;
-                }
+                alone(robot).await.stop().await;
                 Err(error)
             }
         }
@@ -157,9 +156,7 @@ impl Center {
         if let Err(error) = self.door.await {
             tracing::error!("the centre's task ended badly: {error}");
         }
-        if let Some(robot) = Arc::into_inner(self.robot) {
-            robot.stop().await;
-        }
+        alone(self.robot).await.stop().await;
     }
 }
 

@@ -9,6 +9,7 @@ use opencv::core::{Mat, Size};
 use super::frame_queue::{Count, Look};
 use super::pace::{Pace, Paces};
 use super::service::{Lately, Service};
+use crate::body::alone;
 use crate::camera_report::CameraReport;
 use crate::stream::MAX_MEGAPIXELS;
 use crate::telling::{tell, tell_camera};
@@ -163,18 +164,9 @@ impl Seat {
 
     /// Lets the robot leave the swarm, and waits until it has.
     pub async fn leave(self: Arc<Self>) {
-        // A worker may have a last look; its seat is free a few milliseconds later.
-        let mut seat = self;
-        let robot = loop {
-            match Arc::try_unwrap(seat) {
-                Ok(seat) => break seat.robot,
-                Err(shared) => seat = shared,
-            }
-            tokio::time::sleep(Duration::from_millis(10)).await;
-        };
-        if let Some(robot) = Arc::into_inner(robot) {
-            robot.stop().await;
-        }
+        // A worker may have a last look.
+        let seat = alone(self).await;
+        alone(seat.robot).await.stop().await;
     }
 }
 

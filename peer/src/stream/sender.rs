@@ -139,6 +139,8 @@ impl Sender {
                 Err(error) => {
                     self.failures.note(error.to_string());
                     self.tell_failures(&mut tell);
+                    // The session may open again, and fail again, at once.
+                    tokio::time::sleep(LOOKOUT).await;
                 }
             }
         }

@@ -90,27 +90,28 @@ pub(super) async fn ask_around(config: &Config, home: Option<String>) -> SwarmFa
     facts
 }
 
-/// Asks those that were heard and are in no part yet; gives those that cannot be asked.
+/// Asks some of those that were heard and are in no part yet; gives those that are in none then.
 async fn ask_heard(
     config: &Config,
     heard: &BTreeMap<RobotId, Vec<String>>,
     parts: &mut Vec<Vec<Answer>>,
 ) -> BTreeSet<RobotId> {
-    let mut silent = BTreeSet::new();
-    for _ in 0..DOORS {
+    let unknown = |parts: &[Vec<Answer>]| -> BTreeSet<RobotId> {
         let known: BTreeSet<RobotId> = parts.iter().flatten().map(|answer| answer.status.robot).collect();
-        let next = heard.iter().find(|(robot, _)| !known.contains(robot) && !silent.contains(*robot));
-        let Some((robot, locators)) = next else { break };
-        match ask(config, locators).await {
-            Ok(reply) if reply.answers.iter().any(|answer| answer.status.robot == *robot) => {
-                join(parts, reply.answers)
+        heard.keys().filter(|robot| !known.contains(robot)).copied().collect()
+    };
+    let mut asked = BTreeSet::new();
+    for _ in 0..DOORS {
+        let Some(robot) = unknown(parts).into_iter().find(|robot| !asked.contains(robot)) else { break };
+        asked.insert(robot);
+        match ask(config, &heard[&robot]).await {
+            Ok(reply) if reply.answers.iter().any(|answer| answer.status.robot == robot) => {
+                join(parts, reply.answers);
             }
-            _ => {
-                silent.insert(*robot);
-            }
+            _ => {}
         }
     }
-    silent
+    unknown(parts)
 }
 
 /// Asks all robots twice through the one at an endpoint.

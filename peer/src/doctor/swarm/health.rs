@@ -183,6 +183,10 @@ fn meaning(counter: &str) -> (&'static str, &'static str) {
         _ if has(&["_too_often", "_too_fast", "_too_soon"]) => {
             ("somebody says too much; what is beyond the bound is not looked into", WHO)
         }
+        _ if has(&["_frame_full"]) => (
+            "more cameras come at once than the centre has waiting",
+            "nothing, if they are served in the end (robots_served): they are let in one after the other",
+        ),
         _ if has(&["_full"]) => (
             "more arrives than the robot takes in",
             "fewer links at each robot: links: {max_links: 3}; or a faster processor",
