@@ -42,6 +42,15 @@ pub fn replace_secret(path: &Path, bytes: &[u8]) -> io::Result<()> {
     put(path, bytes, 0o600)
 }
 
+/// Makes a file that its owner alone can read, as a whole or not at all, where nothing of that name is.
+///
+/// # Errors
+/// [`io::ErrorKind::AlreadyExists`], and what else the operating system objects to; nothing is left then.
+pub fn new_secret(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    beside(path, bytes, 0o600)?.persist_noclobber(path).map_err(|refused| refused.error)?;
+    keep_name(path).inspect_err(|_| drop(fs::remove_file(path)))
+}
+
 /// Finds out whether [`write`] can succeed, before the work is done whose results are to be written. Leaves everything as it was.
 ///
 /// # Errors
@@ -75,14 +84,19 @@ pub fn keep_name(path: &Path) -> io::Result<()> {
 
 fn put(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
     let path = target(path)?;
+    beside(&path, bytes, mode)?.persist(&path).map_err(|refused| refused.error)?;
+    keep_name(&path)
+}
+
+/// All of that on the disk, in a file beside the one that it is to become.
+fn beside(path: &Path, bytes: &[u8], mode: u32) -> io::Result<tempfile::NamedTempFile> {
     let mut beside = tempfile::Builder::new();
     #[cfg(unix)]
     beside.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
-    let mut file = beside.tempfile_in(folder(&path))?;
+    let mut file = beside.tempfile_in(folder(path))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
-    file.persist(&path).map_err(|refused| refused.error)?;
-    keep_name(&path)
+    Ok(file)
 }
 
 /// Whether something is there that is written to, not replaced.
@@ -161,6 +175,11 @@ mod tests {
         assert_ne!(mode() & 0o400, 0);
         replace_secret(&path, b"mine").unwrap();
         assert_eq!(mode(), 0o600);
+        assert_eq!(new_secret(&path, b"new").unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&path).unwrap(), b"mine");
+        fs::remove_file(&path).unwrap();
+        new_secret(&path, b"new").unwrap();
+        assert_eq!((mode(), fs::read_dir(place.path()).unwrap().count()), (0o600, 1));
     }
 
     #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! A secret key on disk.
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use gestalt_protocol::hex::{self, HexError};
@@ -79,22 +79,10 @@ impl Identity {
     /// # Errors
     /// [`KeyFileError::Exists`] and [`KeyFileError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), KeyFileError> {
-        let mut options = OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let mut file = options.open(path).map_err(|source| match source.kind() {
+        // Half a key, whatever kept the rest of it off the disk, would stand in the way of the next attempt.
+        gestalt_file::new_secret(path, self.text().as_ref()).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => KeyFileError::Exists { path: path.to_owned() },
             _ => KeyFileError::Write { path: path.to_owned(), source },
-        })?;
-        let written = file
-            .write_all(self.text().as_ref())
-            .and_then(|()| file.sync_all())
-            .and_then(|()| gestalt_file::keep_name(path));
-        written.map_err(|source| {
-            // Half a key would stand in the way of the next attempt.
-            let _ = fs::remove_file(path);
-            KeyFileError::Write { path: path.to_owned(), source }
         })
     }
 
