@@ -164,6 +164,48 @@ pub async fn what_the_page_shows_and_says_is_what_the_swarm_says_and_hears() {
     school.end().await;
 }
 
+/// What the page makes of parts that its own server seldom writes so.
+const SELDOM: &str = r##"(async () => {
+  const told = (name, it) => take(`event: ${name}\ndata: ${JSON.stringify(it)}`);
+  const words = (selector) => [...document.querySelectorAll(selector)].map((it) => it.textContent);
+  const found = {};
+  // These end lines, and JSON leaves them as they are.
+  told("beat", { swarm: "a\u2028b\u2029c" });
+  found.lines = $("swarm").textContent;
+  take('event: rounds\ndata: {"rounds": [');
+  told("beat", { swarm: "beside a bad part" });
+  found.beside = $("swarm").textContent;
+
+  const list = make("ol");
+  for (let turn = 0; turn < 3; turn += 1) sync(list, ["a", "a"], (it) => it, () => make("li"), put);
+  found.alike = list.children.length;
+  const word = (at, word, more) => ({ instructor: "ada", at, round: null, word, gesture: "circle", of: null, words: "learned", ...more });
+  const round = { counter: 7, opener: 0, life: 1 };
+  const said = [word(6, "was", { round }), word(5, "was", { round }), word(4, "same", { of: "ring" }), word(3, "retire"), word(2, "new"), word(1, "open")];
+  for (let turn = 0; turn < 3; turn += 1) told("rounds", { rounds: [], curve: [], said });
+  found.said = words("#said li");
+
+  const asks = (counter, gestures) => told("question", {
+    round: { ...round, counter }, kind: "between", words: "?", gestures, answers: gestures, robot: 0,
+  });
+  asks(8, ["1", "2"]);
+  $("replies").lastElementChild.click();
+  found.others = words("#replies button");
+  asks(9, ["1", "2"]);
+  found.next = words("#replies button");
+  asks(10, state.swarm.vocabulary);
+  found.all = words("#replies button").includes("Neither");
+  told("question", null);
+
+  // Timers of one length end in their order: this one between those of the two rounds.
+  const decided = (counter) => told("decision", { ...state.decision, round: { ...round, counter } });
+  decided(1000);
+  const between = new Promise((done) => setTimeout(() => done(settled), SETTLES));
+  decided(1001);
+  found.settled = await between;
+  return found;
+})()"##;
+
 pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
     const EVIL: &str = "<img src=x onerror=alert(1)>";
     let mut school =
@@ -217,6 +259,27 @@ pub async fn a_browser_shows_teaches_and_says_when_it_is_no_longer_live() {
     assert_eq!(markup, 0, "a name became a part of the page");
     let complaints = block_in_place(|| browser.complaints());
     assert!(complaints.is_empty(), "{complaints:#?}");
+    let found = block_in_place(|| browser.evaluate(SELDOM));
+    let expected = json!({
+        "lines": "a\u{2028}b\u{2029}c",
+        "beside": "beside a bad part",
+        "alike": 2,
+        "said": [
+            "ada, round 7“it was circle” → learned",
+            "ada, round 7“it was circle” → learned",
+            "ada“circle is ring” → learned",
+            "ada“circle is shown no more” → learned",
+            "ada“circle is a new one” → learned",
+            "ada“look” → learned",
+        ],
+        "others": ["0", "3", "4", "5"],
+        "next": ["1", "2", "Neither"],
+        "all": false,
+        "settled": false,
+    });
+    assert_eq!(found, expected);
+    let complaints = block_in_place(|| browser.complaints());
+    assert_eq!(complaints.len(), 1, "of the bad part alone: {complaints:#?}");
     // The server goes, and comes back.
     let port = school.desk.address().port();
     school.desk.close().await;

@@ -1,6 +1,5 @@
 //! What all readers of the page are shown, written once for all of them.
 
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use axum::body::Bytes;
@@ -32,8 +31,6 @@ pub(crate) struct Parts([Part; NAMES.len()]);
 #[derive(Debug)]
 pub(crate) struct Board {
     parts: watch::Sender<Parts>,
-    /// The latest decision as it was announced, whole.
-    announced: Mutex<Option<Bytes>>,
     swarm: String,
 }
 
@@ -46,8 +43,7 @@ pub(crate) struct Reader {
 
 impl Board {
     pub fn new(swarm: &str) -> Self {
-        let parts = watch::Sender::new(Parts::default());
-        Self { parts, announced: Mutex::default(), swarm: swarm.to_owned() }
+        Self { parts: watch::Sender::new(Parts::default()), swarm: swarm.to_owned() }
     }
 
     pub fn reader(&self) -> Reader {
@@ -57,11 +53,6 @@ impl Board {
     /// How many readers there are.
     pub fn readers(&self) -> usize {
         self.parts.receiver_count()
-    }
-
-    /// The latest decision as it was announced: JSON.
-    pub fn announced(&self) -> Option<Bytes> {
-        self.announced.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -74,8 +65,6 @@ impl Show for Board {
             event(NAMES[2], &json!({"rounds": view.rounds(), "curve": view.curve(), "said": view.said()})),
             event(NAMES[3], &view.question(now)),
         ];
-        let announced = view.latest().map(|latest| serde_json::to_vec(latest).expect(IN_JSON).into());
-        *self.announced.lock().unwrap_or_else(PoisonError::into_inner) = announced;
         self.parts.send_if_modified(|parts| {
             let parts = parts.0.iter_mut().zip(events);
             let changed = parts.filter(|(part, event)| part.event != *event);
@@ -117,7 +106,7 @@ impl Reader {
     }
 }
 
-const IN_JSON: &str = "numbers, texts and lists of them have a place in JSON";
+pub(crate) const IN_JSON: &str = "numbers, texts and lists of them have a place in JSON";
 
 /// A server-sent event; JSON has no line breaks of its own.
 fn event(name: &str, data: &impl Serialize) -> Bytes {

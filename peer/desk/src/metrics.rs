@@ -37,7 +37,8 @@ impl Format {
     }
 }
 
-/// Of more robots than this only the swarm is measured: each is some sixty time series.
+/// So many robots are measured one by one, those of the smallest ids: each is some sixty time series. What is said of the swarm is
+/// of all.
 const MAX_ROBOTS: usize = 256;
 
 /// What a view says at one moment. Labels are robots, and names of the robots' own counters, both bounded in number.
@@ -45,6 +46,7 @@ const MAX_ROBOTS: usize = 256;
 struct Moment {
     robots: Vec<RobotView>,
     there: usize,
+    answering: usize,
     counters: Vec<(String, Vec<(String, u64)>)>,
     tally: Tally,
     readers: usize,
@@ -54,12 +56,14 @@ struct Moment {
 pub(crate) fn text(view: &View, now: Duration, readers: usize, format: Format) -> Result<String, fmt::Error> {
     let mut robots = view.swarm(now).robots;
     let there = robots.len();
+    let answering = robots.iter().filter(|robot| robot.answers).count();
     robots.truncate(MAX_ROBOTS);
     let counters = view.counters().take(MAX_ROBOTS);
     let counters = counters.map(|(robot, counters)| {
         (robot.to_string(), counters.iter().map(|(name, count)| (name.clone(), *count)).collect())
     });
-    let moment = Moment { there, counters: counters.collect(), robots, tally: view.tally().clone(), readers };
+    let (counters, tally) = (counters.collect(), view.tally().clone());
+    let moment = Moment { there, answering, counters, robots, tally, readers };
     let mut registry = Registry::with_prefix("gestalt");
     registry.register_collector(Box::new(moment));
     let mut text = String::new();
@@ -97,8 +101,7 @@ impl Collector for Moment {
             [([("version", env!("CARGO_PKG_VERSION"))], 1.0)],
         )?;
         gauge(to, "robots", "Robots that are there", [(NONE, self.there as f64)])?;
-        let answering = self.robots.iter().filter(|robot| robot.answers).count();
-        gauge(to, "robots_answering", "Robots that report themselves", [(NONE, answering as f64)])?;
+        gauge(to, "robots_answering", "Robots that report themselves", [(NONE, self.answering as f64)])?;
         gauge(to, "page_readers", "Readers of the page", [(NONE, self.readers as f64)])?;
         self.encode_swarm(to)?;
         self.encode_robots(to)
@@ -217,4 +220,28 @@ fn family<const N: usize, V: prometheus_client::encoding::EncodeLabelValue, T>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::RobotId;
+
+    use super::*;
+    use crate::view::{Input, SILENT};
+
+    #[test]
+    fn robots_that_are_not_measured_one_by_one_are_counted() {
+        let mut view = View::default();
+        for robot in 0..300 {
+            let heard = if robot % 3 == 0 { Duration::ZERO } else { SILENT };
+            view.hear(heard, Input::Came(RobotId(robot)));
+        }
+        let now = SILENT + Duration::from_secs(1);
+        let text = text(&view, now, 0, Format::OpenMetrics).unwrap();
+        for line in ["gestalt_robots 300", "gestalt_robots_answering 200"] {
+            assert!(text.lines().any(|found| found.starts_with(line)), "{line} is not in {text}");
+        }
+        let measured = text.lines().filter(|line| line.starts_with("gestalt_robot_links{"));
+        assert_eq!(measured.count(), MAX_ROBOTS);
+    }
 }

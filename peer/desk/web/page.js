@@ -20,6 +20,7 @@ let live = false;
 let why = "";
 let since = new Date();
 let settled = true;
+let settling;
 let waiting = false;
 
 function text(id, words) {
@@ -40,9 +41,11 @@ function draw(tag, attributes, words) {
   return it;
 }
 
-// Makes the children of `parent` those of `items`, keeping those that are there: what is open or has the focus stays so.
+// Makes the children of `parent` those of `items`, and no others, keeping those that are there: what is open or has the
+// focus stays so.
 function sync(parent, items, key, create, update) {
   const known = new Map([...parent.children].map((child) => [child.dataset.key, child]));
+  const placed = new Set();
   let place = parent.firstElementChild;
   for (const item of items) {
     const name = String(key(item));
@@ -50,10 +53,11 @@ function sync(parent, items, key, create, update) {
     if (child) known.delete(name);
     else (child = create(item)).dataset.key = name;
     update(child, item);
+    placed.add(child);
     if (child === place) place = place.nextElementSibling;
     else parent.insertBefore(child, place);
   }
-  for (const child of known.values()) child.remove();
+  for (const child of [...parent.children]) if (!placed.has(child)) child.remove();
 }
 
 function put(child, words) {
@@ -282,10 +286,11 @@ function showRounds() {
     cell.title = `round ${it.round.counter}: ${it.label ?? it.outcome ?? "undecided"}, ${percent(it.confidence)}, ${verdict}`;
   });
   showCurve(curve.slice(-120));
-  const told = { was: (it) => `it was ${it.gesture}`, right: () => "right", wrong: () => "wrong", retract: () => "took it back",
-    new: (it) => `this is ${it.gesture}, a new one` };
-  lines("said", "no-said", said.slice(0, 6), (it) => `${it.instructor} ${it.round.counter}@${it.round.opener}-${it.round.life} ${it.word} ${it.gesture}`, (it) => [
-    `${it.instructor}, round ${it.round.counter}`, `“${told[it.word](it)}” → ${it.words}`,
+  const told = { open: () => "look", was: (it) => `it was ${it.gesture}`, right: () => "right", wrong: () => "wrong", retract: () => "took it back",
+    new: (it) => (it.round ? `this is ${it.gesture}, a new one` : `${it.gesture} is a new one`), same: (it) => `${it.gesture} is ${it.of}`,
+    retire: (it) => `${it.gesture} is shown no more`, restore: (it) => `${it.gesture} is in use again` };
+  lines("said", "no-said", said.slice(0, 6), (it) => `${it.instructor} ${it.at}`, (it) => [
+    it.round ? `${it.instructor}, round ${it.round.counter}` : it.instructor, `“${told[it.word](it)}” → ${it.words}`,
   ]);
 }
 
@@ -360,9 +365,8 @@ function showQuestion() {
   const asked = it.kind === "again" ? [] : it.kind === "between" ? it.gestures : known;
   const gestures = asked.map((label, k) => ({ label, answer: it.kind === "between" ? it.answers[k] : meant(label) }));
   const neither = it.kind === "between" ? known.filter((label) => !it.gestures.includes(label)) : [];
-  const replies = [...gestures, ...(it.kind === "between" ? [{ label: "Neither", of: neither }] : [])];
-  const of = `${it.round.counter}@${it.round.opener}-${it.round.life}`;
-  sync($("replies"), replies, (reply) => `${of} ${reply.label}`, (reply) => {
+  const replies = neither.length > 0 ? [...gestures, { label: "Neither", of: neither }] : gestures;
+  sync($("replies"), replies, (reply) => JSON.stringify([it.round, reply]), (reply) => {
     const button = make("button", "", reply.label);
     button.type = "button";
     button.addEventListener("click", () => {
@@ -463,7 +467,8 @@ const PARTS = {
     if (changed) {
       settled = false;
       reply("", false);
-      setTimeout(() => { settled = true; buttons(); }, SETTLES);
+      clearTimeout(settling);
+      settling = setTimeout(() => { settled = true; buttons(); }, SETTLES);
     }
     showDecision();
     showVerdict();
@@ -496,10 +501,14 @@ function is(now) {
   buttons();
 }
 
+// What is wrong with one part costs that part. Only line feeds end lines here: a text may have other separators in it.
 function take(event) {
-  const [, name] = event.match(/^event: (\w+)$/m) ?? [];
-  const [, data] = event.match(/^data: (.*)$/m) ?? [];
-  if (name in PARTS && data !== undefined) PARTS[name](JSON.parse(data));
+  const [, name, data] = event.match(/^event: (\w+)\ndata: ([^\n]*)$/) ?? [];
+  try {
+    if (name in PARTS) PARTS[name](JSON.parse(data));
+  } catch (error) {
+    console.error(`cannot show "${name}":`, error);
+  }
   buttons();
 }
 

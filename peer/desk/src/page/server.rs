@@ -19,7 +19,7 @@ use tokio::sync::Semaphore;
 
 use super::files::{FILES, answer};
 use crate::asks::{Asks, MAX_WORD, Unsaid};
-use crate::board::Board;
+use crate::board::{Board, IN_JSON};
 use crate::door::{Door, Gate, Guard, Token, at_the_door, with_token};
 use crate::known::Known;
 use crate::metrics;
@@ -121,7 +121,8 @@ async fn say(State(server): State<Server>, headers: HeaderMap, body: Bytes) -> R
 
 /// The latest decision with all its votes, as it was announced: what `gestalt verify` checks.
 async fn decision(State(server): State<Server>) -> Response {
-    let Some(announced) = server.board.upgrade().and_then(|board| board.announced()) else {
+    // Written once the view is let go of: it has all votes in it.
+    let Some(announced) = server.known.with(|view, _| view.latest().cloned()) else {
         return (StatusCode::NOT_FOUND, "Nothing was decided yet.\n").into_response();
     };
     let headers = [
@@ -129,7 +130,7 @@ async fn decision(State(server): State<Server>) -> Response {
         (CONTENT_DISPOSITION, "attachment; filename=\"decision.json\""),
         (CACHE_CONTROL, "no-store"),
     ];
-    (headers, announced).into_response()
+    (headers, serde_json::to_vec(&announced).expect(IN_JSON)).into_response()
 }
 
 async fn measured(State(server): State<Server>, headers: HeaderMap) -> Response {

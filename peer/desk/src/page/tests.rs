@@ -17,6 +17,7 @@ use crate::door::{Address, Door, Gate, Limits, Token};
 use crate::follow::Show;
 use crate::known::Known;
 use crate::view::Input;
+use crate::view::tests::decided;
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -237,6 +238,18 @@ async fn a_word_is_passed_on_as_it_was_said_and_what_is_none_is_refused() {
     let (page, said) = said.await.unwrap();
     assert_eq!(said, Instruction::Open);
     assert_eq!(page.status("GET /decision.json", &[], "").await, 404, "nothing was decided yet");
+}
+
+#[tokio::test]
+async fn the_latest_decision_is_given_as_it_was_announced() {
+    let page = page(None, Limits::default()).await;
+    for counter in [2, 3] {
+        let announced = decided(counter, Some(2), &[2, 2, 1]);
+        page.known.hear(Input::Decided(Box::new(announced.clone())));
+        let answer = page.ask("GET /decision.json", &[], "").await;
+        let (_, body) = answer.split_once("\r\n\r\n").unwrap();
+        assert_eq!(body, serde_json::to_string(&announced).unwrap());
+    }
 }
 
 #[tokio::test]

@@ -10,7 +10,7 @@ mod round;
 mod said;
 mod tally;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod text;
 
 use std::collections::BTreeMap;
@@ -84,8 +84,8 @@ pub enum Event {
     Decided(Box<Announcement>),
     /// The swarm asks.
     Question(Box<Question>),
-    /// An instructor was answered.
-    Answered(RoundId),
+    /// An instructor was answered; of which round, where the word names one.
+    Answered(Option<RoundId>),
 }
 
 /// The robots, and what is the matter with all of them.
@@ -173,7 +173,8 @@ impl View {
     #[must_use]
     pub fn said(&self) -> Vec<SaidView> {
         self.said.views(|round, class| {
-            let vocabulary = self.rounds.vocabulary(round).and_then(|id| self.known_vocabulary(id));
+            let decided = round.and_then(|round| self.rounds.vocabulary(round));
+            let vocabulary = decided.and_then(|id| self.known_vocabulary(id));
             text::gesture(class, vocabulary.or_else(|| self.vocabulary()))
         })
     }
@@ -330,13 +331,17 @@ impl View {
     }
 
     fn on_answered(&mut self, by: InstructorId, answer: Answer) -> Option<Event> {
-        let round = answer.to.round()?;
-        self.asked.answer(round, answer.outcome);
-        if !self.said.note(&by, round, &answer) {
+        let round = answer.to.round();
+        if let Some(round) = round {
+            self.asked.answer(round, answer.outcome);
+        }
+        if !self.said.note(&by, &answer) {
             return None;
         }
         self.tally.count_answer(answer.outcome);
-        self.rounds.answer(round, by, &answer);
+        if let Some(round) = round {
+            self.rounds.answer(round, by, &answer);
+        }
         Some(Event::Answered(round))
     }
 }

@@ -1,4 +1,4 @@
-//! What instructors said of rounds, and what became of it.
+//! What instructors said, and what became of it.
 
 use std::collections::VecDeque;
 
@@ -15,12 +15,16 @@ pub const MAX_SAID: usize = 32;
 pub struct SaidView {
     /// Who said it.
     pub instructor: InstructorId,
-    /// Of which round.
-    pub round: RoundId,
-    /// What: `was`, `right`, `wrong`, `retract`.
+    /// When: see [`Answer::at`].
+    pub at: u64,
+    /// Of which round; `None` where the word names none.
+    pub round: Option<RoundId>,
+    /// What: `was`, `right`, `wrong`, `retract`, `new`, `same`, `retire`, `restore`, or `open` where it was refused.
     pub word: &'static str,
     /// Of which gesture, as it was named.
     pub gesture: Option<String>,
+    /// Which other one that is, where the word is `same`.
+    pub of: Option<String>,
     /// What became of it.
     pub outcome: Outcome,
     /// The same in words.
@@ -35,75 +39,77 @@ pub struct SaidView {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Said(VecDeque<Noted>);
 
+/// A word whose gestures are named when it is shown: the names of numbers may come later.
 #[derive(Clone, Debug)]
 struct Noted {
-    at: u64,
-    /// The gesture, where it was named by its number.
-    class: Option<ClassId>,
+    gesture: Option<Gesture>,
+    of: Option<Gesture>,
     view: SaidView,
 }
 
 impl Said {
     /// Notes a word and its answer. Says whether it is new: robots answer each word once, but where one dies its successor
     /// may repeat it, and the smaller id then stands. A word is known by its author and its time, whatever its clock says.
-    pub fn note(&mut self, by: &InstructorId, round: RoundId, answer: &Answer) -> bool {
-        let (view, class) = SaidView::new(by, round, answer);
-        let known = self.0.iter_mut().find(|it| it.at == answer.at && it.view.instructor == *by);
-        if let Some(Noted { view: known, .. }) = known {
-            if (view.robot, view.samples) < (known.robot, known.samples) {
-                *known = view;
+    pub fn note(&mut self, by: &InstructorId, answer: &Answer) -> bool {
+        let noted = Noted::new(by, answer);
+        let known = self.0.iter_mut().find(|it| it.view.at == answer.at && it.view.instructor == *by);
+        if let Some(known) = known {
+            if (noted.view.robot, noted.view.samples) < (known.view.robot, known.view.samples) {
+                *known = noted;
             }
             return false;
         }
         if self.0.len() == MAX_SAID {
             self.0.pop_front();
         }
-        self.0.push_back(Noted { at: answer.at, class, view });
+        self.0.push_back(noted);
         true
     }
 
-    /// Latest first; `name` knows the names of a round's gestures.
-    pub fn views(&self, name: impl Fn(RoundId, ClassId) -> String) -> Vec<SaidView> {
-        let view = |Noted { class, view, .. }: &Noted| {
-            let named = class.map(|class| name(view.round, class));
-            SaidView { gesture: named.or_else(|| view.gesture.clone()), ..view.clone() }
+    /// Latest first; `name` knows the names of a round's gestures, and of those that words without a round are about.
+    pub fn views(&self, name: impl Fn(Option<RoundId>, ClassId) -> String) -> Vec<SaidView> {
+        let view = |Noted { gesture, of, view }: &Noted| {
+            let named = |gesture: &Gesture| match gesture {
+                Gesture::Class(class) => name(view.round, *class),
+                Gesture::Label(label) => label.clone(),
+            };
+            SaidView { gesture: gesture.as_ref().map(named), of: of.as_ref().map(named), ..view.clone() }
         };
         self.0.iter().rev().map(view).collect()
     }
 }
 
-impl SaidView {
-    /// A word as it was said, and the gesture's number if it has no name yet.
-    fn new(by: &InstructorId, round: RoundId, answer: &Answer) -> (Self, Option<ClassId>) {
-        let (word, gesture) = match &answer.to {
-            Instruction::Open => ("open", None),
-            Instruction::Was { class, .. } => ("was", Some(class)),
-            Instruction::Right { of, .. } => ("right", Some(of)),
-            Instruction::Wrong { of, .. } => ("wrong", Some(of)),
-            Instruction::Retract { .. } => ("retract", None),
-            Instruction::New { .. } => ("new", None),
-            Instruction::Same { class, .. } => ("same", Some(class)),
-            Instruction::Retire { class } => ("retire", Some(class)),
-            Instruction::Restore { class } => ("restore", Some(class)),
+impl Noted {
+    fn new(by: &InstructorId, answer: &Answer) -> Self {
+        let short = |gesture: &Gesture| {
+            Some(match gesture {
+                Gesture::Class(class) => Gesture::Class(*class),
+                Gesture::Label(label) => Gesture::Label(clipped(label)),
+            })
         };
-        let (gesture, class) = match gesture {
-            Some(Gesture::Label(label)) => (Some(clipped(label)), None),
-            Some(Gesture::Class(class)) => (None, Some(*class)),
-            None => match &answer.to {
-                Instruction::New { label, .. } => (Some(clipped(label)), None),
-                _ => (None, None),
-            },
+        let (word, gesture, of) = match &answer.to {
+            Instruction::Open => ("open", None, None),
+            Instruction::Was { class, .. } => ("was", short(class), None),
+            Instruction::Right { of, .. } => ("right", short(of), None),
+            Instruction::Wrong { of, .. } => ("wrong", short(of), None),
+            Instruction::Retract { .. } => ("retract", None, None),
+            Instruction::New { label, .. } => ("new", Some(Gesture::Label(clipped(label))), None),
+            Instruction::Same { class, of } => ("same", short(class), short(of)),
+            Instruction::Retire { class } => ("retire", short(class), None),
+            Instruction::Restore { class } => ("restore", short(class), None),
         };
-        let view = Self {
+        let view = SaidView {
             instructor: by.clone(),
-            round,
+            at: answer.at,
+            round: answer.to.round(),
             word,
-            gesture,
+            gesture: None,
+            of: None,
             outcome: answer.outcome,
             words: answer.outcome.describe(),
             robot: answer.robot,
             samples: answer.samples,
         };
-        (view, class)
+        Self { gesture, of, view }
     }
 }

@@ -28,7 +28,7 @@ fn status(robot: u32) -> Status {
 }
 
 /// A decision of robots' votes for classes.
-fn decided(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
+pub(crate) fn decided(counter: u32, class: Option<u32>, votes: &[u32]) -> Announcement {
     let round = round(counter);
     let vote = |(robot, class): (u32, &u32)| {
         let mut evidence = vec![-0.5; 3];
@@ -226,6 +226,45 @@ fn what_a_round_showed_is_what_the_swarm_heeds() {
 }
 
 #[test]
+fn words_about_names_are_counted_and_shown_though_they_name_no_round() {
+    let circle = || Gesture::Label("circle".to_owned());
+    let words = [
+        (Instruction::New { label: "circle".to_owned(), round: None }, Outcome::Learned),
+        (Instruction::Same { class: circle(), of: Gesture::Class(ClassId(1)) }, Outcome::Learned),
+        (Instruction::Retire { class: circle() }, Outcome::Known),
+        (Instruction::Restore { class: circle() }, Outcome::UnknownGesture),
+        (Instruction::Open, Outcome::NotAllowed),
+    ];
+    let mut view = after([reported(status(1)), Input::Came(RobotId(1))]);
+    for (at, (to, outcome)) in (5..).zip(words) {
+        let (by, answer) = was(1, "", at, outcome);
+        let heard = answered((by, Answer { to, ..answer }));
+        assert_eq!(view.hear(NOW, heard.clone()), Some(Event::Answered(None)));
+        assert_eq!(view.hear(NOW, heard), None, "answered twice, said once");
+    }
+    let said = view.said();
+    let shown = said.iter().rev().map(|it| (it.word, it.gesture.as_deref(), it.of.as_deref()));
+    let circle = Some("circle");
+    let expected = [
+        ("new", circle, None),
+        ("same", circle, Some("one")),
+        ("retire", circle, None),
+        ("restore", circle, None),
+        ("open", None, None),
+    ];
+    assert_eq!(shown.collect::<Vec<_>>(), expected);
+    assert!(said.iter().all(|it| it.round.is_none()));
+    assert_eq!(view.tally().answers, [2, 1, 0, 0, 1, 0, 1, 0]);
+}
+
+#[test]
+fn what_is_said_again_is_another_word() {
+    let view = after([5, 6, 6].map(|at| answered(was(1, "one", at, Outcome::Known))));
+    let said: Vec<_> = view.said().iter().map(|it| (it.at, it.round)).collect();
+    assert_eq!(said, [(6, Some(round(1))), (5, Some(round(1)))]);
+}
+
+#[test]
 fn a_round_says_what_it_came_to_also_without_a_gesture() {
     let outcome = |counter, class| after([decision(decided(counter, class, &[2, 2, 1]))]).rounds()[0].outcome;
     assert_eq!([outcome(1, Some(2)), outcome(2, None)], [RoundOutcome::Gesture, RoundOutcome::Undecided]);
@@ -371,6 +410,11 @@ fn heard() -> impl Strategy<Value = Input> {
             // A word is known by its time, so one time has one word.
             let at = u64::from(counter) * 100 + class as u64 * 10 + outcome as u64;
             answered(was(counter, &labels()[class], at, outcome))
+        }),
+        (0_usize..3, robot()).prop_map(|(class, robot)| {
+            let (by, answer) = was(0, "", 10_000 + class as u64, Outcome::Learned);
+            let to = Instruction::Retire { class: Gesture::Label(labels()[class].clone()) };
+            answered((by, Answer { to, robot, ..answer }))
         }),
     ]
 }
