@@ -252,7 +252,7 @@ GestaltStatus gestalt_mind_next_message(GestaltMind *mind,
  zero. `GESTALT_STATUS_NOTHING` before a decision; `GESTALT_STATUS_TOO_SMALL` for a buffer that has no room for it.
 
  # Safety
- `mind` as everywhere; `buffer` is null or has room for `capacity` bytes; `length` is null or points to a number.
+ `mind` as everywhere; `buffer` is null or has room for `capacity` bytes; `length` is null or has room for a number.
  */
 GestaltStatus gestalt_mind_decision(GestaltMind *mind,
                                     char *buffer,

@@ -14,6 +14,10 @@ pub(crate) fn set(error: impl Into<String>) {
     let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = error.into());
 }
 
+pub(crate) fn get() -> String {
+    LAST_ERROR.try_with(|last| last.borrow().clone()).unwrap_or_default()
+}
+
 /// Writes what was wrong with this thread's latest call that failed, as UTF-8 that ends with a zero byte, cut to
 /// `capacity`. Gives its whole length in bytes, without the zero; 0 before the first error.
 ///
@@ -21,7 +25,7 @@ pub(crate) fn set(error: impl Into<String>) {
 /// `buffer` is null, or has room for `capacity` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gestalt_last_error(buffer: *mut c_char, capacity: usize) -> usize {
-    let text = LAST_ERROR.try_with(|last| last.borrow().clone()).unwrap_or_default();
+    let text = get();
     let mut cut = text.len().min(capacity.saturating_sub(1));
     while !text.is_char_boundary(cut) {
         cut -= 1;

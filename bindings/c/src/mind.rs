@@ -11,6 +11,7 @@ use std::time::Duration;
 use gestalt_mind::{MAX_MODEL_FILE, PortableMind, Settings};
 
 use crate::border::guarded;
+use crate::last_error;
 use crate::pointers::{slice, text, write_out};
 use crate::refused::Refused;
 use crate::status::Status;
@@ -25,8 +26,8 @@ pub const GESTALT_TO_ALL: u32 = u32::MAX;
 #[derive(Debug)]
 pub struct Mind {
     mind: PortableMind,
-    /// Whether it panicked: what it holds may be half done.
-    broken: bool,
+    /// What a panic said, if it met one: what it holds may be half done.
+    broken: Option<String>,
 }
 
 /// A message for the host to carry, in buffers of the caller: `key`, `key_capacity`, `payload` and `payload_capacity` are the
@@ -61,11 +62,15 @@ unsafe fn with(mind: *mut Mind, call: impl FnOnce(&mut PortableMind) -> Result<S
     let Some(mind) = (unsafe { mind.as_mut() }) else {
         return guarded(|| Err(Refused::Argument("the mind is null".to_owned())));
     };
-    if mind.broken {
+    if let Some(panic) = &mind.broken {
+        // Whoever calls now may not be the thread that was told of the panic.
+        last_error::set(format!(
+            "an earlier call may have left this mind half changed: {panic}; free it, and start another"
+        ));
         return Status::Panicked;
     }
     let status = guarded(|| call(&mut mind.mind));
-    mind.broken = status == Status::Panicked;
+    mind.broken = (status == Status::Panicked).then(last_error::get);
     status
 }
 
@@ -90,7 +95,7 @@ pub unsafe extern "C" fn gestalt_mind_new(settings: *const c_char, mind: *mut *m
         // SAFETY: the caller promises the zero byte.
         let settings = unsafe { text(settings, "settings") }?;
         let started = PortableMind::new(Settings::parse(settings.as_bytes())?)?;
-        let started = Box::new(Mind { mind: started, broken: false });
+        let started = Box::new(Mind { mind: started, broken: None });
         // SAFETY: as above.
         unsafe { mind.write(Box::into_raw(started)) };
         Ok(Status::Ok)
@@ -325,21 +330,28 @@ pub unsafe extern "C" fn gestalt_mind_is_open(mind: *mut Mind) -> Status {
 /// `mind` as everywhere; `message` is null or points to one whose buffers have room for as many bytes as it says.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gestalt_mind_next_message(mind: *mut Mind, message: *mut Message) -> Status {
-    // SAFETY: the caller's promises are passed on, and each write below is within a room that was just compared.
+    // SAFETY: the caller's promises are passed on; the fields are those of the caller's message, and each write into a buffer is
+    // within a room that was just compared.
     unsafe {
         with(mind, |mind| {
-            let out = message.as_mut().ok_or_else(|| Refused::Argument("message is null".to_owned()))?;
+            if message.is_null() {
+                return Err(Refused::Argument("message is null".to_owned()));
+            }
             let Some(first) = mind.first_message() else { return Ok(Status::Nothing) };
             let (key, payload) = (first.key.as_bytes(), first.payload.as_slice());
-            (out.key_length, out.payload_length) = (key.len(), payload.len());
-            out.to = first.to.map_or(GESTALT_TO_ALL, |robot| robot.0);
-            out.json = first.json;
-            let small = out.key_capacity <= key.len() || out.payload_capacity < payload.len();
-            if small || out.key.is_null() || out.payload.is_null() {
+            // Field by field: a reference to the whole would be one to a `bool` that nobody has written yet.
+            (&raw mut (*message).key_length).write(key.len());
+            (&raw mut (*message).payload_length).write(payload.len());
+            (&raw mut (*message).to).write(first.to.map_or(GESTALT_TO_ALL, |robot| robot.0));
+            (&raw mut (*message).json).write(first.json);
+            let (key_out, key_room) = ((*message).key, (*message).key_capacity);
+            let (payload_out, payload_room) = ((*message).payload, (*message).payload_capacity);
+            let small = key_room <= key.len() || payload_room < payload.len();
+            if small || key_out.is_null() || payload_out.is_null() {
                 return Ok(Status::TooSmall);
             }
-            write_out(out.key.cast(), &[key, b"\0"].concat());
-            write_out(out.payload, payload);
+            write_out(key_out.cast(), &[key, b"\0"].concat());
+            write_out(payload_out, payload);
             mind.next_message();
             Ok(Status::Ok)
         })
@@ -350,7 +362,7 @@ pub unsafe extern "C" fn gestalt_mind_next_message(mind: *mut Mind, message: *mu
 /// zero. `GESTALT_STATUS_NOTHING` before a decision; `GESTALT_STATUS_TOO_SMALL` for a buffer that has no room for it.
 ///
 /// # Safety
-/// `mind` as everywhere; `buffer` is null or has room for `capacity` bytes; `length` is null or points to a number.
+/// `mind` as everywhere; `buffer` is null or has room for `capacity` bytes; `length` is null or has room for a number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gestalt_mind_decision(
     mind: *mut Mind,
@@ -387,9 +399,9 @@ unsafe fn write_text(
     length: *mut usize,
 ) -> Result<Status, Refused> {
     let Some(text) = text else { return Ok(Status::Nothing) };
-    // SAFETY: null, or a number of the caller's.
-    if let Some(length) = unsafe { length.as_mut() } {
-        *length = text.len();
+    if !length.is_null() {
+        // SAFETY: it is not null, and the caller promises room for a number.
+        unsafe { length.write(text.len()) };
     }
     if buffer.is_null() || capacity <= text.len() {
         return Ok(Status::TooSmall);
@@ -414,3 +426,6 @@ pub unsafe extern "C" fn gestalt_mind_train(mind: *mut Mind, now_ns: u64) -> Sta
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! The C interface as a caller sees it, in Rust: what Miri can follow (`make miri`), which runs no program in C.
 
 use std::ffi::{CString, c_char};
+use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 use gestalt_c::*;
@@ -111,6 +112,31 @@ fn two_minds_agree_through_the_c_interface_and_leave_nothing_behind() {
     }
     let held = robots.each_ref().map(|robot| robot.decision().expect("it decides"));
     assert!(held.iter().all(|held| held.contains("right")), "{held:?}");
+}
+
+#[test]
+fn of_a_message_nothing_is_read_but_what_is_the_callers() {
+    let robot = Robot::new(1);
+    let mut message = MaybeUninit::<Message>::uninit();
+    let out = message.as_mut_ptr();
+    // SAFETY: a living mind, and a message whose buffers have room for nothing.
+    unsafe {
+        out.cast::<u8>().write_bytes(0xAA, size_of::<Message>());
+        (&raw mut (*out).key).write(null_mut());
+        (&raw mut (*out).key_capacity).write(0);
+        (&raw mut (*out).payload).write(null_mut());
+        (&raw mut (*out).payload_capacity).write(0);
+        let json = (&raw mut (*out).json).cast::<u8>();
+        assert_eq!(gestalt_mind_next_message(robot.0, out), Status::Nothing);
+        assert_eq!(json.read(), 0xAA, "where nothing waits nothing is written");
+        assert_eq!(gestalt_mind_open(robot.0, MS), Status::Ok);
+        assert_eq!(gestalt_mind_tick(robot.0, 1000 * MS), Status::Ok);
+        assert_eq!(gestalt_mind_next_message(robot.0, out), Status::TooSmall);
+        assert_eq!(json.read(), 0, "a vote is no JSON");
+    }
+    // SAFETY: four of its fields were written above, the others by the call.
+    let message = unsafe { message.assume_init() };
+    assert!(message.key_length > 0 && message.payload_length > 0 && message.to == GESTALT_TO_ALL);
 }
 
 #[test]

@@ -22,7 +22,7 @@ int main(int argc, char **argv) {
   const char *settings = "{\"robot\": 1, \"boot\": 1, \"seed\": 1, \"vocabulary\": [\"left\", \"right\"]}";
   GestaltMind *mind = (GestaltMind *)&argc;
   char small[4], text[4096];
-  size_t length = 0;
+  size_t length;
   assert(argc == 2);
 
   /* Null where there must be something. */
@@ -78,7 +78,12 @@ int main(int argc, char **argv) {
   assert(gestalt_mind_open(mind, 2) == GESTALT_STATUS_OK);
   assert(gestalt_mind_tick(mind, UINT64_C(1000000000)) == GESTALT_STATUS_OK);
   GestaltMessage message;
-  memset(&message, 0, sizeof message);
+  /* Four fields are the caller's; the rest may be anything before. */
+  memset(&message, 0xAA, sizeof message);
+  message.key = NULL;
+  message.key_capacity = 0;
+  message.payload = NULL;
+  message.payload_capacity = 0;
   assert(gestalt_mind_next_message(mind, NULL) == GESTALT_STATUS_ARGUMENT);
   assert(gestalt_mind_next_message(mind, &message) == GESTALT_STATUS_TOO_SMALL);
   assert(message.payload_length > 0 && message.to == GESTALT_TO_ALL && !message.json);

@@ -6,7 +6,7 @@
 //!                                       "evidence": [1.5, -1.5], "looks": 2.0, "unknown": null}}}
 //! ```
 //!
-//! Kinds are `vote`, `have`, `give`, `samples`, `know`, `lessons`, `batches`, `holding` and `announced`, with the fields of the types of that name in
+//! Kinds are `vote`, `have`, `give`, `samples`, `know`, `lessons`, `batches`, `holding`, `announced`, `namings` and `asked`, with the fields of the types of that name in
 //! `gestalt-protocol`. Vectors of samples are spelt `{"f32": […]}`, `{"f16": […]}` (as numbers) or `{"i8": […]}`. What is read
 //! and written again has the same bytes.
 

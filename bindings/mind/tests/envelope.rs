@@ -2,8 +2,9 @@
 
 use gestalt_mind::envelope::{from_json, to_json};
 use gestalt_protocol::{
-    Batches, ClassId, Envelope, FeatureSpaceId, HeldBatch, Lesson, Lessons, Message, RobotId, RoundId,
-    SampleId, Samples, SharedSample, Signature, Stamp, Vector, VocabularyId, Vote, Word,
+    Ask, Asked, Batches, ClassId, Envelope, Fate, FeatureSpaceId, HeldBatch, Lesson, Lessons, Message,
+    Naming, Namings, RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp, Vector,
+    VocabularyId, Vote, Word,
 };
 use proptest::prelude::*;
 
@@ -86,6 +87,36 @@ fn lessons_and_signed_votes_come_back_byte_for_byte() {
     comes_back(
         &Envelope { author: RobotId(7), stamp: STAMP, message: Message::Vote(vote), signature }.encode(),
     );
+}
+
+#[test]
+fn what_was_named_and_what_is_asked_come_back_byte_for_byte() {
+    let circle = Naming {
+        by: "ana".parse().unwrap(),
+        label: "circle".to_owned(),
+        count: 2,
+        at: 1,
+        said_by: "bob".parse().unwrap(),
+        fate: Fate::Same(ClassId(3)),
+        said: None,
+    };
+    comes_back(&envelope(Message::Namings(Namings { namings: vec![circle] })));
+    let ask = Ask::Name { nearest: Some(ClassId(2)) };
+    let asked = Asked { round: ROUND, ask, labels: vec![], entropy: 0.75, disagreement: 0.25 };
+    comes_back(&envelope(Message::Asked(asked)));
+}
+
+#[test]
+fn every_kind_is_documented() {
+    let unknown = r#"{"author":7,"stamp":{"boot":1,"sequence":1},"message":{"kind":"none","body":{}}}"#;
+    let error = from_json(unknown.as_bytes()).unwrap_err().to_string();
+    let (_, known) = error.split_once("expected one of ").expect("the kinds");
+    let kinds: Vec<&str> = known.split('`').skip(1).step_by(2).collect();
+    assert!(kinds.contains(&"vote") && kinds.contains(&"asked"), "{error}");
+    let documented = include_str!("../src/envelope.rs").split("\nuse ").next().unwrap();
+    for kind in kinds {
+        assert!(documented.contains(&format!("`{kind}`")), "{kind}");
+    }
 }
 
 #[test]

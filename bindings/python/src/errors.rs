@@ -1,9 +1,9 @@
-//! Exceptions. All are `ValueError`s, as the scientific Python world expects of a wrong argument.
+//! Exceptions. What is refused is a `ValueError`, as the scientific Python world expects of a wrong argument.
 
 use std::fmt::Display;
 
 use gestalt_mind::MindError;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 pyo3::create_exception!(
@@ -55,6 +55,13 @@ pub(crate) fn decode(error: impl Display) -> PyErr {
 
 pub(crate) fn model(error: impl Display) -> PyErr {
     ModelError::new_err(error.to_string())
+}
+
+/// Of what an earlier call may have left half done.
+pub(crate) fn broken(what: &str) -> PyErr {
+    PyRuntimeError::new_err(format!(
+        "an earlier call panicked and may have left this {what} half changed: start another, and report the panic"
+    ))
 }
 
 pub(crate) fn of_mind(error: MindError) -> PyErr {

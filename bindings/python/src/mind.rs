@@ -1,13 +1,13 @@
 //! The mind of a robot.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::Duration;
 
 use gestalt_mind::{MindError, OutgoingMessage, PortableMind, Settings};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::errors::of_mind;
+use crate::errors::{broken, of_mind};
 use crate::model::Model;
 use crate::rules::{Raised, for_mind};
 
@@ -17,7 +17,7 @@ type Carried<'py> = (String, Bound<'py, PyBytes>, Option<u32>, bool);
 /// The mind of one robot; times are nanoseconds since any fixed moment.
 #[pyclass(module = "gestalt_swarm._native")]
 pub(crate) struct Mind {
-    /// Rules are one thread's at a time; Python's own borrows see to it that nobody waits.
+    /// Rules are one thread's at a time; Python's own borrows see to it that nobody waits. A panic poisons it.
     mind: Mutex<PortableMind>,
     raised: Raised,
 }
@@ -29,14 +29,20 @@ impl Mind {
         py: Python<'_>,
         call: impl FnOnce(&mut PortableMind) -> Result<T, MindError> + Send,
     ) -> PyResult<T> {
-        let mind = self.mind.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let done = py.detach(|| call(mind));
+        let lock = &self.mind;
+        let done = py.detach(|| {
+            let mut mind = lock.lock().ok()?;
+            Some(call(&mut mind))
+        });
+        let done = done.ok_or_else(|| broken("mind"))?;
         self.raised.check()?;
         done.map_err(of_mind)
     }
 
-    fn peek(&mut self) -> &mut PortableMind {
-        self.mind.get_mut().unwrap_or_else(PoisonError::into_inner)
+    /// Asks the mind what it knows at once.
+    fn peek<T>(&mut self, call: impl FnOnce(&mut PortableMind) -> T) -> PyResult<T> {
+        let mut mind = self.mind.lock().map_err(|_| broken("mind"))?;
+        Ok(call(&mut mind))
     }
 }
 
@@ -117,32 +123,34 @@ impl Mind {
         self.with(py, |mind| mind.train(Duration::from_nanos(now_ns)))
     }
 
-    fn next_message<'py>(&mut self, py: Python<'py>) -> Option<Carried<'py>> {
-        let OutgoingMessage { key, to, json, payload } = self.peek().next_message()?;
-        Some((key, PyBytes::new(py, &payload), to.map(|robot| robot.0), json))
+    fn next_message<'py>(&mut self, py: Python<'py>) -> PyResult<Option<Carried<'py>>> {
+        let message = self.peek(|mind| mind.next_message())?;
+        Ok(message.map(|OutgoingMessage { key, to, json, payload }| {
+            (key, PyBytes::new(py, &payload), to.map(|robot| robot.0), json)
+        }))
     }
 
     #[getter]
-    fn next_wake(&mut self) -> Option<u64> {
+    fn next_wake(&mut self) -> PyResult<Option<u64>> {
         // Beyond five hundred years is never.
-        self.peek().next_wake().and_then(|due| due.as_nanos().try_into().ok())
+        Ok(self.peek(|mind| mind.next_wake())?.and_then(|due| due.as_nanos().try_into().ok()))
     }
 
     #[getter]
-    fn is_open(&mut self) -> bool {
-        self.peek().is_open()
+    fn is_open(&mut self) -> PyResult<bool> {
+        self.peek(|mind| mind.is_open())
     }
 
     #[getter]
-    fn wants_training(&mut self) -> bool {
-        self.peek().wants_training()
+    fn wants_training(&mut self) -> PyResult<bool> {
+        self.peek(|mind| mind.wants_training())
     }
 
-    fn decision(&mut self) -> Option<String> {
-        self.peek().decision()
+    fn decision(&mut self) -> PyResult<Option<String>> {
+        self.peek(|mind| mind.decision())
     }
 
-    fn status(&mut self) -> String {
-        self.peek().status()
+    fn status(&mut self) -> PyResult<String> {
+        self.peek(|mind| mind.status())
     }
 }

@@ -12,11 +12,12 @@ use std::sync::{Arc, OnceLock};
 use libtest_mimic::{Arguments, Failed, Trial};
 
 /// Each file of tests, and the packages that it needs.
-const FILES: [(&str, &[&str]); 6] = [
+const FILES: [(&str, &[&str]); 7] = [
     ("test_native", &[]),
     ("test_wire", &[]),
     ("test_training_set", &[]),
     ("test_mind", &[]),
+    ("test_panics", &[]),
     ("test_classifier", &["numpy"]),
     ("test_sklearn", &["numpy", "sklearn"]),
 ];

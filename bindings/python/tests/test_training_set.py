@@ -2,6 +2,8 @@
 
 import json
 import os
+import threading
+import time
 import unittest
 from pathlib import Path
 
@@ -99,6 +101,34 @@ class Sets(unittest.TestCase):
                 g.TrainingSet(**arguments)
         with self.assertRaises(g.DataError):
             samples.keep(256, [1.0, 2.0], round=2)
+
+    def test_a_first_sample_that_is_refused_does_not_say_how_many_coordinates_there_are(self):
+        samples = g.TrainingSet()
+        with self.assertRaisesRegex(g.DataError, "count from 1"):
+            samples.receive((2, 9, 0), 0, [1.0, 2.0], round=1)
+        samples.keep(0, [1.0], round=1)
+        with self.assertRaisesRegex(g.DataError, "the set has 1"):
+            samples.receive((2, 9, 1), 0, [1.0, 2.0], round=1)
+        self.assertTrue(samples.receive((2, 9, 1), 0, [1.0], round=1))
+
+    def test_while_one_thread_works_on_a_set_another_runs(self):
+        many, done = 6000, threading.Event()
+        samples = g.TrainingSet(many, selection="k_center", forgetting="fifo")
+        for n in range(many):
+            samples.keep(0, [float(n * k % 1009) for k in range(1, 17)], round=n + 1)
+
+        def share():
+            samples.share(many)
+            done.set()
+
+        thread = threading.Thread(target=share)
+        thread.start()
+        moments = set()
+        while not done.is_set():
+            moments.add(time.monotonic_ns() // 10_000_000)
+        thread.join()
+        # Without the release this thread would run before and after it alone: in three moments at most, of some forty.
+        self.assertGreater(len(moments), 6)
 
 
 if __name__ == "__main__":

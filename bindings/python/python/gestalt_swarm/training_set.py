@@ -30,6 +30,9 @@ class TrainingSet:
 
     A callable gets all samples and a `random.Random`, and gives the key of one of them; None, or any other, ends the sharing, or
     lets the oldest go. What it raises is raised by the call that asked it.
+
+    While `keep`, `share` and `receive` work, other threads run. A set is one thread's at a time: another that calls it meanwhile gets
+    a `RuntimeError`.
     """
 
     def __init__(
