@@ -1,9 +1,11 @@
 //! What happens in a swarm, as a client hears it.
 
+mod complaints;
 mod newest;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use gestalt_protocol::{
     Announcement, DecodeError, Envelope, Holding, Keys, MAX_ROBOTS, Message, Question, RobotId, RoundId,
@@ -14,6 +16,7 @@ use tokio::sync::broadcast::error::RecvError;
 use zenoh::Session;
 use zenoh::sample::{Sample, SampleKind};
 
+use complaints::Complaints;
 use newest::Newest;
 
 /// How many news may wait for a slow reader before it misses some.
@@ -72,7 +75,7 @@ impl News {
     pub(super) async fn listen(session: &Session, keys: Keys) -> zenoh::Result<Self> {
         let (news, heard) = broadcast::channel(MAX_WAITING);
         let known = Arc::new(Mutex::new(Known::default()));
-        Listener { keys, known: known.clone(), news }.listen(session).await?;
+        Listener { keys, known: known.clone(), news, complaints: Arc::default() }.listen(session).await?;
         Ok(Self { heard, known })
     }
 
@@ -143,6 +146,7 @@ struct Listener {
     keys: Keys,
     known: Arc<Mutex<Known>>,
     news: broadcast::Sender<(Heard, u32)>,
+    complaints: Arc<Mutex<Complaints>>,
 }
 
 impl Listener {
@@ -178,7 +182,16 @@ impl Listener {
         };
         let heard = match heard {
             Ok(heard) => heard,
-            Err(error) => return tracing::warn!("{}: {error}", sample.key_expr()),
+            Err(error) => {
+                let mut complaints = self.complaints.lock().unwrap_or_else(PoisonError::into_inner);
+                if let Some(unsaid) = complaints.note(Instant::now()) {
+                    tracing::warn!(
+                        "{}: {error}; {unsaid} more since the last such warning",
+                        sample.key_expr()
+                    );
+                }
+                return;
+            }
         };
         self.tell(heard);
     }
@@ -251,7 +264,7 @@ mod tests {
         let (news, heard) = broadcast::channel(MAX_WAITING);
         let known = Arc::new(Mutex::new(Known::default()));
         let keys = Keys::new("demo").unwrap();
-        (Listener { keys, known: known.clone(), news }, News { heard, known })
+        (Listener { keys, known: known.clone(), news, complaints: Arc::default() }, News { heard, known })
     }
 
     #[tokio::test]
