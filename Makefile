@@ -11,7 +11,7 @@ endif
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev libturbojpeg0-dev \
             libclang1-14 clang pkg-config
 TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++ systemd \
-                 dpkg-dev lintian python3-numpy python3-websockets mypy
+                 dpkg-dev lintian python3-numpy python3-websockets python3-cryptography mypy
 
 # $(call install,PACKAGES): those of them that are missing.
 define install

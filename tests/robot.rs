@@ -64,11 +64,16 @@ async fn run(orders: &Value, mut stdin: mpsc::Receiver<String>) {
     let sees = orders["sees"].as_u64().and_then(|class| u32::try_from(class).ok()).map(ClassId);
     let p = orders["p"].as_f64().map_or(0.9, |p| p as f32);
     let quorum = serde_json::from_value(orders["quorum"].clone()).unwrap_or(MindConfig::default().quorum);
-    // {"learn": {"keep": 3, "share": 0.5, "memory": "FILE"}}: learns what it is shown and told.
+    // {"learn": {"keep": 3, "share": 0.5, "memory": "FILE", "poison": {}}}: learns what it is shown and told, believing others as the configuration says.
     let learning = orders["learn"]["keep"].as_u64().map(|keep| {
         let keep = usize::try_from(keep).expect("\"keep\": a number");
         let share = orders["learn"]["share"].as_f64().expect("\"share\": a part");
-        learning(keep, share, orders["learn"]["memory"].as_str().map(PathBuf::from))
+        let mut learning = learning(keep, share, orders["learn"]["memory"].as_str().map(PathBuf::from));
+        if !orders["learn"]["poison"].is_null() {
+            learning.config.poison =
+                serde_json::from_value(orders["learn"]["poison"].clone()).expect("\"poison\": a defence");
+        }
+        learning
     });
     // {"rounds": {"deadline": "2s"}}: otherwise as by the default configuration, whether or not it learns.
     let rounds = match &orders["rounds"] {

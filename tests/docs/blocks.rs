@@ -4,24 +4,8 @@ use std::fmt::Write as _;
 
 use crate::stage::{Stage, root};
 
-const TEXTS: [&str; 16] = [
-    "README.md",
-    "CONTRIBUTING.md",
-    "SECURITY.md",
-    "docs/cameras.md",
-    "docs/capture.md",
-    "docs/clients.md",
-    "docs/doctor.md",
-    "docs/foxglove.md",
-    "docs/gestures.md",
-    "docs/install.md",
-    "docs/recording.md",
-    "docs/round.md",
-    "docs/results.md",
-    "docs/glossary.md",
-    "docs/vocabularies.md",
-    "examples/simulator/README.md",
-];
+/// Texts outside of `docs/`.
+const TEXTS: [&str; 4] = ["README.md", "CONTRIBUTING.md", "SECURITY.md", "examples/simulator/README.md"];
 
 /// Lines that cannot run here, by how they begin, and why.
 const APART: [(&str, &str); 19] = [
@@ -59,11 +43,22 @@ impl Block {
     }
 }
 
+/// All of `docs/`, in the order of their names.
+fn guides() -> Vec<String> {
+    let names = std::fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().file_name());
+    let mut guides: Vec<String> = names
+        .map(|name| format!("docs/{}", name.to_string_lossy()))
+        .filter(|text| text.ends_with(".md"))
+        .collect();
+    guides.sort();
+    guides
+}
+
 fn blocks() -> Vec<Block> {
     let mut found = Vec::new();
-    for text in TEXTS {
+    for text in TEXTS.map(str::to_owned).into_iter().chain(guides()) {
         let content =
-            std::fs::read_to_string(root().join(text)).unwrap_or_else(|error| panic!("{text}: {error}"));
+            std::fs::read_to_string(root().join(&text)).unwrap_or_else(|error| panic!("{text}: {error}"));
         let mut open: Option<Block> = None;
         for (number, line) in content.lines().enumerate() {
             match (&mut open, line.trim()) {

@@ -120,6 +120,7 @@ fn differing_outcomes(field: &Field) -> BTreeMap<u64, BTreeMap<u64, Vec<usize>>>
         }
     }
     let decided = outcomes.len();
+    assert!(decided > 0, "no round ended with a gesture");
     outcomes.retain(|_, classes| classes.len() > 1);
     eprintln!("churn: {decided} rounds ended with a gesture, {} of them with several", outcomes.len());
     outcomes

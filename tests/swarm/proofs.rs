@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use gestalt_peer::proof;
 use gestalt_protocol::{Announcement, ClassId, Envelope, FusionRule, Pool, RobotId, Stamp};
 use gestalt_strategies::{MindConfig, Quorum};
+use gestalt_trials::Need;
 use gestalt_trust::statement;
 use serde_json::{Value, json};
 
@@ -55,16 +56,12 @@ impl File {
     }
 }
 
-/// What verify.py says of them; `None` where it cannot run.
-fn by_python(files: &[File]) -> Option<Vec<(bool, String)>> {
-    let python = Command::new("python3").args(["-c", "import cryptography"]).stderr(Stdio::null()).status();
-    if !python.is_ok_and(|status| status.success()) {
-        eprintln!("skipped: verify.py: python3 has no package cryptography");
-        return None;
-    }
+/// What verify.py says of them.
+fn by_python(files: &[File]) -> Vec<(bool, String)> {
+    let python = gestalt_trials::python(Need::CRYPTOGRAPHY).expect("what the trial needs");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("swarm/verdicts.py");
     let mut child =
-        Command::new("python3").arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        Command::new(python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let lines: Vec<String> = files
         .iter()
@@ -78,14 +75,14 @@ fn by_python(files: &[File]) -> Option<Vec<(bool, String)>> {
     let ran = child.wait_with_output().unwrap();
     writer.join().unwrap().unwrap();
     let said = String::from_utf8(ran.stdout).unwrap();
-    Some(said.lines().map(|line| serde_json::from_str(line).unwrap()).collect())
+    said.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[track_caller]
 fn alike(files: &[File]) -> Vec<(bool, String)> {
     let by_gestalt: Vec<Result<(), String>> = files.iter().map(File::by_gestalt).collect();
     let mut apart = Vec::new();
-    for (n, (proven, said)) in by_python(files).into_iter().flatten().enumerate() {
+    for (n, (proven, said)) in by_python(files).into_iter().enumerate() {
         if proven != by_gestalt[n].is_ok() || said.contains("Traceback") {
             apart.push(format!(
                 "{}: {:?}, {said}: {}",

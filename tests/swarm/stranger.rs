@@ -17,6 +17,7 @@ use gestalt_tests::{
     Fixed, Watched, agreed, by_tls, credentials, key, learning, sealed, short_rounds, start, start_learning,
     tag, unique, with_eve,
 };
+use gestalt_trials::Need;
 use gestalt_trust::{Membership, statement};
 use serde_json::Value;
 use zenoh::qos::CongestionControl;
@@ -312,24 +313,16 @@ pub fn a_decision_is_proven_by_two_programs_and_no_other_is() {
     let decision = decision.expect("a decision");
     let roster = keys.join("roster.json");
     let (file, roster) = (folder.path().join("decision.json"), roster.to_str().unwrap());
-    let python = Command::new("python3").args(["-c", "import cryptography"]).stderr(Stdio::null()).status();
-    let python = python.is_ok_and(|status| status.success());
-    if !python {
-        eprintln!("skipped: verify.py: python3 has no package cryptography");
-    }
+    let python = gestalt_trials::python(Need::CRYPTOGRAPHY).expect("what the trial needs");
     let verdicts = |decision: &Value, robots: &str| {
         std::fs::write(&file, decision.to_string()).unwrap();
         let file = file.to_str().unwrap();
         let by_rust = gestalt(&["verify", file, "--roster", roster, "--robots", robots]);
-        let mut verdicts =
-            vec![(by_rust.status.success(), String::from_utf8_lossy(&by_rust.stderr).into_owned())];
-        if python {
-            let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/verify.py");
-            let words = [file, "--roster", roster, "--robots", robots];
-            let ran = Command::new("python3").arg(program).args(words).output().unwrap();
-            verdicts.push((ran.status.success(), String::from_utf8_lossy(&ran.stderr).into_owned()));
-        }
-        verdicts
+        let program = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/verify.py");
+        let words = [file, "--roster", roster, "--robots", robots];
+        let by_python = Command::new(&python).arg(program).args(words).output().unwrap();
+        [by_rust, by_python]
+            .map(|ran| (ran.status.success(), String::from_utf8_lossy(&ran.stderr).into_owned()))
     };
     for (robots, enough) in [("1", true), ("3", true), ("20", false)] {
         for (proven, why) in verdicts(&decision, robots) {

@@ -38,6 +38,8 @@ pub enum Need {
     Prometheus,
     /// A Python that has `websockets`.
     Websockets,
+    /// A Python that has `cryptography`, which examples/verify.py checks signatures with.
+    Cryptography,
 }
 
 /// The checker's one file, `axe.min.js`, of the npm package axe-core: what `GESTALT_AXE` names.
@@ -60,8 +62,10 @@ impl Need {
     pub const RCLPY: &[&str] = &["rclpy", "std_msgs", "zenoh"];
     /// What all other examples of clients import.
     pub const ZENOH: &[&str] = &["zenoh"];
+    /// What the independent verifier imports.
+    pub const CRYPTOGRAPHY: &[&str] = &["cryptography"];
 
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 16] = [
         Self::Namespaces,
         Self::Queues,
         Self::Mount,
@@ -77,6 +81,7 @@ impl Need {
         Self::Axe,
         Self::Prometheus,
         Self::Websockets,
+        Self::Cryptography,
     ];
 
     /// Its name in `GESTALT_REQUIRE`.
@@ -98,6 +103,7 @@ impl Need {
             Self::Axe => "axe",
             Self::Prometheus => "prometheus",
             Self::Websockets => "websockets",
+            Self::Cryptography => "cryptography",
         }
     }
 
@@ -154,6 +160,7 @@ impl Need {
                 }
             }
             Self::Websockets => imports(&["websockets"]),
+            Self::Cryptography => imports(Self::CRYPTOGRAPHY),
         }
     }
 }

@@ -97,13 +97,15 @@ pub struct Attack {
 pub struct Verdict {
     /// Whether every run reached what is expected, or the first that did not, with its seed.
     pub reached: Result<(), String>,
+    /// Whether every run counted what it must, or the first that did not, with its seed.
+    pub counted: Result<(), String>,
     /// What was refused in all runs, by counter.
     pub refused: BTreeMap<String, u64>,
 }
 
 impl Default for Verdict {
     fn default() -> Self {
-        Self { reached: Ok(()), refused: BTreeMap::new() }
+        Self { reached: Ok(()), counted: Ok(()), refused: BTreeMap::new() }
     }
 }
 
@@ -112,7 +114,7 @@ impl Attack {
     pub(crate) fn play_until_shown(&self, seeds: RangeInclusive<u64>) -> Vec<(u64, Played)> {
         let mut played: Vec<(u64, Played)> = Vec::new();
         for seed in seeds {
-            if played.last().is_some_and(|(_, before)| self.met(before).is_err()) {
+            if played.last().is_some_and(|(_, before)| before.reached.is_err()) {
                 break;
             }
             played.push((seed, (self.play)(seed)));
@@ -124,9 +126,10 @@ impl Attack {
     pub(crate) fn judge(&self, played: BTreeMap<u64, Played>) -> Verdict {
         let mut verdict = Verdict::default();
         for (seed, played) in played {
-            if let (true, Err(error)) = (verdict.reached.is_ok(), self.met(&played)) {
-                verdict.reached = Err(format!("seed {seed}: {error}"));
-            }
+            let of_seed = |error: String| format!("seed {seed}: {error}");
+            let counted = self.check_counters(&played).map_err(of_seed);
+            verdict.reached = verdict.reached.and_then(|()| played.reached.map_err(of_seed));
+            verdict.counted = verdict.counted.and(counted);
             for (counter, times) in played.refused {
                 *verdict.refused.entry(counter).or_default() += times;
             }
@@ -134,19 +137,14 @@ impl Attack {
         verdict
     }
 
-    /// Whether one run came to what is expected, and everything that must be counted was.
-    fn met(&self, played: &Played) -> Result<(), String> {
-        played.reached.clone().and_then(|()| self.check_counters(played))
-    }
-
     /// Whether that verdict is the one that the line announces: reached what is promised, and not what is a gap, so that a gap
-    /// which was closed is noticed.
+    /// which was closed is noticed; and counted what must be: an attack that nobody hears shows nothing.
     ///
     /// # Errors
     /// What differs.
     pub fn check(&self, verdict: &Verdict) -> Result<(), String> {
         match (&verdict.reached, self.gap) {
-            (Ok(()), None) | (Err(_), Some(_)) => Ok(()),
+            (Ok(()), None) | (Err(_), Some(_)) => verdict.counted.clone(),
             (Err(error), None) => Err(error.clone()),
             (Ok(()), Some(gap)) => {
                 Err(format!("reached now, so it is no gap any more: strike off \"{gap}\""))

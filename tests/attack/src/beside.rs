@@ -10,6 +10,9 @@ use crate::swarm::{Plan, Swarm};
 pub type Judge = fn(&Swarm, &Swarm) -> Result<(), String>;
 
 /// Plays it twice, the first time with an adversary that keeps silent.
+///
+/// # Panics
+/// If it says nothing to anybody: then nothing is shown.
 pub fn beside(plan: &Plan, seed: u64, play: impl Fn(&mut Swarm), judge: Judge) -> Played {
     let run = |peace| {
         let mut swarm = Swarm::new(plan, seed, peace);
@@ -17,6 +20,7 @@ pub fn beside(plan: &Plan, seed: u64, play: impl Fn(&mut Swarm), judge: Judge) -
         swarm
     };
     let (peace, war) = (run(true), run(false));
+    assert!(war.uttered() > 0, "the attacker says nothing to anybody");
     let mut refused: BTreeMap<String, u64> = war.refused();
     for (counter, times) in peace.refused() {
         if let Some(more) = refused.get_mut(&counter) {

@@ -81,6 +81,7 @@ fn no_round_of_theirs_has_two_final_gestures() {
 fn what_is_final_stands_however_late_votes_are() {
     let _alone = alone();
     let known = corpus::read(&corpus::folder(Target::Mind).join("../../late/mind")).expect("a folder");
+    assert!(!known.is_empty(), "nothing is known to have come late");
     for (path, bytes) in known {
         assert!(!contradicts(&bytes), "{}: two gestures are final for one round", path.display());
     }

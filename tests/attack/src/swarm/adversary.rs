@@ -67,6 +67,11 @@ impl Swarm {
         self.keys.parse(key)
     }
 
+    /// How many messages and tokens of the adversary reached a robot.
+    pub fn uttered(&self) -> u64 {
+        self.uttered
+    }
+
     /// How many messages of the adversary were dropped without a counter naming it.
     pub fn silent(&self) -> u64 {
         self.silent
@@ -126,6 +131,7 @@ impl Swarm {
         let i = robot as usize - 1;
         let before = self.robots[i].refusals();
         self.arrive(i, parcel);
+        self.uttered += 1;
         self.silent += u64::from(self.robots[i].refusals() == before);
     }
 
@@ -222,6 +228,7 @@ impl Swarm {
         for i in 0..self.robots.len() {
             let tokens = self.robots[i].port.tokens(&tokens);
             self.tell(i, Input::Alive(Arc::new(tokens)));
+            self.uttered += 1;
         }
     }
 }

@@ -45,6 +45,8 @@ pub struct Swarm {
     /// All that was said so far.
     pub(super) air: Vec<Parcel>,
     pub(super) silent: u64,
+    /// How many of its messages and tokens reached a robot.
+    pub(super) uttered: u64,
     /// The count of the last word of an instructor.
     pub(super) said: u64,
     /// How often the adversary spoke as a neighbour does.
@@ -84,6 +86,7 @@ impl Swarm {
             answers: Vec::new(),
             air: Vec::new(),
             silent: 0,
+            uttered: 0,
             said: 0,
             whispered: 0,
             channels,
