@@ -248,9 +248,8 @@ impl TrainingSet {
         receipt
     }
 
-    /// The same of a sample of which it is not known yet what it shows: from now on it is known, and none is held for it. [`Self::take_back`]
-    /// takes it in.
-    pub fn note(&mut self, id: SampleId, round: RoundId) -> SampleReceipt {
+    /// Notes a shared sample as seen without holding it, as it is not known yet what it shows. [`Self::take_back`] takes it in later.
+    pub(crate) fn note(&mut self, id: SampleId, round: RoundId) -> SampleReceipt {
         if let Err(error) = self.may_receive(id, round) {
             return SampleReceipt::Refused(error);
         }

@@ -23,7 +23,7 @@ const CHURN: Duration = Duration::from_secs(5);
 /// Until the last robot is out of a round that the first has left; what is shown may change then.
 const OVER: Duration = Duration::from_secs(2);
 
-/// What each liar does in turn. One alone is convicted, and counts no more, by the last of it.
+/// What each liar does in turn: one alone equivocates last, as who is convicted counts no more.
 const LIES: [&str; 3] = ["flood", "poison", "equivocate"];
 
 /// Against what they share. Who was hardly taught yet, and is without it, decides next to nothing while one poisons.

@@ -112,21 +112,16 @@ class Sets(unittest.TestCase):
         self.assertTrue(samples.receive((2, 9, 1), 0, [1.0], round=1))
 
     def test_while_one_thread_works_on_a_set_another_runs(self):
-        many, done = 6000, threading.Event()
+        many = 6000
         samples = g.TrainingSet(many, selection="k_center", forgetting="fifo")
         for n in range(many):
             samples.keep(0, [float(n * k % 1009) for k in range(1, 17)], round=n + 1)
 
-        def share():
-            samples.share(many)
-            done.set()
-
-        thread = threading.Thread(target=share)
+        thread = threading.Thread(target=samples.share, args=(many,))
         thread.start()
         moments = set()
-        while not done.is_set():
+        while thread.is_alive():
             moments.add(time.monotonic_ns() // 10_000_000)
-        thread.join()
         # Without the release this thread would run before and after it alone: in three moments at most, of some forty.
         self.assertGreater(len(moments), 6)
 

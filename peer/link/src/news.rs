@@ -184,13 +184,11 @@ impl Listener {
             Ok(heard) => heard,
             Err(error) => {
                 let mut complaints = self.complaints.lock().unwrap_or_else(PoisonError::into_inner);
-                if let Some(unsaid) = complaints.note(Instant::now()) {
-                    tracing::warn!(
-                        "{}: {error}; {unsaid} more since the last such warning",
-                        sample.key_expr()
-                    );
-                }
-                return;
+                return match complaints.note(Instant::now()) {
+                    None => {}
+                    Some(0) => tracing::warn!("{}: {error}", sample.key_expr()),
+                    Some(unsaid) => tracing::warn!("{}: {error}; {unsaid} before it", sample.key_expr()),
+                };
             }
         };
         self.tell(heard);

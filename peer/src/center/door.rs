@@ -182,6 +182,7 @@ impl Door {
         Ok(())
     }
 
+    /// `identity`: what a guest signs by; a robot of its own reads more than that.
     async fn start(
         &self,
         id: RobotId,

@@ -26,6 +26,8 @@ pub struct SwarmFacts {
     pub unreached: Vec<(String, String)>,
     /// Robots that answer by multicast, and not when they are asked.
     pub silent: BTreeSet<RobotId>,
+    /// Robots that answer by multicast and are in no part: nobody asked them, as enough others were asked.
+    pub unasked: BTreeSet<RobotId>,
     /// The roster that is at hand; `None` in an open swarm.
     pub roster: Option<RosterFacts>,
     /// What the robot that is described would say of itself.

@@ -305,6 +305,8 @@ fn each_fault_of_a_swarm_is_named_alone_with_its_fix() {
     ] {
         is_named(what, swarm::findings(&facts), Severity::Failure, check, what, fix);
     }
+    let unasked = swarm::findings(&SwarmFacts { unasked: BTreeSet::from([RobotId(9)]), ..sound() });
+    is_named("unasked", unasked, Severity::Warning, "parts", "robot 9", "-e ENDPOINT");
 }
 
 fn alone(id: u32) -> Answer {

@@ -107,7 +107,7 @@ struct Looking {
     seen: Arc<Mutex<Option<Seen>>>,
     /// How many frames were replaced by newer ones, as far as its sight knows.
     replaced: u64,
-    /// Whether frames were passed by since the last one that was taken in.
+    /// Whether a round has ended, where motion is not watched, since the last frame that was taken in.
     paused: bool,
     window: Option<Arc<Window>>,
 }
@@ -148,7 +148,6 @@ impl Looking {
             return;
         }
         if !(self.rounds.watches || self.round().is_some()) {
-            self.paused = true;
             if let Some(window) = &self.window {
                 window.offer(&frame.image, frame.at, || Found::NotLooked);
             }

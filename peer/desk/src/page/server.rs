@@ -121,7 +121,7 @@ async fn say(State(server): State<Server>, headers: HeaderMap, body: Bytes) -> R
 
 /// The latest decision with all its votes, as it was announced: what `gestalt verify` checks.
 async fn decision(State(server): State<Server>) -> Response {
-    // Written once the view is let go of: it has all votes in it.
+    // Serialised outside of the view's lock: it has all votes in it.
     let Some(announced) = server.known.with(|view, _| view.latest().cloned()) else {
         return (StatusCode::NOT_FOUND, "Nothing was decided yet.\n").into_response();
     };

@@ -28,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_flood_one_a_second_is_said_and_all_are_counted() {
+    fn of_a_flood_one_a_second_is_said_with_how_many_were_before() {
         let (start, mut complaints) = (Instant::now(), Complaints::default());
         let said: Vec<u64> =
             (0..2500).filter_map(|ms| complaints.note(start + Duration::from_millis(ms))).collect();

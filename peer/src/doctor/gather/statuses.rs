@@ -86,16 +86,16 @@ pub(super) async fn ask_around(config: &Config, home: Option<String>) -> SwarmFa
     let panicked = "asking there panicked, which is a bug: RUST_BACKTRACE=1 shows where";
     facts.unreached.extend(asked.into_iter().map(|endpoint| (endpoint, panicked.to_owned())));
     facts.unreached.sort();
-    facts.silent = ask_heard(config, &heard, &mut facts.parts).await;
+    (facts.silent, facts.unasked) = ask_heard(config, &heard, &mut facts.parts).await;
     facts
 }
 
-/// Asks some of those that were heard and are in no part yet; gives those that are in none then.
+/// Asks some of those that were heard and are in no part yet; of those that are in none then, gives who was asked and who was not.
 async fn ask_heard(
     config: &Config,
     heard: &BTreeMap<RobotId, Vec<String>>,
     parts: &mut Vec<Vec<Answer>>,
-) -> BTreeSet<RobotId> {
+) -> (BTreeSet<RobotId>, BTreeSet<RobotId>) {
     let unknown = |parts: &[Vec<Answer>]| -> BTreeSet<RobotId> {
         let known: BTreeSet<RobotId> = parts.iter().flatten().map(|answer| answer.status.robot).collect();
         heard.keys().filter(|robot| !known.contains(robot)).copied().collect()
@@ -111,7 +111,7 @@ async fn ask_heard(
             _ => {}
         }
     }
-    unknown(parts)
+    unknown(parts).into_iter().partition(|robot| asked.contains(robot))
 }
 
 /// Asks all robots twice through the one at an endpoint.

@@ -103,6 +103,17 @@ fn parts(facts: &SwarmFacts) -> Vec<Finding> {
             "let them connect to each other: open the TCP ports that they listen on, or -l tls/0.0.0.0:7447 and open that one; an open robot (without trust.keys) is reached from its own computer alone",
         ));
     }
+    if !facts.unasked.is_empty() {
+        found.push(Finding::warning(
+            "parts",
+            format!(
+                "{} can be heard by multicast, are in no part that answered, and were not asked",
+                robots(&facts.unasked)
+            ),
+            WHY,
+            "gestalt doctor -e ENDPOINT     with where one of them listens",
+        ));
+    }
     if found.is_empty() && facts.answers().count() > 1 {
         found.push(Finding::fine("parts", "all hear each other"));
     }

@@ -282,7 +282,7 @@ impl Perception {
             Some(reduced) => self.glance.look_at_reduced((reduced, bgr.size()?), before)?,
             None => self.glance.look(bgr, before, whole)?,
         }
-        // Of a frame in which nothing stands out no pixels are left that another one had.
+        // Where nothing stands out the mask of the frame before must not stay.
         self.colours.learn(&self.glance).inspect_err(|_| self.glance.mask = Mat::default())?;
         self.colours.mark(&mut self.glance)?;
         let found = self.finder.locate(&self.glance)?;
