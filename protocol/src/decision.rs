@@ -112,7 +112,7 @@ pub struct CountedVote {
     pub stamp: Stamp,
     /// The class that vote found likeliest.
     pub class: ClassId,
-    /// What that vote weighed in the fusion, `0.0..`.
+    /// What that vote weighs by the rule over all gestures that it lists, `0.0..`: for people. The fusion asks of the gestures that were taught alone.
     pub weight: f32,
     /// The vote, as its author said it.
     pub vote: Vote,

@@ -45,7 +45,7 @@ pub fn learn(
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let trained = train(feature_set, &vocabulary, &samples, &options, rng, |_| ())?;
     println!(
-        "classifier: {} samples, C {}, gamma {}, {:.3} of sets held out, {} support vectors",
+        "classifier: {} samples, C {}, gamma {}, {:.3} of sets that it did not learn from, but the networks did, {} support vectors",
         samples.len(),
         trained.cost,
         trained.gamma,

@@ -85,7 +85,8 @@ pub struct RoundsConfig {
     /// c: how many robots vote in a round, drawn by lot, in a swarm of more than one and a half times as many; those who are not drawn
     /// conclude from their votes. To each liar that a decision must withstand four more. 0: all vote, however many there are.
     pub committee: u32,
-    /// f: how many lying robots a decision must withstand. Whichever f votes are left out, the others must decide the same; more than 2·f robots
+    /// f: how many lying robots a decision must withstand. Whichever f votes are left out, the others must decide the same (by confidence weighted, where some
+    /// know gestures that others do not: in all but rare cases, far from sure); more than 2·f robots
     /// must give evidence; and a majority is more than (n + f) / 2 of n robots, all of which gave evidence.
     pub liars: u32,
     /// c: the bound on a robot's log-evidence for or against any class, in nats.

@@ -138,6 +138,9 @@ fn prior(pool: Pool) -> f64 {
 fn log_likelihood(totals: &[f64], sharpness: f64, possible: &dyn Fn(usize) -> bool) -> f64 {
     let mut row: Vec<f64> = totals.iter().map(|total| sharpness * total).collect();
     softmax(&mut row);
-    let likely: f64 = row.iter().enumerate().filter(|(class, _)| possible(*class)).map(|(_, p)| p).sum();
-    ((1.0 - SLIP) * likely + SLIP / totals.len() as f64).ln()
+    let heard = || row.iter().enumerate().filter(|(class, _)| possible(*class));
+    let likely: f64 = heard().map(|(_, p)| p).sum();
+    // A wrong word is about any gestures, as many as this one is about.
+    let slipped = heard().count() as f64 / totals.len() as f64;
+    ((1.0 - SLIP) * likely + SLIP * slipped).ln()
 }

@@ -3,6 +3,9 @@
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+/// Means of equal numbers lie nearer to each other than this, and those that differ do not.
+const ALIKE: f64 = 1e-9;
+
 /// A share of trials with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Proportion {
@@ -106,7 +109,7 @@ impl Mean {
     pub fn points(self) -> String {
         let mean = format!("{:+.1}", 100.0 * self.mean);
         match self {
-            Self { n: 2.., half_width: 0.0, .. } => format!("{mean} in each"),
+            Self { n: 2.., half_width, .. } if half_width < ALIKE => format!("{mean} in each"),
             _ => self.written(mean, 100.0, 1),
         }
     }
@@ -180,6 +183,8 @@ mod tests {
         assert_eq!(shown(&[0.25, 0.75]), ["0.50 ± 3.18", "50.0 ± 317.7", "+50.0 ± 317.7"]);
         assert_eq!(shown(&[]), ["–"; 3]);
         assert_eq!(Mean::of(&[0.5, 0.5]).points(), "+50.0 in each");
+        // Whose mean, in numbers of 64 bits, is none of them.
+        assert_eq!(Mean::of(&[0.1; 3]).points(), "+10.0 in each");
         let shares = [Proportion::new(0, 0), Proportion::new(1, 2)];
         assert_eq!(Mean::of_shares(shares), Mean::of(&[0.5]));
     }

@@ -153,7 +153,7 @@ fn draw_panel(area: &Area<'_>, figure: &Figure, panel: &Panel) -> Drawn {
     let (left, right) = xs.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
     let margin = if right > left { 0.03 * (right - left) } else { 0.5 };
     let lowest = all().map(|(_, mean)| mean.mean - mean.half_width).fold(1.0, f64::min);
-    let floor = (10.0 * lowest.max(0.0)).floor() * 10.0;
+    let floor = ((10.0 * lowest.max(0.0)).floor() * 10.0).min(90.0);
     let marks = match &figure.marks {
         Some(marks) => marks.iter().map(|x| figure.place(*x)).collect(),
         None => round_numbers(left, right),

@@ -27,7 +27,9 @@ impl<'a> Around<'a> {
     fn of(run: &'a [Standing]) -> Option<Self> {
         let end = run.last()?;
         let change = usize::try_from(end.round / 2).ok()?;
-        let before = run.get((change + 1).checked_sub(BEFORE)?..=change)?;
+        // Before the first round nobody may be able to tell.
+        let first = (change + 1).checked_sub(BEFORE).filter(|first| *first > 0)?;
+        let before = run.get(first..=change)?;
         Some(Self { before, after: run.get(change + 1)?, end })
     }
 

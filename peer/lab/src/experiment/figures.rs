@@ -16,7 +16,9 @@ const PANELS: [(&str, Measure); 2] = [
 /// The figures of an experiment, by their names.
 #[must_use]
 pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
-    let numbers: Option<Vec<f64>> = summary.cells.iter().map(|(cell, _)| cell.value.parse().ok()).collect();
+    // To Rust `inf` and `nan` are numbers; a name may be one.
+    let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
+    let numbers: Option<Vec<f64>> = summary.cells.iter().map(|(cell, _)| number(&cell.value)).collect();
     let last = |means: &[Mean]| means.last().copied().unwrap_or(Mean::of(&[]));
     let kilobytes = |means: &[Mean]| last(means).mean / 1000.0;
     let figure = |x: &str, panels| Figure {

@@ -68,6 +68,25 @@ fn the_number_of_threads_changes_nothing_and_what_is_done_is_not_done_again() {
     assert_eq!(ran, [Progress::Ran(3, 4), Progress::Ran(4, 4)]);
 }
 
+/// Also where it sees no hand in some of what is asked.
+#[test]
+fn a_swarm_of_one_is_right_as_often_as_its_robot() {
+    const ONE: &str = "{ title: 't', base: { rounds: 6, robots: 1 }, axis: { name: 'x', values: [ { name: 'a', set: {} } ] },
+        hands: { places: 3, people: 8 }, seeds: 3 }";
+    let folder = tempfile::tempdir().unwrap();
+    conduct((ONE, Path::new("one")), &Materials::default(), folder.path(), None, |_| ()).unwrap();
+    let table = std::fs::read_to_string(folder.path().join("results.csv")).unwrap();
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let column = |name: &str| names.iter().position(|it| *it == name).unwrap();
+    let (single, swarm, majority) = (column("single"), column("swarm"), column("majority"));
+    let rows: Vec<Vec<&str>> = lines.collect();
+    assert!(rows.len() >= 18, "{table}");
+    for row in rows {
+        assert_eq!([row[swarm], row[majority]], [row[single]; 2], "{row:?}");
+    }
+}
+
 #[test]
 fn rules_that_nobody_brought_are_named() {
     let folder = tempfile::tempdir().unwrap();

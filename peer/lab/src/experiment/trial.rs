@@ -208,7 +208,12 @@ impl<'a> Exam<'a> {
         let chance = 1.0 / self.classes as f64;
         let (mut single, mut certified, mut seen, mut swarm, mut majority) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let unknown: Vec<f64> = verdicts.iter().flatten().flatten().filter_map(|it| it.unknown).collect();
+        let mut judged = 0.0;
         for (n, (class, _)) in self.questions.iter().enumerate() {
+            if verdicts.iter().all(|of_robot| of_robot[n].is_none()) {
+                continue;
+            }
+            judged += 1.0;
             let mut evidence: Vec<Vec<f32>> = Vec::new();
             for Verdict { is_certain, probabilities, .. } in
                 verdicts.iter().filter_map(|of_robot| of_robot[n].as_ref())
@@ -231,7 +236,7 @@ impl<'a> Exam<'a> {
             swarm += pooled(&*self.fusion);
             majority += pooled(&FusionRule::Majority);
         }
-        let questions = self.questions.len().max(1) as f64;
+        let judged = f64::max(judged, 1.0);
         let robots = self.robots as f64;
         let traffic = (0..self.robots).map(|robot| emulation.traffic(robot));
         let traffic: crate::emulation::Traffic = traffic.sum();
@@ -245,8 +250,8 @@ impl<'a> Exam<'a> {
         Standing {
             round,
             single: single / f64::max(seen, 1.0),
-            swarm: swarm / questions,
-            majority: majority / questions,
+            swarm: swarm / judged,
+            majority: majority / judged,
             published: traffic.published_samples as f64 / robots,
             on_links: traffic.samples_on_links() as f64 / robots,
             samples: samples.sum::<usize>() as f64 / robots,
