@@ -43,7 +43,7 @@ demo: packages
 	$(if $(filter 1,$(SEALED)),target/debug/gestalt trust roster out/keys)
 
 # Ends with the sum of all runners, and with what was skipped, and why. What GESTALT_REQUIRE names fails instead of being skipped, of
-# namespaces,queues,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,rospy,rclpy,zenoh.
+# namespaces,queues,mount,browser,data,enki,valgrind,systemd,debian,axe,prometheus,websockets,cryptography,rospy,rclpy,zenoh.
 # Many tests wait for rounds and deadlines: two threads a core. What they print goes to a file that one follows until they end: a
 # pipe ends only with the last process that a test that died may have left. They are a job (-m) that ends when one interrupts.
 test: test-packages

@@ -72,6 +72,17 @@ pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
+/// Opens a file to read. A pipe would keep whoever opens it waiting for its writer, and a device has no end.
+///
+/// # Errors
+/// What the operating system objects to, and what is no regular file.
+pub fn open(path: &Path) -> io::Result<fs::File> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("it is not a regular file"));
+    }
+    fs::File::open(path)
+}
+
 /// Sees to it that a power cut does not take the names of files in the folder of this one back to what they were.
 ///
 /// # Errors

@@ -1,6 +1,5 @@
 //! What happens in a swarm, as a client hears it.
 
-mod complaints;
 mod newest;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +15,7 @@ use tokio::sync::broadcast::error::RecvError;
 use zenoh::Session;
 use zenoh::sample::{Sample, SampleKind};
 
-use complaints::Complaints;
+use crate::complaints::Complaints;
 use newest::Newest;
 
 /// How many news may wait for a slow reader before it misses some.
@@ -184,10 +183,11 @@ impl Listener {
             Ok(heard) => heard,
             Err(error) => {
                 let mut complaints = self.complaints.lock().unwrap_or_else(PoisonError::into_inner);
-                return match complaints.note(Instant::now()) {
+                complaints.note(format!("{}: {error}", sample.key_expr()));
+                return match complaints.due(Instant::now()) {
                     None => {}
-                    Some(0) => tracing::warn!("{}: {error}", sample.key_expr()),
-                    Some(unsaid) => tracing::warn!("{}: {error}; {unsaid} before it", sample.key_expr()),
+                    Some((cause, 1)) => tracing::warn!("{cause}"),
+                    Some((cause, times)) => tracing::warn!("{cause}; {} before it", times - 1),
                 };
             }
         };

@@ -8,7 +8,6 @@
 //! ```
 
 mod credit;
-mod failures;
 mod feed;
 mod inlet;
 mod sender;

@@ -8,10 +8,11 @@ use tokio::sync::mpsc;
 use tokio::time::MissedTickBehavior;
 
 use super::credit::Credit;
-use super::failures::Failures;
 use super::feed::{Content, Feed, Shot};
 use crate::camera_report::SamePicture;
-use gestalt_link::{Client, Decisions, FrameSender, LinkConfig, LinkError, TakenError, fresh_nonce};
+use gestalt_link::{
+    Client, Complaints, Decisions, FrameSender, LinkConfig, LinkError, TakenError, fresh_nonce,
+};
 use gestalt_trust::FrameSigner;
 use gestalt_vision::human::Human;
 use gestalt_vision::source::{Reader, Scene, SourceError, encode_jpeg};
@@ -82,7 +83,7 @@ pub struct Sender {
     human: Human,
     /// A camera that hangs sends nothing: whoever looks is to take it for silent, not for a hand held still.
     same: SamePicture,
-    failures: Failures,
+    failures: Complaints,
     nonce: u64,
     sent: u64,
     taken: u64,
@@ -104,7 +105,7 @@ impl Sender {
         let zero = Instant::now();
         let reader = Reader::start(None, open, zero)?;
         reader.want(Some(Scene::default()));
-        let (same, failures) = (SamePicture::default(), Failures::default());
+        let (same, failures) = (SamePicture::default(), Complaints::default());
         Ok(Self { config, reader, zero, human, same, failures, nonce: fresh_nonce(), sent: 0, taken: 0 })
     }
 

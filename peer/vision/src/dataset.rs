@@ -12,7 +12,7 @@ mod folders;
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -127,11 +127,7 @@ impl LabelledImage {
     /// # Errors
     /// When the file cannot be read.
     pub fn fingerprint(&self) -> io::Result<u64> {
-        // Opening a pipe would wait for its writer.
-        if !fs::metadata(&self.path)?.is_file() {
-            return Err(io::Error::other("it is not a regular file"));
-        }
-        let mut file = File::open(&self.path)?;
+        let mut file = gestalt_file::open(&self.path)?;
         let (mut hash, mut length) = (crc32fast::Hasher::new(), 0_u64);
         let mut chunk = vec![0; 64 * 1024];
         loop {

@@ -6,7 +6,6 @@
 //! Numbers are little-endian.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -157,12 +156,8 @@ impl Model {
     /// See [`ModelFileError`].
     pub fn read(path: &Path) -> Result<Self, ModelFileError> {
         let failed = |source| ModelFileError::Io { action: "read", path: path.to_owned(), source };
-        // Opening a folder succeeds, and a pipe would never end.
-        if !fs::metadata(path).map_err(failed)?.is_file() {
-            return Err(failed(io::Error::other("it is not a regular file")));
-        }
         let mut bytes = Vec::new();
-        let file = File::open(path).map_err(failed)?;
+        let file = gestalt_file::open(path).map_err(failed)?;
         file.take(HEADER as u64 + MAX_BODY + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::decode(&bytes, path)
     }
@@ -255,6 +250,8 @@ fn little_endian(bytes: &[u8]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use gestalt_protocol::ClassId;
     use gestalt_strategies::{LabelledFeatures, TrainOptions, Vocabulary, train};
     use rand_chacha::ChaCha8Rng;

@@ -28,8 +28,7 @@ impl<'a> Around<'a> {
         let end = run.last()?;
         let change = usize::try_from(end.round / 2).ok()?;
         // Before the first round nobody may be able to tell.
-        let first = (change + 1).checked_sub(BEFORE).filter(|first| *first > 0)?;
-        let before = run.get(first..=change)?;
+        let before = run.get(change.checked_sub(BEFORE)? + 1..=change)?;
         Some(Self { before, after: run.get(change + 1)?, end })
     }
 

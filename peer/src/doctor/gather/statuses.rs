@@ -104,11 +104,10 @@ async fn ask_heard(
     for _ in 0..DOORS {
         let Some(robot) = unknown(parts).into_iter().find(|robot| !asked.contains(robot)) else { break };
         asked.insert(robot);
-        match ask(config, &heard[&robot]).await {
-            Ok(reply) if reply.answers.iter().any(|answer| answer.status.robot == robot) => {
-                join(parts, reply.answers);
-            }
-            _ => {}
+        if let Ok(reply) = ask(config, &heard[&robot]).await
+            && reply.answers.iter().any(|answer| answer.status.robot == robot)
+        {
+            join(parts, reply.answers);
         }
     }
     unknown(parts).into_iter().partition(|robot| asked.contains(robot))

@@ -1,7 +1,7 @@
 //! Reads one image, and tells apart everything that may be wrong with its file.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use opencv::core::Mat;
@@ -52,13 +52,11 @@ pub fn read_jpeg(path: &Path, limit: usize) -> Result<Option<Vec<u8>>, SourceErr
 
 /// Checks that a path is a readable file with something in it, and gives its size in bytes.
 pub(super) fn check_file(path: &Path) -> Result<u64, SourceError> {
-    let about = fs::metadata(path).map_err(|cause| SourceError::io(path, cause))?;
-    if !about.is_file() {
-        // A directory, or a pipe that would block.
-        return Err(SourceError::io(path, io::Error::other("it is not a regular file")));
+    let size = gestalt_file::open(path).and_then(|file| Ok(file.metadata()?.len()));
+    match size.map_err(|cause| SourceError::io(path, cause))? {
+        0 => Err(SourceError::Empty(path.into())),
+        size => Ok(size),
     }
-    File::open(path).map_err(|cause| SourceError::io(path, cause))?;
-    if about.len() == 0 { Err(SourceError::Empty(path.into())) } else { Ok(about.len()) }
 }
 
 fn read_bounded(path: &Path) -> Result<Vec<u8>, SourceError> {
@@ -78,6 +76,8 @@ fn read_bounded(path: &Path) -> Result<Vec<u8>, SourceError> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use opencv::core;
     use opencv::prelude::*;
 

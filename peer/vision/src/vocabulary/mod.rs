@@ -7,6 +7,7 @@
 mod hand_pose;
 
 use std::collections::BTreeSet;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use gestalt_protocol::MAX_LABEL;
@@ -135,15 +136,13 @@ impl GestureBook {
     /// See [`GestureBookError`].
     pub fn read(path: &Path) -> Result<Self, GestureBookError> {
         let unreadable = |cause| GestureBookError::Unreadable { path: path.to_owned(), cause };
-        let about = std::fs::metadata(path).map_err(unreadable)?;
-        // A device tells no length, and a pipe would never end.
-        if !about.is_file() {
-            return Err(unreadable(std::io::Error::other("it is not a regular file")));
+        let mut file = gestalt_file::open(path).map_err(unreadable)?;
+        let size = file.metadata().map_err(unreadable)?.len();
+        if size > MAX_FILE as u64 {
+            return Err(GestureBookError::TooLarge { path: path.to_owned(), size });
         }
-        if about.len() > MAX_FILE as u64 {
-            return Err(GestureBookError::TooLarge { path: path.to_owned(), size: about.len() });
-        }
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let mut text = String::new();
+        file.read_to_string(&mut text).map_err(unreadable)?;
         Self::parse(&text, &path.display().to_string())
     }
 

@@ -1,4 +1,5 @@
-//! What fails, said at once and then at most once a second: a camera of 30 frames per second fails 30 times in one.
+//! What fails, said at once and then at most once a second: a camera of 30 frames per second fails 30 times in one, and whoever may speak in a
+//! swarm may say what nobody can read without an end.
 
 use std::time::{Duration, Instant};
 
@@ -7,12 +8,12 @@ const PERIOD: Duration = Duration::from_secs(1);
 
 /// Failures that were not told yet: the latest, and how many.
 #[derive(Debug, Default)]
-pub(super) struct Failures {
+pub struct Complaints {
     told: Option<Instant>,
     kept: Option<(String, u64)>,
 }
 
-impl Failures {
+impl Complaints {
     /// Something failed.
     pub fn note(&mut self, cause: String) {
         let times = self.kept.take().map_or(0, |(_, times)| times);
@@ -37,7 +38,7 @@ mod tests {
     #[test]
     fn the_first_failure_is_said_at_once_and_the_others_once_a_second() {
         let start = Instant::now();
-        let mut failures = Failures::default();
+        let mut failures = Complaints::default();
         let mut said = Vec::new();
         for frame in 0..90u32 {
             let now = start + Duration::from_secs(1) * frame / 30;
