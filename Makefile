@@ -1,4 +1,4 @@
-# `make demo` and `make test` need Rust and git; everything else they install themselves.
+# `make demo` and `make test` need Rust, git and build-essential; everything else they install themselves.
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 # rust-toolchain.toml pins the toolchain; where rustup neither has it nor can fetch it, the stable one that is there serves.
@@ -11,7 +11,7 @@ endif
 PACKAGES := libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev libopencv-objdetect-dev libturbojpeg0-dev \
             libclang1-14 clang pkg-config
 TEST_PACKAGES := iproute2 libsvm-tools valgrind chromium libenki-dev cmake g++ systemd \
-                 dpkg-dev lintian python3-numpy python3-websockets python3-cryptography mypy
+                 dpkg-dev lintian python3-numpy python3-venv python3-websockets python3-cryptography mypy
 
 # $(call install,PACKAGES): those of them that are missing.
 define install

@@ -1,6 +1,7 @@
 """A Gestalt swarm for ROS 1: its gestures and decisions as topics, an instructor's words taken from one.
 
-    sudo apt install python3-rospy python3-std-msgs && pip install eclipse-zenoh
+    sudo apt install python3-rospy python3-std-msgs python3-venv
+    python3 -m venv --system-site-packages venv && . venv/bin/activate && pip install eclipse-zenoh
     python3 ros1.py _connect:=tcp/127.0.0.1:7447 _swarm:=gestalt
 
 Publishes ~gesture (latched) and ~decision; takes the words open, right, wrong, undo and "was three" on ~say.

@@ -1,6 +1,6 @@
 """A Gestalt swarm for ROS 2 over DDS: what `gestalt ros` does for rmw_zenoh, as a node of rclpy.
 
-    pip install eclipse-zenoh
+    python3 -m venv --system-site-packages venv && . venv/bin/activate && pip install eclipse-zenoh      # needs python3-venv; ROS sourced
     python3 ros2_dds.py --connect tcp/127.0.0.1:7447 --swarm gestalt
 
 Publishes /gestalt/gesture (latched) and /gestalt/decision; takes the words open, right, wrong, undo and "was three" on /gestalt/say.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Prints each decision of a running swarm, from any robot of it.
+"""Prints each decision of a running swarm, from any robot of it: one that listens there, as `gestalt peer -c configs/footbot.json5 -l tcp/127.0.0.1:7447` does.
 
-    pip install eclipse-zenoh
+    python3 -m venv venv && . venv/bin/activate && pip install eclipse-zenoh      # needs python3-venv
     python3 examples/subscribe.py --connect tcp/127.0.0.1:7447 --swarm gestalt
     python3 examples/subscribe.py --connect tls/192.168.1.5:7447 --config keys/client-desk/zenoh.json5    # a sealed swarm
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks a decision of a sealed swarm without the swarm, and without a line of Gestalt's own code.
 
-    pip install cryptography
+    sudo apt install python3-cryptography
     python3 examples/verify.py decision.json --roster keys/roster.json
 
 A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--rule`, `--alpha`,
@@ -21,7 +21,7 @@ try:
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 except ImportError:
-    sys.exit("verify.py checks signatures by another library: pip install cryptography")
+    sys.exit("verify.py checks signatures by another library: sudo apt install python3-cryptography, or in a virtual environment pip install cryptography")
 
 ROLES = ("open", "teach", "overrule")
 VERSION, VOTE, ANNOUNCED = 3, 0, 8

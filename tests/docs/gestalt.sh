@@ -4,7 +4,9 @@
 case "$1" in
   peer | center | stream | teach | watch | doctor) set -- "$@" --cfg links.scouting.interface:lo --cfg "links.scouting.address:239.255.77.79:$SCOUTING" ;;
 esac
+# Clients know a robot by the port that stands in a block; here it is one of this test alone.
 case "$1" in
+  peer) set -- "${@/#tcp\/127.0.0.1:7447/tcp/127.0.0.1:$SCOUTING}" ;;
   center) set -- "$@" --listen "tcp/127.0.0.1:$SCOUTING" ;;
 esac
 case "$1" in

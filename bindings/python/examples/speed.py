@@ -1,7 +1,7 @@
 """How fast it is, with yardsticks in the same run: training in two threads against two processes, which share no interpreter;
 predict_proba against scikit-learn's SVC. For Unix.
 
-    pip install scikit-learn
+    pip install scikit-learn      # in the virtual environment that has gestalt_swarm
     python3 speed.py
 """
 
