@@ -1,6 +1,10 @@
 //! Your own controller around a robot: it takes part in the swarm's decisions, and acts on them. Neither OpenCV nor
 //! libclang is needed to build it.
 //!
+//! ```text
+//! cargo run -p gestalt-examples --example embed
+//! ```
+//!
 //! The robot's camera and perception are the controller's own; what it hands over are feature vectors and a
 //! classifier for them. Here the "camera" is a number, and the classifier tells small from large.
 

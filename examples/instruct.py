@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Opens a round in a sealed swarm, or says what was shown, with the files of `gestalt trust enrol --client`.
 
-    pip install eclipse-zenoh cryptography
+    python3 -m venv venv && . venv/bin/activate && pip install eclipse-zenoh cryptography      # needs python3-venv
     python3 examples/instruct.py keys/client-desk --connect tls/127.0.0.1:7447 '{"say": "open"}'
 
+A robot listens there if it is started so: `gestalt peer --id 1 --swarm demo --keys keys --source rendered -l tls/127.0.0.1:7447`.
 The word is JSON; its signature travels beside it (docs/trust.md).
 """
 import argparse
@@ -11,6 +12,7 @@ import hashlib
 import json
 import pathlib
 import struct
+import threading
 import time
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -50,18 +52,37 @@ def main() -> None:
     except zenoh.ZError as error:
         raise SystemExit(f"no robot answers at {args.connect}: {error}") from None
     with session:
-        key_expr = f"gestalt/{roster['swarm']}/instructor/{name}"
+        swarm = f"gestalt/{roster['swarm']}"
+        key_expr = f"{swarm}/instructor/{name}"
+        opens, heard, refused = said == {"say": "open"}, threading.Event(), threading.Event()
 
         def on_answer(sample) -> None:
-            # Another word of the same client may be answered meanwhile. To open a round is not answered: the decision is.
+            # Another word of the same client may be answered meanwhile.
             if json.loads(sample.payload.to_string())["to"] == said:
                 print(sample.payload.to_string(), flush=True)
+                if opens:
+                    refused.set()
+                heard.set()
 
-        answers = session.declare_subscriber(f"{key_expr}/answer", on_answer)
+        def on_decision(sample) -> None:
+            # To open a round is answered by the decision, or by why there will be none.
+            print(sample.payload.to_string(), flush=True)
+            heard.set()
+
+        subscribers = [session.declare_subscriber(f"{key_expr}/answer", on_answer)]
+        if opens:
+            subscribers.append(session.declare_subscriber(f"{swarm}/decision", on_decision))
         session.put(f"{key_expr}/word", word, attachment=attachment(key, roster, name, word, count),
                     encoding=zenoh.Encoding.APPLICATION_JSON)
-        time.sleep(3)
-        answers.undeclare()
+        patience = 15 if opens else 10
+        answered = heard.wait(patience)
+        for subscriber in subscribers:
+            subscriber.undeclare()
+    if refused.is_set():
+        raise SystemExit(f"no round was opened for '{name}', as its answer says: gestalt trust enrol --client {name} --role open gives it the role")
+    if not answered:
+        raise SystemExit(f"no {'decision' if opens else 'answer'} within {patience} s: the word is none that robots know (docs/clients.md), "
+                         f"or the roster has no '{name}' with this key any more; gestalt doctor --keys {args.folder} -e {args.connect} says what is wrong")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Teaches a running swarm from the keyboard: shows its decision, and what the swarm asks; asks what the gesture really was, prints the answer.
 
-    pip install eclipse-zenoh
+    python3 -m venv venv && . venv/bin/activate && pip install eclipse-zenoh      # needs python3-venv
     python3 examples/teach.py --connect tcp/127.0.0.1:7447 --swarm gestalt
 
+A robot listens there if it is started so: `gestalt peer -c configs/footbot.json5 -l tcp/127.0.0.1:7447`.
 Teaching is a put of JSON on `gestalt/<swarm>/instructor/<name>/feedback`; answers come on `…/<name>/answer`.
 """
 import argparse
@@ -94,8 +95,8 @@ def main() -> None:
             session.put(feedback, json.dumps({"say": "open"}))
             decision = wait_for(decisions, 15, decided, lambda decision: decision["round"] not in known)
             if decision is None:
-                print("no decision: is a robot alive?")
-                return
+                raise SystemExit(f"no decision within 15 s: is a robot of swarm '{given.swarm}' at {given.connect}, and can it decide alone? "
+                                 f"gestalt doctor --swarm {given.swarm} -e {given.connect} says what is wrong")
             known.append(decision["round"])
             print(decision["words"], flush=True)
             if told is None:
@@ -111,7 +112,10 @@ def main() -> None:
             session.put(feedback, json.dumps(word))
             # Others may say something under the same name: the answer names its word.
             answer = wait_for(answers, 10, answered, lambda answer: answer["to"] == word)
-            print("no answer" if answer is None else f"  {answer['words']}", flush=True)
+            if answer is None:
+                raise SystemExit(f"no answer within 10 s to '{gesture}': its robot has gone, or passes over what is said; "
+                                 f"gestalt doctor --swarm {given.swarm} -e {given.connect} says what is wrong")
+            print(f"  {answer['words']}", flush=True)
 
 
 if __name__ == "__main__":
