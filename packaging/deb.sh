@@ -22,10 +22,15 @@ tree=$work/tree
 
 install -D -m 755 "$program" "$tree/usr/bin/gestalt"
 strip --strip-unneeded --remove-section=.comment --remove-section=.note "$tree/usr/bin/gestalt"
-install -D -m 644 packaging/gestalt@.service "$tree/lib/systemd/system/gestalt@.service"
+install -D -m 644 -t "$tree/lib/systemd/system" packaging/gestalt@.service packaging/gestalt-center@.service
 doc=$tree/usr/share/doc/gestalt
-install -D -m 644 -t "$doc" README.md docs/install.md docs/doctor.md SECURITY.md
-install -D -m 644 -t "$doc/examples" configs/{footbot,parrot,laptop,fusion-center}.json5
+install -D -m 644 -t "$doc" README.md SECURITY.md docs/*.md docs/*.json
+install -D -m 644 -t "$doc/schemas" docs/schemas/*
+install -D -m 644 -t "$doc/examples" configs/{template,footbot,parrot,laptop,fusion-center}.json5
+# All in one folder: links to guides lead there, and what the package has not, such as sources and pictures, is named without a link.
+doc=$doc perl -i -pe 's{!?\[([^][]*)\]\((?!\w+:|#)(?:docs/|\.\./)?([^)#]*)(#[^)]*)?\)}{-e "$ENV{doc}/$2" ? "[$1]($2" . ($3 // "") . ")" : $1}ge' "$doc"/*.md
+# Likewise the commands and guides that examples name.
+sed -i 's#configs/#/usr/share/doc/gestalt/examples/#; s#docs/#/usr/share/doc/gestalt/#' "$doc"/examples/*.json5
 # The font is part of the program.
 { cat packaging/copyright; sed 's/^$/./; s/^/ /' LICENSE-MIT; echo; sed -n '/^Files:/,$p' peer/draw/fonts/LICENSE | sed 's|^Files: .*|Files: peer/draw/fonts/*|'; } >"$doc/copyright"
 chmod 644 "$doc/copyright"
@@ -66,7 +71,8 @@ Description: swarm of robots that reads hand gestures together
  right, and every robot learns.
  .
  This package has the program "gestalt" and the service gestalt@NAME, which
- runs the robot that /etc/gestalt/NAME.json5 describes.
+ runs the robot that /etc/gestalt/NAME.json5 describes, and gestalt-center@NAME
+ for a fusion centre.
 CONTROL
 (cd "$tree" && find . -path ./DEBIAN -prune -o -type f -printf '%P\0' | sort -z | xargs -0 md5sum >DEBIAN/md5sums)
 chmod 644 "$tree/DEBIAN/md5sums" "$tree/DEBIAN/control"
