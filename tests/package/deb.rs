@@ -36,11 +36,14 @@ pub fn the_package_is_whole_and_lintian_finds_no_error() {
     for path in [
         "./usr/bin/gestalt",
         "./lib/systemd/system/gestalt@.service",
+        "./lib/systemd/system/gestalt-center@.service",
         "./usr/share/man/man1/gestalt-peer.1.gz",
         "./usr/share/bash-completion/completions/gestalt",
         "./usr/share/doc/gestalt/copyright",
         "./usr/share/doc/gestalt/install.md",
+        "./usr/share/doc/gestalt/cameras.md",
         "./usr/share/doc/gestalt/examples/footbot.json5",
+        "./usr/share/doc/gestalt/examples/template.json5",
     ] {
         assert!(listed.lines().any(|line| line.ends_with(path)), "{path} is missing in\n{listed}");
     }
