@@ -54,7 +54,8 @@ def main() -> None:
     with session:
         swarm = f"gestalt/{roster['swarm']}"
         key_expr = f"{swarm}/instructor/{name}"
-        opens, heard, refused = said == {"say": "open"}, threading.Event(), threading.Event()
+        opens, spoken, heard, refused = said == {"say": "open"}, threading.Event(), threading.Event(), threading.Event()
+        before = set()
 
         def on_answer(sample) -> None:
             # Another word of the same client may be answered meanwhile.
@@ -65,21 +66,30 @@ def main() -> None:
                 heard.set()
 
         def on_decision(sample) -> None:
-            # To open a round is answered by the decision, or by why there will be none.
-            print(sample.payload.to_string(), flush=True)
-            heard.set()
+            # To open a round is answered by the decision, or by why there will be none. Rounds that were decided before it was said are others'.
+            decided = json.dumps(json.loads(sample.payload.to_string())["round"], sort_keys=True)
+            if not spoken.is_set():
+                before.add(decided)
+            elif decided not in before:
+                print(sample.payload.to_string(), flush=True)
+                heard.set()
 
         subscribers = [session.declare_subscriber(f"{key_expr}/answer", on_answer)]
         if opens:
             subscribers.append(session.declare_subscriber(f"{swarm}/decision", on_decision))
+            time.sleep(1)
+        spoken.set()
         session.put(f"{key_expr}/word", word, attachment=attachment(key, roster, name, word, count),
                     encoding=zenoh.Encoding.APPLICATION_JSON)
         patience = 15 if opens else 10
         answered = heard.wait(patience)
+        if opens:
+            # A decision of others' round may come before the answer.
+            refused.wait(0.5)
         for subscriber in subscribers:
             subscriber.undeclare()
     if refused.is_set():
-        raise SystemExit(f"no round was opened for '{name}', as its answer says: gestalt trust enrol --client {name} --role open gives it the role")
+        raise SystemExit(f"no round was opened for '{name}', as its answer says: gestalt trust enrol --client {name} --role open keys, where the authority's key is, gives it the role")
     if not answered:
         raise SystemExit(f"no {'decision' if opens else 'answer'} within {patience} s: the word is none that robots know (docs/clients.md), "
                          f"or the roster has no '{name}' with this key any more; gestalt doctor --keys {args.folder} -e {args.connect} says what is wrong")

@@ -83,11 +83,12 @@ def main() -> None:
         answers = ring(f"{prefix}/instructor/{given.name}/answer")
         questions = ring(f"{prefix}/question")
         known = collections.deque(maxlen=256)
+        unanswered = []
         told = iter(given.gestures) if given.gestures is not None else None
         while True:
             said = next(told, "") if told is not None else None
             if said == "":
-                return
+                break
             # Half a second after a round began, a request to open is taken for an echo of the one before.
             time.sleep(1)
             # What others had decided meanwhile is not what the next word is about.
@@ -106,16 +107,20 @@ def main() -> None:
                     print(f"  the swarm asks: {question['words']}", flush=True)
             gesture = said or input("it was (empty to end): ").strip()
             if not gesture:
-                return
+                break
             # Gestures are named by label; a number in JSON would be a class.
             word = {"say": "was", "round": decision["round"], "class": gesture}
             session.put(feedback, json.dumps(word))
             # Others may say something under the same name: the answer names its word.
             answer = wait_for(answers, 10, answered, lambda answer: answer["to"] == word)
             if answer is None:
-                raise SystemExit(f"no answer within 10 s to '{gesture}': its robot has gone, or passes over what is said; "
-                                 f"gestalt doctor --swarm {given.swarm} -e {given.connect} says what is wrong")
+                print("  no answer within 10 s", flush=True)
+                unanswered.append(gesture)
+                continue
             print(f"  {answer['words']}", flush=True)
+    if unanswered:
+        raise SystemExit(f"not answered: {', '.join(unanswered)}; the robot has gone, or passes over what is said; "
+                         f"gestalt doctor --swarm {given.swarm} -e {given.connect} says what is wrong")
 
 
 if __name__ == "__main__":
