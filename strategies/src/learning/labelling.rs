@@ -147,6 +147,17 @@ impl Learning {
         }
     }
 
+    /// Lets go of what is aside of lives of which no sample counts as seen any more: from here they would come back to all that let go of them.
+    pub(super) fn let_go_aside(&mut self) {
+        let seen = self.set.seen();
+        let is_gone =
+            |aside: &UnresolvedSample| aside.shared.is_some_and(|id| seen.intervals(id.series()).is_empty());
+        for (number, aside) in self.aside.take(is_gone) {
+            self.aside.take_earned(number);
+            self.note_not_aside(number, &aside);
+        }
+    }
+
     /// Trains, or trains no longer, on a sample aside as what the robot itself takes it for.
     fn guess(&mut self, number: u64, class: Option<ClassId>) {
         self.aside.guess(number, class);

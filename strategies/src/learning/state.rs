@@ -195,6 +195,7 @@ impl Learning {
             thinned,
             unsent: VecDeque::new(),
         };
+        learning.let_go_aside();
         learning.gestures = learning.all_gestures();
         learning.judge_from_the_start();
         learning.training = learning.training_anew();
@@ -310,6 +311,9 @@ impl Learning {
                 }
                 SetChange::Seen(series) => {
                     self.dirty.insert(Item::Seen(series));
+                    if self.set.seen().intervals(series).is_empty() {
+                        self.let_go_aside();
+                    }
                 }
                 SetChange::Relabelled(key, before) => {
                     self.dirty.insert(Item::Sample(key));

@@ -270,6 +270,43 @@ proptest! {
     }
 }
 
+#[test]
+fn a_life_that_is_let_go_of_stays_on_no_shelf() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 30);
+    swarm.loss = 1.0;
+    let oldest = RoundId { counter: 1, opener: RobotId(9), life: 0 };
+    let lesson = Lesson {
+        round: oldest,
+        instructor: "ada".parse().unwrap(),
+        count: 1,
+        at: 1,
+        word: Word::Not(ClassId(1)),
+        said: None,
+    };
+    swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
+    shares_of_rounds(&mut swarm, 0, 9, 1, &[1, 2], |_| 1);
+    let offered = |swarm: &Swarm| {
+        let learning = swarm.minds[0].learning.as_ref().unwrap();
+        let told = learning.lacking(|id| id.life == 1, 1 << 20).flat_map(|told| told.batches);
+        told.map(|batch| batch.samples.samples.len()).sum::<usize>()
+    };
+    let aside = |swarm: &Swarm| swarm.minds[0].learned().unwrap().aside;
+    assert_eq!((aside(&swarm), offered(&swarm)), (2, 2), "what it shows is open");
+    let before = swarm.disks[0].clone();
+    for life in 2..=crate::sample::MAX_LIVES as u32 + 1 {
+        shares_of_rounds(&mut swarm, 0, 9, life, &[1], |_| life);
+    }
+    assert_eq!((aside(&swarm), offered(&swarm)), (0, 0));
+    swarm.check();
+    // As releases left it on the disk that kept it there.
+    let left: Vec<_> = before.into_iter().filter(|(key, _)| [5, 6].contains(&key[0])).collect();
+    assert_eq!(left.len(), 3, "two samples, and their batch");
+    swarm.disks[0].extend(left);
+    swarm.restart(0);
+    assert_eq!((aside(&swarm), offered(&swarm)), (0, 0));
+    swarm.check();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
