@@ -154,7 +154,9 @@ impl Learning {
         let again = known.is_some_and(|known| known.fate == fate);
         let count = match known {
             _ if said.is_some() => *at,
-            Some(_) if again => return (Outcome::Known, Some(gesture)),
+            // A neighbour told of it before it was heard.
+            Some(known) if again && known.at == *at && known.said_by == *said_by => known.count,
+            // What is said again is kept all the same: where others say otherwise, it goes before what was said before it.
             Some(known) => known.count.saturating_add(1),
             None => 1,
         };

@@ -85,6 +85,46 @@ fn who_has_a_clock_that_was_set_back_teaches_on() {
     assert_eq!(swarm.last_words(round), [Some(Word::Was(ClassId(3))); 3]);
 }
 
+/// As with what was shown: of two parts of a cut swarm the one in which the last word was said is right.
+#[test]
+fn what_is_said_of_a_name_again_goes_before_what_was_said_otherwise_elsewhere_meanwhile() {
+    let mut swarm = Swarm::new(4, config(2, 1.0), 73);
+    let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
+    let class = || Gesture::Class(circle);
+    swarm.reaches_all(seconds(0), &Instruction::New { label: "circle".to_owned(), round: None });
+    let count = |swarm: &Swarm, i: usize| {
+        swarm.minds[i].learning.as_ref().unwrap().names().get(circle).unwrap().count
+    };
+    swarm.loss = 1.0;
+    for i in [2, 3] {
+        let (by, instruction) = ("bob".parse().unwrap(), Instruction::Retire { class: class() });
+        swarm.input(i, Input::Instructed(Instructed { by, at: seconds(10), instruction, said: None }));
+    }
+    swarm.pass(Duration::from_secs(3));
+    let restored = (seconds(20), Instruction::Restore { class: class() });
+    (0..2).for_each(|i| swarm.reaches(i, restored.0, &restored.1));
+    swarm.pass(Duration::from_secs(3));
+    assert_eq!(swarm.outcome(restored.0), Outcome::Known, "it was in use there");
+    let [used, retired] = [Some(Fate::InUse), Some(Fate::Retired)];
+    assert_eq!(swarm.fates(circle), [used, used, retired, retired]);
+    swarm.loss = 0.0;
+    swarm.pass(Duration::from_secs(20));
+    assert_eq!(swarm.fates(circle), [used; 4], "she spoke last");
+    // Copies of it are no further words, whoever hears them, how often, and after which start.
+    let counted = count(&swarm, 0);
+    for again in 0..5 {
+        (0..4).for_each(|i| swarm.reaches(i, restored.0, &restored.1));
+        swarm.pass(Duration::from_secs(3));
+        if again % 2 == 1 {
+            swarm.restart_all();
+        }
+    }
+    assert_eq!((0..4).map(|i| count(&swarm, i)).collect::<Vec<_>>(), [counted; 4]);
+    swarm.pass(Duration::from_secs(10));
+    swarm.check_rest();
+    swarm.check();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
