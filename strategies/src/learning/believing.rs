@@ -35,6 +35,16 @@ impl Learning {
         }
     }
 
+    /// Whether words count by whose key they are signed with.
+    pub fn is_sealed(&self) -> bool {
+        self.believer.is_some()
+    }
+
+    /// What was refused may be taken now. Under another key neighbours that gave up giving it find something else to be lacking.
+    pub fn ask_again(&mut self) {
+        self.heard = true;
+    }
+
     /// The latest word of an instructor on a round, with its count and time.
     pub fn latest(&self, round: RoundId, instructor: &InstructorId) -> Option<(u64, u64, Word)> {
         self.lessons.latest(self.recent.names(round), instructor)

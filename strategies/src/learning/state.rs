@@ -94,8 +94,8 @@ pub(crate) struct Learning {
     /// From which the keys of the digest follow, and how many were drawn.
     secret: u64,
     drawn: u64,
-    /// Something was said that does not go to the disk yet.
-    heard: bool,
+    /// Something was said that does not go to the disk yet, or is to be said again.
+    pub(super) heard: bool,
     /// Samples that may still be shared, by the bounds of the rounds so far.
     pub(super) credit: f64,
     /// What was shared in the newest round, of the swarm's budget.

@@ -20,6 +20,9 @@ const NAMES_GIVEN: u32 = 8;
 /// The same of samples: of many lives of one robot two robots may keep others for good.
 const SAMPLES_GIVEN: u32 = 16;
 
+/// The same of lessons, however many turns it takes to give all that it lacks: what it refuses, beyond the rounds that it says to have declined, stays refused.
+const LESSONS_GIVEN: u32 = 16;
+
 /// And again after so many more questions: links may lose many messages in a row, and come to themselves.
 const GIVEN_AGAIN: u32 = 256;
 
@@ -44,6 +47,9 @@ struct Exchange {
     names: Given,
     /// The same of the samples that it lacks.
     samples: Given,
+    /// The same of the lessons, and the last round of those given, where there was no room for all: the next turn begins behind it.
+    lessons: Given,
+    lessons_up_to: Option<RoundId>,
     /// The messages it was told, less those that time has made up for, and when that was reckoned.
     told: f64,
     told_at: Duration,
@@ -132,6 +138,31 @@ impl Exchanges {
         self.with(robot).samples.may(digests, SAMPLES_GIVEN)
     }
 
+    /// Of these rounds, in order, whose lessons that neighbour lacks, those that it is to be given next, where the digests of both are these: each in its
+    /// turn, whatever became of the others.
+    pub fn turn_of_lessons(
+        &mut self,
+        robot: RobotId,
+        digests: (u64, u64),
+        mut lacking: Vec<RoundId>,
+    ) -> Vec<RoundId> {
+        let exchange = self.with(robot);
+        let given = exchange.lessons_up_to.take();
+        let given = given.map_or(0, |last| lacking.partition_point(|round| *round <= last));
+        if (1..lacking.len()).contains(&given) {
+            return lacking.split_off(given);
+        }
+        if !lacking.is_empty() && !exchange.lessons.may(digests, LESSONS_GIVEN) {
+            lacking.clear();
+        }
+        lacking
+    }
+
+    /// The last round of those that it was given, where there was no room for all.
+    pub fn end_turn_of_lessons(&mut self, robot: RobotId, last: Option<RoundId>) {
+        self.with(robot).lessons_up_to = last;
+    }
+
     /// How many messages that neighbour may be told now.
     pub fn allowance(&mut self, now: Duration, robot: RobotId) -> usize {
         let exchange = self.with(robot);
@@ -146,11 +177,14 @@ impl Exchanges {
         self.with(robot).told += messages as f64;
     }
 
-    /// Lessons that lay too far ahead may do so no longer.
-    pub fn forget_declined_lessons(&mut self) {
+    /// Lessons that lay too far ahead may do so no longer. Says whether any were declined.
+    pub fn forget_declined_lessons(&mut self) -> bool {
+        let mut some = false;
         for exchange in self.0.values_mut().filter(|exchange| !exchange.declined_lessons.is_empty()) {
             (exchange.declined_lessons, exchange.at_rest) = (LessonBook::default(), None);
+            some = true;
         }
+        some
     }
 
     /// Only these are neighbours now. One that comes back begins anew.

@@ -64,7 +64,7 @@ impl Mind {
             learning.believe(believer);
         }
         // What was not believed may be.
-        self.exchanges.forget_declined_lessons();
+        self.ask_again_for_lessons();
         self.share();
         AboutRounds::Tick
     }

@@ -72,7 +72,7 @@ impl Mind {
         });
         if news {
             // Lessons may name what was not known.
-            self.exchanges.forget_declined_lessons();
+            self.ask_again_for_lessons();
             self.call_by_names();
             // The other neighbours may lack it too.
             self.rounds.pass_on_soon(from);

@@ -12,7 +12,7 @@ use gestalt_rounds::Refusal;
 use super::machine::Mind;
 use super::output::Output;
 use crate::learning::Declined;
-use crate::lessons::{LessonReceipt, MAX_INSTRUCTORS};
+use crate::lessons::{LessonBook, LessonReceipt, MAX_INSTRUCTORS};
 use crate::names::NameBook;
 use crate::sample::{MAX_GAPS, MAX_INTERVALS_IN_ALL, MAX_SERIES, SeenSamples};
 use crate::vector_codec::VectorError;
@@ -44,28 +44,37 @@ fn names_to_give(names: &NameBook) -> impl Iterator<Item = Message> {
     given.map(|namings| Message::Namings(Namings { namings }))
 }
 
-/// These lessons, round by round, in messages: all of a round in one, so that it is known to be all.
-fn lessons_to_give(rounds: impl Iterator<Item = impl Iterator<Item = Lesson>>) -> Vec<Message> {
+/// What is said of these rounds, in messages: all of a round in one, so that it is known to be all. Says also which was the last, if there is no room for
+/// those behind it. Where words may be refused, so few are in a message that none stands behind too many of these to be looked at.
+fn lessons_to_give(
+    book: &LessonBook,
+    rounds: &[RoundId],
+    may_be_refused: bool,
+) -> (Vec<Message>, Option<RoundId>) {
     let (mut messages, mut lessons, mut told, mut bytes) = (Vec::new(), Vec::new(), 0, 0);
-    for of_round in rounds {
+    let (mut last, mut ended) = (None, None);
+    for round in rounds {
         if told + MAX_INSTRUCTORS > MAX_TOLD {
+            ended = last;
             break;
         }
-        if bytes >= CHUNK {
+        let mut of_round: Vec<Lesson> = book.told_of(*round).collect();
+        let is_long = may_be_refused && lessons.len() + of_round.len() > MAX_UNPROVEN;
+        if (is_long || bytes >= CHUNK) && !lessons.is_empty() {
             messages.push(Message::Lessons(Lessons { lessons: std::mem::take(&mut lessons) }));
             bytes = 0;
         }
-        let before = lessons.len();
-        lessons.extend(of_round);
-        told += lessons.len() - before;
         let signed =
             |lesson: &Lesson| lesson.said.as_ref().map_or(0, |it| it.word.len() + it.attachment.len());
-        bytes += lessons[before..].iter().map(|lesson| 64 + signed(lesson)).sum::<usize>();
+        told += of_round.len();
+        bytes += of_round.iter().map(|lesson| 64 + signed(lesson)).sum::<usize>();
+        lessons.append(&mut of_round);
+        last = Some(*round);
     }
     if !lessons.is_empty() {
         messages.push(Message::Lessons(Lessons { lessons }));
     }
-    messages
+    (messages, ended)
 }
 
 impl Mind {
@@ -151,6 +160,7 @@ impl Mind {
             let lacking = book.rounds(key).filter(|(round, digest)| {
                 first.is_none_or(|first| round >= first) && theirs.get(round) != Some(digest)
             });
+            let lacking: Vec<RoundId> = lacking.map(|(round, _)| round).collect();
             // First the names: lessons may speak of them.
             let names = learning.names();
             if names.digest(key) != know.named {
@@ -158,7 +168,11 @@ impl Mind {
                 let again = self.exchanges.may_give_names(from, (names.digest(0), know.named));
                 given.extend(names_to_give(names).filter(|_| again));
             }
-            given.extend(lessons_to_give(lacking.map(|(round, _)| book.told_of(round))));
+            let digests = (here.lessons, know.digest.lessons);
+            let turn = self.exchanges.turn_of_lessons(from, digests, lacking);
+            let (messages, ended) = lessons_to_give(book, &turn, learning.is_sealed());
+            self.exchanges.end_turn_of_lessons(from, ended);
+            given.extend(messages);
         }
         let settled = given.is_empty() && !learning.withholds();
         self.exchanges.spend(from, given.len() + 1);
@@ -243,6 +257,15 @@ impl Mind {
     fn compares_with(&self, robot: RobotId) -> bool {
         let mut neighbours = self.rounds.neighbours();
         neighbours.len() == 0 || neighbours.any(|neighbour| neighbour == robot)
+    }
+
+    /// What was declined may be taken now.
+    pub(super) fn ask_again_for_lessons(&mut self) {
+        if self.exchanges.forget_declined_lessons()
+            && let Some(learning) = &mut self.learning
+        {
+            learning.ask_again();
+        }
     }
 
     /// Takes in what instructors said and this robot had not heard.

@@ -8,7 +8,7 @@ use crate::believe::{Believe, Standing};
 
 /// Who may teach. A word is signed by whoever's name stands before its count.
 #[derive(Debug)]
-struct Roll(&'static [(&'static str, Standing)]);
+pub(super) struct Roll(pub &'static [(&'static str, Standing)]);
 
 impl Believe for Roll {
     fn believe(&self, by: &InstructorId, said: &SignedWord) -> Option<(u64, Standing)> {
@@ -20,12 +20,12 @@ impl Believe for Roll {
 }
 
 /// A robot may speak for the guest.
-const ALL: &[(&str, Standing)] =
+pub(super) const ALL: &[(&str, Standing)] =
     &[("ada", Standing::Overrules), ("bob", Standing::Teaches), ("guest", Standing::Vouched)];
 
-const BOTH: &[(&str, Standing)] = &[("ada", Standing::Overrules), ("bob", Standing::Teaches)];
+pub(super) const BOTH: &[(&str, Standing)] = &[("ada", Standing::Overrules), ("bob", Standing::Teaches)];
 
-fn signed(who: &str, count: u64, instruction: &Instruction) -> SignedWord {
+pub(super) fn signed(who: &str, count: u64, instruction: &Instruction) -> SignedWord {
     let attachment = [who.as_bytes(), &count.to_le_bytes()].concat();
     SignedWord { word: serde_json::to_vec(instruction).unwrap(), attachment }
 }

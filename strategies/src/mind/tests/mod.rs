@@ -3,6 +3,7 @@
 mod asking;
 mod believing;
 mod feedback;
+mod giving;
 mod knowledge;
 mod naming;
 mod preceding;
