@@ -40,6 +40,12 @@ impl Learning {
         self.believer.is_some()
     }
 
+    /// Whether a robot whose book is full may keep what was said of that round, however old, rather than of newer ones: where somebody with a key spoke of
+    /// it, or where it lived through it, as this one did.
+    pub fn keeps_before_others(&self, round: RoundId) -> bool {
+        self.recent.contains(round) || self.is_sealed() && self.lessons.is_signed(round)
+    }
+
     /// What was refused may be taken now. Under another key neighbours that gave up giving it find something else to be lacking.
     pub fn ask_again(&mut self) {
         self.heard = true;

@@ -155,10 +155,11 @@ impl Mind {
             lacking_here |= theirs.iter().any(|(round, digest)| {
                 book.digest_of(*round, key) != *digest && declined.get(round) != Some(digest)
             });
-            // What lies before all of a full list was left out of it, or would be.
+            // What lies before all of a full list was left out of it, or would be, unless it is kept before others.
             let first = theirs.keys().next().filter(|_| theirs.len() >= MAX_LESSONS);
             let lacking = book.rounds(key).filter(|(round, digest)| {
-                first.is_none_or(|first| round >= first) && theirs.get(round) != Some(digest)
+                first.is_none_or(|first| round >= first || learning.keeps_before_others(*round))
+                    && theirs.get(round) != Some(digest)
             });
             let lacking: Vec<RoundId> = lacking.map(|(round, _)| round).collect();
             // First the names: lessons may speak of them.

@@ -1,8 +1,8 @@
-//! What robots give each other of which some refuse words.
+//! What robots give each other of which some refuse words, or hold all that they can.
 
-use gestalt_protocol::{InstructorId, Lessons};
+use gestalt_protocol::{Digest, InstructorId, Know, Lessons, MAX_LESSONS};
 
-use super::believing::{BOTH, Roll, signed, was};
+use super::believing::{ALL, BOTH, Roll, signed, was};
 use super::*;
 use crate::believe::Standing;
 
@@ -35,6 +35,73 @@ impl Swarm {
     fn count_told(&self, what: &str) -> usize {
         self.told.get(what).map_or(0, |(messages, _)| *messages)
     }
+}
+
+/// A member can vouch for ever so many words of somebody without a key.
+#[test]
+fn a_signed_word_reaches_a_book_that_is_full_of_newer_ones_without_a_key() {
+    let mut swarm = Swarm::sealed(81);
+    swarm.believe(ALL);
+    let round = swarm.show(1);
+    swarm.hear(0, "ada", 600, &was(round, 1));
+    swarm.pass(Duration::from_secs(10));
+    swarm.hear(0, "ada", 700, &was(round, 4));
+    swarm.pass(Duration::from_secs(10));
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+    (0..2).for_each(|i| swarm.hear_of_many(i, "guest", round, MAX_LESSONS));
+    // Started again, these did not live through it, as far as they know.
+    swarm.restart_all();
+    swarm.loss = 1.0;
+    swarm.restart_empty(2);
+    swarm.hear_of_many(2, "guest", round, MAX_LESSONS);
+    assert_eq!(swarm.lessons(), [MAX_LESSONS; 3]);
+    swarm.loss = 0.0;
+    swarm.pass(Duration::from_secs(60));
+    assert_eq!(swarm.last_word(2, round, "ada"), Some(Word::Was(ClassId(4))));
+    assert_eq!(swarm.of_class(4), [9, 9, 9]);
+    swarm.pass(Duration::from_secs(120));
+    swarm.check_rest();
+    swarm.check();
+}
+
+#[test]
+fn what_a_robot_lived_through_it_is_told_however_many_rounds_others_made_up_since() {
+    let mut swarm = Swarm::new(2, config(3, 1.0), 82);
+    let round = swarm.show(1);
+    (0..2).for_each(|i| swarm.hear_of_many(i, "eve", round, MAX_LESSONS));
+    swarm.pass(Duration::from_secs(60));
+    let word = Instruction::Was { round, class: Gesture::Class(ClassId(4)) };
+    let by = "ada".parse().unwrap();
+    swarm.input(0, Input::Instructed(Instructed { by, at: 1 << 40, instruction: word, said: None }));
+    swarm.pass(Duration::from_secs(60));
+    assert_eq!(swarm.last_word(1, round, "ada"), Some(Word::Was(ClassId(4))));
+    assert_eq!(swarm.of_class(4), [6, 6]);
+    swarm.pass(Duration::from_secs(60));
+    swarm.check_rest();
+}
+
+/// What is older than all of a full list, and is given all the same, is not given for ever.
+#[test]
+fn who_takes_no_word_however_often_is_given_it_no_more() {
+    let mut swarm = Swarm::sealed(83);
+    let round = swarm.show(1);
+    swarm.hear(0, "ada", 700, &was(round, 1));
+    swarm.pass(Duration::from_secs(10));
+    let name = |n: u32| RoundId { counter: round.counter + 1, opener: RobotId(2), life: n };
+    let mut ask = |sequence, lessons| {
+        let digest = Digest { key: 1, samples: 0, lessons };
+        let lessons = (0..MAX_LESSONS as u32).map(|n| (name(n), 1)).collect();
+        let know = Know { samples: Vec::new(), lessons, named: 0, digest, answer: true, nothing_for: None };
+        let (stamp, message) = (Stamp { boot: u32::MAX, sequence }, Message::Know(know));
+        let said = Envelope { author: RobotId(2), stamp, message, signature: None };
+        let before = swarm.count_told("lessons");
+        swarm.input(0, Input::Received(said));
+        swarm.pass(Duration::from_millis(500));
+        swarm.count_told("lessons") - before
+    };
+    let given: usize = (0..100).map(|sequence| ask(sequence, 3)).sum();
+    assert_eq!(given, 16);
+    assert_eq!(ask(101, 4), 1, "it has taken something else");
 }
 
 #[test]

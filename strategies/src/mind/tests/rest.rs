@@ -214,7 +214,13 @@ fn who_shares_much_keeps_nobody_else_from_being_passed_on() {
 fn what_a_full_list_leaves_out_is_not_given_again_and_again() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 28);
     let round = swarm.show(1);
-    swarm.was(round, 1);
+    // One that it did not live through: that it would keep, however full its list.
+    let another = RoundId { opener: RobotId(9), ..round };
+    let instructor = "ada".parse().unwrap();
+    let word = Word::Was(ClassId(1));
+    let lesson = Lesson { round: another, instructor, count: 1, at: 1, word, said: None };
+    swarm.minds[0].learning.as_mut().unwrap().hear(&lesson);
+    swarm.pass(Duration::from_secs(10));
     let told = |first: u32| {
         let name = |counter| RoundId { counter, opener: RobotId(2), life: 0 };
         let lessons = (0..gestalt_protocol::MAX_LESSONS as u32).map(|i| (name(first + i), 1)).collect();
