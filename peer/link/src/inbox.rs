@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use gestalt_protocol::{
-    Announcement, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, Message,
-    RobotId, Stamp, Topic, decode_json,
+    Announcement, Envelope, Instruction, InstructorId, Keys, MAX_JSON, MAX_MESSAGE, MAX_ROBOTS, MAX_WORD,
+    Message, RobotId, Stamp, Topic, decode_json,
 };
 use gestalt_strategies::{Input, Instructed};
 use gestalt_trust::{Channels, Distrust, Evidence, Judge};
@@ -359,7 +359,8 @@ impl Inbox {
     }
 
     fn on_feedback(&self, by: InstructorId, sample: &Sample) -> Result<(), Refusal> {
-        let instruction: Instruction = decode_json(&payload(sample, MAX_JSON)?)?;
+        // Words are kept whole until later ones take their place: no longer ones than in a sealed swarm.
+        let instruction: Instruction = decode_json(&payload(sample, MAX_WORD)?)?;
         if self.sealed.is_some() {
             return self.on_local_word(by, instruction, sample);
         }

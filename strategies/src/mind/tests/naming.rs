@@ -1,6 +1,6 @@
 //! Gestures that are named while the swarm works.
 
-use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, MAX_NAMED, Naming, Namings};
+use gestalt_protocol::{Fate, InstructorId, MAX_CLASSES, MAX_LABEL, MAX_NAMED, MAX_WORD, Naming, Namings};
 
 use super::believing::was;
 use super::*;
@@ -245,6 +245,24 @@ fn what_makes_no_gesture_is_answered_and_changes_nothing() {
     swarm.say("ana", Instruction::Retire { class: called("gesture 7") });
     let named = swarm.say("ana", new("one more"));
     assert_eq!(swarm.outcome(named), Outcome::Learned);
+}
+
+/// Clients may write each sign of a label as a number, as JSON lets them; who named it is letters.
+#[test]
+fn the_longest_word_on_names_fits_in_what_a_word_may_take() {
+    let mut swarm = Swarm::new(2, config(2, 1.0), 76);
+    let long = |letter: &str| format!("{letter:-<32}");
+    let label = "<".repeat(MAX_LABEL);
+    for by in [long("a"), long("b")] {
+        swarm.say(&by, new(&label));
+    }
+    let class = |by| called(&format!("{label} ({})", long(by)));
+    let word = Instruction::Same { class: class("a"), of: class("b") };
+    let json = serde_json::to_string(&word).unwrap().replace('<', "\\u003c");
+    assert!((800..=MAX_WORD).contains(&json.len()), "{} bytes", json.len());
+    let read: Instruction = gestalt_protocol::decode_json(json.as_bytes()).unwrap();
+    let said = swarm.say("ana", read);
+    assert_eq!(swarm.outcome(said), Outcome::Learned);
 }
 
 #[test]
