@@ -145,6 +145,12 @@ impl TrustSection {
         let mut clients = clients.filter(|name| client_key_file(folder, name).exists());
         let (holder, key) = match (clients.next(), clients.next()) {
             (Some(one), None) => (Bearer::Client(one.clone()), client_key_file(folder, one)),
+            (Some(one), Some(other)) if !key_file(folder, robot).exists() => {
+                let folder = folder.display();
+                return Err(wrong(format_args!(
+                    "{folder} has the keys of the clients {one} and {other}: name a folder with one of them"
+                )));
+            }
             _ => (Bearer::Robot(robot), key_file(folder, robot)),
         };
         let identity = Arc::new(Identity::read(&key).map_err(wrong)?);

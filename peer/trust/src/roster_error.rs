@@ -103,6 +103,14 @@ pub enum RosterError {
         /// The epoch of both.
         epoch: u64,
     },
+    /// What a file holds is none that is accepted.
+    #[error("{path}: {cause}")]
+    Contents {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: Box<RosterError>,
+    },
     /// The file could not be read or written.
     #[error(
         "{path}: the roster could not be {verb}: {source}: check the path, whose file it is, and the room on the disk"

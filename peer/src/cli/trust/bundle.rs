@@ -5,13 +5,14 @@ use std::path::Path;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gestalt_link::{Bearer, Certificate, Credentials};
-use gestalt_trust::{Applicant, Identity, Roster};
+use gestalt_trust::{Applicant, Identity, Roster, RosterError};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::sync::Arc;
 
 use super::super::Failure;
-use super::folder::{key_path, said};
+use super::folder::said;
+use super::keys::key_path;
 use crate::config::{ROSTER_FILE, certificate_file};
 
 const BEGIN: &str = "-----BEGIN GESTALT MEMBERSHIP-----";
@@ -74,14 +75,13 @@ pub(super) fn accept(folder: &Path, text: &str) -> Result<(Applicant, Roster), F
     }
     let identity = Identity::read(&key)?;
     certificate.check(&offered, holder(&who), &identity.public_key())?;
-    let members = offered.members();
-    let is_member = match &who {
-        Applicant::Robot(robot) => members.robots.get(robot) == Some(&identity.public_key()),
+    let is_member = |roster: &Roster| match &who {
+        Applicant::Robot(robot) => roster.members().robots.get(robot) == Some(&identity.public_key()),
         Applicant::Client(name) => {
-            members.instructors.get(name).is_some_and(|it| it.key == identity.public_key())
+            roster.members().instructors.get(name).is_some_and(|it| it.key == identity.public_key())
         }
     };
-    if !is_member {
+    if !is_member(&offered) {
         return Err(format!(
             "{} is not on this roster with the key that it has here: ask for the newest",
             said(&who)
@@ -89,13 +89,18 @@ pub(super) fn accept(folder: &Path, text: &str) -> Result<(Applicant, Roster), F
         .into());
     }
     let file = folder.join(ROSTER_FILE);
-    let roster = if file.exists() {
-        let held: Roster = Roster::read(&file)?;
-        held.successor(block.roster.as_bytes())?.unwrap_or(held)
-    } else {
-        offered
+    let held: Option<Roster> = if file.exists() { Some(Roster::read(&file)?) } else { None };
+    let (roster, is_new) = match held {
+        None => (offered, true),
+        Some(held) => match held.successor(block.roster.as_bytes()) {
+            // Somebody else was enrolled since, and this folder knows it: whoever is a member there as well needs the certificate alone.
+            Err(RosterError::Older { .. }) if is_member(&held) => (held, false),
+            other => other?.map_or((held, false), |newer| (newer, true)),
+        },
     };
-    roster.write(&file)?;
+    if is_new {
+        roster.write(&file)?;
+    }
     certificate.write(&certificate_file(&key))?;
     Ok((who, roster))
 }
@@ -143,7 +148,8 @@ mod tests {
     use gestalt_protocol::RobotId;
     use gestalt_trust::{Request, Role, Roles};
 
-    use super::super::folder::{Authority, key_of};
+    use super::super::folder::Authority;
+    use super::super::keys::key_of;
     use super::*;
 
     /// What a robot prints, and what whoever has the authority's key answers.
@@ -172,8 +178,17 @@ mod tests {
         // The block of another one, of an older epoch, of another swarm.
         let other = enrolled(&folder.path().join("other"), &mut authority, 8);
         assert!(accept(&there, &other).unwrap_err().to_string().contains("robot-8.key"));
-        let (_, newer) = accept(&there, &enrolled(&there, &mut authority, 7)).unwrap();
-        assert!(accept(&there, &block).unwrap_err().to_string().contains("older"));
+        // One of the same folder that was enrolled before the other was accepted: its roster is older, and it is a member of the newer one.
+        let [first, second] = [9, 10].map(|robot| enrolled(&there, &mut authority, robot));
+        let (_, newer) = accept(&there, &second).unwrap();
+        assert_eq!(accept(&there, &first).unwrap(), (Applicant::Robot(RobotId(9)), newer.clone()));
+        assert!(trust.seal(RobotId(9)).unwrap().unwrap().credentials(RobotId(9)).is_ok());
+        authority.rekey(RobotId(7), None).unwrap();
+        let (_, newer) = accept(&there, &enrolled(&there, &mut authority, 10)).unwrap();
+        assert!(
+            accept(&there, &block).unwrap_err().to_string().contains("older"),
+            "its key is believed no more"
+        );
         assert_eq!(Roster::<gestalt_trust::Ed25519>::read(&there.join(ROSTER_FILE)).unwrap(), newer);
         let mut elsewhere = Authority::create(&folder.path().join("elsewhere"), "demo", Roles::NONE).unwrap();
         let usurped = enrolled(&there, &mut elsewhere, 7);

@@ -8,11 +8,15 @@ use std::thread;
 use std::time::Duration;
 
 use gestalt_link::{Bearer, Certificate};
-use gestalt_protocol::{InstructorId, Keys, RobotId};
-use gestalt_trust::{Applicant, Identity, Instructor, Membership, PublicKey, Role, Roles, Roster};
+use gestalt_protocol::{IdError, InstructorId, Keys, RobotId};
+use gestalt_trust::{
+    Applicant, Identity, Instructor, KeyFileError, Membership, PublicKey, Role, Roles, Roster,
+};
 
 use super::super::Failure;
-use crate::config::{ROSTER_FILE, SwarmName, certificate_file, client_key_file, key_file};
+use super::keys::{make, new_identity, remove, until_it_counts};
+use super::revoked::Revoked;
+use crate::config::{ROSTER_FILE, SwarmName, certificate_file, key_file};
 
 /// The secret of whoever may change the roster.
 const AUTHORITY_FILE: &str = "authority.key";
@@ -26,6 +30,7 @@ pub(crate) struct Authority {
     folder: PathBuf,
     identity: Arc<Identity>,
     members: Membership,
+    revoked: Revoked,
     /// Files that take the place of others once the roster is written, which needs them.
     new_files: Vec<(PathBuf, PathBuf)>,
     /// Kept while the roster may change: of two who change it at once, the key of one would stand on it, and that of the other lie here.
@@ -38,28 +43,41 @@ impl Authority {
     /// # Errors
     /// A name that no swarm can have, a folder that has a swarm already, and files that cannot be written.
     pub fn create(folder: &Path, swarm: &str, local: Roles) -> Result<Self, Failure> {
+        Self::found(folder, swarm, local)?.ok_or_else(|| {
+            let roster = folder.join(ROSTER_FILE);
+            format!("{} is there already: this folder has its swarm; choose another", roster.display()).into()
+        })
+    }
+
+    /// The same, or `None` where the folder has a swarm already; nothing is written then.
+    fn found(folder: &Path, swarm: &str, local: Roles) -> Result<Option<Self>, Failure> {
         Keys::new(swarm)?;
+        let has_swarm = || folder.join(ROSTER_FILE).exists();
+        if has_swarm() {
+            return Ok(None);
+        }
         make(folder)?;
         let file = folder.join(AUTHORITY_FILE);
-        let identity = if file.exists() { Identity::read(&file)? } else { new_identity(&file)? };
-        let alone = alone(&file)?;
-        if folder.join(ROSTER_FILE).exists() {
-            return Err(format!(
-                "{} is there already: this folder has its swarm; choose another",
-                file.display()
-            )
-            .into());
+        match new_identity(&file) {
+            Ok(_) => {}
+            // Made by who was interrupted, or does the same just now.
+            Err(error) if matches!(error.downcast_ref(), Some(KeyFileError::Exists { .. })) => {}
+            Err(error) => return Err(error),
         }
-        let members = Membership { swarm: swarm.to_owned(), local, ..Membership::default() };
+        let alone = alone(&file)?;
+        if has_swarm() {
+            return Ok(None);
+        }
         let mut authority = Self {
             folder: folder.to_owned(),
-            identity: Arc::new(identity),
-            members,
+            identity: Arc::new(Identity::read(&file)?),
+            members: Membership { swarm: swarm.to_owned(), local, ..Membership::default() },
+            revoked: Revoked::read(folder)?,
             new_files: Vec::new(),
             _alone: alone,
         };
         authority.save()?;
-        Ok(authority)
+        Ok(Some(authority))
     }
 
     /// Opens the folder of a swarm; nobody else changes it until this is dropped. New keys that are on the roster already take their places, where who made
@@ -83,8 +101,16 @@ impl Authority {
             return Err(format!("{} is of another authority: choose another folder", folder.display()).into());
         }
         let members = roster.members().clone();
-        let mut authority =
-            Self { folder: folder.to_owned(), identity, members, new_files: Vec::new(), _alone: alone };
+        let mut revoked = Revoked::read(folder)?;
+        members.expelled.values().for_each(|key| revoked.add(*key));
+        let mut authority = Self {
+            folder: folder.to_owned(),
+            identity,
+            members,
+            revoked,
+            new_files: Vec::new(),
+            _alone: alone,
+        };
         authority.go_on()?;
         Ok(authority)
     }
@@ -94,10 +120,10 @@ impl Authority {
     /// # Errors
     /// As [`Authority::create`] and [`Authority::open`]; a folder of another swarm.
     pub fn open_or_create(folder: &Path, swarm: Option<&str>) -> Result<Self, Failure> {
-        if !folder.join(ROSTER_FILE).exists() {
-            // Whoever works on a robot's own computer could as well show it gestures.
-            let usual = SwarmName::default().0;
-            return Self::create(folder, swarm.unwrap_or(&usual), Roles::up_to(Role::Teach));
+        // Whoever works on a robot's own computer could as well show it gestures.
+        let (usual, local) = (SwarmName::default().0, Roles::up_to(Role::Teach));
+        if let Some(new) = Self::found(folder, swarm.unwrap_or(&usual), local)? {
+            return Ok(new);
         }
         let authority = Self::open(folder)?;
         let of = &authority.members.swarm;
@@ -131,17 +157,38 @@ impl Authority {
     /// Makes a robot or a client a member with that key.
     ///
     /// # Errors
-    /// One that is a member already with another key.
+    /// One that is a member already with another key, a key that was taken off the roster before, a client whose name is a number.
     pub fn enrol(&mut self, applicant: &Applicant, key: PublicKey, roles: Roles) -> Result<(), Failure> {
+        if let Applicant::Client(name) = applicant {
+            client_name(&name.to_string())?;
+        }
+        let held = self.key(applicant);
+        if held.is_some_and(|held| held != key) {
+            let (who, mend) = (
+                said(applicant),
+                match applicant {
+                    Applicant::Robot(robot) => format!("rekey {robot}` takes"),
+                    Applicant::Client(name) => format!("expel {name}`, and enrolling it then, takes"),
+                },
+            );
+            return Err(format!(
+                "{who} is a member with another key: if it was given a new one, `gestalt trust {mend} the old one's trust away"
+            )
+            .into());
+        }
+        if held.is_none() && self.revoked.contains(&key) {
+            let again = match applicant {
+                Applicant::Robot(robot) => format!("`gestalt trust rekey {robot}`, or "),
+                Applicant::Client(_) => String::new(),
+            };
+            return Err(format!(
+                "the key of {} was taken off the roster before: make another, by {again}`gestalt trust request --anew` where it is",
+                said(applicant)
+            )
+            .into());
+        }
         match applicant {
             Applicant::Robot(robot) => {
-                if self.members.robots.get(robot).is_some_and(|held| *held != key) {
-                    return Err(format!(
-                        "robot {robot} is a member with another key: if it was given a new one, `gestalt trust rekey {robot}` takes the old one's \
-                         trust away"
-                    )
-                    .into());
-                }
                 self.members.robots.insert(*robot, key);
             }
             Applicant::Client(name) => {
@@ -161,6 +208,7 @@ impl Authority {
             old.ok_or_else(|| format!("robot {robot} was never a member: gestalt trust enrol makes it one"))?;
         self.members.robots.remove(&robot);
         self.members.expelled.insert(robot, old);
+        self.revoked.add(old);
         let who = Applicant::Robot(robot);
         let Some(key) = key else {
             let (new, _) = self.new_key_file(robot);
@@ -215,10 +263,30 @@ impl Authority {
         Ok(())
     }
 
-    /// Whether a client is a member with that key.
+    /// The key that a member has.
     #[must_use]
-    pub fn has_client(&self, name: &InstructorId, key: &PublicKey) -> bool {
-        self.members.instructors.get(name).is_some_and(|held| held.key == *key)
+    pub fn key(&self, who: &Applicant) -> Option<PublicKey> {
+        match who {
+            Applicant::Robot(robot) => self.members.robots.get(robot).copied(),
+            Applicant::Client(name) => self.members.instructors.get(name).map(|held| held.key),
+        }
+    }
+
+    /// Whether that key was taken off the roster once.
+    #[must_use]
+    pub fn is_revoked(&self, key: &PublicKey) -> bool {
+        self.revoked.contains(key)
+    }
+
+    /// What a client may do as yet.
+    #[must_use]
+    pub fn roles(&self, who: &Applicant) -> Roles {
+        match who {
+            Applicant::Robot(_) => Roles::NONE,
+            Applicant::Client(name) => {
+                self.members.instructors.get(name).map_or(Roles::NONE, |held| held.roles)
+            }
+        }
     }
 
     /// Takes a robot or a client off the roster. Says whether it was on it: a robot that was expelled before is none already.
@@ -226,17 +294,22 @@ impl Authority {
     /// # Errors
     /// One that was never a member, as far as is known: of clients nothing is kept.
     pub fn expel(&mut self, who: &Applicant) -> Result<bool, Failure> {
-        let (was, before) = match who {
+        let key = self.key(who);
+        key.into_iter().for_each(|key| self.revoked.add(key));
+        let before = match who {
             Applicant::Robot(robot) => {
+                self.members.robots.remove(robot);
                 let before = self.members.expelled.contains_key(robot);
-                let key = self.members.robots.remove(robot);
                 self.members.expelled.extend(key.map(|key| (*robot, key)));
-                (key.is_some(), before)
+                before
             }
-            Applicant::Client(name) => (self.members.instructors.remove(name).is_some(), false),
+            Applicant::Client(name) => {
+                self.members.instructors.remove(name);
+                false
+            }
         };
-        if was || before {
-            return Ok(was);
+        if key.is_some() || before {
+            return Ok(key.is_some());
         }
         let words = "is no member: gestalt trust roster shows who is, and gestalt trust tell says it to a swarm that runs";
         Err(format!("{} {words}", said(who)).into())
@@ -267,35 +340,22 @@ impl Authority {
     /// # Errors
     /// Members that exclude each other, and a file that cannot be written.
     pub fn save(&mut self) -> Result<Roster, Failure> {
+        // Where a roster was restored from an older copy, or a command was interrupted.
+        let robots = self.members.robots.iter().map(|(robot, key)| (Applicant::Robot(*robot), key));
+        let clients =
+            self.members.instructors.iter().map(|(name, it)| (Applicant::Client(name.clone()), &it.key));
+        if let Some((who, _)) = robots.chain(clients).find(|(_, key)| self.revoked.contains(key)) {
+            let who = said(&who);
+            return Err(format!("{who} is a member with a key that was taken off the roster before: `gestalt trust expel` it first, or give a robot another by `gestalt trust rekey`").into());
+        }
         self.members.epoch += 1;
+        // Before the roster: no key that was taken off it is ever unknown here.
+        self.revoked.write()?;
         let roster = self.members.clone().sign(&self.identity)?;
         roster.write(&self.folder.join(ROSTER_FILE))?;
         self.put_new_files()?;
         Ok(roster)
     }
-}
-
-/// The key of a robot or client in that folder, made now if there is none.
-///
-/// # Errors
-/// Files that cannot be read or written.
-pub(super) fn key_of(folder: &Path, who: &Applicant, anew: bool) -> Result<Identity, Failure> {
-    make(folder)?;
-    let file = key_path(folder, who);
-    if file.exists() && !anew {
-        return Ok(Identity::read(&file)?);
-    }
-    // One that is there stays until there is another.
-    let new = until_it_counts(&file);
-    remove(&new)?;
-    let identity = new_identity(&new)?;
-    fs::rename(&new, &file).map_err(|error| format!("cannot write {}: {error}", file.display()))?;
-    Ok(identity)
-}
-
-/// Where the key that will lie there lies before.
-fn until_it_counts(key: &Path) -> PathBuf {
-    key.with_extension("new.key")
 }
 
 /// Keeps others that ask for the same out, until what is returned is dropped. `None` where files cannot be locked.
@@ -312,14 +372,6 @@ fn alone(file: &Path) -> Result<Option<File>, Failure> {
         .into())
 }
 
-/// Where a member's key lies.
-pub(super) fn key_path(folder: &Path, who: &Applicant) -> PathBuf {
-    match who {
-        Applicant::Robot(robot) => key_file(folder, *robot),
-        Applicant::Client(name) => client_key_file(folder, name),
-    }
-}
-
 /// The member in words.
 pub(super) fn said(who: &Applicant) -> String {
     match who {
@@ -328,34 +380,26 @@ pub(super) fn said(who: &Applicant) -> String {
     }
 }
 
-/// A robot by its number, a client by its name.
+/// A robot by its number, a client by its name; either as an [`Applicant`] is written.
 pub(super) fn applicant(text: &str) -> Result<Applicant, String> {
-    if let Ok(robot) = text.parse() {
-        return Ok(Applicant::Robot(robot));
+    let robot = |text: &str| text.parse().map(Applicant::Robot);
+    let client = |text: &str| text.parse().map(Applicant::Client);
+    let who: Result<Applicant, IdError> = match text.split_once(':') {
+        Some(("robot", number)) => robot(number),
+        Some(("client", name)) => client(name),
+        _ => robot(text).or_else(|_| client(text)),
+    };
+    who.map_err(|error| error.to_string())
+}
+
+/// A client's name: one that no robot could have.
+pub(super) fn client_name(text: &str) -> Result<InstructorId, String> {
+    if text.parse::<RobotId>().is_ok() {
+        return Err(format!(
+            "client {text} would be taken for robot {text}: choose a name that is no number"
+        ));
     }
-    let name: Result<InstructorId, _> = text.parse();
-    name.map(Applicant::Client).map_err(|error| error.to_string())
-}
-
-fn remove(file: &Path) -> Result<(), Failure> {
-    match fs::remove_file(file) {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            Err(format!("cannot remove {}: {error}", file.display()).into())
-        }
-        _ => Ok(()),
-    }
-}
-
-fn make(folder: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()).into())
-}
-
-fn new_identity(file: &Path) -> Result<Identity, Failure> {
-    let mut secret = zeroize::Zeroizing::new([0; 32]);
-    getrandom::fill(&mut *secret).map_err(|error| format!("the system gives no random numbers: {error}"))?;
-    let identity = Identity::from_bytes(&secret);
-    identity.write(file)?;
-    Ok(identity)
+    text.parse().map_err(|error: IdError| error.to_string())
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@
 
 mod bundle;
 mod folder;
+mod keys;
+mod revoked;
 mod tell;
 
 use std::fs::File;
@@ -12,7 +14,8 @@ use gestalt_protocol::{InstructorId, RobotId};
 use gestalt_trust::{Applicant, PublicKey, Request, Roles, Roster};
 use serde_json::json;
 
-use self::folder::{applicant, key_of, said};
+use self::folder::{applicant, client_name, said};
+use self::keys::{key_here, key_of};
 use self::tell::Tell;
 use super::Failure;
 use super::show::{counted, line};
@@ -68,15 +71,15 @@ struct Enrol {
     #[arg(long, requires = "robots", conflicts_with_all = ["request", "client"])]
     local: bool,
     /// Ids of the robots
-    #[arg(long, value_delimiter = ',', value_name = "ID,…")]
+    #[arg(long, value_delimiter = ',', value_name = "ID,…", requires = "local")]
     robots: Vec<u32>,
     /// Name of the swarm, where --local makes one [default: that of the folder, else gestalt]
     #[arg(long, value_name = "NAME", requires = "local")]
     swarm: Option<String>,
     /// Make a client a member, and all that it needs in a folder of its own (client-NAME): a Zenoh configuration for any language, a key to speak with
-    #[arg(long, value_name = "NAME", conflicts_with = "request")]
+    #[arg(long, value_name = "NAME", conflicts_with = "request", value_parser = client_name)]
     client: Option<InstructorId>,
-    /// What the client may do, with what comes before it: listen, open, teach, overrule [default: listen]
+    /// What the client may do, with what comes before it: listen, open, teach, overrule [default: what it may do as yet, else listen]
     #[arg(long, value_name = "ROLE", value_parser = Roles::named)]
     role: Option<Roles>,
     /// The line that `gestalt trust request` printed where the new member is
@@ -135,9 +138,8 @@ struct Show {
   gestalt trust expel 7 keys -e tls/192.168.1.5:7447
   gestalt trust expel 7 keys --offline")]
 struct Expel {
-    /// Id of the robot, or name of the client
-    #[arg(value_parser = applicant)]
-    who: Applicant,
+    /// Id of the robot, or name of the client; robot:7 and client:7 where one name could mean either
+    who: String,
     #[command(flatten)]
     tell: Tell,
     /// Change the roster alone, where no robot runs: they are told by whichever starts with it
@@ -222,7 +224,6 @@ fn new(args: &New) -> Result<(), Failure> {
 }
 
 fn enrol(args: &Enrol) -> Result<(), Failure> {
-    let roles = args.role.unwrap_or_default();
     if args.role.is_some() && !args.robots.is_empty() {
         return Err("robots have no roles: whoever works on their computer has those of `gestalt trust new --local-role`".into());
     }
@@ -235,18 +236,30 @@ fn enrol(args: &Enrol) -> Result<(), Failure> {
     let words = if let Some(name) = &args.client {
         let who = Applicant::Client(name.clone());
         let folder = args.folder.join(format!("client-{name}"));
-        // Whoever is no member any more gets another key: the old one may be in a thief's hands.
-        let mut identity = key_of(&folder, &who, false)?;
-        if !authority.has_client(name, &identity.public_key()) {
-            identity = key_of(&folder, &who, true)?;
+        let roles = args.role.unwrap_or_else(|| authority.roles(&who));
+        let (key, identity) = match authority.key(&who) {
+            // It keeps its key, wherever that is: with another one all that it said would lose its proof.
+            Some(held) => (held, key_here(&folder, &who)?.filter(|it| it.public_key() == held)),
+            // Whoever is no member any more gets another key: the old one may be in a thief's hands.
+            None => {
+                let here = key_here(&folder, &who)?.filter(|it| !authority.is_revoked(&it.public_key()));
+                let own = here.map_or_else(|| key_of(&folder, &who, true), Ok)?;
+                (own.public_key(), Some(own))
+            }
+        };
+        authority.enrol(&who, key, roles)?;
+        let place = folder.display().to_string();
+        match identity {
+            Some(identity) => {
+                own = Some((folder, name.clone(), identity, authority.certify(&who, &key)?));
+                format!("client {name} may {roles}: its key and its zenoh.json5 are in {place}")
+            }
+            None => format!(
+                "client {name} may {roles}, with the key that it has, which is not in {place}: if it is lost, gestalt trust expel {name}, and enrol it again"
+            ),
         }
-        authority.enrol(&who, identity.public_key(), roles)?;
-        let certificate = authority.certify(&who, &identity.public_key())?;
-        let words =
-            format!("client {name} may {roles}: its key and its zenoh.json5 are in {}", folder.display());
-        own = Some((folder, name.clone(), identity, certificate));
-        words
     } else if let Some(request) = &args.request {
+        let roles = args.role.unwrap_or_else(|| authority.roles(&request.applicant));
         authority.enrol(&request.applicant, request.key, roles)?;
         print = Some((request.applicant.clone(), authority.certify(&request.applicant, &request.key)?));
         show_key(&request.applicant, &request.key, "request");
@@ -314,13 +327,18 @@ fn show(args: &Show) -> Result<(), Failure> {
 }
 
 fn expel(args: &Expel) -> Result<(), Failure> {
+    let who = applicant(&args.who)?;
     let mut authority = Authority::open(&args.folder)?;
-    let roster = match authority.expel(&args.who)? {
+    let client = format!("client:{}", args.who);
+    if applicant(&client).is_ok_and(|client| client != who && authority.key(&client).is_some()) {
+        return Err(format!("a client has that name, too: say robot:{} or {client}", args.who).into());
+    }
+    let roster = match authority.expel(&who)? {
         true => authority.save()?,
         // Said again, to those who were not reached.
         false => authority.roster()?,
     };
-    say(&format!("{} is no member by epoch {}", said(&args.who), roster.members().epoch))?;
+    say(&format!("{} is no member by epoch {}", said(&who), roster.members().epoch))?;
     if args.offline { Ok(()) } else { args.tell.now(&authority, &roster) }
 }
 
@@ -369,44 +387,4 @@ fn digits(hex: &str) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use clap::Parser;
-
-    use super::*;
-
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        args: Args,
-    }
-
-    fn run(words: &[&str]) -> Result<(), Failure> {
-        super::run(&Line::parse_from([&["trust"], words].concat()).args)
-    }
-
-    #[test]
-    fn a_client_that_was_expelled_comes_back_with_a_new_key() {
-        let folder = tempfile::tempdir().unwrap();
-        let keys = folder.path().join("keys").display().to_string();
-        let desk = "desk".parse().unwrap();
-        let key = || {
-            let roster: Roster = Roster::read(&Path::new(&keys).join(ROSTER_FILE)).unwrap();
-            roster.members().instructors.get(&desk).map(|held| held.key)
-        };
-        run(&["new", "--swarm", "demo", &keys]).unwrap();
-        run(&["enrol", "--client", "desk", "--role", "open", &keys]).unwrap();
-        let first = key().unwrap();
-        run(&["enrol", "--client", "desk", "--role", "teach", &keys]).unwrap();
-        run(&["enrol", "--client", "desk", "--role", "listen", &keys]).unwrap();
-        assert_eq!(key(), Some(first), "another role takes no key away");
-        run(&["expel", "desk", "--offline", &keys]).unwrap();
-        assert_eq!(key(), None);
-        run(&["enrol", "--client", "desk", "--role", "teach", &keys]).unwrap();
-        assert!(key().is_some_and(|key| key != first));
-        let file = Path::new(&keys).join("client-desk");
-        assert_eq!(
-            key_of(&file, &Applicant::Client(desk.clone()), false).unwrap().public_key(),
-            key().unwrap()
-        );
-    }
-}
+mod tests;

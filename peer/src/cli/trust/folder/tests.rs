@@ -1,5 +1,6 @@
 //! Who is a member, whatever happens while that changes.
 
+use super::super::keys::key_of;
 use super::*;
 use crate::config::TrustSection;
 
@@ -47,13 +48,87 @@ fn who_was_expelled_comes_back_with_a_new_key_alone() {
     assert!(!authority.expel(&Applicant::Robot(RobotId(7))).unwrap(), "it is none already");
     assert!(authority.expel(&Applicant::Robot(RobotId(8))).unwrap_err().to_string().contains("no member"));
     // With its old key, which still lies there.
-    authority.enrol_here(RobotId(7)).unwrap();
-    assert!(authority.save().unwrap_err().to_string().contains("expelled"));
+    let refused = authority.enrol_here(RobotId(7)).unwrap_err().to_string();
+    assert!(refused.contains("rekey 7"), "{refused}");
     drop(authority);
     let mut authority = Authority::open(folder.path()).unwrap();
     authority.rekey(RobotId(7), None).unwrap();
     let after = authority.save().unwrap().members().clone();
     assert!(after.robots[&RobotId(7)] != before && after.expelled[&RobotId(7)] == before);
+}
+
+#[test]
+fn no_key_that_was_taken_off_the_roster_ever_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("keys");
+    let mut authority = Authority::create(&place, "demo", Roles::NONE).unwrap();
+    let (robot, desk) = (Applicant::Robot(RobotId(7)), Applicant::Client("desk".parse().unwrap()));
+    let new = |number: u32, who: &Applicant| {
+        key_of(&folder.path().join(number.to_string()), who, false).unwrap().public_key()
+    };
+    let keys: Vec<PublicKey> = (0..3).map(|number| new(number, &robot)).collect();
+    authority.enrol(&robot, keys[0], Roles::NONE).unwrap();
+    for key in &keys[1..] {
+        authority.save().unwrap();
+        authority.rekey(RobotId(7), Some(*key)).unwrap();
+    }
+    let of_desk = new(3, &desk);
+    authority.enrol(&desk, of_desk, Roles::NONE).unwrap();
+    authority.save().unwrap();
+    for who in [&robot, &desk] {
+        authority.expel(who).unwrap();
+    }
+    authority.save().unwrap();
+    drop(authority);
+    // The roster knows the last key of a robot; the folder all, also where the file was lost as it was before this was kept.
+    let mut authority = Authority::open(&place).unwrap();
+    for (who, key) in keys.iter().map(|key| (&robot, key)).chain([(&desk, &of_desk)]) {
+        let refused = authority.enrol(who, *key, Roles::NONE).unwrap_err().to_string();
+        assert!(refused.contains("taken off the roster before"), "{refused}");
+    }
+    authority.enrol(&robot, new(4, &robot), Roles::NONE).unwrap();
+    authority.save().unwrap();
+    // A roster from an older copy has such a key: nobody else is enrolled beside it.
+    authority.revoked.add(new(4, &robot));
+    authority.enrol_here(RobotId(8)).unwrap();
+    let refused = authority.save().unwrap_err().to_string();
+    assert!(refused.contains("robot 7 is a member with a key that was taken off"), "{refused}");
+    authority.rekey(RobotId(7), None).unwrap();
+    authority.save().unwrap();
+    drop(authority);
+    fs::write(place.join("revoked.json"), "[").unwrap();
+    let refused = Authority::open(&place).map(drop).unwrap_err().to_string();
+    assert!(refused.contains("revoked.json") && refused.contains("restore"), "{refused}");
+}
+
+#[test]
+fn a_folder_that_has_a_swarm_is_left_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+    authority.enrol_here(RobotId(7)).unwrap();
+    authority.save().unwrap();
+    drop(authority);
+    // The key that may change it was put away.
+    fs::remove_file(folder.path().join(AUTHORITY_FILE)).unwrap();
+    let refused = Authority::create(folder.path(), "demo", Roles::NONE).map(drop).unwrap_err().to_string();
+    assert!(refused.contains("roster.json is there already"), "{refused}");
+    let refused = Authority::open_or_create(folder.path(), Some("demo")).map(drop).unwrap_err().to_string();
+    assert!(refused.contains("authority.key is not there"), "{refused}");
+    assert!(!folder.path().join(AUTHORITY_FILE).exists());
+}
+
+#[test]
+fn robots_that_are_enrolled_at_once_in_a_new_folder_are_of_one_swarm() {
+    for _ in 0..8 {
+        let folder = tempfile::tempdir().unwrap();
+        let enrol = |robot: u32| {
+            let mut authority = Authority::open_or_create(folder.path(), Some("demo")).unwrap();
+            authority.enrol_here(RobotId(robot)).unwrap();
+            authority.save().unwrap();
+        };
+        std::thread::scope(|scope| (0..4).for_each(|robot| drop(scope.spawn(move || enrol(robot)))));
+        assert_eq!(Authority::open(folder.path()).unwrap().members.robots.len(), 4);
+    }
 }
 
 #[test]
