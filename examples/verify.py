@@ -5,7 +5,8 @@
     python3 examples/verify.py decision.json --roster keys/roster.json
 
 A member of the roster must have announced it so, every vote that it rests on must be signed by one, and it must follow from them. `--rule`, `--alpha`,
-`--clip`, `--quorum`, `--liars` and `--committee` are those of the swarm's `rounds`. It proves the same files as `gestalt verify`.
+`--clip`, `--quorum`, `--liars` and `--committee` are those of the swarm's `rounds`. It proves the same files as `gestalt verify`. What the gesture is called is its
+announcer's word alone, as are who drew the decision, how long that took, and whether it is final: act on its `class`.
 """
 import argparse
 import collections
@@ -88,8 +89,10 @@ def rounded(value: float) -> float:
 
 def single(value: object) -> float:
     """A 32-bit float: robots write its shortest digits and compute with the float. To round it to 64 bits first may be to round it otherwise, so these become
-    odd where digits are left over."""
+    odd where digits are left over. Whole numbers from -2^63 down to -2^64, which no robot writes, robots do read as 64 bits first."""
     double = real(value)
+    if type(value) is Whole and value.startswith("-") and 1 << 63 < int(value[1:]) < 1 << 64:
+        return rounded(double)
     left_over = decimal.Decimal(value).copy_abs().compare(decimal.Decimal(abs(double))) if double else 0
     bits, = struct.unpack("<Q", struct.pack("<d", double))
     return rounded(struct.unpack("<d", struct.pack("<Q", bits - (left_over < 0) | (left_over != 0)))[0])
@@ -326,6 +329,8 @@ def sound(decision: dict) -> None:
     said = [decision["confidence"], *probabilities, *([] if certificate["unknown"] is None else [certificate["unknown"]])]
     require(are_named(named, probabilities), "gestures that were not named, twice, or out of order")
     require(all(0 <= p <= 1 for p in said), "a probability outside 0 to 1")
+    label = decision["label"]
+    require(label is None or decision["class"] is not None and len(label.encode()) <= 99, "a label of no gesture")
     terms, pool = certificate["terms"], certificate["pool"]
     require(0 < terms["clip"] <= 1000 and 0 < terms["alpha"] <= 0.5, "terms that no robot can decide by")
     if pool is not None:
@@ -600,7 +605,7 @@ def follows(decision: dict, given: argparse.Namespace) -> str:
 def of_line(text: bytes) -> bytes:
     """What a line of `gestalt watch --json` says of a decision; any other text as it is."""
     begin, end = b'{"decision":', b',"event":"decision"}'
-    line = text.strip()
+    line = text.strip(b" \t\n\r")
     return line[len(begin):-len(end)] if line.startswith(begin) and line.endswith(end) else text
 
 

@@ -58,7 +58,7 @@ const LINE: [&[u8]; 2] = [b"{\"decision\":", b",\"event\":\"decision\"}"];
 /// # Errors
 /// [`Unproven::Decision`] and [`Unproven::Spelling`].
 pub fn read(json: &[u8]) -> Result<Announcement, Unproven> {
-    let of_line = json.trim_ascii().strip_prefix(LINE[0]).and_then(|rest| rest.strip_suffix(LINE[1]));
+    let of_line = trimmed(json).strip_prefix(LINE[0]).and_then(|rest| rest.strip_suffix(LINE[1]));
     let json = of_line.unwrap_or(json);
     let announcement: Announcement = decode_json(json)?;
     let written = serde_json::to_value(&announcement).ok().zip(serde_json::from_slice(json).ok());
@@ -66,6 +66,14 @@ pub fn read(json: &[u8]) -> Result<Announcement, Unproven> {
         .is_some_and(|(meant, found)| is_spelt(&found, &meant))
         .then_some(announcement)
         .ok_or(Unproven::Spelling)
+}
+
+/// Without the space that JSON may have around it.
+fn trimmed(json: &[u8]) -> &[u8] {
+    let is_space = |byte: &u8| b" \t\n\r".contains(byte);
+    let start = json.iter().position(|byte| !is_space(byte)).unwrap_or(json.len());
+    let end = json.iter().rposition(|byte| !is_space(byte)).map_or(start, |last| last + 1);
+    &json[start..end]
 }
 
 /// The same of the roster, of which members that there are none of may be left out.
@@ -100,8 +108,8 @@ fn is_spelt(found: &Value, meant: &Value) -> bool {
 }
 
 /// Whether a member of the swarm announced that, to the last word; every vote that it rests on was signed by a member, and it follows from
-/// them by the rounds of that configuration, in a swarm of at least so many `robots`. Who drew it, how long that took, of how many more robots, and
-/// whether it is final is its announcer's word alone: for a robot that says it is alone, its own vote suffices.
+/// them by the rounds of that configuration, in a swarm of at least so many `robots`. Who drew it, how long that took, of how many more robots, what its
+/// gesture is called, and whether it is final is its announcer's word alone: for a robot that says it is alone, its own vote suffices.
 ///
 /// # Errors
 /// The first [`Unproven`] found.
@@ -116,6 +124,11 @@ pub fn check(
     let signature = said.signature.ok_or(Unproven::Announcement { robot, cause: Distrust::Unsigned })?;
     let checked = roster.check(&said.statement(), &signature);
     checked.map_err(|cause| Unproven::Announcement { robot, cause })?;
+    // No robot would take it: see `Refusal::Label`.
+    announcement.check()?;
+    if announcement.label.is_some() && announcement.decision.class.is_none() {
+        return Err(DecodeError::Impossible("a label, where nothing was decided").into());
+    }
     check_votes(&announcement.decision, roster, rounds, robots)
 }
 

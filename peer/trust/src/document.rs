@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
+use std::str::FromStr;
 
 use gestalt_protocol::{InstructorId, MAX_ROBOTS, RobotId, Signature};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
@@ -46,14 +47,14 @@ impl Document {
 fn members<'de, D, K, V, const MAX: usize>(deserializer: D) -> Result<BTreeMap<K, V>, D::Error>
 where
     D: Deserializer<'de>,
-    K: Deserialize<'de> + Ord + fmt::Display,
+    K: FromStr<Err: fmt::Display> + Ord + fmt::Display,
     V: Deserialize<'de>,
 {
     struct Members<K, V, const MAX: usize>(PhantomData<(K, V)>);
 
     impl<'de, K, V, const MAX: usize> Visitor<'de> for Members<K, V, MAX>
     where
-        K: Deserialize<'de> + Ord + fmt::Display,
+        K: FromStr<Err: fmt::Display> + Ord + fmt::Display,
         V: Deserialize<'de>,
     {
         type Value = BTreeMap<K, V>;
@@ -64,10 +65,12 @@ where
 
         fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
             let mut members = BTreeMap::new();
-            while let Some((member, key)) = map.next_entry()? {
+            // As text: the JSON of a number as a name would have to be written without escapes.
+            while let Some((member, key)) = map.next_entry::<String, V>()? {
                 if members.len() == MAX {
                     return Err(A::Error::invalid_length(MAX + 1, &self));
                 }
+                let member: K = member.parse().map_err(A::Error::custom)?;
                 if members.contains_key(&member) {
                     return Err(A::Error::custom(format_args!("'{member}' is there twice")));
                 }
