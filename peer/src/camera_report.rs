@@ -171,7 +171,7 @@ impl CameraReport {
         let errors = if matches!(error, SourceError::Panicked(_)) { self.errors_allowed } else { 1 };
         self.errors = self.errors.saturating_add(errors);
         self.error = Some(error.to_string());
-        self.ended = matches!(error, SourceError::Ended(_));
+        self.ended = error.is_the_end();
         self.urgent = true;
     }
 

@@ -196,6 +196,10 @@ impl Session<'_> {
                 },
                 // A pipe ends with its writer.
                 Err(SourceError::Ended(_) | SourceError::WriterGone(_)) => break,
+                Err(error @ SourceError::CutShort { .. }) => {
+                    eprintln!("note: {error}");
+                    break;
+                }
                 Err(error) if error.is_of_one_picture() => self.refuse("unreadable", &error.to_string())?,
                 Err(error) if feed.comes_back_after(&error) => {
                     self.refuse("camera failed", &error.to_string())?;

@@ -89,9 +89,9 @@ impl Source<Shot> for Files {
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Shot, SourceError> {
         let path = self.0.next_file()?;
-        let content = match read_jpeg(path, MAX_FRAME)? {
+        let content = match read_jpeg(path, MAX_FRAME).map_err(SourceError::of_one_file)? {
             Some(jpeg) => Content::Encoded(jpeg),
-            None => Content::Picture(read_image(path)?),
+            None => Content::Picture(read_image(path).map_err(SourceError::of_one_file)?),
         };
         Ok(Shot { content, at: now, period: self.period(), checksum: None })
     }

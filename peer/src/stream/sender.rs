@@ -174,7 +174,7 @@ impl Sender {
             };
             tokio::select! {
                 shot = picture => {
-                    if let Err(SourceError::Ended(_)) = shot {
+                    if shot.as_ref().is_err_and(SourceError::is_the_end) {
                         return Ok(End::CameraEnded);
                     }
                     if let Err(cause) = self.send(&sender, credit, shot).await {

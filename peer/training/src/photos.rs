@@ -155,7 +155,8 @@ fn without_hands(folder: &Path, files: &mut Vec<PathBuf>) -> Result<Vec<Pyramid>
         for second in (0..).step_by(10).take(frames) {
             match video.next_frame(Duration::from_secs(second), &Scene::default()) {
                 Ok(frame) => all.push(pyramid(&frame.image)?),
-                Err(SourceError::Ended(_)) => break,
+                Err(error) if error.is_the_end() => break,
+                Err(error) if error.is_of_one_picture() => {}
                 Err(error) => return Err(error.into()),
             }
         }

@@ -76,7 +76,7 @@ fn watch(path: &Path, step: usize) -> Course {
     for frame in 0.. {
         let image = match video.next_frame(Duration::ZERO, &Scene::default()) {
             Ok(frame) => frame.image,
-            Err(SourceError::Ended(_)) => break,
+            Err(error) if error.is_the_end() => break,
             Err(error) => panic!("{error}"),
         };
         if frame % step != 0 {

@@ -102,7 +102,7 @@ fn signing(perception: &mut Perception) -> Seen {
                     seen.push(perception.observe(&frame.image).ok());
                 }
                 Ok(_) => (),
-                Err(SourceError::Ended(_)) => break,
+                Err(error) if error.is_the_end() => break,
                 Err(error) => panic!("{}: {error}", path.display()),
             }
         }

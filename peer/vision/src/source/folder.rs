@@ -28,35 +28,16 @@ impl ImageFolder {
     /// # Errors
     /// When the folder cannot be read, holds no file named `*.jpg`, `*.jpeg` or `*.png`, or more than 100,000.
     pub fn open(folder: &Path, period: Duration, looping: bool) -> Result<Self, SourceError> {
-        let unreadable = |cause| SourceError::io(folder, cause);
-        let mut images = Vec::new();
-        for entry in fs::read_dir(folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            if has_image_name(&path) {
-                images.push(path);
-            }
-            if images.len() > MAX_IMAGES {
-                return Err(SourceError::TooLarge {
-                    path: folder.into(),
-                    size: format!("more than {MAX_IMAGES} images"),
-                    limit: format!("{MAX_IMAGES} images"),
-                });
-            }
-        }
-        if images.is_empty() {
-            return Err(SourceError::NoImages(folder.into()));
-        }
-        images.sort();
-        Ok(Self { folder: folder.into(), images, next: 0, period, looping })
+        Ok(Self { folder: folder.into(), images: listed(folder)?, next: 0, period, looping })
     }
 
-    /// The file of the next frame.
+    /// The file of the next frame. The folder is listed anew whenever it starts again.
     ///
     /// # Errors
-    /// [`SourceError::Ended`].
+    /// [`SourceError::Ended`], and those of [`ImageFolder::open`].
     pub fn next_file(&mut self) -> Result<&Path, SourceError> {
         if self.next == self.images.len() && self.looping {
-            self.next = 0;
+            (self.images, self.next) = (listed(&self.folder)?, 0);
         }
         let path = self.images.get(self.next).ok_or_else(|| {
             SourceError::Ended(format!("{}, {} frames in all,", self.describe(), self.images.len()))
@@ -64,6 +45,30 @@ impl ImageFolder {
         self.next += 1;
         Ok(path)
     }
+}
+
+/// The images of a folder by name.
+fn listed(folder: &Path) -> Result<Vec<PathBuf>, SourceError> {
+    let unreadable = |cause| SourceError::io(folder, cause);
+    let mut images = Vec::new();
+    for entry in fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if has_image_name(&path) {
+            images.push(path);
+        }
+        if images.len() > MAX_IMAGES {
+            return Err(SourceError::TooLarge {
+                path: folder.into(),
+                size: format!("more than {MAX_IMAGES} images"),
+                limit: format!("{MAX_IMAGES} images"),
+            });
+        }
+    }
+    if images.is_empty() {
+        return Err(SourceError::NoImages(folder.into()));
+    }
+    images.sort();
+    Ok(images)
 }
 
 impl Source for ImageFolder {
@@ -76,7 +81,8 @@ impl Source for ImageFolder {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
-        Ok(Frame { image: read_image(self.next_file()?)?, at: now })
+        let image = read_image(self.next_file()?).map_err(SourceError::of_one_file)?;
+        Ok(Frame { image, at: now })
     }
 }
 
@@ -124,6 +130,36 @@ mod tests {
             assert!(error.to_string().contains("a.jpg"), "{error}");
             assert_eq!(next_width(&mut source).unwrap(), 22);
         }
+    }
+
+    #[test]
+    fn what_cannot_be_opened_costs_one_frame_too() {
+        let folder = tempfile::tempdir().unwrap();
+        for n in 0..12 {
+            std::os::unix::fs::symlink("nowhere", folder.path().join(format!("a{n}.jpg"))).unwrap();
+        }
+        fs::create_dir(folder.path().join("b.jpg")).unwrap();
+        write_grey(&folder.path().join("c.jpg"), 22);
+        let mut source = ImageFolder::open(folder.path(), Duration::from_secs(1), false).unwrap();
+        for _ in 0..13 {
+            let error = next_width(&mut source).unwrap_err();
+            assert!(error.is_of_one_picture() && error.to_string().contains(".jpg"), "{error}");
+        }
+        assert_eq!(next_width(&mut source).unwrap(), 22);
+    }
+
+    #[test]
+    fn a_folder_that_is_filled_anew_is_listed_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        write_grey(&folder.path().join("a.jpg"), 21);
+        let mut source = ImageFolder::open(folder.path(), Duration::from_secs(1), true).unwrap();
+        assert_eq!(next_width(&mut source).unwrap(), 21);
+        fs::remove_file(folder.path().join("a.jpg")).unwrap();
+        for _ in 0..2 {
+            assert!(matches!(next_width(&mut source), Err(SourceError::NoImages(_))));
+        }
+        write_grey(&folder.path().join("b.jpg"), 22);
+        assert_eq!(next_width(&mut source).unwrap(), 22);
     }
 
     #[test]

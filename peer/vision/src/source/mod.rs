@@ -3,6 +3,7 @@
 mod container;
 mod device;
 mod emulated_view;
+mod ffmpeg;
 mod folder;
 mod image_file;
 mod picture;
@@ -101,6 +102,29 @@ pub enum SourceError {
     /// The last frame was given; the source does not start again.
     #[error("{0} has ended: a robot begins it again with `loop: true` in camera.source")]
     Ended(String),
+    /// A video came to its end before it should have by its own word, which is a guess where frames come at no fixed rate.
+    #[error(
+        "{video} has ended after {frames} of the {of} frames that it says it has: it may be damaged or cut short; copy or record it again if so"
+    )]
+    CutShort {
+        /// Which, in words.
+        video: String,
+        /// How many frames came.
+        frames: u64,
+        /// How many there should be.
+        of: u64,
+    },
+    /// One picture of a video that is none.
+    #[error("a picture of {} is passed over: {cause}", path.display())]
+    PassedOver {
+        /// The video.
+        path: PathBuf,
+        /// What is wrong with the picture.
+        cause: String,
+    },
+    /// One file of a folder that cannot be read; others may.
+    #[error("{0}")]
+    OneFile(Box<Self>),
     /// The file or folder is not there.
     #[error("{} does not exist: check the path", .0.display())]
     Missing(PathBuf),
@@ -198,7 +222,21 @@ impl SourceError {
                 | Self::NotAnImage(_)
                 | Self::TooLarge { .. }
                 | Self::Garbled { .. }
+                | Self::PassedOver { .. }
+                | Self::OneFile(_)
         )
+    }
+
+    /// Whether the source has come to its end, and does not begin again.
+    #[must_use]
+    pub fn is_the_end(&self) -> bool {
+        matches!(self, Self::Ended(_) | Self::CutShort { .. })
+    }
+
+    /// The same of one file among others.
+    #[must_use]
+    pub fn of_one_file(self) -> Self {
+        if self.is_of_one_picture() { self } else { Self::OneFile(Box::new(self)) }
     }
 
     /// The error of the operating system, told apart by its mend.

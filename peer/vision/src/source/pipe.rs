@@ -5,16 +5,13 @@ use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use opencv::core::Mat;
-use opencv::prelude::*;
-use opencv::videoio::VideoCapture;
-
-use super::{Frame, Scene, Source, SourceError, video};
+use super::ffmpeg::Ffmpeg;
+use super::{Frame, Scene, Source, SourceError};
 
 /// The frames of a video that is read from a named pipe, as fast as they are written.
 pub struct Pipe {
     path: PathBuf,
-    capture: VideoCapture,
+    video: Ffmpeg,
     period: Duration,
 }
 
@@ -30,8 +27,8 @@ impl Pipe {
     /// # Errors
     /// When what is written is no video, or its frames are too large.
     pub fn open(path: &Path) -> Result<Self, SourceError> {
-        let (capture, period) = video::open(path)?;
-        Ok(Self { path: path.into(), capture, period })
+        let (video, period) = Ffmpeg::open(path)?;
+        Ok(Self { path: path.into(), video, period })
     }
 }
 
@@ -50,10 +47,7 @@ impl Source for Pipe {
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
         let asked = Instant::now();
-        let mut image = Mat::default();
-        if !self.capture.read(&mut image)? || image.empty() {
-            return Err(SourceError::WriterGone(self.path.clone()));
-        }
+        let image = self.video.read()?.ok_or_else(|| SourceError::WriterGone(self.path.clone()))?;
         Ok(Frame { image, at: now + asked.elapsed() })
     }
 }

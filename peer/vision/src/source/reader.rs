@@ -153,13 +153,13 @@ impl<F> Reading<F> {
                     self.shared.deliver(Ok(frame));
                 }
                 Err(error) => {
-                    let is_over = matches!(error, SourceError::Ended(_));
-                    errors = if error.is_of_one_picture() { 0 } else { errors + 1 };
+                    let (is_over, is_of_one) = (error.is_the_end(), error.is_of_one_picture());
+                    errors = if is_of_one { 0 } else { errors + 1 };
                     self.shared.deliver(Err(error));
                     if is_over {
                         return;
                     }
-                    if live || errors > TOLERATED {
+                    if live && !is_of_one || errors > TOLERATED {
                         // Closed before it is opened again: a device serves one at a time.
                         self.close();
                         if self.shared.ended_within(back_off) {

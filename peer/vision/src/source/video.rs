@@ -3,15 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use opencv::core::Mat;
-use opencv::prelude::*;
-use opencv::videoio::{self, VideoCapture};
-
-use super::image_file::{MAX_MEGAPIXELS, check_file};
+use super::ffmpeg::Ffmpeg;
+use super::image_file::check_file;
 use super::{Frame, Scene, Source, SourceError};
-
-/// Assumed where a video does not say how many frames per second it has.
-const PERIOD: Duration = Duration::from_millis(33);
 
 /// So many frames are passed over one by one; beyond that it is quicker to seek.
 const GRABBED: u64 = 60;
@@ -22,11 +16,13 @@ const MOST_GRABBED: u64 = 30 * GRABBED;
 /// The frames of a video file, decoded by FFmpeg. It runs on while nobody reads it, as what happens in front of a camera does.
 pub struct Video {
     path: PathBuf,
-    capture: VideoCapture,
+    video: Ffmpeg,
     period: Duration,
     looping: bool,
     /// Whether this pass through the file has given a frame: one that gives none would loop for ever.
     gave_frame: bool,
+    /// Whether it was said that there are fewer frames than there should be.
+    said_short: bool,
     /// When its last frame was read.
     last: Option<Duration>,
 }
@@ -38,8 +34,9 @@ impl Video {
     /// When the file cannot be read, is empty, is no video, or its frames are too large.
     pub fn open(path: &Path, looping: bool) -> Result<Self, SourceError> {
         check_file(path)?;
-        let (capture, period) = open(path)?;
-        Ok(Self { path: path.into(), capture, period, looping, gave_frame: false, last: None })
+        let (video, period) = Ffmpeg::open(path)?;
+        let (gave_frame, said_short, last) = (false, false, None);
+        Ok(Self { path: path.into(), video, period, looping, gave_frame, said_short, last })
     }
 
     /// Passes over what has been shown since the last frame was read. A video that ends meanwhile says so at the next.
@@ -50,11 +47,11 @@ impl Video {
         let passed_over = shown.saturating_sub(1);
         if passed_over <= GRABBED || !self.seek(passed_over)? {
             for _ in 0..passed_over.min(MOST_GRABBED) {
-                if self.capture.grab()? {
+                if self.video.grab()? {
                     self.gave_frame = true;
                 } else if self.looping && self.gave_frame {
-                    self.capture = from_ffmpeg(&self.path)?;
-                    self.gave_frame = self.capture.grab()?;
+                    self.video.rewind()?;
+                    self.gave_frame = self.video.grab()?;
                 } else {
                     break;
                 }
@@ -65,51 +62,19 @@ impl Video {
 
     /// Goes on by so many frames at once; `false` where the video does not say how many it has, or cannot.
     fn seek(&mut self, by: u64) -> Result<bool, SourceError> {
-        let count = self.capture.get(videoio::CAP_PROP_FRAME_COUNT)?;
-        let next = self.capture.get(videoio::CAP_PROP_POS_FRAMES)?;
-        if !(count >= 1.0 && next >= 0.0) {
-            return Ok(false);
-        }
+        let Some((next, count)) = self.video.place()? else { return Ok(false) };
         let to = next + by as f64;
         if self.looping {
-            return Ok(self.capture.set(videoio::CAP_PROP_POS_FRAMES, to % count)?);
+            return self.video.go_to(to % count);
         }
         if to < count {
-            return Ok(self.capture.set(videoio::CAP_PROP_POS_FRAMES, to)?);
+            return self.video.go_to(to);
         }
         // Its last frame is passed over with the others.
-        let reached = self.capture.set(videoio::CAP_PROP_POS_FRAMES, count - 1.0)?;
-        while reached && self.capture.grab()? {}
+        let reached = self.video.go_to(count - 1.0)?;
+        while reached && self.video.grab()? {}
         Ok(reached)
     }
-}
-
-/// The time between two frames, of a video that says it has so many per second.
-fn period(fps: f64) -> Duration {
-    if (0.01..=1000.0).contains(&fps) { Duration::from_secs_f64(1.0 / fps) } else { PERIOD }
-}
-
-/// Named explicitly, since OpenCV would otherwise try every backend it was built with.
-fn from_ffmpeg(path: &Path) -> Result<VideoCapture, SourceError> {
-    let capture = VideoCapture::from_file(path, videoio::CAP_FFMPEG)?;
-    if capture.is_opened()? { Ok(capture) } else { Err(SourceError::NotAVideo(path.into())) }
-}
-
-/// A video whose frames are not too large, and the time between two of them.
-pub(super) fn open(path: &Path) -> Result<(VideoCapture, Duration), SourceError> {
-    let capture = from_ffmpeg(path)?;
-    let (width, height) =
-        (capture.get(videoio::CAP_PROP_FRAME_WIDTH)?, capture.get(videoio::CAP_PROP_FRAME_HEIGHT)?);
-    let fits = width * height <= MAX_MEGAPIXELS * 1e6;
-    if !fits {
-        return Err(SourceError::TooLarge {
-            path: path.into(),
-            size: format!("{width}×{height} pixels"),
-            limit: format!("{MAX_MEGAPIXELS} megapixels"),
-        });
-    }
-    let period = period(capture.get(videoio::CAP_PROP_FPS)?);
-    Ok((capture, period))
 }
 
 impl Source for Video {
@@ -123,19 +88,27 @@ impl Source for Video {
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
         self.run_on(now)?;
-        let mut image = Mat::default();
-        while !self.capture.read(&mut image)? || image.empty() {
+        loop {
+            if let Some(image) = self.video.read()? {
+                self.gave_frame = true;
+                return Ok(Frame { image, at: now });
+            }
             if !self.gave_frame {
                 return Err(SourceError::NotAVideo(self.path.clone()));
             }
+            let (video, lacks) = (self.describe(), self.video.lacks()?);
             if !self.looping {
-                return Err(SourceError::Ended(self.describe()));
+                let short =
+                    lacks.map(|(frames, of)| SourceError::CutShort { video: video.clone(), frames, of });
+                return Err(short.unwrap_or(SourceError::Ended(video)));
             }
-            self.capture = from_ffmpeg(&self.path)?;
+            self.video.rewind()?;
             self.gave_frame = false;
+            if let Some((frames, of)) = lacks.filter(|_| !std::mem::replace(&mut self.said_short, true)) {
+                let cause = format!("it begins again after {frames} of the {of} frames that it says it has");
+                return Err(SourceError::PassedOver { path: self.path.clone(), cause });
+            }
         }
-        self.gave_frame = true;
-        Ok(Frame { image, at: now })
     }
 }
 
@@ -143,7 +116,9 @@ impl Source for Video {
 mod tests {
     use std::fs;
 
-    use opencv::core::{self, Scalar, Size};
+    use opencv::core::{self, Mat, Scalar, Size};
+    use opencv::prelude::*;
+    use opencv::videoio;
 
     use super::*;
 
@@ -216,14 +191,6 @@ mod tests {
             let mut video = Video::open(&path, false).unwrap();
             assert_eq!(shown(&mut video, 0).unwrap(), 0);
             assert!(matches!(shown(&mut video, pause), Err(SourceError::Ended(_))), "{pause}");
-        }
-    }
-
-    #[test]
-    fn a_video_that_does_not_say_its_rate_is_a_video_all_the_same() {
-        assert_eq!(period(10.0), Duration::from_millis(100));
-        for unknown in [0.0, -1.0, f64::NAN, f64::INFINITY, 90_000.0] {
-            assert_eq!(period(unknown), PERIOD, "{unknown}");
         }
     }
 
