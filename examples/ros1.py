@@ -14,7 +14,7 @@ import rospy
 import zenoh
 from std_msgs.msg import String
 
-from ros_words import instruction
+from ros_words import Last, instruction
 
 
 def main():
@@ -26,29 +26,32 @@ def main():
     gesture = rospy.Publisher("~gesture", String, queue_size=1, latch=True)
     decision = rospy.Publisher("~decision", String, queue_size=10)
     # The last decision, and the round of which something was said last.
-    decided = spoken = None
+    last, spoken = Last(), None
     with zenoh.open(config) as swarm:
 
         def on_decision(sample):
-            nonlocal decided
             text = sample.payload.to_string()
-            heard = json.loads(text)
             # All that is needed of it, or nothing: what lacks it is no decision.
-            decided = {field: heard[field] for field in ("round", "class", "label")}
+            is_news = last.hear(json.loads(text))
             decision.publish(text)
-            if decided["label"] is not None:
-                gesture.publish(decided["label"])
+            if is_news and last.decision["label"] is not None:
+                gesture.publish(last.decision["label"])
 
         def on_word(message):
             nonlocal spoken
             try:
-                word = instruction(message.data, decided, spoken)
+                word = instruction(message.data, last.decision, spoken)
             except ValueError as refused:
                 return rospy.logwarn(str(refused))
             spoken = word.get("round", spoken)
             swarm.put(f"gestalt/{name}/instructor/ros/feedback", json.dumps(word))
 
-        subscriber = swarm.declare_subscriber(f"gestalt/{name}/decision", on_decision)
+        key = f"gestalt/{name}/decision"
+        subscriber = swarm.declare_subscriber(key, on_decision)
+        # What was decided before: each robot answers with the last that it knows.
+        for reply in swarm.get(key, consolidation=zenoh.ConsolidationMode.NONE, timeout=2.0):
+            if reply.ok is not None:
+                on_decision(reply.ok)
         rospy.Subscriber("~say", String, on_word)
         rospy.spin()
         subscriber.undeclare()

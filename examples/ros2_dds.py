@@ -16,7 +16,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-from ros_words import instruction
+from ros_words import Last, instruction
 
 
 def main():
@@ -33,29 +33,32 @@ def main():
     gesture = node.create_publisher(String, "~/gesture", latched)
     decision = node.create_publisher(String, "~/decision", 10)
     # The last decision, and the round of which something was said last.
-    decided = spoken = None
+    last, spoken = Last(), None
     with zenoh.open(config) as swarm:
 
         def on_decision(sample):
-            nonlocal decided
             text = sample.payload.to_string()
-            heard = json.loads(text)
             # All that is needed of it, or nothing: what lacks it is no decision.
-            decided = {field: heard[field] for field in ("round", "class", "label")}
+            is_news = last.hear(json.loads(text))
             decision.publish(String(data=text))
-            if decided["label"] is not None:
-                gesture.publish(String(data=decided["label"]))
+            if is_news and last.decision["label"] is not None:
+                gesture.publish(String(data=last.decision["label"]))
 
         def on_word(message):
             nonlocal spoken
             try:
-                word = instruction(message.data, decided, spoken)
+                word = instruction(message.data, last.decision, spoken)
             except ValueError as refused:
                 return node.get_logger().warning(str(refused))
             spoken = word.get("round", spoken)
             swarm.put(f"gestalt/{options.swarm}/instructor/ros/feedback", json.dumps(word))
 
-        subscriber = swarm.declare_subscriber(f"gestalt/{options.swarm}/decision", on_decision)
+        key = f"gestalt/{options.swarm}/decision"
+        subscriber = swarm.declare_subscriber(key, on_decision)
+        # What was decided before: each robot answers with the last that it knows.
+        for reply in swarm.get(key, consolidation=zenoh.ConsolidationMode.NONE, timeout=2.0):
+            if reply.ok is not None:
+                on_decision(reply.ok)
         node.create_subscription(String, "~/say", on_word, 10)
         try:
             rclpy.spin(node)

@@ -1,6 +1,41 @@
 """What an instructor's words on a ROS topic mean to a swarm, as `gestalt ros` takes them: for ros1.py and ros2_dds.py. Needs no ROS."""
 
 
+import collections
+
+
+class Last:
+    """The last decision, which words are about: not one of an earlier round that comes late or again, nor the same one said less surely."""
+
+    # How many rounds may be decided in another order than they were opened; how many of those that were decided are remembered.
+    LATE, REMEMBERED = 2, 32
+
+    def __init__(self):
+        self.decision = None
+        self._rounds = collections.deque(maxlen=self.REMEMBERED)
+
+    def hear(self, decision):
+        """Takes in a decision; says whether its gesture is news. What lacks a field is none: a KeyError or TypeError."""
+        heard = {field: decision[field] for field in ("round", "class", "label", "final")}
+        name = tuple(heard["round"][part] for part in ("counter", "opener", "life"))
+        known = self.decision
+        is_last = known is None or self._follows(name, heard["final"])
+        self._rounds.append(name)
+        if not is_last:
+            return False
+        self.decision = heard
+        return known is None or known["label"] != heard["label"] or known["round"]["counter"] != heard["round"]["counter"]
+
+    def _follows(self, name, is_final):
+        (counter, opener, life), known = name, self.decision
+        last, its_opener, its_life = (known["round"][part] for part in ("counter", "opener", "life"))
+        if counter == last and (opener != its_opener or life == its_life):
+            return is_final or not known["final"]
+        # A swarm that starts again counts from one.
+        starts_again = life != its_life if opener == its_opener else counter + self.LATE < last
+        return counter > last or starts_again and name not in self._rounds
+
+
 def instruction(text, decision, spoken=None):
     """What to put on `gestalt/<swarm>/instructor/<name>/feedback` for the words in `text`: of the last `decision`, or, for what is withdrawn, of the
     round of which something was said last, `spoken`. Raises a ValueError with what there is to say instead.

@@ -56,7 +56,7 @@ def main() -> None:
                 continue
             try:
                 print(in_words(json.loads(text)), flush=True)
-            except (ValueError, TypeError, KeyError) as error:
+            except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
                 # In an open swarm anybody may say anything there.
                 print(f"what is no decision: {error!r}", file=sys.stderr, flush=True)
 

@@ -21,7 +21,7 @@ def waiting(subscriber, read):
     while (sample := subscriber.try_recv()) is not None:
         try:
             yield read(json.loads(sample.payload.to_bytes().decode(errors="replace")))
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             # In an open swarm anybody may say anything there.
             print(f"passed over on {sample.key_expr}: {error!r}", file=sys.stderr, flush=True)
 

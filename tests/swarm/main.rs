@@ -33,6 +33,7 @@ mod pause;
 mod proofs;
 mod python_examples;
 mod recording;
+mod respelling;
 mod restarts;
 mod ring;
 mod ros;
@@ -112,6 +113,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Rospy] ros_examples::rospy_echoes_a_decision.await,
         [Waits, Rclpy] ros_examples::rclpy_over_dds_echoes_a_decision.await,
         [Works] ros_examples::words_of_ros_mean_what_they_mean_to_the_program,
+        [Works] ros_examples::examples_for_ros_take_no_late_decision_for_the_last,
         [Waits, Zenoh] python_examples::a_word_from_python_is_about_the_round_that_was_opened_for_it.await,
         [Waits] trouble::random_bytes_on_every_key_are_refused_by_name_and_the_swarm_goes_on.await,
         [Waits] trouble::well_formed_lies_are_refused_and_the_swarm_goes_on.await,
@@ -141,6 +143,7 @@ fn main() -> std::process::ExitCode {
         [Works, Cryptography] proofs::what_robots_decide_both_programs_prove_as_it_was_published,
         [Works, Cryptography] proofs::a_line_of_watch_is_its_decision_to_both_programs,
         [Works, Cryptography] proofs::what_a_member_makes_of_a_decision_both_programs_judge_alike,
+        [Works, Cryptography] proofs::a_number_in_other_digits_both_programs_judge_alike,
         [Works, Cryptography] proofs::a_file_in_other_words_both_programs_judge_alike,
         [Waits] trouble::an_occupied_port_is_an_error_that_names_it.await,
         [Waits] trouble::a_black_hole_in_the_routing_delays_and_loses_nothing.await,

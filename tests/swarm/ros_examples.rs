@@ -114,9 +114,14 @@ for case in json.loads(sys.argv[2]):
 
 /// What the examples make of words, each of a text, the last decision, and the round last spoken of.
 fn read(cases: &Value) -> Vec<Value> {
+    run_python(READ, cases)
+}
+
+/// What a script prints, a line of JSON each; its arguments are the examples' folder and those cases.
+fn run_python(script: &str, cases: &Value) -> Vec<Value> {
     let python = python(&["json"]).expect("a Python");
     let ran = Command::new(python)
-        .args(["-B", "-c", READ])
+        .args(["-B", "-c", script])
         .arg(example(""))
         .arg(cases.to_string())
         .output()
@@ -178,6 +183,36 @@ pub fn words_of_ros_mean_what_they_mean_to_the_program() {
     }
     assert_eq!(*undo, json!({"say": "retract", "round": before}), "of what was said last");
     assert_eq!(*was, json!({"say": "was", "round": last, "class": "three"}));
+}
+
+/// Prints whether each decision's gesture is news, and of which count the last one is.
+const HEAR: &str = r#"
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ros_words import Last
+last = Last()
+for decision in json.loads(sys.argv[2]):
+    print(json.dumps([last.hear(decision), last.decision["round"]["counter"]]))
+"#;
+
+pub fn examples_for_ros_take_no_late_decision_for_the_last() {
+    let said = |counter: u32, life: u32, label: &str, is_final: bool| json!({"round": {"counter": counter, "opener": 1, "life": life}, "class": 1, "label": label, "final": is_final});
+    let steps = [
+        (said(5, 7, "five", false), json!([true, 5])),
+        (said(5, 7, "five", true), json!([false, 5])),
+        (said(5, 7, "four", false), json!([false, 5])),
+        (said(6, 7, "five", true), json!([true, 6])),
+        (said(5, 7, "four", true), json!([false, 6])),
+        // Started again, and the old ones once more.
+        (said(1, 8, "one", true), json!([true, 1])),
+        (said(1, 8, "one", true), json!([false, 1])),
+        (said(2, 8, "two", true), json!([true, 2])),
+    ];
+    let said: Vec<&Value> = steps.iter().map(|(said, _)| said).collect();
+    let ran = run_python(HEAR, &json!(said));
+    for ((said, expected), came_to) in steps.iter().zip(ran) {
+        assert_eq!(came_to, *expected, "{said}");
+    }
 }
 
 pub async fn rospy_echoes_a_decision() {

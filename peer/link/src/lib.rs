@@ -91,7 +91,7 @@ pub use guest::GuestConfig;
 pub use hearing::hear;
 pub use identity::fresh_nonce;
 pub use memory::StoreError;
-pub use news::{Heard, News};
+pub use news::{Heard, News, begins_anew};
 pub use overhear::Overheard;
 pub use robot::{Robot, RobotConfig, rounds_in_words};
 pub use seal::{Seal, SealError};

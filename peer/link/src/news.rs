@@ -17,6 +17,7 @@ use zenoh::sample::{Sample, SampleKind};
 
 use crate::complaints::Complaints;
 use newest::Newest;
+pub use newest::begins_anew;
 
 /// How many news may wait for a slow reader before it misses some.
 const MAX_WAITING: usize = 1024;

@@ -65,6 +65,9 @@ const MAX_WORDS: usize = 16;
 /// No word is longer, in bytes.
 const MAX_WORD: usize = 256;
 
+/// How long the swarm may take to say that somebody may open no round: nothing else answers that.
+const REFUSED_WITHIN: Duration = Duration::from_millis(500);
+
 /// How long the swarm may take to answer a word.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 
@@ -158,22 +161,34 @@ impl Bridge {
         let client = &*client;
         let mut news = client.news().await?;
         let (newest, last) = tokio::sync::watch::channel(client.last_decision(super::ANSWER).await?);
-        let show = |announced: &Announcement| -> Result<(), Failure> {
-            decision.publish(&Text(serde_json::to_string(announced)?), clock())?;
-            if let Some(label) = &announced.label {
-                gesture.publish(&Text(label.clone()), clock())?;
-            }
-            Ok(())
+        let publish = |announced: &Announcement| -> Result<(), Failure> {
+            Ok(decision.publish(&Text(serde_json::to_string(announced)?), clock())?)
+        };
+        let call = |announced: &Announcement| -> Result<(), Failure> {
+            let mut label = announced.label.iter();
+            Ok(label.try_for_each(|label| gesture.publish(&Text(label.clone()), clock()))?)
         };
         // Whoever subscribes now gets what was decided last.
         let known = last.borrow().clone();
-        known.iter().try_for_each(show)?;
+        known.iter().for_each(|last| news.know(last.decision.round));
+        known.iter().try_for_each(|last| publish(last).and_then(|()| call(last)))?;
         let decisions = async {
             while let Some(heard) = news.next().await {
-                if let Heard::Decided(announced) = heard {
-                    show(&announced)?;
-                    newest.send_replace(Some(announced));
+                let Heard::Decided(announced) = heard else { continue };
+                publish(&announced)?;
+                if !news.is_newest(announced.decision.round) {
+                    continue;
                 }
+                let of_this =
+                    |known: &Announcement| known.decision.round.may_merge(&announced.decision.round);
+                let known = newest.borrow().clone().filter(of_this);
+                match known {
+                    // The same again, less sure.
+                    Some(known) if known.decision.is_final && !announced.decision.is_final => continue,
+                    Some(known) if known.label == announced.label => {}
+                    _ => call(&announced)?,
+                }
+                newest.send_replace(Some(announced));
             }
             Err::<(), Failure>("the swarm's Zenoh session was closed".into())
         };
@@ -220,8 +235,11 @@ async fn said(
     let words: Vec<&str> = word.split_whitespace().collect();
     let word = Word::read(&words)?;
     if word == Word::Open {
-        client.instruct(instructor, &Instruction::Open).await?;
-        return Ok("asked for a round".to_owned());
+        let answer = client.teach(instructor, &Instruction::Open, REFUSED_WITHIN).await?;
+        let refused = answer.filter(|answer| answer.outcome.is_refusal());
+        return Ok(
+            refused.map_or("asked for a round".to_owned(), |answer| answer.outcome.describe().to_owned())
+        );
     }
     let instruction = match word.of_names(None) {
         Some(instruction) => instruction,

@@ -16,7 +16,7 @@ mod text;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use gestalt_link::Heard;
+use gestalt_link::{Heard, begins_anew};
 use gestalt_protocol::{
     Announcement, Answer, Gesture, Holding, InstructorId, MAX_ROBOTS, Question, RobotId, RoundId, Status,
     VocabularyId,
@@ -302,15 +302,16 @@ impl View {
     }
 
     /// Whether a round before the latest is of a swarm that started again, and counts from one: whoever is there knows of none as late as the latest.
+    /// Where nobody is asked what they know, its name says it.
     fn begins_anew(&self, round: RoundId) -> bool {
         let Some(latest) = self.latest.as_ref().map(|latest| latest.decision.round) else { return false };
-        let is_another_start = (round.opener, round.life) != (latest.opener, latest.life);
         let mut known =
             self.present().filter_map(|(_, robot)| robot.status()).map(|status| status.round).peekable();
-        round < latest
-            && is_another_start
-            && known.peek().is_some()
-            && known.all(|known| known < Some(latest))
+        if known.peek().is_none() {
+            return begins_anew(latest, round);
+        }
+        let is_another_start = (round.opener, round.life) != (latest.opener, latest.life);
+        round < latest && is_another_start && known.all(|known| known < Some(latest))
     }
 
     fn on_held(&mut self, now: Duration, id: RobotId, holding: Holding) -> Option<Event> {

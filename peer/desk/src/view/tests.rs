@@ -340,6 +340,10 @@ fn a_swarm_that_starts_again_is_followed_though_it_counts_from_one() {
         assert!(view.hear(NOW, decision(first.clone())).is_some());
         assert_eq!(latest(&view), Some(first.decision.round));
         assert_eq!(view.rounds().last().map(|round| round.round.counter), Some(1), "the strip ends with it");
+        // Where nobody is asked what they know.
+        let mut view = after((1..=before).map(|counter| decision(decided(counter, Some(2), &[2]))));
+        assert!(view.hear(NOW, decision(again(1))).is_some(), "after {before}");
+        assert_eq!(latest(&view), Some(again(1).decision.round));
     }
 }
 

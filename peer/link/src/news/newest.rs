@@ -36,7 +36,7 @@ impl Newest {
             self.known.pop_front();
         }
         self.known.push_back(round);
-        if self.begins_anew(round) {
+        if self.decided.is_some_and(|newest| begins_anew(newest, round)) {
             (self.counter, self.decided) = (Some(round.counter), Some(round));
             self.turn = self.turn.saturating_add(1);
         }
@@ -45,16 +45,6 @@ impl Newest {
             self.decided = Some(round);
         }
         self.turn
-    }
-
-    /// Whether a round that was not heard of before is of a swarm that started again, or all that was heard of later ones made up. A robot that
-    /// starts again alone goes on from the newest round.
-    fn begins_anew(&self, round: RoundId) -> bool {
-        let anew = |newest: RoundId| match newest.opener == round.opener {
-            true => newest.life != round.life && round.counter <= newest.counter,
-            false => round.counter.saturating_add(LATE) < newest.counter,
-        };
-        self.decided.is_some_and(anew)
     }
 
     /// The highest counter since the swarm began. What is held is soon decided, or made up where it is far ahead of what was.
@@ -71,6 +61,16 @@ impl Newest {
     /// How often the swarm began anew.
     pub fn turn(&self) -> u32 {
         self.turn
+    }
+}
+
+/// Whether a round that was not heard of before is of a swarm that started again, though `newest` was heard of; or all that was heard of later ones made
+/// up. A robot that starts again alone goes on from the newest round.
+#[must_use]
+pub fn begins_anew(newest: RoundId, round: RoundId) -> bool {
+    match newest.opener == round.opener {
+        true => newest.life != round.life && round.counter <= newest.counter,
+        false => round.counter.saturating_add(LATE) < newest.counter,
     }
 }
 
