@@ -1,4 +1,4 @@
-//! Files that are written as a whole or not at all.
+//! Files that are written as a whole or not at all, by one at a time.
 //!
 //! ```
 //! # let place = tempfile::tempdir()?;
@@ -11,6 +11,13 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+/// How often a folder that others write to is tried, and how long each time is waited. Whoever may read a folder can lock it: nobody is kept from
+/// writing for longer than that.
+const TRIES: usize = 200;
+const PAUSE: Duration = Duration::from_millis(10);
 
 /// How many links may lead to one another: as many as Linux follows.
 const MAX_LINKS: usize = 40;
@@ -93,6 +100,21 @@ pub fn keep_name(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// Keeps others that ask for the same from the files of that one's folder, until what is returned is dropped. `None` where files cannot be locked, or when
+/// somebody keeps the lock for two seconds: then nothing but the order of two writers at the same moment is left to chance.
+#[must_use]
+pub fn lock(path: &Path) -> Option<fs::File> {
+    let folder = fs::File::open(folder(path)).ok()?;
+    for _ in 0..TRIES {
+        match folder.try_lock() {
+            Ok(()) => return Some(folder),
+            Err(fs::TryLockError::WouldBlock) => thread::sleep(PAUSE),
+            Err(fs::TryLockError::Error(_)) => return None,
+        }
+    }
+    None
+}
+
 fn put(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
     let path = target(path)?;
     beside(&path, bytes, mode)?.persist(&path).map_err(|refused| refused.error)?;
@@ -159,6 +181,16 @@ mod tests {
         write(&path, b"mine").unwrap();
         check(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn who_keeps_the_lock_keeps_nobody_from_writing_for_long() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("roster.json");
+        let kept = lock(&path);
+        assert!(kept.is_some() && lock(&path).is_none());
+        drop(kept);
+        assert!(lock(&path).is_some());
     }
 
     #[test]

@@ -40,6 +40,8 @@ pub(crate) fn leap() -> u32 {
 /// and the log says so.
 #[must_use]
 pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
+    // Of two that start at once the second counts on from the first.
+    let _alone = gestalt_file::lock(file);
     let last = match fs::read_to_string(file) {
         Ok(text) => text.trim().parse::<u32>().map_err(|error| error.to_string()),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(0),
@@ -105,6 +107,19 @@ mod tests {
         fs::write(&file, "nonsense").unwrap();
         assert_eq!(counted_boot(&file, now), first);
         assert!(counted_boot(&file, now) > first);
+    }
+
+    #[test]
+    fn of_starts_at_once_no_two_have_one_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, now) = (folder.path().join("robot-7.starts"), SystemTime::now());
+        let start = || counted_boot(&file, now);
+        let numbers: Vec<u32> = std::thread::scope(|scope| {
+            let starts: Vec<_> = (0..8).map(|_| scope.spawn(start)).collect();
+            starts.into_iter().map(|start| start.join().unwrap()).collect()
+        });
+        let apart: std::collections::BTreeSet<&u32> = numbers.iter().collect();
+        assert_eq!(apart.len(), 8, "{numbers:?}");
     }
 
     #[test]

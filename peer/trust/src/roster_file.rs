@@ -1,31 +1,25 @@
 //! A roster on disk.
 
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::thread;
-use std::time::Duration;
 
 use crate::roster::{MAX_ROSTER, Roster};
 use crate::roster_error::RosterError;
 use crate::scheme::Scheme;
 
-/// How often a folder that others write to is tried, and how long each time is waited. Whoever may read a folder can lock it: nobody is kept from
-/// writing for longer than that.
-const TRIES: usize = 200;
-const PAUSE: Duration = Duration::from_millis(10);
-
 impl<S: Scheme> Roster<S> {
     /// Reads and checks a roster file.
     ///
     /// # Errors
-    /// [`RosterError::File`], and those of [`Roster::parse`].
+    /// [`RosterError::File`]; [`RosterError::Contents`] for those of [`Roster::parse`].
     pub fn read(path: &Path) -> Result<Self, RosterError> {
         let unreadable = |source| RosterError::File { path: path.to_owned(), verb: "read", source };
         let file = File::open(path).map_err(unreadable)?;
         let mut json = Vec::new();
         file.take(MAX_ROSTER as u64 + 1).read_to_end(&mut json).map_err(unreadable)?;
         Self::parse(&json)
+            .map_err(|cause| RosterError::Contents { path: path.to_owned(), cause: Box::new(cause) })
     }
 
     /// Writes a roster file in place of the one that is there: whoever reads meanwhile, or after a power cut, finds the whole old
@@ -34,7 +28,7 @@ impl<S: Scheme> Roster<S> {
     /// # Errors
     /// [`RosterError::File`]; [`RosterError::Older`] and [`RosterError::Contradiction`] say that the one that is there stays.
     pub fn write(&self, path: &Path) -> Result<(), RosterError> {
-        let _alone = lock(path);
+        let _alone = gestalt_file::lock(path);
         // What is no roster, or one of another swarm, keeps nobody from writing this one.
         if let Ok(there) = Self::read(path) {
             match there.is_succeeded_by(self) {
@@ -51,24 +45,10 @@ impl<S: Scheme> Roster<S> {
     }
 }
 
-/// Keeps others that ask for the same from writing beside that file, until what is returned is dropped. `None` where files cannot be locked, or when
-/// somebody keeps the lock: then nothing but the order of two writers at the same moment is left to chance.
-fn lock(path: &Path) -> Option<File> {
-    let folder = File::open(gestalt_file::folder(path)).ok()?;
-    for _ in 0..TRIES {
-        match folder.try_lock() {
-            Ok(()) => return Some(folder),
-            Err(TryLockError::WouldBlock) => thread::sleep(PAUSE),
-            Err(TryLockError::Error(_)) => return None,
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
-    use std::fs;
     use std::sync::atomic::{AtomicBool, Ordering};
+    use std::{fs, thread};
 
     use super::*;
     use crate::testing::{authority, members, robot, roster};
@@ -156,16 +136,7 @@ mod tests {
         assert!(error.to_string().contains("No such file"), "the system's reason: {error}");
         fs::write(&missing, vec![b' '; MAX_ROSTER + 1]).unwrap();
         let error = Roster::<crate::Ed25519>::read(&missing).unwrap_err();
-        assert!(matches!(error, RosterError::TooLong { .. }), "{error}");
-    }
-
-    #[test]
-    fn who_keeps_the_lock_keeps_nobody_from_writing_for_long() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("roster.json");
-        let kept = lock(&path);
-        assert!(kept.is_some() && lock(&path).is_none());
-        drop(kept);
-        assert!(lock(&path).is_some());
+        let RosterError::Contents { path, cause } = error else { panic!("{error}") };
+        assert!(path == missing && matches!(*cause, RosterError::TooLong { .. }), "{cause}");
     }
 }

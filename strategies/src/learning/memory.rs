@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use gestalt_protocol::{
-    ClassId, Envelope, Fate, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, Naming, RobotId,
-    RoundId, SampleId, SampleSeries, SignedWord, VocabularyId, Word,
+    ClassId, DecodeError, Envelope, Fate, FeatureSpaceId, HeldBatch, InstructorId, Lesson, Message, Naming,
+    PROTOCOL_VERSION, RobotId, RoundId, SampleId, SampleSeries, SignedWord, VocabularyId, Word,
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
@@ -30,6 +30,11 @@ pub enum MemoryError {
         "the memory has layout {0}, this program reads layout {LAYOUT}: move the file away, or run the release that wrote it"
     )]
     Layout(u8),
+    /// With samples as another version of the protocol has them.
+    #[error(
+        "the memory has samples of version {0} of the protocol, this program speaks version {PROTOCOL_VERSION}: run the release that wrote it, or move the file away"
+    )]
+    Protocol(u8),
     /// Of another robot.
     #[error("the memory is robot {found}'s, this is robot {expected}: give each robot a file of its own")]
     Robot {
@@ -389,6 +394,7 @@ fn decode_batch(first: SampleId, bytes: &[u8]) -> Result<HeldBatch, MemoryError>
         {
             Ok(HeldBatch { robot, stamp, samples, signature })
         }
+        Err(DecodeError::Version { found }) => Err(MemoryError::Protocol(found)),
         _ => Err(MemoryError::Damaged("a batch of samples that is none")),
     }
 }

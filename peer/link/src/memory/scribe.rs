@@ -149,12 +149,16 @@ impl Writing {
         loop {
             let take = |pending: &mut Pending| {
                 let (records, classifier) = (std::mem::take(&mut pending.records), pending.classifier.take());
-                (records, pending.revision, classifier)
+                (records, pending.revision, classifier, pending.found)
             };
             let ready = |pending: &Pending| pending.is_work() || self.supervisor.is_doomed(Part::Memory);
-            let ((records, revision, classifier), ended) = tray.take(ready, LOOK_AFTER, take);
+            let ((records, revision, classifier, found), ended) = tray.take(ready, LOOK_AFTER, take);
             if ended && records.is_empty() && classifier.is_none() {
                 return;
+            }
+            // It is not known yet whether that can be taken up, or it cannot: then the file is not this robot's to write, nor to make anew.
+            if found {
+                continue;
             }
             latest = revision.max(latest);
             let changes: Vec<RecordChange> =

@@ -119,11 +119,15 @@ impl Store {
             return Ok(Reopened { store, removed: true });
         }
         let opened = place.open().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
-        let store = Self::read(place, robot, opened)?;
-        if store.mark != before.mark {
+        let mut store = Self::read(place, robot, opened)?;
+        // Begun in place of one that was removed, before the disk was full: no start is counted in it yet.
+        let is_begun = store.boot == 0 && store.records()?.is_empty();
+        if is_begun {
+            store.count(before.boot)?;
+        } else if store.mark != before.mark {
             return Err(StoreError::Replaced(store.place.path().to_owned()));
         }
-        Ok(Reopened { store, removed: false })
+        Ok(Reopened { store, removed: is_begun })
     }
 
     /// Makes a new file, signed.

@@ -9,6 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use redb::{Database, TableDefinition};
 
+use super::super::store::Reopened;
 use super::super::{Records, Store, StoreError};
 use super::{ME, applied, change, open, place};
 
@@ -215,4 +216,25 @@ fn a_file_removed_or_exchanged_while_open_acknowledges_nothing() {
     assert!(reopened.removed && reopened.store.boot() == run.boot);
     drop(reopened);
     assert!(open(&path).unwrap().boot() > run.boot, "it is signed");
+}
+
+#[test]
+fn a_file_that_was_begun_in_place_of_a_removed_one_is_this_robots() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m");
+    let run = open(&path).unwrap().run();
+    // Another run's stays what it is.
+    fs::remove_file(&path).unwrap();
+    drop(open(&path).unwrap());
+    let replaced = Store::reopen(place(&path), ME, run).map(drop).unwrap_err();
+    assert!(matches!(replaced, StoreError::Replaced(_)), "{replaced}");
+    // Begun, and then the disk was full.
+    fs::remove_file(&path).unwrap();
+    drop(Store::look(place(&path), ME).unwrap());
+    let Reopened { store, removed } = Store::reopen(place(&path), ME, run).unwrap();
+    assert!(removed && store.boot() == run.boot);
+    store.write(&[change(1, Some(1))], None).unwrap();
+    let run = store.run();
+    drop(store);
+    assert!(!Store::reopen(place(&path), ME, run).unwrap().removed);
 }

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::Status;
+use gestalt_strategies::RecordChange;
 use tokio::sync::broadcast;
 
 use super::super::{Assignment, Place, Records, Scribe, Store, Told};
@@ -141,6 +142,29 @@ fn what_could_be_read_alone_and_went_then_is_written_anew() {
     watched.wait_for_revision(1);
     drop(watched);
     assert_eq!(open(&late.join("m")).unwrap().records().unwrap().into_keys().collect::<Vec<_>>(), [[1], [2]]);
+}
+
+#[test]
+fn what_is_found_late_and_not_taken_up_is_never_written_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let late = folder.path().join("late");
+    let watched = start(place(&late.join("m")), None);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_error("its folder is not there");
+    let made = folder.path().join("made");
+    fs::create_dir(&made).unwrap();
+    // Whose it is, and nothing else.
+    let owner = RecordChange { key: vec![0], value: Some(vec![3, ME.0 as u8, 1, 1]) };
+    open(&made.join("m")).unwrap().write(&[owner], None).unwrap();
+    fs::rename(&made, &late).unwrap();
+    watched.wait("found", |told| matches!(told, Told::Found(_)).then_some(()));
+    // As whoever is told to moves it away.
+    fs::remove_file(late.join("m")).unwrap();
+    watched.scribe.remember(2, vec![change(2, Some(2))]);
+    let told = watched.told.recv_timeout(Duration::from_millis(2500));
+    assert!(told.is_err() && !late.join("m").exists());
+    drop(watched);
+    assert!(!late.join("m").exists());
 }
 
 #[test]
