@@ -21,7 +21,7 @@
 #define GESTALT_TO_ALL UINT32_MAX
 
 /*
- How a call ended. What is negative is an error, of which `gestalt_last_error` says more; the mind is unchanged by it.
+ How a call ended. What is negative is an error, of which `gestalt_last_error` says more; the mind is unchanged by it, but by training.
  */
 typedef enum {
   /*
@@ -273,7 +273,8 @@ GestaltStatus gestalt_mind_status(GestaltMind *mind,
 
 /*
  Makes the classifier follow what was learned since the last time. `GESTALT_STATUS_NOTHING` if there is nothing to
- follow. It may take seconds: call it where nothing waits.
+ follow. It may take seconds: call it where nothing waits. After `GESTALT_STATUS_MODEL` it follows all but what could not
+ be trained on.
 
  # Safety
  `mind` as everywhere.

@@ -412,7 +412,8 @@ unsafe fn write_text(
 }
 
 /// Makes the classifier follow what was learned since the last time. `GESTALT_STATUS_NOTHING` if there is nothing to
-/// follow. It may take seconds: call it where nothing waits.
+/// follow. It may take seconds: call it where nothing waits. After `GESTALT_STATUS_MODEL` it follows all but what could not
+/// be trained on.
 ///
 /// # Safety
 /// `mind` as everywhere.

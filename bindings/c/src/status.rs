@@ -2,7 +2,7 @@
 
 use gestalt_mind::MindError;
 
-/// How a call ended. What is negative is an error, of which `gestalt_last_error` says more; the mind is unchanged by it.
+/// How a call ended. What is negative is an error, of which `gestalt_last_error` says more; the mind is unchanged by it, but by training.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::model_file::ModelFileError;
 
-/// What a mind cannot do. It is unchanged by what it refuses.
+/// What a mind cannot do. It is unchanged by what it refuses, but by training, which leaves out what cannot be trained on.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum MindError {
@@ -76,6 +76,9 @@ pub enum MindError {
         /// How many may be.
         most: usize,
     },
+    /// A number that means all robots at the border to C.
+    #[error("no robot has the number {0}: take another")]
+    Nobody(RobotId),
     /// The robot itself among others.
     #[error("robot {0} is this robot itself: name its neighbours")]
     Itself(RobotId),

@@ -82,7 +82,7 @@ impl PortableMind {
     pub fn with_rules(settings: Settings, rules: OwnRules) -> Result<Self, MindError> {
         let mut mind = Self {
             keys: Keys::new(&settings.swarm)?,
-            mind: Mind::new(settings.robot, settings.life(), settings.rounds.clone())?,
+            mind: Mind::new(somebody(settings.robot)?, settings.life(), settings.rounds.clone())?,
             sight: Sight::Nothing,
             learner: None,
             untrained: Vec::new(),
@@ -433,7 +433,12 @@ fn robots_of(robots: &[u32]) -> Result<BTreeSet<RobotId>, MindError> {
     if robots.len() > MAX_ROBOTS {
         return Err(MindError::TooMany { found: robots.len(), most: MAX_ROBOTS });
     }
-    Ok(robots.iter().copied().map(RobotId).collect())
+    robots.iter().copied().map(RobotId).map(somebody).collect()
+}
+
+/// The robot, unless its number is that which means all.
+fn somebody(robot: RobotId) -> Result<RobotId, MindError> {
+    if robot.0 == u32::MAX { Err(MindError::Nobody(robot)) } else { Ok(robot) }
 }
 
 /// The beginning of a text of any length, for an error.

@@ -211,3 +211,13 @@ fn a_clock_that_runs_back_or_to_its_end_breaks_nothing() {
     }
     assert!(mind.next_wake().is_none_or(|due| due >= Duration::from_nanos(u64::MAX)));
 }
+
+#[test]
+fn no_robot_has_the_number_that_means_all() {
+    assert!(matches!(PortableMind::new(settings(u32::MAX, GESTURES)), Err(MindError::Nobody(_))));
+    let mut mind = PortableMind::new(settings(1, GESTURES)).unwrap();
+    for tell in [PortableMind::set_alive, PortableMind::set_neighbours] {
+        let refused = tell(&mut mind, Duration::ZERO, &[2, u32::MAX]);
+        assert!(matches!(refused, Err(MindError::Nobody(_))), "{refused:?}");
+    }
+}

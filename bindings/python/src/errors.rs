@@ -67,7 +67,9 @@ pub(crate) fn broken(what: &str) -> PyErr {
 pub(crate) fn of_mind(error: MindError) -> PyErr {
     match &error {
         MindError::Message { .. } | MindError::Key(_) | MindError::Mismatch(_) => decode(error),
-        MindError::Model(_) | MindError::Vocabulary | MindError::TooLate => model(error),
+        MindError::Model(_) | MindError::Vocabulary | MindError::TooLate | MindError::Learner(_) => {
+            model(error)
+        }
         MindError::Features(_)
         | MindError::Probabilities(_)
         | MindError::Sightless

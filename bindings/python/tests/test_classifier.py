@@ -3,6 +3,7 @@
 import os
 import pickle
 import tempfile
+import threading
 import unittest
 from pathlib import Path
 
@@ -50,6 +51,42 @@ class Learning(unittest.TestCase):
         with self.assertRaisesRegex(g.DataError, "features"):
             classifier.partial_fit(X[:2, :5], y[:2])
         self.assertEqual(sum(classifier.model.learned), 160)
+
+    def test_what_is_refused_leaves_what_was_learned(self):
+        X, y = hands()
+        classifier = g.Classifier(components=4).fit(X, y)
+        before = classifier.predict_proba(X)
+        numbers = np.unique(y, return_inverse=True)[1].astype(float)
+        for bad in (np.where(numbers == 2, np.nan, numbers), np.zeros(len(y))):
+            with self.assertRaises(g.GestaltError):
+                classifier.fit(X, bad)
+            np.testing.assert_array_equal(classifier.predict_proba(X), before)
+            np.testing.assert_array_equal(classifier.classes_, ["fist", "palm", "two"])
+
+    def test_it_answers_by_what_it_knew_while_another_thread_teaches_it(self):
+        X, y = hands()
+        classifier = g.Classifier(components=4).fit(X, y)
+        before = classifier.predict(X[:5])
+        many, labels = hands(4000)
+        other = np.char.add("new ", labels)
+        thread = threading.Thread(target=classifier.fit, args=(many, other))
+        thread.start()
+        refused = answered = 0
+        while thread.is_alive():
+            gestures = classifier.predict(X[:5])
+            answered += 1
+            self.assertTrue((gestures == before).all() or np.char.startswith(gestures, "new ").all(), gestures)
+            try:
+                classifier.partial_fit(X[:2], y[:2])
+            except RuntimeError as error:
+                self.assertIn("another thread", str(error))
+                refused += 1
+            except g.DataError:
+                # It had just learned.
+                pass
+        thread.join()
+        self.assertGreater(min(refused, answered), 0)
+        self.assertTrue(np.char.startswith(classifier.predict(X), "new ").all())
 
     def test_a_file_and_a_pickle_judge_alike_and_learn_on(self):
         X, y = hands()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import os
 import tempfile
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +15,8 @@ from . import _native
 from ._native import DataError, GestaltError, SettingsError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import numpy as np
     import numpy.typing as npt
 
@@ -80,7 +84,9 @@ class Classifier:
         import numpy as np
 
         rows, labels = _samples(X, y)
-        return self._start(rows, np.unique(labels))._follow(rows, labels)
+        with self._alone():
+            self._begin(rows, labels, np.unique(labels))
+        return self
 
     def partial_fit(
         self, X: npt.ArrayLike, y: npt.ArrayLike, classes: npt.ArrayLike | None = None
@@ -90,15 +96,21 @@ class Classifier:
         import numpy as np
 
         rows, labels = _samples(X, y)
-        if not hasattr(self, "_model"):
-            self._start(rows, np.unique(labels if classes is None else np.asarray(classes)))
-        elif classes is not None and not np.array_equal(np.unique(np.asarray(classes)), np.unique(self.classes_)):
-            raise DataError("classes differ from those of the first call")
-        if self._learner is None:
-            self._learner = _native.Learner.on(self._model, **self._options())
-        return self._follow(rows, labels)
+        with self._alone():
+            if not hasattr(self, "_model"):
+                self._begin(rows, labels, np.unique(labels if classes is None else np.asarray(classes)))
+                return self
+            if classes is not None and not np.array_equal(np.unique(np.asarray(classes)), np.unique(self.classes_)):
+                raise DataError("classes differ from those of the first call")
+            if self._learner is None:
+                self._learner = _native.Learner.on(self._model, **self._options())
+            if rows.shape[1] != self.n_features_in_:
+                raise DataError(f"X has {rows.shape[1]} features, it learned from {self.n_features_in_}")
+            self._learner.insert(rows.tobytes(), _places(labels, self.classes_))
+            self._model = self._learner.learn()
+        return self
 
-    def _start(self, rows: Singles, classes: npt.NDArray[Any]) -> Classifier:
+    def _begin(self, rows: Singles, labels: npt.NDArray[Any], classes: npt.NDArray[Any]) -> None:
         learner = _native.Learner(
             [str(label) for label in classes],
             rows.tobytes(),
@@ -109,42 +121,41 @@ class Classifier:
             feature_set=self.feature_set,
             **self._options(),
         )
-        self.classes_, self.n_features_in_ = classes, rows.shape[1]
-        self._learner = learner
-        return self
+        learner.insert(rows.tobytes(), _places(labels, classes))
+        model = learner.learn()
+        # All of it at once: what is refused, or interrupted, leaves what was learned before as it was.
+        self.__dict__.update(classes_=classes, n_features_in_=rows.shape[1], _learner=learner, _model=model)
 
-    def _follow(self, rows: Singles, labels: npt.NDArray[Any]) -> Classifier:
-        import numpy as np
-
-        if rows.shape[1] != self.n_features_in_:
-            raise DataError(f"X has {rows.shape[1]} features, it learned from {self.n_features_in_}")
-        known = np.isin(labels, self.classes_)
-        if not known.all():
-            raise DataError(f"{labels[~known][0]!r} is not among the classes: name all in the first call")
-        assert self._learner is not None
-        # The classes of a model that was loaded are in its own order.
-        ascending = np.argsort(self.classes_)
-        order = ascending[np.searchsorted(self.classes_, labels, sorter=ascending)]
-        self._learner.insert(rows.tobytes(), order.astype(np.uint8).tobytes())
-        self._model = self._learner.learn()
-        return self
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """One thread learns at a time: what two learn at once would be neither's."""
+        lock = self.__dict__.setdefault("_lock", threading.Lock())
+        if not lock.acquire(blocking=False):
+            raise RuntimeError("another thread teaches this Classifier: teach it in one, or each its own")
+        try:
+            yield
+        finally:
+            lock.release()
 
     def _options(self) -> dict[str, Any]:
         return {"cost": self.cost, "gamma": self.gamma, "folds": self.folds, "staleness": self.staleness}
 
     def predict_proba(self, X: npt.ArrayLike) -> Floats:
         """The probability of each gesture: shape (samples, classes), each row sums to 1."""
-        import numpy as np
-
-        rows = self._rows(X)
-        judged = np.frombuffer(self.model.probabilities(rows.tobytes()), dtype=np.float64)
-        return judged.reshape(len(rows), len(self.classes_)).copy()
+        return self._judged(X)[0]
 
     def predict(self, X: npt.ArrayLike) -> npt.NDArray[Any]:
         """The likeliest gesture of each sample."""
-        likeliest = self.predict_proba(X).argmax(axis=1)
-        gestures: npt.NDArray[Any] = self.classes_[likeliest]
+        judged, classes = self._judged(X)
+        gestures: npt.NDArray[Any] = classes[judged.argmax(axis=1)]
         return gestures
+
+    def _judged(self, X: npt.ArrayLike) -> tuple[Floats, npt.NDArray[Any]]:
+        import numpy as np
+
+        model, classes, rows = self._known(X)
+        judged = np.frombuffer(model.probabilities(rows.tobytes()), dtype=np.float64)
+        return judged.reshape(len(rows), len(classes)).copy(), classes
 
     def score(self, X: npt.ArrayLike, y: npt.ArrayLike) -> float:
         """The part of the samples that are told right."""
@@ -156,9 +167,9 @@ class Classifier:
         """Coordinates in the feature space: what samples of a `TrainingSet` hold."""
         import numpy as np
 
-        rows = self._rows(X)
-        coordinates = np.frombuffer(self.model.coordinates(rows.tobytes()), dtype=np.float32)
-        return coordinates.reshape(len(rows), self.model.components).copy()
+        model, _, rows = self._known(X)
+        coordinates = np.frombuffer(model.coordinates(rows.tobytes()), dtype=np.float32)
+        return coordinates.reshape(len(rows), model.components).copy()
 
     @property
     def model(self) -> _native.Model:
@@ -215,7 +226,7 @@ class Classifier:
 
     def __getstate__(self) -> dict[str, Any]:
         # The learner's samples stay behind: what is loaded learns on from the support vectors.
-        state = {name: value for name, value in self.__dict__.items() if name not in ("_learner", "_model")}
+        state = {name: value for name, value in self.__dict__.items() if name not in ("_learner", "_lock", "_model")}
         if hasattr(self, "_model"):
             state["_model"] = self._model.encode()
         return state
@@ -240,12 +251,14 @@ class Classifier:
             regressor_tags=None,
         )
 
-    def _rows(self, X: npt.ArrayLike) -> Singles:
+    def _known(self, X: npt.ArrayLike) -> tuple[_native.Model, npt.NDArray[Any], Singles]:
+        """What was learned, all of one moment: another thread may learn anew meanwhile."""
         self.model  # says so if there is none
+        known = dict(self.__dict__)
         rows = _matrix(X)
-        if rows.shape[1] != self.n_features_in_:
-            raise DataError(f"X has {rows.shape[1]} features, it learned from {self.n_features_in_}")
-        return rows
+        if rows.shape[1] != known["n_features_in_"]:
+            raise DataError(f"X has {rows.shape[1]} features, it learned from {known['n_features_in_']}")
+        return known["_model"], known["classes_"], rows
 
 
 _PARAMETERS = tuple(inspect.signature(Classifier).parameters)
@@ -271,3 +284,15 @@ def _samples(X: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Singles, npt.NDArray[A
     if labels.ndim != 1 or len(labels) != len(rows):
         raise DataError(f"y has the shape {labels.shape}: one gesture for each of {len(rows)} samples is expected")
     return rows, labels
+
+
+def _places(labels: npt.NDArray[Any], classes: npt.NDArray[Any]) -> bytes:
+    """The place of each label among the classes, which of a model that was loaded are in its own order."""
+    import numpy as np
+
+    known = np.isin(labels, classes)
+    if not known.all():
+        raise DataError(f"{labels[~known][0]!r} is not among the classes: name all in the first call")
+    ascending = np.argsort(classes)
+    places: npt.NDArray[Any] = ascending[np.searchsorted(classes, labels, sorter=ascending)]
+    return places.astype(np.uint8).tobytes()
