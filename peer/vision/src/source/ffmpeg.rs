@@ -207,10 +207,12 @@ fn is_jpeg(path: &Path, capture: &VideoCapture, size: Size) -> Result<bool, Sour
     // The first may be damaged.
     for _ in 0..FIRST {
         let mut picture = Mat::default();
-        if probe.read(&mut picture)? && !picture.empty() && picture.data_bytes()?.starts_with(JPEG) {
-            if let Ok(claim) = inspect(picture.data_bytes()?) {
-                return Ok(claim.size() == Some(size));
-            }
+        if probe.read(&mut picture)?
+            && !picture.empty()
+            && picture.data_bytes()?.starts_with(JPEG)
+            && let Ok(claim) = inspect(picture.data_bytes()?)
+        {
+            return Ok(claim.size() == Some(size));
         }
     }
     Ok(false)
