@@ -30,7 +30,7 @@ pub struct Calibration {
     /// seeds by Student's t; without one where fewer than ten decisions are wrong.
     pub error: Mean,
     /// Up to where the error of decisions of these confidences is in 95 of 100 cases if they are right exactly as often as they say, by a bootstrap.
-    pub error_by_chance: f64,
+    pub error_by_chance: Option<f64>,
     /// Wrong decisions, of those of a confidence of at least .99.
     pub sure_and_wrong: Proportion,
     /// Decisions of a confidence of at least .9, of the showings of a gesture that nobody had taught yet.
@@ -90,6 +90,10 @@ fn error(decisions: impl Iterator<Item = Said>) -> f64 {
 }
 
 fn jackknife(seeds: &[Heard<'_>]) -> Mean {
+    // Who said nothing was not wrong about it, nor right.
+    if seeds.iter().all(|seed| seed.said.is_empty()) {
+        return Mean::of(&[]);
+    }
     let all = error(seeds.iter().flat_map(|seed| seed.said).copied());
     if seeds.iter().flat_map(|seed| seed.said).filter(|said| !said.right).count() < FEW {
         return Mean::of(&[all]);
@@ -103,7 +107,10 @@ fn jackknife(seeds: &[Heard<'_>]) -> Mean {
     Mean::by_jackknife(all, &without)
 }
 
-fn by_chance(seeds: &[Heard<'_>]) -> f64 {
+fn by_chance(seeds: &[Heard<'_>]) -> Option<f64> {
+    if seeds.iter().all(|seed| seed.said.is_empty()) {
+        return None;
+    }
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut draw = || {
         let drawn = seeds.iter().flat_map(|seed| seed.said);
@@ -111,7 +118,7 @@ fn by_chance(seeds: &[Heard<'_>]) -> f64 {
     };
     let mut errors: Vec<f64> = (0..DRAWS).map(|_| draw()).collect();
     errors.sort_by(f64::total_cmp);
-    errors[DRAWS * 95 / 100]
+    Some(errors[DRAWS * 95 / 100])
 }
 
 #[cfg(test)]
@@ -135,7 +142,7 @@ mod tests {
         assert_eq!(of(&honest).sure_and_wrong.trials, 0);
         assert_eq!(of(&honest).taught_and_decided, Proportion::over_seeds([(100, 100), (100, 150)]));
         assert_eq!(of(&honest).taught_and_right, Proportion::over_seeds([(75, 100); 2]));
-        assert!(of(&honest).error.n == 2 && of(&boasting).error.mean > of(&boasting).error_by_chance);
+        assert!(of(&honest).error.n == 2 && Some(of(&boasting).error.mean) > of(&boasting).error_by_chance);
         let unheard = [Said { confidence: 0.95, right: false, taught: false }];
         let of = Calibration::of(&[Heard { said: &unheard, taught: 3, untaught: 4 }]);
         assert_eq!(of.untaught_and_sure, Proportion::new(1, 4));
@@ -148,7 +155,8 @@ mod tests {
         let of = Calibration::of(&[Heard { said: &right, taught: 20, untaught: 0 }; 4]);
         assert_eq!((of.error.n, of.error.decimals(3)), (1, "0.050".to_owned()));
         // Of 80 decisions of .95 the share is off by .0375 or less in 94 cases of 100, and by .05 or less in 98.
-        assert!((0.035..=0.055).contains(&of.error_by_chance), "{}", of.error_by_chance);
-        assert_eq!(Calibration::of(&[]).error_by_chance, 0.0);
+        assert!(of.error_by_chance.is_some_and(|error| (0.035..=0.055).contains(&error)), "{of:?}");
+        let silent = Calibration::of(&[Heard { said: &[], taught: 9, untaught: 0 }]);
+        assert_eq!((silent.error_by_chance, silent.error.n), (None, 0), "nothing was measured");
     }
 }

@@ -324,7 +324,7 @@ impl fmt::Display for Table<'_> {
                 summary.rule,
                 summary.alpha,
                 error.decimals(3),
-                format!("≤ {error_by_chance:.3}"),
+                error_by_chance.map_or("–".to_owned(), |error| format!("≤ {error:.3}")),
                 of(summary.calibration.sure_and_wrong),
                 of(summary.calibration.untaught_and_sure),
                 of(summary.calibration.taught_and_decided),

@@ -84,7 +84,7 @@ pub fn asking(
         text,
         "\n`labels`: answers of the instructor. `to`: given when the accuracy on held-out hands had first been that high after {IN_A_ROW} rounds in a row, over the \
          seeds in which it was; how many of all is said beside it. `of the first's`: the geometric mean of the ratio to the first row of its line, seed by seed, where both \
-         reached it. Means with 95 % intervals (±: Student's t; brackets of accuracies: Wilson's with Student's t)."
+         reached it and needed labels for it. Means with 95 % intervals (±: Student's t; brackets of accuracies: Wilson's with Student's t)."
     );
     Some(text)
 }

@@ -21,6 +21,7 @@ use super::pool::Pool;
 use super::progress::Progress;
 use super::results::Results;
 use super::school::Schools;
+use super::setting::Start;
 use super::split::Split;
 use super::summary::Summary;
 use super::{chart, trial};
@@ -73,7 +74,14 @@ pub fn conduct_by(
     let looked = |done, total| progress(Progress::Looked(done, total));
     let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);
+    let split = fewest_judged(&pool, seeds)?;
     let ready = materials.dataset.is_none() && experiment.hands.vocabulary.is_some();
+    let starts_from_it = |cell: &Cell| cell.setting.start == Start::Model;
+    if materials.start.is_some() && (ready || !cells.iter().any(starts_from_it)) {
+        return Err(ExperimentError::Setting(
+            "no robot starts from --start-dataset: leave it out, or say start: 'model' of hands that are counts of fingers".to_owned(),
+        ));
+    }
     let mut schools = Schools::new(pool.vocabulary()?, (hands.features, ready), materials.start.as_deref())?;
     let taught: Vec<Taught<'_>> = cells
         .iter()
@@ -88,8 +96,6 @@ pub fn conduct_by(
     let runs = run_what_is_left(&taught, &pool, results, seeds, &progress)?.finish()?;
 
     let summary = Summary::of(&experiment, &cells, &runs, seeds);
-    // That of any run: how many are held out, and whether people are, does not depend on the seed.
-    let split = Split::draw(&pool.gestures, &pool.moments, &mut ChaCha8Rng::seed_from_u64(0))?;
     let table = summary.markdown(&pool, materials, &split)
         + &asking(&experiment, &cells, &runs, (seeds, split.judged())).unwrap_or_default()
         + &drift(&experiment, &cells, &runs, (seeds, &split)).unwrap_or_default();
@@ -97,6 +103,20 @@ pub fn conduct_by(
     gestalt_file::write(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
     chart::draw_into(folder, &figures(&summary))?;
     Ok(table)
+}
+
+/// Of the splits of all seeds, before hours of runs, the one in which the fewest hands are judged: who is held out differs from seed to seed, and how many
+/// hands those show, if not all show the same.
+fn fewest_judged(pool: &Pool, seeds: u32) -> Result<Split, ExperimentError> {
+    let draw = |seed| Split::draw(&pool.gestures, &pool.moments, &mut ChaCha8Rng::seed_from_u64(seed));
+    let mut fewest = draw(0)?;
+    for seed in 1..u64::from(seeds) {
+        let split = draw(seed).map_err(|error| ExperimentError::Setting(format!("seed {seed}: {error}")))?;
+        if split.judged() < fewest.judged() {
+            fewest = split;
+        }
+    }
+    Ok(fewest)
 }
 
 /// A cell and all that its runs share.

@@ -44,18 +44,27 @@ impl Naming {
     }
 }
 
-/// A folder with images that were not asked for, or that show no gesture.
+/// A folder with images that were not asked for, that show no gesture, or that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ignored {
     /// Its name; where folders are counts of fingers, the count.
     pub label: String,
-    /// How many images it has.
+    /// How many images it has that can be read.
     pub images: usize,
+    /// How many files it has of other formats, and folders in it.
+    pub others: usize,
 }
 
 impl fmt::Display for Ignored {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({} images)", self.label, self.images)
+        match self.others {
+            0 => write!(f, "{} ({} images)", self.label, self.images),
+            others => write!(
+                f,
+                "{others} of {}: no .jpg, .jpeg or .png (convert pictures, and move them out of folders in it)",
+                self.label
+            ),
+        }
     }
 }
 
@@ -73,14 +82,18 @@ pub(super) struct Folders {
 impl Folders {
     pub fn read(folder: &Path, naming: Naming) -> Result<Self, DatasetError> {
         let mut found = Self::default();
-        for (name, images) in folders_with_images(folder)? {
+        for (name, Inside { images, others }) in folders_with_images(folder)? {
+            let label = name.to_string_lossy().into_owned();
+            if others > 0 {
+                found.ignored.push(Ignored { label: label.clone(), images: 0, others });
+            }
+            if images.is_empty() {
+                continue;
+            }
             match name.to_str().and_then(|name| naming.gesture(name)) {
                 _ if name == NONE => found.none = images,
                 Some(label) => found.gestures.entry(label.to_owned()).or_default().extend(images),
-                None => {
-                    let label = name.to_string_lossy().into_owned();
-                    found.ignored.push(Ignored { images: images.len(), label });
-                }
+                None => found.ignored.push(Ignored { images: images.len(), label, others: 0 }),
             }
         }
         Ok(found)
@@ -91,15 +104,26 @@ impl Folders {
         let Self { mut gestures, mut ignored, .. } = self;
         let left: Vec<Ignored> = in_order(gestures.keys().cloned().collect())
             .into_iter()
-            .map(|label| Ignored { images: gestures.remove(&label).map_or(0, |images| images.len()), label })
+            .map(|label| {
+                let images = gestures.remove(&label).map_or(0, |images| images.len());
+                Ignored { images, label, others: 0 }
+            })
             .collect();
         ignored.splice(0..0, left);
         ignored
     }
 }
 
-/// The images of each sub-folder that has any, by file name.
-fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Vec<PathBuf>>, DatasetError> {
+/// What a sub-folder has in it.
+struct Inside {
+    /// Its images, by file name.
+    images: Vec<PathBuf>,
+    /// How many pictures of other formats it has; where it has no images, also how many folders.
+    others: usize,
+}
+
+/// The sub-folders that have images, or pictures that cannot be read.
+fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Inside>, DatasetError> {
     let entries = |path: &Path| -> Result<Vec<PathBuf>, DatasetError> {
         let failed = |source| DatasetError::Io { path: path.to_owned(), source };
         let entries = fs::read_dir(path).map_err(failed)?;
@@ -111,15 +135,17 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Vec<PathBuf>>
         let Some(label) = path.file_name().map(OsStr::to_owned).filter(|_| path.is_dir()) else {
             continue;
         };
-        let mut images = entries(&path)?;
-        images.retain(|path| has_image_name(path));
+        let (mut images, others): (Vec<PathBuf>, Vec<PathBuf>) =
+            entries(&path)?.into_iter().partition(|path| has_image_name(path));
         images.sort();
+        let is_lost = |path: &&PathBuf| is_picture(path) || images.is_empty() && path.is_dir();
+        let others = others.iter().filter(is_lost).count();
         count += images.len();
         if count > MAX_IMAGES {
             return Err(DatasetError::TooLarge(folder.to_owned()));
         }
-        if !images.is_empty() {
-            found.insert(label, images);
+        if !images.is_empty() || others > 0 {
+            found.insert(label, Inside { images, others });
         }
     }
     Ok(found)
@@ -128,8 +154,17 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Vec<PathBuf>>
 /// Whether a file is named as the images are that can be read.
 #[must_use]
 pub fn has_image_name(path: &Path) -> bool {
+    has_extension(path, &["jpg", "jpeg", "png"])
+}
+
+/// Whether a file is named as a picture is that cannot be read.
+fn is_picture(path: &Path) -> bool {
+    has_extension(path, &["avif", "bmp", "gif", "heic", "jfif", "jp2", "pgm", "ppm", "tif", "tiff", "webp"])
+}
+
+fn has_extension(path: &Path, known: &[&str]) -> bool {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-    ["jpg", "jpeg", "png"].iter().any(|known| extension.eq_ignore_ascii_case(known))
+    known.iter().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// By number where all labels are numbers (10 after 9), else by alphabet.
@@ -145,6 +180,31 @@ pub(super) fn in_order(mut labels: Vec<String>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_that_cannot_be_read_are_named_with_their_folder() {
+        let dataset = tempfile::tempdir().unwrap();
+        for (folder, files) in [
+            ("one", &["a.jpg", "b.PNG", "notes.csv"][..]),
+            ("two", &["a.jpg", "b.webp", "c.bmp"]),
+            ("three", &["a.heic"]),
+            ("four", &["alice/a.jpg", "bob/a.jpg"]),
+            ("docs", &["README.md"]),
+        ] {
+            for file in files {
+                let path = dataset.path().join(folder).join(file);
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(path, "").unwrap();
+            }
+        }
+        let folders = Folders::read(dataset.path(), Naming::Names).unwrap();
+        assert_eq!(folders.gestures.keys().collect::<Vec<_>>(), ["one", "two"]);
+        let ignored: Vec<(&str, usize)> =
+            folders.ignored.iter().map(|it| (it.label.as_str(), it.others)).collect();
+        assert_eq!(ignored, [("four", 2), ("three", 1), ("two", 2)]);
+        let said = folders.ignored[2].to_string();
+        assert!(said.starts_with("2 of two: no .jpg"), "{said}");
+    }
 
     #[test]
     fn a_count_of_fingers_is_what_a_name_begins_with() {

@@ -90,7 +90,7 @@ fn chosen_gestures_keep_the_order_they_were_chosen_in() {
     let folder = dataset(&["a/1.jpg", "b/1.jpg", "c/1.jpg"]);
     let chosen = Dataset::list(folder.path(), Some(&strings(&["c", "a"]))).unwrap();
     assert_eq!(chosen.vocabulary.labels(), ["c", "a"]);
-    assert_eq!(chosen.ignored, [Ignored { label: "b".to_owned(), images: 1 }]);
+    assert_eq!(chosen.ignored, [Ignored { label: "b".to_owned(), images: 1, others: 0 }]);
     let missing = Dataset::list(folder.path(), Some(&strings(&["a", "d"]))).unwrap_err();
     assert!(missing.to_string().contains("'d': it has a, b, c"), "{missing}");
 }
