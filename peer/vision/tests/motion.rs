@@ -15,7 +15,7 @@ use gestalt_vision::human::Human;
 use gestalt_vision::motion::Change;
 use gestalt_vision::motion::{MotionConfig, MotionDetector};
 use gestalt_vision::pose::Pose;
-use gestalt_vision::source::{Glove, RenderedSource, Scene, ScheduledSource, Source, SourceError, Video};
+use gestalt_vision::source::{Glove, RenderedSource, Scene, ScheduledSource, Source, Video};
 use opencv::prelude::*;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

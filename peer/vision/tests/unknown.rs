@@ -15,7 +15,7 @@ use gestalt_strategies::{
 use gestalt_vision::dataset::{Dataset, LabelledImage};
 use gestalt_vision::model::RobotModel;
 use gestalt_vision::perception::{HandConfig, Perception};
-use gestalt_vision::source::{Scene, Source, SourceError, Video, read_image};
+use gestalt_vision::source::{Scene, Source, Video, read_image};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
