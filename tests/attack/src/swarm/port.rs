@@ -139,7 +139,7 @@ impl Port {
                 ("feedback", Err(Refusal::Distrust(Distrust::Unsigned)))
             }
             Some(Topic::Feedback(by)) => {
-                let heard = json::<Instruction>(&parcel.bytes);
+                let heard = within(&parcel.bytes, MAX_WORD).and_then(|()| json::<Instruction>(&parcel.bytes));
                 let word = |instruction| {
                     Input::Instructed(Instructed { by, at: parcel.at, instruction, said: None })
                 };
