@@ -201,6 +201,8 @@ pub struct Summary {
     pub seeds: usize,
     /// How many robots there are.
     pub robots: usize,
+    /// Gestures shown that opened no round, of all seeds: robots were still in the one before. Nothing else counts them.
+    pub unopened: u64,
     /// As in [`Report`], over the rounds of all seeds.
     pub right: Proportion,
     /// As in [`Report`], over the rounds of all seeds.
@@ -246,6 +248,7 @@ impl Summary {
             alpha,
             seeds: reports.len(),
             robots: reports.first().map_or(0, |report| report.robots),
+            unopened: reports.iter().map(|report| report.showings - report.right.trials).sum(),
             right: pool(&|report| report.right),
             wrong: pool(&|report| report.wrong),
             undecided: pool(&|report| report.undecided),
@@ -329,6 +332,13 @@ impl fmt::Display for Table<'_> {
                 of(summary.calibration.untaught_and_sure),
                 of(summary.calibration.taught_and_decided),
                 of(summary.calibration.taught_and_right),
+            )?;
+        }
+        for Summary { rule, alpha, unopened, right, .. } in self.0.iter().filter(|it| it.unopened > 0) {
+            let shown = unopened + right.trials;
+            writeln!(
+                f,
+                "{rule}, α {alpha}: {unopened} of {shown} gestures shown opened no round, as robots were in the one before, and count nowhere"
             )?;
         }
         if let Some(any) = self.0.first() {

@@ -85,11 +85,14 @@ fn show(
         }
     }
     let (report, _) = emulation.finish();
+    // What opened no round, as robots were still in the one before, was not decided.
+    let opened = report.right.trials as f64 / report.showings as f64;
+    let [right, wrong] = [report.right, report.wrong].map(|of| of.share * opened);
     Ok(Outcome {
-        right: report.right.share,
-        wrong: report.wrong.share,
+        right,
+        wrong,
         frames_right: (report.frames_right.trials > 0).then_some(report.frames_right.share),
-        undecided: report.undecided.share,
+        undecided: report.undecided.share * opened + (1.0 - opened),
         decided_s: (report.decided_ms.n > 0).then_some(report.decided_ms.mean / 1000.0),
     })
 }
