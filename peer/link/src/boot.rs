@@ -41,7 +41,13 @@ pub(crate) fn leap() -> u32 {
 #[must_use]
 pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
     // Of two that start at once the second counts on from the first.
-    let _alone = gestalt_file::lock(file);
+    let alone = gestalt_file::lock(file);
+    if alone.is_none() {
+        tracing::warn!(
+            "{} cannot be kept from another start at the same moment: see that no two robots start with one key",
+            file.display()
+        );
+    }
     let last = match fs::read_to_string(file) {
         Ok(text) => text.trim().parse::<u32>().map_err(|error| error.to_string()),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(0),
@@ -51,7 +57,7 @@ pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
         tracing::warn!("the number of the last start is not known from {}: {error}", file.display());
         0
     });
-    after(last, boot_number(now), |number| {
+    let number = after(last, boot_number(now), |number| {
         let kept = gestalt_file::replace(file, format!("{number}\n").as_bytes());
         kept.inspect_err(|error| {
             tracing::error!(
@@ -60,7 +66,9 @@ pub fn counted_boot(file: &Path, now: SystemTime) -> u32 {
                 file.display()
             );
         })
-    })
+    });
+    drop(alone);
+    number
 }
 
 /// The number of a start after that one, by that clock.

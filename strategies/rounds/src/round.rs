@@ -31,6 +31,8 @@ pub(crate) struct Round {
     pub since: Duration,
     /// Whether this robot still takes part by looking and voting.
     pub open: bool,
+    /// Whether it was open for long enough to say something.
+    pub lasted: bool,
     pub ballot: Ballot,
     pub agreement: Agreement,
     evidence: Option<Evidence>,
@@ -89,6 +91,7 @@ impl Round {
             id,
             since,
             open,
+            lasted: false,
             ballot: Ballot::default(),
             agreement: Agreement::default(),
             evidence: None,

@@ -68,6 +68,10 @@ impl Asks {
     pub fn enter(&mut self, now: Duration, round: Option<RoundId>) {
         let counter = round.map(|round| round.counter);
         if counter != self.counted {
+            // Of what was asked in rounds that it missed it has not heard.
+            if self.counted.zip(counter).is_some_and(|(before, counter)| counter > before.saturating_add(1)) {
+                self.budget = QuestionBudget::default();
+            }
             self.counted = counter;
             self.budget.enter(now);
             // What was not asked in time is not asked.

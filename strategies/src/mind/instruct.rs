@@ -62,9 +62,10 @@ impl Mind {
     pub(super) fn on_believe(&mut self, believer: Arc<dyn Believe>) -> AboutRounds {
         if let Some(learning) = &mut self.learning {
             learning.believe(believer);
+            // What was not believed may be: lessons, and names, of which nobody says that they were declined.
+            learning.ask_again();
         }
-        // What was not believed may be.
-        self.ask_again_for_lessons();
+        self.exchanges.forget_declined_lessons();
         self.share();
         AboutRounds::Tick
     }

@@ -105,11 +105,7 @@ impl Rounds {
     pub(super) fn close(&mut self, effects: &mut Effects<'_>) {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.open = false;
-            if self.now >= round.since + self.config.patience {
-                let since = round.since;
-                self.electorate.round_over(since);
-                self.note_silence();
-            }
+            round.lasted = self.now >= round.since + self.config.patience;
         }
         if self.looking_until(effects.follower).is_none() {
             self.stop_looking(effects);
@@ -152,6 +148,7 @@ impl Rounds {
     pub(super) fn enter(&mut self, id: RoundId, open: bool, effects: &mut Effects<'_>) {
         self.close(effects);
         self.stop_looking(effects);
+        self.judge_silence();
         self.highest = self.highest.max(Some(id.counter));
         self.electorate.forget(self.now, self.config.lately, &self.alive);
         self.took_part = self.last_showing();
@@ -180,6 +177,16 @@ impl Rounds {
         self.draw(&BTreeSet::new());
         self.looking = open.then_some(id);
         effects.follower.entered(id);
+    }
+
+    /// Who said nothing in the round before counts no more from now on. Not from its end: it is still to be made final by as many as there were when it was
+    /// decided, and whether somebody was silent or cut off shows a while later.
+    fn judge_silence(&mut self) {
+        if let Some(round) = self.round.as_ref().filter(|round| round.lasted) {
+            let since = round.since;
+            self.electorate.round_over(since);
+            self.note_silence();
+        }
     }
 
     /// Whether this robot may have counted for a gesture of that round in an earlier life, which it has forgotten: where it heard of it soon after its start, or when it was

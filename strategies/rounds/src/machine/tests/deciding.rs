@@ -37,6 +37,28 @@ fn a_round_waits_until_every_live_robot_has_seen_something_but_not_beyond_patien
 }
 
 #[test]
+fn who_was_silent_counts_until_the_next_round_and_who_was_cut_off_meanwhile_counts_on() {
+    let is_final = |mind: &mut Rounds| mind.held_aloud().unwrap().decision.is_final;
+    // What shows a lease later, if the others were cut off: their links had gone.
+    for (left, expected) in [(vec![1], 5), (vec![1, 2, 3, 4], 3)] {
+        let mut mind = mind(7);
+        mind.electorate.require_keys();
+        mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 2, 3, 4]))));
+        mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
+        mind.handle(ms(10), votes(2, 1, vote(1, 0, SURE)));
+        mind.handle(ms(20), saw([0.98, 0.01, 0.01]));
+        live(&mut mind, ms(1300));
+        let held = mind.held().unwrap().clone();
+        assert_eq!((held.class, held.certificate.robots), (Some(ClassId(0)), 5));
+        mind.handle(ms(1300), says_it_holds(1, &held));
+        assert!(!is_final(&mut mind), "two of five");
+        mind.handle(ms(1600), Input::Alive(Arc::new(robots(left))));
+        mind.handle(ms(20_000), votes(1, 2, vote(2, 0, SURE)));
+        assert_eq!(mind.electorate.count(), expected);
+    }
+}
+
+#[test]
 fn fewer_robots_than_the_quorum_decide_nothing() {
     let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(2), ..adding_up() });
     mind.handle(ms(0), votes(1, 1, vote(1, 0, SURE)));
