@@ -31,6 +31,8 @@ pub(crate) struct Authority {
     identity: Arc<Identity>,
     members: Membership,
     revoked: Revoked,
+    /// How many members had keys of those when the folder was opened.
+    found_revoked: usize,
     /// Files that take the place of others once the roster is written, which needs them.
     new_files: Vec<(PathBuf, PathBuf)>,
     /// Kept while the roster may change: of two who change it at once, the key of one would stand on it, and that of the other lie here.
@@ -73,6 +75,7 @@ impl Authority {
             identity: Arc::new(Identity::read(&file)?),
             members: Membership { swarm: swarm.to_owned(), local, ..Membership::default() },
             revoked: Revoked::read(folder)?,
+            found_revoked: 0,
             new_files: Vec::new(),
             _alone: alone,
         };
@@ -108,9 +111,11 @@ impl Authority {
             identity,
             members,
             revoked,
+            found_revoked: 0,
             new_files: Vec::new(),
             _alone: alone,
         };
+        authority.found_revoked = authority.revoked_members().len();
         authority.go_on()?;
         Ok(authority)
     }
@@ -148,6 +153,12 @@ impl Authority {
     /// Files that cannot be read or written.
     pub fn enrol_here(&mut self, robot: RobotId) -> Result<(), Failure> {
         let file = key_file(&self.folder, robot);
+        if !file.exists() && self.key(&Applicant::Robot(robot)).is_some() {
+            return Err(format!(
+                "robot {robot} is a member, and its key is elsewhere: `gestalt trust rekey {robot}` makes another here"
+            )
+            .into());
+        }
         let identity = if file.exists() { Identity::read(&file)? } else { new_identity(&file)? };
         self.enrol(&Applicant::Robot(robot), identity.public_key(), Roles::NONE)?;
         self.certify(&Applicant::Robot(robot), &identity.public_key())?.write(&certificate_file(&file))?;
@@ -178,8 +189,10 @@ impl Authority {
         }
         if held.is_none() && self.revoked.contains(&key) {
             let again = match applicant {
-                Applicant::Robot(robot) => format!("`gestalt trust rekey {robot}`, or "),
-                Applicant::Client(_) => String::new(),
+                Applicant::Robot(robot) if self.members.expelled.contains_key(robot) => {
+                    format!("`gestalt trust rekey {robot}`, or ")
+                }
+                _ => String::new(),
             };
             return Err(format!(
                 "the key of {} was taken off the roster before: make another, by {again}`gestalt trust request --anew` where it is",
@@ -272,6 +285,30 @@ impl Authority {
         }
     }
 
+    /// Refuses members whose keys were taken off the roster before, where it was restored from an older copy, or a command was interrupted; not while they become
+    /// fewer, as each is expelled, or given another key, by itself.
+    fn check_revoked(&mut self) -> Result<(), Failure> {
+        let revoked = self.revoked_members();
+        match revoked.first() {
+            Some(who) if revoked.len() >= self.found_revoked => Err(format!(
+                "{who} is a member with a key that was taken off the roster before: `gestalt trust expel` it first, or give a robot another by `gestalt trust rekey`"
+            )
+            .into()),
+            _ => {
+                self.found_revoked = revoked.len();
+                Ok(())
+            }
+        }
+    }
+
+    fn revoked_members(&self) -> Vec<String> {
+        let robots = self.members.robots.iter().map(|(robot, key)| (Applicant::Robot(*robot), key));
+        let clients = self.members.instructors.iter();
+        let clients = clients.map(|(name, it)| (Applicant::Client(name.clone()), &it.key));
+        let revoked = robots.chain(clients).filter(|(_, key)| self.revoked.contains(key));
+        revoked.map(|(who, _)| said(&who)).collect()
+    }
+
     /// Whether that key was taken off the roster once.
     #[must_use]
     pub fn is_revoked(&self, key: &PublicKey) -> bool {
@@ -340,18 +377,11 @@ impl Authority {
     /// # Errors
     /// Members that exclude each other, and a file that cannot be written.
     pub fn save(&mut self) -> Result<Roster, Failure> {
-        // Where a roster was restored from an older copy, or a command was interrupted.
-        let robots = self.members.robots.iter().map(|(robot, key)| (Applicant::Robot(*robot), key));
-        let clients =
-            self.members.instructors.iter().map(|(name, it)| (Applicant::Client(name.clone()), &it.key));
-        if let Some((who, _)) = robots.chain(clients).find(|(_, key)| self.revoked.contains(key)) {
-            let who = said(&who);
-            return Err(format!("{who} is a member with a key that was taken off the roster before: `gestalt trust expel` it first, or give a robot another by `gestalt trust rekey`").into());
-        }
+        self.check_revoked()?;
         self.members.epoch += 1;
+        let roster = self.members.clone().sign(&self.identity)?;
         // Before the roster: no key that was taken off it is ever unknown here.
         self.revoked.write()?;
-        let roster = self.members.clone().sign(&self.identity)?;
         roster.write(&self.folder.join(ROSTER_FILE))?;
         self.put_new_files()?;
         Ok(roster)

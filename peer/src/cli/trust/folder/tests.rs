@@ -89,11 +89,27 @@ fn no_key_that_was_taken_off_the_roster_ever_comes_back() {
     authority.enrol(&robot, new(4, &robot), Roles::NONE).unwrap();
     authority.save().unwrap();
     // A roster from an older copy has such a key: nobody else is enrolled beside it.
-    authority.revoked.add(new(4, &robot));
+    authority.enrol(&desk, new(5, &desk), Roles::NONE).unwrap();
+    authority.save().unwrap();
+    let older = fs::read(place.join(ROSTER_FILE)).unwrap();
+    authority.rekey(RobotId(7), Some(new(6, &robot))).unwrap();
+    authority.expel(&desk).unwrap();
+    authority.save().unwrap();
+    drop(authority);
+    fs::write(place.join(ROSTER_FILE), older).unwrap();
+    let mut authority = Authority::open(&place).unwrap();
     authority.enrol_here(RobotId(8)).unwrap();
     let refused = authority.save().unwrap_err().to_string();
     assert!(refused.contains("robot 7 is a member with a key that was taken off"), "{refused}");
+    // One by one they are none any more.
+    drop(authority);
+    let mut authority = Authority::open(&place).unwrap();
+    authority.expel(&desk).unwrap();
+    authority.save().unwrap();
+    drop(authority);
+    let mut authority = Authority::open(&place).unwrap();
     authority.rekey(RobotId(7), None).unwrap();
+    authority.enrol_here(RobotId(8)).unwrap();
     authority.save().unwrap();
     drop(authority);
     fs::write(place.join("revoked.json"), "[").unwrap();
@@ -200,4 +216,19 @@ fn who_was_interrupted_goes_on() {
     }
     drop(authority);
     assert!(Authority::create(folder.path(), "demo", Roles::NONE).is_err(), "it has its swarm");
+}
+
+#[test]
+fn a_key_is_not_taken_away_where_the_roster_stays_what_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
+    [7, 8].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+    let of_eight = authority.save().unwrap().members().robots[&RobotId(8)];
+    // The card of one was copied for the other.
+    authority.rekey(RobotId(7), Some(of_eight)).unwrap();
+    assert!(authority.save().unwrap_err().to_string().contains("the same key"));
+    drop(authority);
+    let mut authority = Authority::open(folder.path()).unwrap();
+    authority.enrol_here(RobotId(9)).unwrap();
+    authority.save().unwrap();
 }
