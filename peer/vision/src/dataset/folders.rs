@@ -132,7 +132,10 @@ fn folders_with_images(folder: &Path) -> Result<BTreeMap<OsString, Inside>, Data
     let mut found = BTreeMap::new();
     let mut count = 0;
     for path in entries(folder)? {
-        let Some(label) = path.file_name().map(OsStr::to_owned).filter(|_| path.is_dir()) else {
+        let is_hidden = |name: &OsString| name.as_encoded_bytes().starts_with(b".");
+        let Some(label) =
+            path.file_name().map(OsStr::to_owned).filter(|name| path.is_dir() && !is_hidden(name))
+        else {
             continue;
         };
         let (mut images, others): (Vec<PathBuf>, Vec<PathBuf>) =

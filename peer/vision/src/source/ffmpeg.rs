@@ -8,7 +8,6 @@ use opencv::prelude::*;
 use opencv::videoio::{self, VideoCapture};
 
 use super::SourceError;
-use super::container::inspect;
 use super::image_file::MAX_MEGAPIXELS;
 use super::picture::decode;
 
@@ -18,8 +17,8 @@ const PERIOD: Duration = Duration::from_millis(33);
 /// How many pictures in a row may be none before a video is at its end: FFmpeg says the same of both.
 const MOST_BAD: usize = 64;
 
-/// How many pictures of a video without an index are read to come to another place in it.
-const MOST_READ: f64 = 20_000.0;
+/// How many pictures of a JPEG video are read to come to another place in it.
+const MOST_READ: u64 = 20_000;
 
 /// By how many pictures it is told whether a video is of JPEG.
 const FIRST: usize = 8;
@@ -60,10 +59,8 @@ impl Ffmpeg {
     /// # Errors
     /// As [`Ffmpeg::open`].
     pub fn rewind(&mut self) -> Result<(), SourceError> {
-        (self.capture, self.next, self.at) = (open(&self.path)?.0, None, 0);
-        if self.is_jpeg {
-            as_they_are(&mut self.capture)?;
-        }
+        // Another may be there by now.
+        *self = Self::open(&self.path)?.0;
         Ok(())
     }
 
@@ -109,33 +106,39 @@ impl Ffmpeg {
         Ok(false)
     }
 
-    /// The place of the next picture, and how many there are; `None` where the video does not say, or to go to another place would be to read on for long.
+    /// The place of the next picture, and how many there are; `None` where the video does not say.
     ///
     /// # Errors
     /// OpenCV's.
     pub fn place(&self) -> Result<Option<(f64, f64)>, SourceError> {
         let count = self.capture.get(videoio::CAP_PROP_FRAME_COUNT)?;
-        if self.is_jpeg {
-            return Ok((1.0..=MOST_READ).contains(&count).then_some((self.at as f64, count)));
-        }
-        let next = self.capture.get(videoio::CAP_PROP_POS_FRAMES)?;
+        let next = match self.is_jpeg {
+            true => (self.at - u64::from(self.next.is_some())) as f64,
+            false => self.capture.get(videoio::CAP_PROP_POS_FRAMES)?,
+        };
         Ok((count >= 1.0 && next >= 0.0).then_some((next, count)))
     }
 
-    /// Goes to the picture of that place; `false` where it cannot.
+    /// Goes to the picture of that place; `false` where it cannot, or would read for long.
     ///
     /// # Errors
     /// OpenCV's, and those of [`Ffmpeg::open`].
     pub fn go_to(&mut self, place: f64) -> Result<bool, SourceError> {
-        self.next = None;
         if !self.is_jpeg {
+            self.next = None;
             return Ok(self.capture.set(videoio::CAP_PROP_POS_FRAMES, place)?);
         }
         // OpenCV finds places by times that it learns as it decodes.
-        if (place as u64) < self.at {
+        let place = place as u64;
+        let (begins_anew, from) = if place < self.at { (true, 0) } else { (false, self.at) };
+        if place - from > MOST_READ {
+            return Ok(false);
+        }
+        self.next = None;
+        if begins_anew {
             self.rewind()?;
         }
-        while self.at < place as u64 && self.grab()? {}
+        while self.at < place && self.grab()? {}
         Ok(true)
     }
 
@@ -207,12 +210,12 @@ fn is_jpeg(path: &Path, capture: &VideoCapture, size: Size) -> Result<bool, Sour
     // The first may be damaged.
     for _ in 0..FIRST {
         let mut picture = Mat::default();
-        if probe.read(&mut picture)?
-            && !picture.empty()
-            && picture.data_bytes()?.starts_with(JPEG)
-            && let Ok(claim) = inspect(picture.data_bytes()?)
-        {
-            return Ok(claim.size() == Some(size));
+        if probe.read(&mut picture)? && !picture.empty() && picture.data_bytes()?.starts_with(JPEG) {
+            let mut image = Mat::default();
+            // What is a JPEG to FFmpeg alone is left to it.
+            if decode(picture.data_bytes()?, MAX_MEGAPIXELS, &mut image).is_ok() {
+                return Ok(image.size()? == size);
+            }
         }
     }
     Ok(false)
