@@ -19,21 +19,26 @@ class Last:
         heard = {field: decision[field] for field in ("round", "class", "label", "final")}
         name = tuple(heard["round"][part] for part in ("counter", "opener", "life"))
         known = self.decision
-        is_last = known is None or self._follows(name, heard["final"])
+        is_last = known is None or self._follows(name, heard)
         self._rounds.append(name)
         if not is_last:
             return False
         self.decision = heard
-        return known is None or known["label"] != heard["label"] or known["round"]["counter"] != heard["round"]["counter"]
+        return known is None or known["label"] != heard["label"] or not self._is_one(heard["round"], known["round"])
 
-    def _follows(self, name, is_final):
+    @staticmethod
+    def _is_one(this, other):
+        """Whether two rounds may be two names of one: of one count, and not of one robot before and after it started again."""
+        return this["counter"] == other["counter"] and (this["opener"] != other["opener"] or this["life"] == other["life"])
+
+    def _follows(self, name, heard):
         (counter, opener, life), known = name, self.decision
-        last, its_opener, its_life = (known["round"][part] for part in ("counter", "opener", "life"))
-        if counter == last and (opener != its_opener or life == its_life):
-            return is_final or not known["final"]
+        if self._is_one(heard["round"], known["round"]):
+            return heard["final"] or not known["final"]
+        last = known["round"]
         # A swarm that starts again counts from one.
-        starts_again = life != its_life if opener == its_opener else counter + self.LATE < last
-        return counter > last or starts_again and name not in self._rounds
+        starts_again = life != last["life"] if opener == last["opener"] else counter + self.LATE < last["counter"]
+        return counter > last["counter"] or starts_again and name not in self._rounds
 
 
 def instruction(text, decision, spoken=None):

@@ -207,6 +207,8 @@ pub fn examples_for_ros_take_no_late_decision_for_the_last() {
         (said(1, 8, "one", true), json!([true, 1])),
         (said(1, 8, "one", true), json!([false, 1])),
         (said(2, 8, "two", true), json!([true, 2])),
+        // And again, under the same count.
+        (said(2, 9, "two", true), json!([true, 2])),
     ];
     let said: Vec<&Value> = steps.iter().map(|(said, _)| said).collect();
     let ran = run_python(HEAR, &json!(said));

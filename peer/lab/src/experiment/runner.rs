@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use gestalt_vision::perception::FeatureSet;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -69,19 +70,20 @@ pub fn conduct_by(
     let rules = cells.iter().map(|cell| rules_of(cell, rules)).collect::<Result<Vec<_>, _>>()?;
     let seeds = seeds.unwrap_or(experiment.seeds);
     let hands = experiment.seen(materials.dataset.as_deref());
+    let ready = materials.dataset.is_none() && experiment.hands.vocabulary.is_some();
+    let starts_from_it = |cell: &Cell| cell.setting.start == Start::Model;
+    let are_drawn = ready && hands.features != FeatureSet::Embedding;
+    if materials.start.is_some() && (are_drawn || !cells.iter().any(starts_from_it)) {
+        return Err(ExperimentError::Setting(
+            "no robot starts from --start-dataset: leave it out, or say start: 'model'".to_owned(),
+        ));
+    }
     let program = this_program(hands.features)?;
     folder::claim(folder, text, materials, seeds, &program)?;
     let looked = |done, total| progress(Progress::Looked(done, total));
     let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);
     let split = fewest_judged(&pool, seeds)?;
-    let ready = materials.dataset.is_none() && experiment.hands.vocabulary.is_some();
-    let starts_from_it = |cell: &Cell| cell.setting.start == Start::Model;
-    if materials.start.is_some() && (ready || !cells.iter().any(starts_from_it)) {
-        return Err(ExperimentError::Setting(
-            "no robot starts from --start-dataset: leave it out, or say start: 'model' of hands that are counts of fingers".to_owned(),
-        ));
-    }
     let mut schools = Schools::new(pool.vocabulary()?, (hands.features, ready), materials.start.as_deref())?;
     let taught: Vec<Taught<'_>> = cells
         .iter()
