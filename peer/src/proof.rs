@@ -275,7 +275,7 @@ mod tests {
         let rounds = MindConfig::default();
         let said = |decision: Decision, by: u8| {
             let (announcer, stamp) = (RobotId(2), gestalt_protocol::Stamp { boot: 1, sequence: 900 });
-            let label = Some("b".to_owned());
+            let label = decision.class.map(|_| "b".to_owned());
             let unsigned = Announcement { decision, label, announcer, stamp, signature: None };
             let signer = Signer(Identity::from_bytes(&[by; 32]), roster.swarm_id());
             let signature = Some(signer.sign(&Envelope::from(unsigned.clone()).statement()));

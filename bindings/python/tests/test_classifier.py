@@ -71,6 +71,8 @@ class Learning(unittest.TestCase):
         other = np.char.add("new ", labels)
         thread = threading.Thread(target=classifier.fit, args=(many, other))
         thread.start()
+        while not classifier._lock.locked() and thread.is_alive():
+            pass
         refused = answered = 0
         while thread.is_alive():
             gestures = classifier.predict(X[:5])

@@ -190,7 +190,7 @@ impl Mind {
             }
         }
         if self.rounds.round() != round {
-            self.ask_again_for_lessons();
+            self.exchanges.forget_declined_lessons();
         }
         self.carry_on_learning(&mut out);
         self.answer_when_due(&mut out);

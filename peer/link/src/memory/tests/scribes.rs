@@ -154,7 +154,8 @@ fn what_is_found_late_and_not_taken_up_is_never_written_again() {
     let made = folder.path().join("made");
     fs::create_dir(&made).unwrap();
     // Whose it is, and nothing else.
-    let owner = RecordChange { key: vec![0], value: Some(vec![3, ME.0 as u8, 1, 1]) };
+    let owner = [&[3, ME.0 as u8][..], &1_u64.to_le_bytes(), &[1]].concat();
+    let owner = RecordChange { key: vec![0], value: Some(owner) };
     open(&made.join("m")).unwrap().write(&[owner], None).unwrap();
     fs::rename(&made, &late).unwrap();
     watched.wait("found", |told| matches!(told, Told::Found(_)).then_some(()));
