@@ -29,9 +29,8 @@ pub(crate) struct Round {
     pub id: RoundId,
     /// When this robot first heard of it.
     pub since: Duration,
-    /// Whether this robot still takes part by looking and voting.
+    /// Whether this robot still takes part by looking and voting; and, once it does not, whether it was long enough to say something.
     pub open: bool,
-    /// Whether it was open for long enough to say something.
     pub lasted: bool,
     pub ballot: Ballot,
     pub agreement: Agreement,
@@ -105,8 +104,7 @@ impl Round {
         }
     }
 
-    /// Whether that is its name, or was found to be one while it began. A vote is passed on under the name that it was cast under, however late:
-    /// who took that for another round would go on in one that nobody shows anything in.
+    /// Whether that is its name, or was found to be one while it began: a vote is passed on under the name that it was cast under, however late.
     pub fn is_named(&self, id: RoundId) -> bool {
         self.names.contains(id)
     }
