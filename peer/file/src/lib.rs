@@ -12,11 +12,12 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// How often a folder that others write to is tried, and how long each time is waited. Whoever may read a folder can lock it: nobody is kept from
-/// writing for longer than that.
-const TRIES: usize = 200;
+/// How long a folder that others write to is waited for. Whoever may read a folder can lock it: nobody is kept from writing for longer than that.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// How often a file that others hold is tried.
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// How many links may lead to one another: as many as Linux follows.
@@ -105,14 +106,23 @@ pub fn keep_name(path: &Path) -> io::Result<()> {
 #[must_use]
 pub fn lock(path: &Path) -> Option<fs::File> {
     let folder = fs::File::open(folder(path)).ok()?;
-    for _ in 0..TRIES {
-        match folder.try_lock() {
-            Ok(()) => return Some(folder),
+    matches!(hold(&folder, PATIENCE), Ok(true)).then_some(folder)
+}
+
+/// Keeps others that ask for the same from an open file, until it is dropped; `false` where files cannot be locked.
+///
+/// # Errors
+/// [`io::ErrorKind::WouldBlock`] when somebody else has kept it for so long.
+pub fn hold(file: &fs::File, patience: Duration) -> io::Result<bool> {
+    let began = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(true),
+            Err(fs::TryLockError::Error(_)) => return Ok(false),
+            Err(held) if began.elapsed() >= patience => return Err(held.into()),
             Err(fs::TryLockError::WouldBlock) => thread::sleep(PAUSE),
-            Err(fs::TryLockError::Error(_)) => return None,
         }
     }
-    None
 }
 
 fn put(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {

@@ -88,11 +88,12 @@ impl Source<Shot> for Files {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Shot, SourceError> {
-        let path = self.0.next_file()?;
-        let content = match read_jpeg(path, MAX_FRAME).map_err(SourceError::of_one_file)? {
-            Some(jpeg) => Content::Encoded(jpeg),
-            None => Content::Picture(read_image(path).map_err(SourceError::of_one_file)?),
-        };
+        let content = self.0.read_next(|path| {
+            Ok(match read_jpeg(path, MAX_FRAME)? {
+                Some(jpeg) => Content::Encoded(jpeg),
+                None => Content::Picture(read_image(path)?),
+            })
+        })?;
         Ok(Shot { content, at: now, period: self.period(), checksum: None })
     }
 }

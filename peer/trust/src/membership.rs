@@ -6,6 +6,7 @@ use gestalt_protocol::{InstructorId, Keys, MAX_ROBOTS, RobotId};
 use serde::{Deserialize, Serialize};
 
 use crate::public_key::PublicKey;
+use crate::request::Applicant;
 use crate::roles::Roles;
 use crate::roster_error::{Member, RosterError};
 
@@ -43,6 +44,15 @@ pub struct Membership {
 }
 
 impl Membership {
+    /// The key that a member has.
+    #[must_use]
+    pub fn key(&self, who: &Applicant) -> Option<PublicKey> {
+        match who {
+            Applicant::Robot(robot) => self.robots.get(robot).copied(),
+            Applicant::Client(name) => self.instructors.get(name).map(|held| held.key),
+        }
+    }
+
     /// [`ROSTER_DOMAIN`], then authority and members in postcard: sorted maps have one spelling.
     pub(crate) fn signed_bytes(&self, authority: &PublicKey) -> Vec<u8> {
         postcard::to_extend(&(authority, self), ROSTER_DOMAIN.to_vec())

@@ -104,8 +104,7 @@ class Classifier:
                 raise DataError("classes differ from those of the first call")
             if self._learner is None:
                 self._learner = _native.Learner.on(self._model, **self._options())
-            if rows.shape[1] != self.n_features_in_:
-                raise DataError(f"X has {rows.shape[1]} features, it learned from {self.n_features_in_}")
+            _check_width(rows, self.n_features_in_)
             self._learner.insert(rows.tobytes(), _places(labels, self.classes_))
             self._model = self._learner.learn()
         return self
@@ -256,8 +255,7 @@ class Classifier:
         self.model  # says so if there is none
         known = dict(self.__dict__)
         rows = _matrix(X)
-        if rows.shape[1] != known["n_features_in_"]:
-            raise DataError(f"X has {rows.shape[1]} features, it learned from {known['n_features_in_']}")
+        _check_width(rows, known["n_features_in_"])
         return known["_model"], known["classes_"], rows
 
 
@@ -284,6 +282,11 @@ def _samples(X: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Singles, npt.NDArray[A
     if labels.ndim != 1 or len(labels) != len(rows):
         raise DataError(f"y has the shape {labels.shape}: one gesture for each of {len(rows)} samples is expected")
     return rows, labels
+
+
+def _check_width(rows: Singles, features: int) -> None:
+    if rows.shape[1] != features:
+        raise DataError(f"X has {rows.shape[1]} features, it learned from {features}")
 
 
 def _places(labels: npt.NDArray[Any], classes: npt.NDArray[Any]) -> bytes:

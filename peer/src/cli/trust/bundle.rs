@@ -4,7 +4,7 @@ use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use gestalt_link::{Bearer, Certificate, Credentials};
+use gestalt_link::{Certificate, Credentials};
 use gestalt_trust::{Applicant, Identity, Roster, RosterError};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::super::Failure;
 use super::folder::said;
-use super::keys::key_path;
+use super::keys::{holder, key_path};
 use crate::config::{ROSTER_FILE, certificate_file};
 
 const BEGIN: &str = "-----BEGIN GESTALT MEMBERSHIP-----";
@@ -75,12 +75,7 @@ pub(super) fn accept(folder: &Path, text: &str) -> Result<(Applicant, Roster), F
     }
     let identity = Identity::read(&key)?;
     certificate.check(&offered, holder(&who), &identity.public_key())?;
-    let is_member = |roster: &Roster| match &who {
-        Applicant::Robot(robot) => roster.members().robots.get(robot) == Some(&identity.public_key()),
-        Applicant::Client(name) => {
-            roster.members().instructors.get(name).is_some_and(|it| it.key == identity.public_key())
-        }
-    };
+    let is_member = |roster: &Roster| roster.members().key(&who) == Some(identity.public_key());
     if !is_member(&offered) {
         return Err(format!(
             "{} is not on this roster with the key that it has here: ask for the newest",
@@ -134,13 +129,6 @@ pub(super) fn write_client(
     let file = folder.join("zenoh.json5");
     gestalt_file::replace_secret(&file, text.as_bytes())
         .map_err(|error| format!("cannot write {}: {error}", file.display()).into())
-}
-
-fn holder(who: &Applicant) -> Bearer {
-    match who {
-        Applicant::Robot(robot) => Bearer::Robot(*robot),
-        Applicant::Client(name) => Bearer::Client(name.clone()),
-    }
 }
 
 #[cfg(test)]

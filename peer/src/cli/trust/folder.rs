@@ -1,29 +1,27 @@
 //! The folder of whoever has the authority's key: who is a member, and with which key.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread;
 use std::time::Duration;
 
-use gestalt_link::{Bearer, Certificate};
+use gestalt_link::Certificate;
 use gestalt_protocol::{IdError, InstructorId, Keys, RobotId};
 use gestalt_trust::{
     Applicant, Identity, Instructor, KeyFileError, Membership, PublicKey, Role, Roles, Roster,
 };
 
 use super::super::Failure;
-use super::keys::{make, new_identity, remove, until_it_counts};
+use super::keys::{holder, make, new_identity, remove, until_it_counts};
 use super::revoked::Revoked;
 use crate::config::{ROSTER_FILE, SwarmName, certificate_file, key_file};
 
 /// The secret of whoever may change the roster.
 const AUTHORITY_FILE: &str = "authority.key";
 
-/// How often a folder in which somebody else changes the roster is tried, and how long each time is waited.
-const TRIES: usize = 100;
-const PAUSE: Duration = Duration::from_millis(100);
+/// How long a folder in which somebody else changes the roster is waited for.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A swarm in the hands of its authority.
 pub(crate) struct Authority {
@@ -279,10 +277,7 @@ impl Authority {
     /// The key that a member has.
     #[must_use]
     pub fn key(&self, who: &Applicant) -> Option<PublicKey> {
-        match who {
-            Applicant::Robot(robot) => self.members.robots.get(robot).copied(),
-            Applicant::Client(name) => self.members.instructors.get(name).map(|held| held.key),
-        }
+        self.members.key(who)
     }
 
     /// Refuses members whose keys were taken off the roster before, where it was restored from an older copy, or a command was interrupted; not while they become
@@ -365,11 +360,7 @@ impl Authority {
     /// # Errors
     /// What keeps a certificate from being made.
     pub fn certify(&self, who: &Applicant, key: &PublicKey) -> Result<Certificate, Failure> {
-        let holder = match who {
-            Applicant::Robot(robot) => Bearer::Robot(*robot),
-            Applicant::Client(name) => Bearer::Client(name.clone()),
-        };
-        Ok(Certificate::issue(&self.identity, &self.members.swarm, holder, key)?)
+        Ok(Certificate::issue(&self.identity, &self.members.swarm, holder(who), key)?)
     }
 
     /// Signs the next roster and writes it; then new keys take the place of old ones.
@@ -391,15 +382,10 @@ impl Authority {
 /// Keeps others that ask for the same out, until what is returned is dropped. `None` where files cannot be locked.
 fn alone(file: &Path) -> Result<Option<File>, Failure> {
     let held = File::open(file).map_err(|error| format!("cannot read {}: {error}", file.display()))?;
-    for _ in 0..TRIES {
-        match held.try_lock() {
-            Ok(()) => return Ok(Some(held)),
-            Err(TryLockError::WouldBlock) => thread::sleep(PAUSE),
-            Err(TryLockError::Error(_)) => return Ok(None),
-        }
-    }
-    Err(format!("somebody else changes the roster in {} all the time", file.with_file_name("").display())
-        .into())
+    let is_held = gestalt_file::hold(&held, PATIENCE).map_err(|_| {
+        format!("somebody else changes the roster in {} all the time", file.with_file_name("").display())
+    })?;
+    Ok(is_held.then_some(held))
 }
 
 /// The member in words.

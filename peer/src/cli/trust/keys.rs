@@ -4,6 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use gestalt_link::Bearer;
 use gestalt_trust::{Applicant, Identity};
 
 use super::super::Failure;
@@ -40,6 +41,14 @@ pub(super) fn key_here(folder: &Path, who: &Applicant) -> Result<Option<Identity
 /// Where the key that will lie there lies before.
 pub(super) fn until_it_counts(key: &Path) -> PathBuf {
     key.with_extension("new.key")
+}
+
+/// Whose certificate it is.
+pub(super) fn holder(who: &Applicant) -> Bearer {
+    match who {
+        Applicant::Robot(robot) => Bearer::Robot(*robot),
+        Applicant::Client(name) => Bearer::Client(name.clone()),
+    }
 }
 
 /// Where a member's key lies.

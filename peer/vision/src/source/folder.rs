@@ -31,11 +31,18 @@ impl ImageFolder {
         Ok(Self { folder: folder.into(), images: listed(folder)?, next: 0, period, looping })
     }
 
-    /// The file of the next frame. The folder is listed anew whenever it starts again.
+    /// What is read of the next file. The folder is listed anew whenever it starts again.
     ///
     /// # Errors
-    /// [`SourceError::Ended`], and those of [`ImageFolder::open`].
-    pub fn next_file(&mut self) -> Result<&Path, SourceError> {
+    /// [`SourceError::Ended`], and those of [`ImageFolder::open`]; those of `read` are of one file.
+    pub fn read_next<T>(
+        &mut self,
+        read: impl FnOnce(&Path) -> Result<T, SourceError>,
+    ) -> Result<T, SourceError> {
+        read(self.next_file()?).map_err(SourceError::of_one_file)
+    }
+
+    fn next_file(&mut self) -> Result<&Path, SourceError> {
         if self.next == self.images.len() && self.looping {
             (self.images, self.next) = (listed(&self.folder)?, 0);
         }
@@ -81,8 +88,7 @@ impl Source for ImageFolder {
     }
 
     fn next_frame(&mut self, now: Duration, _: &Scene) -> Result<Frame, SourceError> {
-        let image = read_image(self.next_file()?).map_err(SourceError::of_one_file)?;
-        Ok(Frame { image, at: now })
+        Ok(Frame { image: self.read_next(read_image)?, at: now })
     }
 }
 

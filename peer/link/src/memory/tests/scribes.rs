@@ -1,13 +1,14 @@
 //! What the writing thread makes of disks that fail, come late, or lose the file.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use gestalt_protocol::Status;
 use gestalt_strategies::RecordChange;
+use tempfile::TempDir;
 use tokio::sync::broadcast;
 
 use super::super::{Assignment, Place, Records, Scribe, Store, Told};
@@ -45,6 +46,15 @@ fn start_knowing(place: Arc<dyn Place>, store: Option<Store>, known: Records) ->
 
 fn start_at(path: &Path) -> Watched {
     start(place(path), Some(open(path).unwrap()))
+}
+
+/// A scribe that has something to write, and where its disk will be.
+fn start_without_disk(folder: &TempDir) -> (PathBuf, Watched) {
+    let late = folder.path().join("late");
+    let watched = start(place(&late.join("m")), None);
+    watched.scribe.remember(1, vec![change(1, Some(1))]);
+    watched.wait_for_error("its folder is not there");
+    (late, watched)
 }
 
 impl Watched {
@@ -120,10 +130,7 @@ fn a_file_removed_while_running_is_written_anew_with_all_that_is_known() {
 #[test]
 fn a_disk_that_comes_late_and_empty_takes_all() {
     let folder = tempfile::tempdir().unwrap();
-    let late = folder.path().join("late");
-    let watched = start(place(&late.join("m")), None);
-    watched.scribe.remember(1, vec![change(1, Some(1))]);
-    watched.wait_for_error("its folder is not there");
+    let (late, watched) = start_without_disk(&folder);
     fs::create_dir(&late).unwrap();
     watched.wait_for_revision(1);
     drop(watched);
@@ -147,10 +154,7 @@ fn what_could_be_read_alone_and_went_then_is_written_anew() {
 #[test]
 fn what_is_found_late_and_not_taken_up_is_never_written_again() {
     let folder = tempfile::tempdir().unwrap();
-    let late = folder.path().join("late");
-    let watched = start(place(&late.join("m")), None);
-    watched.scribe.remember(1, vec![change(1, Some(1))]);
-    watched.wait_for_error("its folder is not there");
+    let (late, watched) = start_without_disk(&folder);
     let made = folder.path().join("made");
     fs::create_dir(&made).unwrap();
     // Whose it is, and nothing else.
@@ -171,10 +175,7 @@ fn what_is_found_late_and_not_taken_up_is_never_written_again() {
 #[test]
 fn a_file_damaged_late_is_refused_again_and_again_and_never_written_over() {
     let folder = tempfile::tempdir().unwrap();
-    let late = folder.path().join("late");
-    let watched = start(place(&late.join("m")), None);
-    watched.scribe.remember(1, vec![change(1, Some(1))]);
-    watched.wait_for_error("its folder is not there");
+    let (late, watched) = start_without_disk(&folder);
     fs::create_dir(folder.path().join("made")).unwrap();
     fs::write(folder.path().join("made/m"), "redb\x1a, but no more").unwrap();
     fs::rename(folder.path().join("made"), &late).unwrap();

@@ -4,6 +4,14 @@ use super::super::keys::key_of;
 use super::*;
 use crate::config::TrustSection;
 
+/// A new swarm of these robots.
+fn swarm_of(folder: &Path, robots: &[u32]) -> (Authority, Roster) {
+    let mut authority = Authority::create(folder, "demo", Roles::NONE).unwrap();
+    robots.iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
+    let roster = authority.save().unwrap();
+    (authority, roster)
+}
+
 #[test]
 fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
     let folder = tempfile::tempdir().unwrap();
@@ -36,9 +44,8 @@ fn robots_are_enrolled_one_after_the_other_and_keep_their_keys() {
 #[test]
 fn who_was_expelled_comes_back_with_a_new_key_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
-    [1, 7].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
-    let before = authority.save().unwrap().members().robots[&RobotId(7)];
+    let (mut authority, roster) = swarm_of(folder.path(), &[1, 7]);
+    let before = roster.members().robots[&RobotId(7)];
     authority.expel(&Applicant::Robot(RobotId(7))).unwrap();
     let roster = authority.save().unwrap();
     assert!(
@@ -120,10 +127,7 @@ fn no_key_that_was_taken_off_the_roster_ever_comes_back() {
 #[test]
 fn a_folder_that_has_a_swarm_is_left_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
-    authority.enrol_here(RobotId(7)).unwrap();
-    authority.save().unwrap();
-    drop(authority);
+    drop(swarm_of(folder.path(), &[7]));
     // The key that may change it was put away.
     fs::remove_file(folder.path().join(AUTHORITY_FILE)).unwrap();
     let refused = Authority::create(folder.path(), "demo", Roles::NONE).map(drop).unwrap_err().to_string();
@@ -150,9 +154,7 @@ fn robots_that_are_enrolled_at_once_in_a_new_folder_are_of_one_swarm() {
 #[test]
 fn the_old_key_is_there_until_the_roster_has_the_new_one() {
     let folder = tempfile::tempdir().unwrap();
-    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
-    authority.enrol_here(RobotId(7)).unwrap();
-    let before = authority.save().unwrap();
+    let (authority, before) = swarm_of(folder.path(), &[7]);
     drop(authority);
     let key = || Identity::read(&key_file(folder.path(), RobotId(7))).unwrap().public_key();
     let trust = TrustSection { keys: Some(folder.path().to_owned()), ..TrustSection::default() };
@@ -174,10 +176,7 @@ fn the_old_key_is_there_until_the_roster_has_the_new_one() {
 #[test]
 fn of_keys_that_are_made_at_once_the_one_on_the_roster_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
-    authority.enrol_here(RobotId(7)).unwrap();
-    authority.save().unwrap();
-    drop(authority);
+    drop(swarm_of(folder.path(), &[7]));
     let rekey = || {
         let mut authority = Authority::open(folder.path()).unwrap();
         authority.rekey(RobotId(7), None).unwrap();
@@ -221,9 +220,8 @@ fn who_was_interrupted_goes_on() {
 #[test]
 fn a_key_is_not_taken_away_where_the_roster_stays_what_it_was() {
     let folder = tempfile::tempdir().unwrap();
-    let mut authority = Authority::create(folder.path(), "demo", Roles::NONE).unwrap();
-    [7, 8].iter().for_each(|robot| authority.enrol_here(RobotId(*robot)).unwrap());
-    let of_eight = authority.save().unwrap().members().robots[&RobotId(8)];
+    let (mut authority, roster) = swarm_of(folder.path(), &[7, 8]);
+    let of_eight = roster.members().robots[&RobotId(8)];
     // The card of one was copied for the other.
     authority.rekey(RobotId(7), Some(of_eight)).unwrap();
     assert!(authority.save().unwrap_err().to_string().contains("the same key"));
