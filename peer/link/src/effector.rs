@@ -25,8 +25,12 @@ impl Effector {
         match output {
             Output::Broadcast(envelope) => {
                 self.voice.broadcast(&envelope);
-                if let Message::Samples(samples) = envelope.message {
-                    self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
+                match envelope.message {
+                    Message::Samples(samples) => {
+                        self.tell(Event::Shared(samples.samples.iter().map(|sample| sample.id).collect()));
+                    }
+                    Message::Holding(holding) => self.tell(Event::Holding(holding)),
+                    _ => {}
                 }
             }
             Output::Tell(neighbour, envelope) => self.voice.tell(neighbour, &envelope),

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use gestalt_protocol::{Announcement, Answer, Decision, InstructorId, Question, RobotId, RoundId, SampleId};
+use gestalt_protocol::{
+    Announcement, Answer, Decision, Holding, InstructorId, Question, RobotId, RoundId, SampleId,
+};
 
 use crate::failure::Part;
 
@@ -22,6 +24,8 @@ pub enum Event {
     Closed(RoundId),
     /// It now holds that decision.
     Held(Decision),
+    /// It told the others that it holds that, and whether it held another gesture of that round before.
+    Holding(Holding),
     /// That decision was announced for the swarm, by this robot, or by another and this one found nothing against it.
     Announced(Announcement),
     /// That was asked in the name of the swarm, by this robot or another.

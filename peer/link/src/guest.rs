@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use gestalt_protocol::{Decision, RobotId, Status};
+use gestalt_protocol::{Holding, RobotId, Status};
 use gestalt_strategies::{Classify, Input, Voter};
 use gestalt_trust::Identity;
 use tokio::sync::{broadcast, mpsc};
@@ -193,7 +193,7 @@ impl Guest {
                 },
                 () = given.there() => self.take_given(),
                 event = host_events.recv() => match event {
-                    Ok(Event::Held(decision)) => self.hold(&decision).await,
+                    Ok(Event::Holding(holding)) => self.hold(holding).await,
                     Ok(event) => self.on_event(event),
                     Err(broadcast::error::RecvError::Lagged(_)) => self.catch_up(),
                     Err(broadcast::error::RecvError::Closed) => break,
@@ -249,6 +249,7 @@ impl Guest {
             Event::Announced(_) | Event::Asked(_) => {}
             // What the host alone lives through.
             Event::Held(_)
+            | Event::Holding(_)
             | Event::Neighbours(_)
             | Event::Shared(_)
             | Event::Answered(..)
@@ -260,8 +261,8 @@ impl Guest {
     }
 
     /// Says that it holds what its host does.
-    async fn hold(&mut self, decision: &Decision) {
-        if let Some(said) = self.voter.holds(decision) {
+    async fn hold(&mut self, holding: Holding) {
+        if let Some(said) = self.voter.holds(holding) {
             self.presence.hold(&said);
             self.tell_host(Input::Received(said)).await;
         }

@@ -24,14 +24,16 @@ impl Rounds {
         let (id, class, is_final) = (decision.round, decision.class, decision.is_final);
         // Who has no list of gestures announces without a label, and a liar may do so to keep it from all clients: who knows one still says it in its turn.
         let lacks_its_label = label.is_none() && self.label_of(&decision).is_some();
+        let heard = self.hear_decision(decision, announcer, effects);
         // What nobody would decide, nobody announced.
-        self.announcement_stands =
-            self.hear_decision(decision, announcer, effects) != Heard::Refused && !lacks_its_label;
-        if self.announcement_stands
+        let is_said = heard != Heard::Refused && !lacks_its_label;
+        self.announcement_stands = is_said && heard != Heard::Doubted;
+        if is_said
             && self.is_this_round(id)
             && let Some(round) = &mut self.round
         {
-            round.agreement.note_announced(self.now, class, is_final);
+            // Clients heard it, and are to hear what is held here. If that comes to be this, it is still to be said that it is final.
+            round.agreement.note_announced(self.now, class, is_final && self.announcement_stands);
         }
     }
 

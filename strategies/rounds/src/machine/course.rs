@@ -105,7 +105,9 @@ impl Rounds {
     pub(super) fn close(&mut self, effects: &mut Effects<'_>) {
         if let Some(round) = self.round.as_mut().filter(|round| round.open) {
             round.open = false;
-            round.lasted = self.now >= round.since + self.config.patience;
+            // Where most of the swarm cannot be seen its members were to say nothing, also if they can be by the time that silence is judged.
+            let asked = self.committee.is_none() || self.electorate.sees_most();
+            round.lasted = asked && self.now >= round.since + self.config.patience;
         }
         if self.looking_until(effects.follower).is_none() {
             self.stop_looking(effects);

@@ -150,6 +150,7 @@ impl Rounds {
         let scale = Scale { vocabulary: vote.vocabulary, classes: vote.listed() };
         if !vote.evidence.is_empty() && self.is_foreign(scale) {
             self.refusals.add(Refusal::Vocabulary);
+            self.hear_of(robot);
             return false;
         }
         let this = self.is_this_round(vote.round);
@@ -201,9 +202,7 @@ impl Rounds {
             self.hear_waiting(effects);
         }
         if let Some(earlier) = of_other_life.filter(|known| known.stamp < stamp) {
-            // It does not know that it was in this round before, and would count itself.
-            let give = Give { decision: None, votes: vec![earlier], holders: Vec::new() };
-            self.tell(robot, Message::Give(give), effects);
+            self.tell_of_other_life(earlier, effects);
         }
         is_news
     }
@@ -281,7 +280,7 @@ impl Rounds {
             Ok(Ordering::Greater) => self.enter(decision.round, false, effects),
             Ok(Ordering::Equal) => {}
         }
-        self.cast_counted(&decision);
+        self.cast_known(&decision, effects);
         let expected = expected(self.committee.as_ref(), &self.electorate, &self.alive);
         let committee = self.committee.as_ref().map(|committee| &committee.members);
         let (scale, robots) = (self.own_scale(), self.electorate.count());
@@ -292,33 +291,60 @@ impl Rounds {
             && !round.bears_out(self.now, &decision, &view, &*self.fusion, &self.config)
         {
             // Its votes were heard; what they are worth, this robot finds itself.
-            return Heard::Known;
+            return Heard::Doubted;
         }
         // Where that is no name of this round by now, it had as many: it is a decision of this by any of one count.
         let id = if round.is_named(decision.round) { decision.round } else { round.id };
         let decision = Decision { round: id, ..decision };
         let news = match most_hold {
             Some(true) => round.agreement.give_way(decision),
-            Some(false) => false,
+            Some(false) => return Heard::Doubted,
             None => round.agreement.believe(decision),
         };
         if news { Heard::News } else { Heard::Known }
     }
 
-    /// Counts the votes that a decision rests on. A robot whose vote was lost on its way here says something all the same: whoever took it
-    /// for a name without a robot would draw another committee than all others.
-    fn cast_counted(&mut self, decision: &Decision) {
+    /// Takes in the votes that come with a decision, those that it rests on and the others that were known. A robot whose vote was lost on its way here
+    /// says something all the same: whoever took it for a name without a robot would draw another committee than all others, or be a majority of its own.
+    fn cast_known(&mut self, decision: &Decision, effects: &mut Effects<'_>) {
+        let own = self.own_scale();
         let Some(round) = self.round.as_mut() else { return };
-        for counted in &decision.certificate.votes {
-            let robot = counted.robot;
-            if robot == self.me || self.past.contains(&counted.vote.round) {
+        let (mut earlier, mut lived_before) = (Vec::new(), false);
+        for held in decision.certificate.held_votes() {
+            let (robot, stamp, vote) = (held.robot, held.stamp, &held.vote);
+            if robot == self.me {
+                lived_before |= stamp.boot < self.stamp.boot;
                 continue;
             }
-            if round.ballot.cast(counted.held()) == Cast::Counted && self.alive.contains(robot) {
+            if self.past.contains(&vote.round) {
+                continue;
+            }
+            let known = round.ballot.of(robot).filter(|known| known.stamp.boot != stamp.boot);
+            if let Some(known) = known {
+                round.agreement.note_restart(robot);
+                earlier.extend((known.stamp < stamp).then(|| known.clone()));
+            }
+            let scale = Scale { vocabulary: vote.vocabulary, classes: vote.listed() };
+            // Who judges by another list of gestures counts for nothing, and is there.
+            let is_foreign = !vote.evidence.is_empty() && own.is_some_and(|own| own != scale);
+            let is_news = is_foreign || round.ballot.cast(held) == Cast::Counted;
+            if is_news && self.alive.contains(robot) {
                 self.electorate.hear(robot, self.now);
             }
         }
+        if lived_before {
+            round.agreement.note_restart(self.me);
+            self.say_holding(effects);
+        }
+        earlier.into_iter().for_each(|vote| self.tell_of_other_life(vote, effects));
         self.draw_if_the_size_calls_for_it();
+    }
+
+    /// Lets a robot know of a vote that it said before it started: it does not know that it was in this round before, and would count itself.
+    fn tell_of_other_life(&mut self, earlier: HeldVote, effects: &mut Effects<'_>) {
+        let robot = earlier.robot;
+        let give = Give { decision: None, votes: vec![earlier], holders: Vec::new() };
+        self.tell(robot, Message::Give(give), effects);
     }
 
     /// Whether most hold the gesture of that decision where this robot holds another (`true`), or the other (`false`), long after its round was over.
@@ -385,6 +411,9 @@ pub(super) enum Heard {
     News,
     /// It changes nothing.
     Known,
+    /// It is one that others may have drawn, and this robot holds it on no account: what its votes are worth to it, or what most say that they hold, is
+    /// another gesture.
+    Doubted,
     /// It is none, or of an older round.
     Refused,
 }

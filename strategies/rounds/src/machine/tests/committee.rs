@@ -147,6 +147,22 @@ fn where_most_of_the_swarm_cannot_be_seen_nobody_votes() {
     assert_eq!(mind.votes(), members.contains(&mind.me()));
 }
 
+/// They were not to say anything, as long as they saw so few.
+#[test]
+fn who_was_of_the_smaller_part_is_not_silent_when_the_cut_has_healed() {
+    let (members, _) = drawn(1);
+    let mut mind = one_of_many(members[0], adding_up());
+    let part: Vec<u32> = (1..=400).chain([members[0]]).collect();
+    mind.handle(ms(1000), Input::Alive(Arc::new(robots(part.clone()))));
+    mind.handle(ms(2000), votes(2, 1, null(1)));
+    assert!(members.iter().filter(|robot| part.contains(robot)).count() > 20 && !mind.votes());
+    live(&mut mind, ms(9000));
+    mind.handle(ms(9000), Input::Alive(Arc::new(robots(1..=SWARM))));
+    mind.handle(ms(9100), votes(2, 2, null(2)));
+    assert!(mind.silent().is_empty(), "{:?}", mind.silent());
+    assert_eq!(mind.electorate.count(), SWARM);
+}
+
 #[test]
 fn names_without_robots_are_drawn_once() {
     let (members, others) = drawn(1);

@@ -58,6 +58,49 @@ fn who_was_silent_counts_until_the_next_round_and_who_was_cut_off_meanwhile_coun
     }
 }
 
+/// All else that they said was lost on its way here.
+#[test]
+fn whose_votes_come_with_a_decision_are_robots_also_if_they_saw_nothing_or_judge_by_another_list() {
+    let other_list = Vote { vocabulary: VocabularyId(99), ..vote(1, 0, SURE) };
+    for vote_of_others in [null(1), other_list] {
+        let mut mind = mind(7);
+        mind.handle(ms(0), Input::Alive(Arc::new(robots((1..=9).filter(|robot| *robot != 7)))));
+        mind.handle(ms(0), votes(1, 1, null(1)));
+        let stamp = Stamp { boot: 1, sequence: 2 };
+        let counted = |robot| CountedVote {
+            robot: RobotId(robot),
+            stamp,
+            class: ClassId(0),
+            weight: 1.0,
+            vote: vote(1, 0, SURE),
+            signature: None,
+        };
+        let mut decision = decided(round(1, 1), Some(0), (1..=3).map(counted).collect(), 1);
+        let others = [4, 5, 6, 8, 9].map(RobotId);
+        let other = |robot| HeldVote { robot, stamp, vote: vote_of_others.clone(), signature: None };
+        decision.certificate.others = others.map(other).to_vec();
+        (decision.certificate.robots, decision.certificate.quorum) = (9, 5);
+        mind.handle(ms(1500), gives(1, decision));
+        live(&mut mind, ms(9000));
+        mind.handle(ms(9000), votes(1, 3, null(2)));
+        assert!(mind.silent().is_empty(), "{:?}", mind.silent());
+        assert_eq!(mind.electorate.count(), 9);
+    }
+}
+
+#[test]
+fn who_votes_by_another_list_of_gestures_is_no_name_without_a_robot() {
+    let mut mind = mind(7);
+    mind.handle(ms(0), Input::Alive(Arc::new(robots([1, 2, 4, 5]))));
+    mind.handle(ms(0), votes(1, 1, null(1)));
+    for robot in [4, 5] {
+        mind.handle(ms(1), votes(robot, 1, Vote { vocabulary: VocabularyId(99), ..vote(1, 0, SURE) }));
+    }
+    live(&mut mind, ms(9000));
+    mind.handle(ms(9000), votes(1, 2, null(2)));
+    assert_eq!(mind.silent(), &robots([2]));
+}
+
 #[test]
 fn fewer_robots_than_the_quorum_decide_nothing() {
     let mut mind = mind_with(7, RoundsConfig { quorum: Quorum::Evidence(2), ..adding_up() });
@@ -279,8 +322,11 @@ fn where_liars_are_expected_no_decision_is_believed_whose_gesture_leads_by_them_
     let scale = crate::ballot::Scale { vocabulary: vocabulary().id(), classes: 3 };
     let of_all = mind.ballot().unwrap().fuse(&config.rule, config.clip, scale).unwrap();
     assert_eq!((of_all.top, mind.held()), (ClassId(2), None), "it leads, and does not convince");
-    mind.handle(ms(1500), gives(66, by(&config, chosen)));
+    mind.handle(ms(1500), gives(66, by(&config, chosen.clone())));
     assert_eq!(mind.held(), None);
+    // Nor is it told to those who act on it.
+    mind.handle(ms(1500), announced(66, by(&config, Decision { is_final: true, ..chosen })));
+    assert_eq!((mind.held(), mind.announcement_stands()), (None, false));
     assert!(mind.refusals().iter().all(|(_, count)| count == 0), "it follows from its votes");
 }
 

@@ -68,20 +68,27 @@ fn who_started_again_in_the_midst_of_a_round_takes_what_was_decided_in_it_under_
 /// Others keep what it said last, and count it for that until it says otherwise.
 #[test]
 fn who_learns_that_it_was_in_a_round_before_says_so_of_what_it_holds_already() {
-    for given in [true, false] {
+    for given in ["held", "voted", "counted"] {
         let mut mind = mind(7);
         mind.handle(ms(0), votes(3, 1, vote(1, 0, SURE)));
         live(&mut mind, ms(3000));
         let held = mind.held().expect("it suffices").clone();
         let (robot, stamp) = (RobotId(7), Stamp { boot: 0, sequence: 9 });
         let give = match given {
-            true => {
+            "held" => {
                 let before = Holder { robot, stamp, holding: held.holding(false), signature: None };
                 Give { decision: None, votes: vec![], holders: vec![before] }
             }
-            false => {
+            "voted" => {
                 let before = HeldVote { robot, stamp, vote: vote(1, 1, SURE), signature: None };
                 Give { decision: None, votes: vec![before], holders: vec![] }
+            }
+            // Of a neighbour that holds a decision no votes come beside it.
+            _ => {
+                let mut theirs = decision(1, Some(1), 3, 3);
+                theirs.certificate.votes[0] =
+                    CountedVote { robot, stamp, ..theirs.certificate.votes[0].clone() };
+                Give { decision: Some(theirs), votes: vec![], holders: vec![] }
             }
         };
         let out = mind.handle(ms(3000), says(3, 9, Message::Give(give)));
