@@ -18,7 +18,8 @@ use crate::session::Node;
 /// How often links are looked at.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Who is newly linked is heard after this long: both say what they have at the busy pace, and answer.
+/// Who is newly linked is heard after this long: both say what they have at the busy pace, and answer. Nor is a link cut sooner that was heard
+/// over, however short the periods are: what is slow is not deaf, and what is dead ends by its lease.
 const FIRST_WORD: Duration = Duration::from_secs(5);
 
 /// The longest that first words are waited for, when links made anew stayed silent too: perhaps that robot tells nobody anything.
@@ -79,7 +80,7 @@ impl Patience {
             Some(silent) => {
                 self.tried.remove(&robot);
                 let periods = SILENT_PERIODS.max(u32::try_from(2 * self.of).unwrap_or(u32::MAX));
-                silent > self.idle.saturating_mul(periods)
+                silent > self.idle.saturating_mul(periods).max(FIRST_WORD)
             }
             None => {
                 let tried = self.tried.get(&robot).copied().unwrap_or_default();
@@ -120,5 +121,14 @@ mod tests {
         let mut patience = Patience::new(seconds(4));
         assert!(!patience.is_over(ROBOT, seconds(1000), Some(seconds(48))));
         assert!(patience.is_over(ROBOT, seconds(1000), Some(seconds(49))));
+    }
+
+    #[test]
+    fn nobody_is_cut_off_within_seconds_however_short_the_periods_are() {
+        for idle in [1, 50, 400] {
+            let mut patience = Patience::new(Duration::from_millis(idle));
+            assert!(!patience.is_over(ROBOT, seconds(1000), Some(FIRST_WORD)), "{idle} ms");
+            assert!(patience.is_over(ROBOT, seconds(1000), Some(2 * FIRST_WORD)), "{idle} ms");
+        }
     }
 }
