@@ -91,8 +91,13 @@ impl Account {
 
     /// A member is proven to lie. Counted once, however often it is told again.
     pub(super) fn convicted(&self, robot: RobotId, lie: Lie) {
-        self.set(&format!("convicted_{robot}"), 1);
+        self.set(&conviction(robot), 1);
         self.error(&format!("robot {robot} {lie}; enrol it anew with a new key"));
+    }
+
+    /// The key that lied is none of a member any more: it has another one, or has left.
+    pub(super) fn acquitted(&self, robot: RobotId) {
+        self.lock().counters.remove(&conviction(robot));
     }
 
     /// Sets a counter that is kept elsewhere.
@@ -130,6 +135,11 @@ impl Account {
         }
         status.errors.push(Reported { at_ms, what });
     }
+}
+
+/// The counter that says that this robot lied with the key that it has.
+fn conviction(robot: RobotId) -> String {
+    format!("convicted_{robot}")
 }
 
 fn add(counters: &mut BTreeMap<String, u64>, name: String, amount: u64) {

@@ -177,8 +177,13 @@ impl Inbox {
 
     /// Whoever was convicted meanwhile counts no more.
     pub(super) fn expel_fallen(&self) {
-        let fallen = self.judged(|judge, _| judge.fallen()).unwrap_or_default();
-        fallen.iter().for_each(|(robot, lie)| self.account.convicted(*robot, *lie));
+        // While the judge is held: a roster that is taken up meanwhile may acquit them, and is to come after.
+        let fallen = self.judged(|judge, _| {
+            let fallen = judge.fallen();
+            fallen.iter().for_each(|(robot, lie)| self.account.convicted(*robot, *lie));
+            fallen
+        });
+        let fallen = fallen.unwrap_or_default();
         let others: BTreeSet<RobotId> = fallen.into_iter().map(|(robot, _)| robot).collect();
         if !others.is_empty() {
             self.expel(others);

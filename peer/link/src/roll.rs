@@ -133,7 +133,9 @@ impl Roll {
         judge.adopt(next.clone())?;
         let members = next.members();
         let gone = before.iter().filter(|(robot, key)| members.robots.get(robot) != Some(key));
-        let gone = gone.map(|(robot, _)| *robot).collect();
+        let gone: BTreeSet<RobotId> = gone.map(|(robot, _)| *robot).collect();
+        // The status is told as the judge is, which has just forgotten them: nobody convicts in between.
+        gone.iter().for_each(|robot| self.account.acquitted(*robot));
         report(&self.account, &next);
         if members.robots.get(&self.me) != Some(&self.key) {
             self.account.count("expelled");
@@ -262,7 +264,7 @@ fn report(account: &Account, roster: &Roster) {
 #[cfg(test)]
 mod tests {
     use gestalt_protocol::Status;
-    use gestalt_trust::{Identity, Membership};
+    use gestalt_trust::{Identity, Lie, Membership};
 
     use super::*;
 
@@ -301,6 +303,36 @@ mod tests {
         assert!(roll.may_read(next.len()));
         assert!(roll.take_up(&mut judge, next.as_bytes()).unwrap().is_some());
         assert_eq!(roll.newest().0, 2);
+    }
+
+    #[test]
+    fn who_has_another_key_or_has_left_is_no_liar_any_more() {
+        let key = |number| Identity::from_bytes(&[number; 32]).public_key();
+        let with = |epoch, robots: &[(u32, u8)]| {
+            let robots = robots.iter().map(|(robot, number)| (RobotId(*robot), key(*number)));
+            Membership { epoch, robots: robots.collect(), ..roster(epoch, 100).members().clone() }
+                .sign(&Identity::from_bytes(&[100; 32]))
+                .unwrap()
+        };
+        let (roll, _) = roll();
+        let mut judge = Judge::new(with(1, &[(1, 1), (2, 2), (3, 3)]), |_| false);
+        (2..=3).for_each(|robot| roll.account.convicted(RobotId(robot), Lie::Unfounded));
+        let convicted = || -> Vec<String> {
+            let counters = roll.account.lock().counters.clone();
+            counters
+                .into_keys()
+                .filter_map(|name| Some(name.strip_prefix("convicted_")?.to_owned()))
+                .collect()
+        };
+        let mut follow = |next: Roster| -> Vec<String> {
+            roll.take_up(&mut judge, next.to_json().as_bytes()).unwrap();
+            convicted()
+        };
+        assert_eq!(follow(with(2, &[(1, 1), (2, 2), (3, 3), (4, 4)])), ["2", "3"], "they have their keys");
+        assert_eq!(follow(with(3, &[(1, 1), (2, 2), (3, 9), (4, 4)])), ["2"]);
+        // By its new key it can lie again.
+        roll.account.convicted(RobotId(3), Lie::Unfounded);
+        assert_eq!(follow(with(4, &[(1, 1), (3, 9), (4, 4)])), ["3"]);
     }
 
     #[tokio::test]
