@@ -12,6 +12,7 @@ import hashlib
 import json
 import pathlib
 import struct
+import sys
 import threading
 import time
 
@@ -39,8 +40,18 @@ def main() -> None:
     roster = json.loads((args.folder / "roster.json").read_text())
     secret = bytes.fromhex((args.folder / f"client-{name}.key").read_text().strip())
     key = Ed25519PrivateKey.from_private_bytes(secret)
-    # Grows with every word, as long as the clock is right: seconds in the upper half, as in Zenoh's timestamps.
-    count = int(time.time() * 2**32)
+    # Grows with every word: seconds in the upper half, as in Zenoh's timestamps. Robots heed no word whose count is not above the last one's, so the
+    # last is kept beside the key, where `gestalt teach` keeps it, for a clock that is set back.
+    counted = args.folder / f"client-{name}.words"
+    try:
+        last = int(counted.read_text())
+    except (OSError, ValueError):
+        last = 0
+    count = max(int(time.time() * 2**32), last + 1)
+    try:
+        counted.write_text(f"{count}\n")
+    except OSError as error:
+        print(f"the count of this word is not kept: {error}", file=sys.stderr)
     word = args.word.encode()
 
     import zenoh
@@ -92,7 +103,7 @@ def main() -> None:
         raise SystemExit(f"no round was opened for '{name}', as its answer says: gestalt trust enrol --client {name} --role open keys, where the authority's key is, gives it the role")
     if not answered:
         raise SystemExit(f"no {'decision' if opens else 'answer'} within {patience} s: the word is none that robots know (docs/clients.md), "
-                         f"or the roster has no '{name}' with this key any more; gestalt doctor --keys {args.folder} -e {args.connect} says what is wrong")
+                         f"or the roster has no '{name}' with this key any more, or this key was last used by a clock that is ahead of this one's; gestalt doctor --keys {args.folder} -e {args.connect} says what is wrong")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,5 @@
 //! A client of a swarm: no robot, no vote; it hears decisions, asks robots how they are, and instructs them.
 
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use gestalt_protocol::{
@@ -20,7 +19,7 @@ use zenoh::sample::Sample;
 use super::attach::Attached;
 use super::identity::{robot_of, swarm_checksum};
 use super::tls::{Bearer, Credentials};
-use super::words::next_count;
+use super::word_count::WordCount;
 use super::{LinkConfig, LinkError, News};
 
 /// How many decisions wait for a slow reader before the oldest gives way.
@@ -34,8 +33,8 @@ const MAX_ANSWERS: usize = 64 << 20;
 pub struct Client {
     pub(super) session: Session,
     pub(super) keys: Keys,
-    /// Whoever speaks through it, in a sealed swarm, and the count of their last word.
-    speaker: Option<(Credentials, Mutex<u64>)>,
+    /// Whoever speaks through it, in a sealed swarm, and the count of their words.
+    speaker: Option<(Credentials, WordCount)>,
     /// Holds the session to robots of the swarm.
     attached: Attached,
 }
@@ -63,7 +62,10 @@ impl Client {
         let keys = Keys::new(swarm)?;
         let attached = Attached::open(&keys, link).await?;
         let session = attached.session().clone();
-        let speaker = link.credentials.clone().map(|credentials| (credentials, Mutex::new(0)));
+        let speaker = link.credentials.clone().map(|who| {
+            let count = WordCount::new(who.words.clone());
+            (who, count)
+        });
         Ok(Self { session, keys, speaker, attached })
     }
 
@@ -163,7 +165,7 @@ impl Client {
     pub async fn instruct(&self, as_whom: &InstructorId, say: &Instruction) -> Result<(), LinkError> {
         let as_whom = self.name(as_whom);
         let json = serde_json::to_string(say).expect("an instruction has a place in JSON");
-        let attachment = self.speaker.as_ref().and_then(|(who, last)| signed(who, last, as_whom, &json));
+        let attachment = self.speaker.as_ref().and_then(|(who, count)| signed(who, count, as_whom, &json));
         let topic = match &attachment {
             Some(_) => Topic::Word(as_whom.clone()),
             None => Topic::Feedback(as_whom.clone()),
@@ -240,15 +242,13 @@ impl Client {
 }
 
 /// The attachment of a word, by whoever has a key to sign it with.
-fn signed(who: &Credentials, last: &Mutex<u64>, by: &InstructorId, word: &str) -> Option<Vec<u8>> {
+fn signed(who: &Credentials, count: &WordCount, by: &InstructorId, word: &str) -> Option<Vec<u8>> {
     let speaker = match &who.holder {
         Bearer::Client(_) => Speaker::Own(by.clone()),
         Bearer::Robot(robot) => Speaker::For(*robot),
         Bearer::Authority => return None,
     };
-    let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    *last = next_count(*last);
-    let heading = WordHeading { speaker, count: *last };
+    let heading = WordHeading { speaker, count: count.next() };
     Some(word::sign(&who.identity, &who.swarm, by, &heading, word.as_bytes()))
 }
 

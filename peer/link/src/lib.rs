@@ -75,6 +75,7 @@ mod voice;
 mod waiting;
 mod wake;
 mod ways;
+mod word_count;
 mod words;
 mod worker;
 

@@ -254,8 +254,7 @@ async fn said(
     };
     *spoken = instruction.round().or(*spoken);
     let answer = client.teach(instructor, &instruction, ANSWERED_WITHIN).await?;
-    let answer =
-        answer.ok_or_else(|| format!("no answer within {ANSWERED_WITHIN:?}: is a robot running?"))?;
+    let answer = answer.ok_or_else(|| super::teach::unanswered("answer", ANSWERED_WITHIN))?;
     Ok(show::answer(&answer, &show::Names::default()))
 }
 

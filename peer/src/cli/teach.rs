@@ -310,7 +310,7 @@ impl Lesson<'_> {
         // Also what nobody answers may have arrived.
         self.about.say(instruction);
         let answer = self.client.teach(&self.args.instructor, instruction, timeout).await?;
-        let answer = answer.ok_or_else(|| format!("no answer within {timeout:?}: is a robot running?"))?;
+        let answer = answer.ok_or_else(|| unanswered("answer", timeout))?;
         if answer.looks_like.is_some() && !self.args.json {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
         }
@@ -326,9 +326,7 @@ impl Lesson<'_> {
         let before = self.news.newest();
         let (instructor, timeout) = (&self.args.instructor, self.args.timeout);
         let decided = super::open_round(&self.client, &mut self.news, instructor, before, timeout).await?;
-        let decided = decided.ok_or_else(|| {
-            format!("no decision within {timeout:?}: is a robot running? (gestalt watch --status)")
-        })?;
+        let decided = decided.ok_or_else(|| unanswered("decision", timeout))?;
         self.hear(&decided.decision);
         if !self.args.json && !self.names.cover(&decided.decision) {
             self.names = Names::reported(&self.client.statuses(super::ANSWER).await?);
@@ -340,6 +338,14 @@ impl Lesson<'_> {
         )?;
         Ok(decided.decision.round)
     }
+}
+
+/// What a word comes to that nobody answers. Of a word whose count is not above the last one's of its key robots say nothing.
+pub(super) fn unanswered(what: &str, within: Duration) -> String {
+    format!(
+        "no {what} within {within:?}: is a robot running? (gestalt watch --status) In a sealed swarm it may be that this key was last used by a clock \
+         that is ahead of this one's (refused_word_repeated)"
+    )
 }
 
 /// Why a word changed nothing, where an answer in short says something else.

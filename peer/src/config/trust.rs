@@ -30,6 +30,11 @@ fn starts_file(key: &Path) -> PathBuf {
     key.with_extension("starts")
 }
 
+/// The count of the last word that a client said with a key, beside it.
+fn words_file(key: &Path) -> PathBuf {
+    key.with_extension("words")
+}
+
 /// Among how many centres the numbers of a robot's starts are shared out.
 const SHARES: u32 = 16;
 
@@ -155,7 +160,8 @@ impl TrustSection {
         };
         let identity = Arc::new(Identity::read(&key).map_err(wrong)?);
         let certificate = Certificate::read(&certificate_file(&key)).map_err(wrong)?;
-        Credentials::new(&roster, holder, identity, certificate).map(Some).map_err(wrong)
+        let credentials = Credentials::new(&roster, holder, identity, certificate).map_err(wrong)?;
+        Ok(Some(credentials.counting_in(words_file(&key))))
     }
 }
 

@@ -328,6 +328,7 @@ fn what_may_be_meant_is_a_warning() {
     });
     for (facts, check, what, fix) in [
         (refusing("refused_vote_version"), "refusals", "robot 2 refused 12", "one release"),
+        (refusing("refused_word_repeated"), "refusals", "robot 2 refused 12", "client-NAME.words"),
         (refusing("refused_something_new"), "refusals", "refused_something_new", "gestalt watch --status"),
         (SwarmFacts { mine, ..sound() }, "twin", "robot 2 answers", "--id N"),
         (

@@ -1,15 +1,19 @@
 //! A robot of a sealed swarm, and a member that votes and asks.
 
 use gestalt_protocol::{
-    Announcement, Envelope, Keys, Message, RoundId, Stamp, Topic, VocabularyId, Vote, decode_json,
+    Announcement, ClassId, Envelope, Gesture, Instruction, InstructorId, Keys, Message, Outcome, RoundId,
+    Stamp, Topic, VocabularyId, Vote, decode_json,
 };
 use gestalt_strategies::is_refuted;
-use gestalt_trust::{Distrust, Identity, Judge, Membership, Roster, statement};
+use gestalt_trust::{
+    Distrust, Identity, Instructor, Judge, Membership, Roles, Roster, Speaker, WordHeading, statement, word,
+};
 use zenoh::Session;
 
 use super::*;
 use crate::tls::{Bearer, Certificate, Credentials};
-use crate::{GuestConfig, LinkConfig, Seal};
+use crate::words::next_count;
+use crate::{Client, GuestConfig, LinkConfig, Seal};
 
 fn key(number: u8) -> Identity {
     Identity::from_bytes(&[number; 32])
@@ -79,6 +83,50 @@ async fn what_a_robot_holds_it_signs_for_whoever_asks() {
     assert_eq!(judge.announcement(Duration::ZERO, &announcement), Ok(()));
     let other = Announcement { label: Some("another".to_owned()), ..announcement };
     assert_eq!(judge.announcement(Duration::ZERO, &other), Err(Distrust::Forged));
+    member.close().await.unwrap();
+    robot.stop().await;
+}
+
+/// Ada may say nothing, and is answered that as long as she is heard.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_clock_that_was_set_back_silences_no_client() {
+    let (swarm, folder) = (unique(), tempfile::tempdir().unwrap());
+    let ada: InstructorId = "ada".parse().unwrap();
+    let (of_ada, holder) = (key(90).public_key(), Bearer::Client(ada.clone()));
+    let instructors = [(ada.clone(), Instructor { key: of_ada, roles: Roles::NONE })].into();
+    let members = Membership { instructors, ..roster(&swarm).members().clone() };
+    let roster = members.sign(&key(100)).unwrap();
+    let seal = Seal::issue(&key(100), roster.clone(), RobotId(1), Arc::new(key(2))).unwrap();
+    let config = config(1, &swarm, &[]);
+    let link = LinkConfig { listen: vec!["tls/127.0.0.1:0".to_owned()], ..config.link };
+    let robot = Robot::start(RobotConfig { link, seal: Some(seal), ..config }).await.unwrap();
+    // Her word of an hour from now, as another program of hers said it by the clock of then.
+    let member = session(&swarm, &roster, &robot).await;
+    let open = serde_json::to_string(&Instruction::Open).unwrap();
+    let heading = WordHeading { speaker: Speaker::Own(ada.clone()), count: next_count(0) + (3600 << 32) };
+    let signed = word::sign(&key(90), &roster.swarm_id(), &ada, &heading, open.as_bytes());
+    let of_words = Keys::new(&swarm).unwrap().key(&Topic::Word(ada.clone()));
+    let end = Instant::now() + PATIENCE;
+    while !robot.status().counters.contains_key("received_word") {
+        assert!(Instant::now() < end, "it is not heard: {:#?}", robot.status());
+        member.put(&of_words, open.clone()).attachment(signed.clone()).await.unwrap();
+        sleep(Duration::from_millis(200)).await;
+    }
+    let words = folder.path().join("client-ada.words");
+    std::fs::write(&words, heading.count.to_string()).unwrap();
+    let certificate = Certificate::issue(&key(100), &swarm, holder.clone(), &of_ada).unwrap();
+    let credentials = Credentials::new(&roster, holder, Arc::new(key(90)), certificate).unwrap();
+    for counter in 1..=2 {
+        let credentials = Some(credentials.clone().counting_in(words.clone()));
+        let connect = robot.locators().to_vec();
+        let link = LinkConfig { connect, credentials, ..LinkConfig::default() };
+        let client = Client::open(&swarm, &link).await.unwrap();
+        let round = RoundId { counter, opener: RobotId(1), life: 0 };
+        let was = Instruction::Was { round, class: Gesture::Class(ClassId(0)) };
+        let answer = client.teach(&ada, &was, PATIENCE).await.unwrap().expect("an answer");
+        assert_eq!(answer.outcome, Outcome::NotAllowed);
+        client.close().await;
+    }
     member.close().await.unwrap();
     robot.stop().await;
 }

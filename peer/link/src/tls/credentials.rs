@@ -1,6 +1,7 @@
 //! What a session shows to be let in.
 
 use std::fmt;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use base64::Engine;
@@ -18,6 +19,8 @@ pub struct Credentials {
     pub(crate) holder: Bearer,
     pub(crate) identity: Arc<Identity>,
     pub(crate) swarm: SwarmId,
+    /// The file with the count of the last word that was said with this key.
+    pub(crate) words: Option<PathBuf>,
     roster: Arc<Roster>,
     certificate: Certificate,
 }
@@ -34,7 +37,15 @@ impl Credentials {
         certificate: Certificate,
     ) -> Result<Self, CertificateError> {
         certificate.check(roster, holder.clone(), &identity.public_key())?;
-        Ok(Self { holder, identity, swarm: roster.swarm_id(), roster: Arc::new(roster.clone()), certificate })
+        let (swarm, roster) = (roster.swarm_id(), Arc::new(roster.clone()));
+        Ok(Self { holder, identity, swarm, words: None, roster, certificate })
+    }
+
+    /// The same, which counts on from the last word that any program said with this key: that count is kept in that file. Without one a client whose
+    /// clock was set back is not heeded until it has caught up.
+    #[must_use]
+    pub fn counting_in(self, file: PathBuf) -> Self {
+        Self { words: Some(file), ..self }
     }
 
     /// Those of the authority itself, which writes its own certificate: to tell a running swarm of its next roster.

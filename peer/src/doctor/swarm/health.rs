@@ -180,6 +180,12 @@ fn meaning(counter: &str) -> (&'static str, &'static str) {
         _ if has(&["_forged", "_malformed", "_impossible", "_unfounded"]) => {
             ("somebody says what no robot would say", WHO)
         }
+        "refused_word_repeated" => (
+            "somebody says an instructor's old words again; or that key was last used by a clock that is ahead of its clock of today, and its words are \
+             not heeded until that has caught up",
+            "let the client write to the folder of its key, where it counts its words (client-NAME.words); or give it a new key: gestalt trust expel \
+             NAME, then enrol --client NAME",
+        ),
         _ if has(&["_too_often", "_too_fast", "_too_soon"]) => {
             ("somebody says too much; what is beyond the bound is not looked into", WHO)
         }
