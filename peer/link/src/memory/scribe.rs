@@ -266,10 +266,11 @@ impl Writing {
 
     /// A disk that was not there at the start may hold what this robot knew before.
     fn open_late(&mut self) -> Result<Option<Found>, StoreError> {
+        let (mut store, new) = Store::look(self.place.clone(), self.robot)?;
+        // Before this start is counted: what is refused is tried again and again, and nothing is written to it.
+        let (memory, holds, classifier) = (store.memory()?, store.records()?, store.classifier()?);
         // Under a number that nothing was said under: until now it voted under the clock's.
-        let (store, new) = Store::open(self.place.clone(), self.robot, self.boot.saturating_add(1))?;
-        let memory = store.memory()?;
-        let holds = store.records()?;
+        store.count(self.boot.saturating_add(1))?;
         let found = if new || memory.is_empty() {
             // One that was read while it could not be written, and has gone since.
             let lacks = self.known.iter().filter(|(key, _)| !holds.contains_key(*key));
@@ -283,7 +284,7 @@ impl Writing {
             None
         } else {
             self.known = holds;
-            let classifier = store.classifier()?.map(Arc::new);
+            let classifier = classifier.map(Arc::new);
             Some(Found { memory, classifier, boot: store.boot() })
         };
         self.run = Some(store.run());

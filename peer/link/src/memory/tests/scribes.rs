@@ -185,6 +185,25 @@ fn a_file_damaged_late_is_refused_again_and_again_and_never_written_over() {
 }
 
 #[test]
+fn records_that_are_refused_late_count_no_start_however_often_they_are_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let (late, watched) = start_without_disk(&folder);
+    let made = folder.path().join("made");
+    fs::create_dir(&made).unwrap();
+    let store = open(&made.join("m")).unwrap();
+    let head = RecordChange { key: vec![0], value: Some(vec![99; 40]) };
+    store.write(&[head], None).unwrap();
+    let before = (store.boot(), store.records().unwrap());
+    drop(store);
+    fs::rename(&made, &late).unwrap();
+    watched.wait_for_error("layout 99");
+    watched.wait_for_error("layout 99");
+    drop(watched);
+    let store = Store::look(place(&late.join("m")), ME).unwrap().0;
+    assert_eq!((store.boot(), store.records().unwrap()), before);
+}
+
+#[test]
 fn a_panic_is_told_and_what_waits_is_written_then() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m");
