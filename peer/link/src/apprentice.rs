@@ -237,7 +237,7 @@ impl Apprentice {
         account: &Arc<Account>,
         supervisor: &Arc<Supervisor>,
     ) -> Result<Self, LinkError> {
-        let Prepared { learning, boot, place, store, records, failure, new, .. } = prepared;
+        let Prepared { learning, boot, place, store, records, remembered, failure, new, .. } = prepared;
         // What cannot be learned on is an error of the start, not of the thread.
         learning.learner()?;
         if new {
@@ -275,7 +275,7 @@ impl Apprentice {
                 }
             };
             Scribe::start(
-                Assignment { place, robot: id, boot, known: records, store },
+                Assignment { place, robot: id, boot, known: records, classifier: remembered, store },
                 supervisor.clone(),
                 tell,
             )

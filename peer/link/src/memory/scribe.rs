@@ -10,7 +10,7 @@ use gestalt_strategies::{Classifier, RecordChange, RobotMemory};
 
 use super::error::StoreError;
 use super::place::Place;
-use super::store::{Records, Reopened, Run, Store};
+use super::store::{Records, Run, Store};
 use crate::failure::Part;
 use crate::panics::said;
 use crate::supervisor::Supervisor;
@@ -70,6 +70,8 @@ pub(crate) struct Assignment {
     pub boot: u32,
     /// What stands in the store, or could be read where it could not be written.
     pub known: Records,
+    /// The classifier that stands, or stood, there.
+    pub classifier: Option<Arc<Classifier>>,
     /// `None` where the disk is not there yet.
     pub store: Option<Store>,
 }
@@ -137,9 +139,9 @@ struct Writing {
 
 impl Writing {
     fn new(assignment: Assignment, supervisor: Arc<Supervisor>) -> Self {
-        let Assignment { place, robot, boot, known, store } = assignment;
+        let Assignment { place, robot, boot, known, classifier, store } = assignment;
         let run = store.as_ref().map(Store::run);
-        Self { place, robot, boot, store, run, known, classifier: None, supervisor }
+        Self { place, robot, boot, store, run, known, classifier, supervisor }
     }
 
     fn run(mut self, tray: &Tray<Pending>, tell: &impl Fn(Told)) {
@@ -247,16 +249,15 @@ impl Writing {
     /// Opens the file. `Some` when it came late and knows something.
     fn open(&mut self) -> Result<Option<Found>, StoreError> {
         let Some(run) = self.run else { return self.open_late() };
-        let Reopened { store, removed } = Store::reopen(self.place.clone(), self.robot, run)?;
-        self.run = Some(store.run());
+        let store = Store::reopen(self.place.clone(), self.robot, run)?;
         // What the file should hold and does not: all of it, where it is a new one.
-        let holds = store.records()?;
+        let (holds, has_none) = (store.records()?, store.classifier()?.is_none());
         let lacks = self.known.iter().filter(|(key, value)| holds.get(*key) != Some(value));
         let lacks = lacks.map(|(key, value)| RecordChange { key: key.clone(), value: Some(value.clone()) });
         let surplus = holds.keys().filter(|key| !self.known.contains_key(*key));
         let surplus = surplus.map(|key| RecordChange { key: key.clone(), value: None });
         let changes: Vec<RecordChange> = lacks.chain(surplus).collect();
-        let classifier = self.classifier.as_deref().filter(|_| removed);
+        let classifier = self.classifier.as_deref().filter(|_| has_none);
         if classifier.is_some() || !changes.is_empty() {
             store.write(&changes, classifier)?;
         }
@@ -271,20 +272,23 @@ impl Writing {
         let (memory, holds, classifier) = (store.memory()?, store.records()?, store.classifier()?);
         // Under a number that nothing was said under: until now it voted under the clock's.
         store.count(self.boot.saturating_add(1))?;
+        let classifier = classifier.map(Arc::new);
         let found = if new || memory.is_empty() {
             // One that was read while it could not be written, and has gone since.
             let lacks = self.known.iter().filter(|(key, _)| !holds.contains_key(*key));
             let lacks =
                 lacks.map(|(key, value)| RecordChange { key: key.clone(), value: Some(value.clone()) });
             let lacks: Vec<RecordChange> = lacks.collect();
-            if !lacks.is_empty() {
-                store.write(&lacks, None)?;
+            let unwritten = self.classifier.as_deref().filter(|_| classifier.is_none());
+            if unwritten.is_some() || !lacks.is_empty() {
+                store.write(&lacks, unwritten)?;
             }
             self.known.extend(holds);
+            self.classifier = classifier.or(self.classifier.take());
             None
         } else {
             self.known = holds;
-            let classifier = classifier.map(Arc::new);
+            self.classifier.clone_from(&classifier);
             Some(Found { memory, classifier, boot: store.boot() })
         };
         self.run = Some(store.run());

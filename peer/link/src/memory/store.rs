@@ -99,35 +99,34 @@ impl Store {
     /// Those of the disk, and [`StoreError::Damaged`].
     pub fn count(&mut self, first_boot: u32) -> Result<(), StoreError> {
         let next = if self.boot == 0 { first_boot } else { first_boot.max(self.boot.saturating_add(step())) };
-        let mark = fresh_nonce();
+        self.sign(next, fresh_nonce())
+    }
+
+    fn sign(&mut self, boot: u32, mark: u64) -> Result<(), StoreError> {
         guarded(self.place.path(), || {
-            sign(&self.database, self.robot, next, mark)?;
+            sign(&self.database, self.robot, boot, mark)?;
             self.commit(&[], None)
         })?;
-        (self.boot, self.mark) = (next, mark);
+        (self.boot, self.mark) = (boot, mark);
         Ok(())
     }
 
-    /// Opens it again after it failed, or makes a new one where it was removed: see [`Reopened`].
+    /// Opens it again after it failed, or makes a new one where it was removed.
     ///
     /// # Errors
     /// [`StoreError::Replaced`] for another file than before, and the others of [`StoreError`].
-    pub fn reopen(place: Arc<dyn Place>, robot: RobotId, before: Run) -> Result<Reopened, StoreError> {
-        let there = place.is_there().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
-        if !there {
-            let store = Self::open(place, robot, before.boot)?.0;
-            return Ok(Reopened { store, removed: true });
+    pub fn reopen(place: Arc<dyn Place>, robot: RobotId, before: Run) -> Result<Self, StoreError> {
+        let mut store = Self::look(place, robot)?.0;
+        if store.mark == before.mark {
+            return Ok(store);
         }
-        let opened = place.open().map_err(|cause| StoreError::of_system(place.path(), &cause))?;
-        let mut store = Self::read(place, robot, opened)?;
-        // Begun in place of one that was removed, before the disk was full: no start is counted in it yet.
-        let is_begun = store.boot == 0 && store.records()?.is_empty();
-        if is_begun {
-            store.count(before.boot)?;
-        } else if store.mark != before.mark {
+        // Begun in place of one that was removed, just now or before the disk was full: no start is counted in it yet.
+        if store.boot != 0 || !store.records()?.is_empty() {
             return Err(StoreError::Replaced(store.place.path().to_owned()));
         }
-        Ok(Reopened { store, removed: is_begun })
+        // By the mark of this run: it is this run's also where the disk fails in the midst of this.
+        store.sign(before.boot, before.mark)?;
+        Ok(store)
     }
 
     /// Makes a new file, signed.
@@ -281,13 +280,6 @@ impl Store {
 pub(crate) struct Run {
     pub boot: u32,
     mark: u64,
-}
-
-/// A memory opened again.
-pub(crate) struct Reopened {
-    pub store: Store,
-    /// Whether it is a new one: the file had gone.
-    pub removed: bool,
 }
 
 /// Tells another program's file from a damaged one, before the database tries to make sense of it.

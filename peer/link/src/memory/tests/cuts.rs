@@ -74,7 +74,7 @@ fn a_full_disk_is_called_full_and_takes_all_once_there_is_room() {
     assert!(error.is_of_the_disk() && error.to_string().contains("make room"), "{error}");
     drop(store);
     disk.fill(false);
-    let store = Store::reopen(Arc::new(disk), ME, run).unwrap().store;
+    let store = Store::reopen(Arc::new(disk), ME, run).unwrap();
     assert_eq!(store.records().unwrap().len(), 1, "what was there is there");
     store.write(&[change(2, Some(2))], None).unwrap();
     assert_eq!(store.records().unwrap().len(), 2);

@@ -51,6 +51,13 @@ impl Disk {
         self.lock().full = full;
     }
 
+    /// Somebody removes the file.
+    pub fn remove(&self) {
+        let mut state = self.lock();
+        (state.cached, state.synced) = (None, None);
+        state.unsynced.clear();
+    }
+
     /// A disk with these bytes on it.
     pub fn holding(file: Vec<u8>) -> Self {
         let state = State { cached: Some(file.clone()), synced: Some(file), ..State::default() };

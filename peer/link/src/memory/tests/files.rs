@@ -9,7 +9,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use redb::{Database, TableDefinition};
 
-use super::super::store::Reopened;
 use super::super::{Records, Store, StoreError};
 use super::{ME, applied, change, open, place};
 
@@ -213,7 +212,7 @@ fn a_file_removed_or_exchanged_while_open_acknowledges_nothing() {
     assert!(matches!(reopened, Err(StoreError::Replaced(_))), "this robot's, but not of this run");
     fs::remove_file(&path).unwrap();
     let reopened = Store::reopen(place(&path), ME, run).unwrap();
-    assert!(reopened.removed && reopened.store.boot() == run.boot);
+    assert_eq!((reopened.boot(), reopened.records().unwrap()), (run.boot, Records::new()));
     drop(reopened);
     assert!(open(&path).unwrap().boot() > run.boot, "it is signed");
 }
@@ -231,10 +230,11 @@ fn a_file_that_was_begun_in_place_of_a_removed_one_is_this_robots() {
     // Begun, and then the disk was full.
     fs::remove_file(&path).unwrap();
     drop(Store::look(place(&path), ME).unwrap());
-    let Reopened { store, removed } = Store::reopen(place(&path), ME, run).unwrap();
-    assert!(removed && store.boot() == run.boot);
+    let store = Store::reopen(place(&path), ME, run).unwrap();
+    assert_eq!(store.boot(), run.boot);
     store.write(&[change(1, Some(1))], None).unwrap();
-    let run = store.run();
     drop(store);
-    assert!(!Store::reopen(place(&path), ME, run).unwrap().removed);
+    // And stays this run's.
+    let store = Store::reopen(place(&path), ME, run).unwrap();
+    assert_eq!((store.boot(), store.records().unwrap().len()), (run.boot, 1));
 }

@@ -6,8 +6,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use gestalt_protocol::Status;
-use gestalt_strategies::RecordChange;
+use gestalt_protocol::{ClassId, Status};
+use gestalt_strategies::{
+    Classifier, Components, FeatureSpace, Learner, LearnerOptions, RecordChange, ScalingMethod, Vocabulary,
+};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use tempfile::TempDir;
 use tokio::sync::broadcast;
 
@@ -31,21 +35,48 @@ struct Watched {
 
 fn start(place: Arc<dyn Place>, store: Option<Store>) -> Watched {
     let known = store.as_ref().map_or_else(Records::new, |store| store.records().unwrap());
-    start_knowing(place, store, known)
+    let classifier = store.as_ref().and_then(|store| store.classifier().unwrap());
+    start_knowing(place, store, known, classifier.map(Arc::new))
 }
 
-fn start_knowing(place: Arc<dyn Place>, store: Option<Store>, known: Records) -> Watched {
+fn start_knowing(
+    place: Arc<dyn Place>,
+    store: Option<Store>,
+    known: Records,
+    classifier: Option<Arc<Classifier>>,
+) -> Watched {
     let account = Account::new(Status::new(ME, "seven".to_owned(), 1), Instant::now());
     let (sender, events) = broadcast::channel(64);
     let supervisor = Supervisor::new(Arc::new(account), sender);
     let (tell, told) = channel();
-    let assignment = Assignment { place, robot: ME, boot: 1, known, store };
+    let assignment = Assignment { place, robot: ME, boot: 1, known, classifier, store };
     let tell = move |what| drop(tell.send(what));
     Watched { scribe: Scribe::start(assignment, supervisor.clone(), tell).unwrap(), told, supervisor, events }
 }
 
 fn start_at(path: &Path) -> Watched {
     start(place(path), Some(open(path).unwrap()))
+}
+
+/// One that has met two gestures.
+fn trained() -> Arc<Classifier> {
+    let views = [[0.0_f32, 0.1], [0.1, 0.0], [1.0, 0.9], [0.9, 1.0]];
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let rows = views.iter().map(|view| &view[..]);
+    let space = FeatureSpace::fit("test", rows, ScalingMethod::Common, Components::Count(2), &mut rng);
+    let vocabulary = Vocabulary::new(["left", "right"]).unwrap();
+    let mut learner = Learner::new(Arc::new(space), vocabulary, LearnerOptions::default()).unwrap();
+    for (key, view) in (0..).zip(&views) {
+        let vector = learner.space().project(view).unwrap();
+        learner.insert(key, ClassId(u8::from(key > 1).into()), &vector).unwrap();
+    }
+    learner.learn().unwrap()
+}
+
+/// What stands in a memory: the keys of its records, and of how many samples of each gesture its classifier is.
+fn standing(store: &Store) -> (Vec<Vec<u8>>, Option<Vec<u32>>) {
+    let classifier = store.classifier().unwrap();
+    (store.records().unwrap().into_keys().collect(), classifier.map(|it| it.learned().to_vec()))
 }
 
 /// A scribe that has something to write, and where its disk will be.
@@ -127,6 +158,39 @@ fn a_file_removed_while_running_is_written_anew_with_all_that_is_known() {
     assert_eq!(records.into_keys().collect::<Vec<_>>(), [[1], [2], [3]]);
 }
 
+/// Whichever write or sync it is at which the disk fails for a while, and though nothing was trained in this life.
+#[test]
+fn a_file_removed_where_the_disk_fails_too_is_written_anew_with_its_classifier() {
+    const FAILURES: u64 = 100;
+    let classifier = trained();
+    let swarm: Vec<(Disk, Watched)> = (1..=FAILURES)
+        .map(|at| {
+            let disk = Disk::default();
+            let (store, _) = Store::open(Arc::new(disk.clone()), ME, 1).unwrap();
+            store.write(&[change(1, Some(1))], Some(&classifier)).unwrap();
+            let watched = start(Arc::new(disk.clone()), Some(store));
+            disk.cut_at(disk.operations() + at);
+            disk.remove();
+            (disk, watched)
+        })
+        .collect();
+    let failed = swarm.iter().filter(|(disk, watched)| {
+        watched.wait_for_error("removed while running");
+        let failed = watched.wait("it is tried", |told| Some(matches!(told, Told::Failed(_))));
+        disk.cut_at(u64::MAX);
+        failed
+    });
+    let failed = failed.count() as u64;
+    assert!((10..FAILURES).contains(&failed), "each is met, and all went well after {failed}");
+    for ((disk, watched), at) in swarm.into_iter().zip(1..) {
+        watched.scribe.remember(1, vec![change(2, Some(2))]);
+        watched.wait_for_revision(1);
+        drop(watched);
+        let store = Store::look(Arc::new(disk), ME).unwrap().0;
+        assert_eq!(standing(&store), (vec![vec![1], vec![2]], Some(vec![2, 2])), "failed at {at}");
+    }
+}
+
 #[test]
 fn a_disk_that_comes_late_and_empty_takes_all() {
     let folder = tempfile::tempdir().unwrap();
@@ -142,13 +206,13 @@ fn what_could_be_read_alone_and_went_then_is_written_anew() {
     let folder = tempfile::tempdir().unwrap();
     let late = folder.path().join("late");
     let known = Records::from([(vec![1], vec![1; 40])]);
-    let watched = start_knowing(place(&late.join("m")), None, known);
+    let watched = start_knowing(place(&late.join("m")), None, known, Some(trained()));
     watched.scribe.remember(1, vec![change(2, Some(2))]);
     watched.wait_for_error("its folder is not there");
     fs::create_dir(&late).unwrap();
     watched.wait_for_revision(1);
     drop(watched);
-    assert_eq!(open(&late.join("m")).unwrap().records().unwrap().into_keys().collect::<Vec<_>>(), [[1], [2]]);
+    assert_eq!(standing(&open(&late.join("m")).unwrap()), (vec![vec![1], vec![2]], Some(vec![2, 2])));
 }
 
 #[test]
