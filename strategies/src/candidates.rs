@@ -51,6 +51,11 @@ impl Candidates {
         self
     }
 
+    /// Whether both are one gesture by now.
+    pub(crate) fn are_one(&self, one: ClassId, other: ClassId) -> bool {
+        now(&self.merged, one) == now(&self.merged, other)
+    }
+
     /// Who denies a gesture denies what it has become, and whatever else has become that.
     pub(crate) fn restrict(&mut self, word: Word) {
         match word {

@@ -258,9 +258,20 @@ impl LessonBook {
             Word::Was(class) if class.is_named() => Some(class),
             _ => None,
         };
+        // By what gestures are now, somebody said the same later: it says nothing more until they are told apart again.
+        let is_said_again = |place: usize, said: &Said| {
+            leading[place + 1..].iter().any(|(_, later)| match (said.word, later.word) {
+                (Word::Was(one), Word::Was(other)) => classes.are_one(one, other),
+                _ => false,
+            })
+        };
         let mut candidates = classes.clone();
         candidates.classes.extend(leading.iter().filter_map(|(_, said)| named(said)));
-        leading.iter().for_each(|(_, said)| candidates.restrict(said.word));
+        for (place, (_, said)) in leading.iter().enumerate() {
+            if !is_said_again(place, said) {
+                candidates.restrict(said.word);
+            }
+        }
         if candidates.classes.is_empty() {
             candidates = classes.clone();
             candidates.classes.extend(named(latest));

@@ -81,6 +81,28 @@ fn who_denies_a_gesture_denies_what_it_has_become() {
     assert_eq!(merged.all_names_of(ClassId(3)).only(), Some(ClassId(3)));
 }
 
+#[test]
+fn who_said_the_same_before_and_after_a_merge_agree_until_it_is_undone() {
+    let ring = ClassId::named(&"ana".parse().unwrap(), "ring");
+    let apart = Candidates::of(six().classes.into_iter().chain([ring]));
+    let merged = six().with_merged([(ring, ClassId(4))]);
+    let round = lesson(1, "ana", 1, was(4)).round;
+    for (of_ana, of_bob) in [(Word::Was(ring), was(4)), (was(4), Word::Was(ring))] {
+        let mut book = LessonBook::default();
+        for (count, (who, word)) in (1..).zip([("ana", of_ana), ("bob", of_bob), ("cyn", not(3))]) {
+            book.hear(&lesson(1, who, count, word));
+        }
+        let Verdict::Class(found) = book.verdict(round, &merged) else { panic!("they agree") };
+        assert!(merged.are_one(found, ClassId(4)));
+        let Verdict::Among(found) = book.verdict(round, &apart) else { panic!("two gestures again") };
+        assert_eq!((found.contains(ClassId(3)), found.classes.len()), (false, 6), "the latest word alone");
+        // Each of them said it, whoever takes back.
+        book.hear(&lesson(1, "bob", 9, Word::Retracted));
+        let Word::Was(anas) = of_ana else { unreachable!() };
+        assert_eq!(book.verdict(round, &apart), Verdict::Class(anas));
+    }
+}
+
 proptest! {
     #[test]
     fn the_order_and_repetition_of_lessons_make_no_difference(
