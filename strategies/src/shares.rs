@@ -9,7 +9,7 @@ use gestalt_protocol::{ClassId, MAX_ROBOTS, RobotId};
 use crate::sample::{HeldSample, HeldSamples, SetPart};
 
 /// However small the share of an author is, so many samples are no flood.
-const LEAST: usize = 5;
+pub(crate) const LEAST: usize = 5;
 
 /// How many samples of a gesture that was named while the swarm works are not forgotten.
 const YOUNG: usize = 20;

@@ -10,6 +10,7 @@ use crate::asking::{QuestionsConfig, QuestionsConfigError};
 use crate::forgetting::ForgettingRule;
 use crate::scrutiny::PoisonDefence;
 use crate::selection::SelectionRule;
+use crate::shares::LEAST;
 use crate::vector_codec::Precision;
 
 /// Parameters no robot can learn with; each names the field and the mend.
@@ -43,6 +44,18 @@ pub enum LearningConfigError {
         "author_shares is false and learner.groups set: groups have room of their own, and the rule of forgetting is not asked; leave one of them out"
     )]
     Shares,
+    /// Groups whose samples would go as they come.
+    #[error(
+        "capacity is {capacity} and learner.groups {groups}: each group and this robot have an equal part of the room, of {LEAST} samples at least; choose a capacity of {least} or more, or fewer groups"
+    )]
+    Room {
+        /// The most samples held.
+        capacity: usize,
+        /// How many groups.
+        groups: usize,
+        /// The least capacity for as many.
+        least: usize,
+    },
     /// Fewer bytes than one sample takes.
     #[error(
         "share_bytes is {0}: one sample takes up to 128 bytes and more; choose at least 128, or leave it out"
@@ -74,7 +87,7 @@ pub enum LearningConfigError {
 ///
 /// | name | default | meaning | range |
 /// |---|---|---|---|
-/// | `capacity` | 1000 | T: the most samples held | 2–100,000 |
+/// | `capacity` | 1000 | T: the most samples held | 2–100,000, with groups of authors at least 5 for each and 5 more |
 /// | `keep` | 3 | M: observations of a round that become samples | 1–64 |
 /// | `spacing` | 400ms | least time between two of them | ≤ 1 min |
 /// | `share_samples` | none | n: the most samples shared per round | ≥ 0 |
@@ -191,6 +204,11 @@ impl LearningConfig {
         if self.learner.groups > 0 && !self.author_shares {
             return Err(LearningConfigError::Shares);
         }
+        let (capacity, groups) = (self.capacity, self.learner.groups);
+        let least = groups.saturating_add(1).saturating_mul(LEAST);
+        if groups > 0 && capacity < least {
+            return Err(LearningConfigError::Room { capacity, groups, least });
+        }
         if let Some(bytes) = self.share_bytes.filter(|bytes| *bytes < 128) {
             return Err(LearningConfigError::Bytes(bytes));
         }
@@ -209,6 +227,12 @@ mod tests {
     fn what_nobody_can_learn_with_is_named() {
         assert_eq!(LearningConfig::default().validate(), Ok(()));
         let default = LearningConfig::default;
+        let with_groups = |groups, capacity| LearningConfig {
+            capacity,
+            learner: LearnerOptions { groups, ..Default::default() },
+            ..default()
+        };
+        assert_eq!(with_groups(63, 320).validate(), Ok(()));
         for (config, field) in [
             (LearningConfig { capacity: 1, ..default() }, "capacity"),
             (LearningConfig { keep: 0, ..default() }, "keep"),
@@ -238,6 +262,7 @@ mod tests {
                 },
                 "author_shares",
             ),
+            (with_groups(63, 319), "a capacity of 320"),
             (LearningConfig { spacing: Duration::MAX, ..default() }, "spacing"),
         ] {
             let error = config.validate().unwrap_err().to_string();
