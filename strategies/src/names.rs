@@ -17,6 +17,13 @@ use crate::believe::Standing;
 /// How far a count that nobody signed may lie beyond the highest known of its gesture: nobody says so much that others hear none of it.
 const COUNT_LEAP: u64 = 1 << 32;
 
+/// The highest such count taken in on a gesture that is known, however far beyond. The counts of a sealed swarm are times, which lie below it until 2038: what was
+/// named there is heard where that swarm was opened.
+const HIGHEST_COUNT: u64 = u64::MAX / 2;
+
+/// The highest on a gesture of which nothing is known: whoever comes later takes in what others say after a forged word.
+const FIRST_COUNT: u64 = u64::MAX / 4 * 3;
+
 /// What came of a word on a gesture that was named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NamingReceipt {
@@ -132,7 +139,8 @@ impl NameBook {
         let gesture = naming.gesture();
         let known = self.namings.get(&gesture);
         let standing_here = standing.unwrap_or(Standing::Overrules);
-        let highest = known.map_or(0, |known| known.naming.count).saturating_add(COUNT_LEAP);
+        let highest = known
+            .map_or(FIRST_COUNT, |known| known.naming.count.saturating_add(COUNT_LEAP).max(HIGHEST_COUNT));
         let rank = (right(standing_here), order(naming));
         if known.is_some_and(|known| (right(known.standing), order(&known.naming)) >= rank) {
             NamingReceipt::Known

@@ -37,7 +37,11 @@ pub enum Refusal {
     LessonFarAhead,
     /// A lesson that nothing shows to be its instructor's word, or of one who may not teach.
     LessonUnproven,
-    /// The same of a gesture's name, or of what became of it.
+    /// A word on a gesture's name where as many gestures that go before it were named as are kept.
+    NamingFull,
+    /// A word on a gesture's name with a count so far ahead of all known that it is taken for a mistake or a lie.
+    NamingFarAhead,
+    /// A word on a gesture's name that nothing shows to be whoever's it is said to be, or of one who may not teach.
     NamingUnproven,
     /// A question about what this robot knows, of one that is no neighbour.
     Stranger,
@@ -57,7 +61,7 @@ pub enum Refusal {
 
 impl Refusal {
     /// All causes.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 27] = [
         Self::DuplicateId,
         Self::FarAhead,
         Self::TooSoon,
@@ -75,6 +79,8 @@ impl Refusal {
         Self::LessonFull,
         Self::LessonFarAhead,
         Self::LessonUnproven,
+        Self::NamingFull,
+        Self::NamingFarAhead,
         Self::NamingUnproven,
         Self::Stranger,
         Self::TooOften,
@@ -106,6 +112,8 @@ impl Refusal {
             Self::LessonFull => "refused_lesson_full",
             Self::LessonFarAhead => "refused_lesson_far_ahead",
             Self::LessonUnproven => "refused_lesson_unproven",
+            Self::NamingFull => "refused_naming_full",
+            Self::NamingFarAhead => "refused_naming_far_ahead",
             Self::NamingUnproven => "refused_naming_unproven",
             Self::Stranger => "refused_question_of_stranger",
             Self::TooOften => "refused_question_too_often",

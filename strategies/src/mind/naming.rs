@@ -57,7 +57,9 @@ impl Mind {
                 NamingReceipt::New => news = true,
                 NamingReceipt::Unproven if unproven.len() == MAX_UNPROVEN => return ControlFlow::Break(()),
                 NamingReceipt::Unproven => unproven.push(naming),
-                NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
+                NamingReceipt::Known => {}
+                NamingReceipt::Full => self.rounds.note_refusal(Refusal::NamingFull),
+                NamingReceipt::FarAhead => self.rounds.note_refusal(Refusal::NamingFarAhead),
             }
             ControlFlow::Continue(())
         });
@@ -66,7 +68,9 @@ impl Mind {
             match receipt {
                 NamingReceipt::New => news = true,
                 NamingReceipt::Unproven => self.rounds.note_refusal(Refusal::NamingUnproven),
-                NamingReceipt::Known | NamingReceipt::Full | NamingReceipt::FarAhead => {}
+                NamingReceipt::Known => {}
+                NamingReceipt::Full => self.rounds.note_refusal(Refusal::NamingFull),
+                NamingReceipt::FarAhead => self.rounds.note_refusal(Refusal::NamingFarAhead),
             }
             ControlFlow::Continue(())
         });

@@ -34,7 +34,44 @@ fn a_word_on_a_gesture_replaces_the_earlier_and_nothing_is_lost() {
     book.hear(&naming("ana", "ring", 3, Fate::InUse));
     assert_eq!(book.in_use(64), [circle, ring].into());
     assert_eq!(book.hear(&naming("ana", "ring", 2, Fate::Retired)), NamingReceipt::Known);
-    assert_eq!(book.hear(&naming("ana", "ring", 1 << 40, Fate::Retired)), NamingReceipt::FarAhead);
+}
+
+/// What is named in a sealed swarm counts by the time: seconds since 1970, in parts of 2⁻³².
+const SIGNED: u64 = 1_796_000_000 << 32;
+
+#[test]
+fn where_a_sealed_swarm_was_opened_a_newcomer_learns_its_names_whatever_was_said_to_it_before() {
+    let mut swarms = NameBook::default();
+    swarms.hear_by(&naming("ana", "circle", SIGNED, Fate::InUse), Some(Standing::Teaches));
+    let circle = ClassId::named(&who("ana"), "circle");
+    for said_before in [None, Some(naming("ana", "circle", 1, Fate::Retired))] {
+        let mut newcomer = book(said_before.as_slice());
+        let next = naming("ana", "circle", SIGNED + 1, Fate::Retired);
+        for word in [swarms.get(circle).unwrap().clone(), next] {
+            assert_eq!(newcomer.hear(&word), NamingReceipt::New);
+            assert_eq!(newcomer.get(circle), Some(&word));
+        }
+    }
+}
+
+#[test]
+fn no_word_on_a_name_is_beyond_correction_nor_keeps_it_from_whoever_comes_later() {
+    for known in [1, SIGNED, HIGHEST_COUNT] {
+        let said = naming("ana", "circle", known, Fate::InUse);
+        let mut swarms = book(std::slice::from_ref(&said));
+        let forged = |count| naming("ana", "circle", count, Fate::Retired);
+        assert_eq!(swarms.hear(&forged(u64::MAX)), NamingReceipt::FarAhead);
+        // As far as may be, over and over.
+        for _ in 0..100 {
+            let before = swarms.get(said.gesture()).unwrap().count;
+            let furthest = (before + COUNT_LEAP).max(HIGHEST_COUNT);
+            assert_eq!(swarms.hear(&forged(furthest + 1)), NamingReceipt::FarAhead);
+            assert_eq!(swarms.hear(&forged(furthest)), NamingReceipt::New);
+            let corrected = naming("ana", "circle", furthest + 1, Fate::InUse);
+            assert_eq!(swarms.hear(&corrected), NamingReceipt::New);
+            assert_eq!(NameBook::default().hear(&corrected), NamingReceipt::New, "also whoever comes later");
+        }
+    }
 }
 
 #[test]

@@ -356,7 +356,7 @@ fn names_that_cannot_be_taken_in_do_not_keep_robots_talking() {
     // Somebody has put a count there that nobody takes in.
     let (by, said_by): (InstructorId, InstructorId) = ("ana".parse().unwrap(), "eve".parse().unwrap());
     let label = "circle".to_owned();
-    let wild = Naming { by, label, count: 1 << 50, at: 1, said_by, fate: Fate::Retired, said: None };
+    let wild = Naming { by, label, count: u64::MAX, at: 1, said_by, fate: Fate::Retired, said: None };
     swarm.minds[0].learning.as_mut().unwrap().remember_naming(&wild);
     swarm.pass(Duration::from_secs(120));
     assert_ne!(swarm.names(0), swarm.names(1));

@@ -142,6 +142,34 @@ fn lessons_on_rounds_to_come_keep_nobody_from_teaching() {
 }
 
 #[test]
+fn words_on_names_that_are_not_taken_in_are_counted() {
+    let mut swarm = Swarm::new(1, config(1, 1.0), 38);
+    let mut told = |labels: std::ops::Range<usize>, count| {
+        let by: gestalt_protocol::InstructorId = "eve".parse().unwrap();
+        let namings = labels.map(|label| gestalt_protocol::Naming {
+            by: by.clone(),
+            label: label.to_string(),
+            count,
+            at: 1,
+            said_by: by.clone(),
+            fate: gestalt_protocol::Fate::InUse,
+            said: None,
+        });
+        let message = Message::Namings(gestalt_protocol::Namings { namings: namings.collect() });
+        let stamp = Stamp { boot: 1, sequence: 1 };
+        swarm.input(0, Input::Received(Envelope { author: RobotId(9), stamp, message, signature: None }));
+        [Refusal::NamingFarAhead, Refusal::NamingFull].map(|cause| swarm.minds[0].refusals().count(cause))
+    };
+    let most = gestalt_protocol::MAX_NAMED;
+    assert_eq!(told(0..3, u64::MAX), [3, 0]);
+    assert_eq!(told(0..most, 1), [3, 0]);
+    let [_, before] = told(most..most + 10, 1);
+    // Ten of them are none of those that are kept, whichever they are.
+    let again = [told(0..most, 1), told(most..most + 10, 1)];
+    assert_eq!(again[1], [3, before + 10]);
+}
+
+#[test]
 fn what_a_newborn_was_told_of_rounds_to_come_is_forgotten_when_it_knows_better() {
     let mut swarm = Swarm::new(2, config(2, 1.0), 32);
     let far = RoundId { counter: 900_000, opener: RobotId(1), life: 0 };
