@@ -123,11 +123,7 @@ fn train_all(
                 Some(learner) => learner,
                 None => learner.insert(begin()?),
             };
-            for (key, sample) in &changed {
-                if let Err(error) = follow(learner, *key, sample.as_ref()) {
-                    failed(&error);
-                }
-            }
+            follow_all(learner, &changed).iter().for_each(failed);
             learner.learn()
         }));
         match trained {
@@ -147,17 +143,83 @@ fn train_all(
     }
 }
 
+/// Makes a learner take all that changed; gives what keeps it from taking some of it. Where there are as many gestures as can be told apart, a new one takes the place
+/// of one that has no samples any more: so what goes does so first, and what finds no place leaves its own, maybe to another, and is tried once more.
+fn follow_all(learner: &mut Learner, changed: &[(u64, Option<Sample>)]) -> Vec<LearnError> {
+    for (key, _) in changed.iter().filter(|(_, sample)| sample.is_none()) {
+        learner.remove(*key);
+    }
+    let held = changed.iter().filter_map(|(key, sample)| Some((*key, sample.as_ref()?)));
+    let failed: Vec<_> = held.filter(|(key, sample)| follow(learner, *key, sample).is_err()).collect();
+    for (key, _) in &failed {
+        learner.remove(*key);
+    }
+    failed.into_iter().filter_map(|(key, sample)| follow(learner, key, sample).err()).collect()
+}
+
 /// Makes a learner take one sample as it is now.
-fn follow(learner: &mut Learner, key: u64, sample: Option<&Sample>) -> Result<(), LearnError> {
-    match sample {
-        // A sample that only changed its class keeps its place, which spares its row of the kernel.
-        Some((class, vector, showing, group)) => {
-            learner.relabel(key, *class)?;
-            learner.insert_of(*group, key, *class, vector.clone(), *showing)
-        }
-        None => {
-            learner.remove(key);
-            Ok(())
-        }
+fn follow(learner: &mut Learner, key: u64, sample: &Sample) -> Result<(), LearnError> {
+    let (class, vector, showing, group) = sample;
+    // A sample that only changed its class keeps its place, which spares its row of the kernel.
+    learner.relabel(key, *class)?;
+    learner.insert_of(*group, key, *class, vector.clone(), *showing)
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::MAX_CLASSES;
+    use gestalt_strategies::{Classify, Components, FeatureSpace, LearnerOptions, ScalingMethod, Vocabulary};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Two samples of each of as many gestures as can be told apart, the first two of which are of the list.
+    fn all_there_can_be() -> (Learner, Vec<(u64, Option<Sample>)>) {
+        let rows = [[0.0_f32, 0.0], [1.0, 1.0], [0.5, 0.9]];
+        let rows = rows.iter().map(<[f32; 2]>::as_slice);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let space =
+            FeatureSpace::fit("test", rows, ScalingMethod::PerComponent, Components::Count(2), &mut rng);
+        let vocabulary = Vocabulary::new(["left", "right"]).unwrap();
+        let learner = Learner::new(Arc::new(space), vocabulary, LearnerOptions::default()).unwrap();
+        let classes = (0..MAX_CLASSES).map(|n| if n < 2 { ClassId(n as u32) } else { named(n) });
+        let samples = (10..).zip(classes.flat_map(|class| [class; 2]));
+        (learner, samples.map(|(key, class)| (key, shows(class, key))).collect())
+    }
+
+    fn named(n: usize) -> ClassId {
+        ClassId::named(&"ana".parse().unwrap(), &n.to_string())
+    }
+
+    fn shows(class: ClassId, key: u64) -> Option<Sample> {
+        Some((class, [key as f32 / 100.0, 0.5].into(), key, None))
+    }
+
+    fn of(learner: &mut Learner, class: ClassId) -> u32 {
+        let classifier = learner.learn().unwrap();
+        classifier.vocabulary().place(class).map_or(0, |place| classifier.learned()[place])
+    }
+
+    #[test]
+    fn a_new_gesture_takes_the_place_of_one_that_goes_in_whatever_order_their_samples_come() {
+        let (mut learner, samples) = all_there_can_be();
+        assert!(follow_all(&mut learner, &samples).is_empty());
+        let full = LearnError::Class(named(100));
+        assert_eq!(follow_all(&mut learner, &[(1, shows(named(100), 1))]), vec![full]);
+        // One is retired, and another restored whose samples have the smaller keys.
+        let last = samples.len() - 1;
+        let gone = [(samples[last - 1].0, None), (samples[last].0, None)];
+        let restored = [(1, shows(named(100), 1)), (2, shows(named(100), 2))];
+        let failed = follow_all(&mut learner, &[restored.as_slice(), &gone].concat());
+        assert_eq!((failed, of(&mut learner, named(100))), (vec![], 2));
+        // All samples of one turn out to be of another.
+        let corrected = [(1, shows(named(101), 1)), (2, shows(named(101), 2))];
+        let failed = follow_all(&mut learner, &corrected);
+        let found = [100, 101].map(|n| of(&mut learner, named(n)));
+        assert_eq!((failed, found), (vec![], [0, 2]));
+        // What finds no place is trained on no more.
+        let failed = follow_all(&mut learner, &[(1, shows(named(102), 1))]);
+        assert_eq!((failed.len(), of(&mut learner, named(101)), learner.len()), (1, 1, 2 * MAX_CLASSES - 1));
     }
 }

@@ -194,10 +194,11 @@ impl Learning {
         in_use.collect()
     }
 
-    /// Trains on all samples of these classes as what they now are, class by class.
+    /// Trains on all samples of these classes as what they now are, class by class: first what goes, for where there are as many gestures as can be told apart, a new
+    /// one takes the place of one that has no samples any more.
     fn train_anew(&mut self, classes: &BTreeSet<ClassId>) {
         let mut changes = self.changes_for(|of| classes.contains(&of));
-        changes.sort_by_key(|(class, _)| *class);
+        changes.sort_by_key(|(class, change)| (!matches!(change, TrainingChange::Remove(_)), *class));
         self.training.extend(changes.into_iter().map(|(_, change)| change));
     }
 

@@ -404,3 +404,30 @@ fn as_many_words_as_one_message_brings_train_each_sample_once() {
     let last = anas(&(MAX_NAMED - 1).to_string());
     assert_eq!(trained(chain.collect(), 2), [(Some(last), 8)].into());
 }
+
+#[test]
+fn what_goes_is_trained_on_no_more_before_another_gesture_takes_its_place() {
+    let mut swarm = Swarm::new(1, config(2, 0.0), 71);
+    // Samples of the first gesture, by number, are trained on before those of the second.
+    let mut labels = ["circle", "ring"];
+    labels.sort_unstable_by_key(|label| anas(label));
+    for label in labels {
+        let round = swarm.show(2);
+        swarm.say("ana", Instruction::New { label: label.to_owned(), round: Some(round) });
+    }
+    for retired in [0, 1, 0] {
+        let known = |at: usize| swarm.names(0).get(anas(labels[at])).unwrap().clone();
+        let word = |at: usize, fate| Naming { count: known(at).count + 1, fate, ..known(at) };
+        let namings = vec![word(1 - retired, Fate::InUse), word(retired, Fate::Retired)];
+        let message = Message::Namings(Namings { namings });
+        let stamp = Stamp { boot: 1 << 20, sequence: 1 };
+        let said = Envelope { author: RobotId(9), stamp, message, signature: None };
+        let outputs = swarm.minds[0].handle(swarm.now, Input::Received(said));
+        let changes = outputs.into_iter().filter_map(|output| match output {
+            Output::Train(changes) => Some(changes),
+            _ => None,
+        });
+        let goes: Vec<bool> = changes.flatten().map(|change| inserted(change).is_none()).collect();
+        assert!(goes.contains(&true) && goes.is_sorted_by(|before, after| before >= after), "{goes:?}");
+    }
+}
