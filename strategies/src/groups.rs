@@ -4,6 +4,9 @@
 //! classifiers [certified](gestalt_svm::Certified).
 
 use std::cmp::Reverse;
+use std::collections::{BTreeMap, VecDeque};
+
+use gestalt_protocol::ClassId;
 
 use crate::sample::{HeldSample, HeldSamples, SetPart};
 
@@ -23,21 +26,34 @@ impl Groups {
         Some(author.0 as usize % self.0)
     }
 
-    /// The sample to go because its group has more than its room, an equal part of that many and one: the oldest of the gesture that it has most of. What is
-    /// left over when the room is divided is this robot's.
-    pub fn above(self, samples: &HeldSamples, capacity: usize) -> Option<u64> {
+    /// The samples to go because their group has more than its room, an equal part of that many and one: as many as are too many, each the oldest of the gesture that the
+    /// group has most of. What is left over when the room is divided is this robot's.
+    pub fn above(self, samples: &HeldSamples, capacity: usize) -> Vec<u64> {
         let each = capacity / (self.0 + 1);
         let mut counts = vec![0; self.0];
         for (author, held) in samples.authors() {
             counts[author.0 as usize % self.0] += held;
         }
         let own = samples.total(SetPart::Personal) + samples.total(SetPart::Shared);
-        let crowded = counts.iter().position(|count| *count > each).map(Some);
-        let crowded = crowded.or((own > capacity - self.0 * each).then_some(None))?;
-        let theirs =
-            |class| samples.with_keys(samples.class_keys(class)).filter(|sample| self.of(sample) == crowded);
-        let most = samples.classes().max_by_key(|class| (theirs(*class).count(), Reverse(*class)))?;
-        theirs(most).next().map(|sample| sample.key)
+        let others = counts.into_iter().enumerate().map(|(group, held)| (Some(group), held, each));
+        let all = others.chain([(None, own, capacity - self.0 * each)]);
+        let crowded = all.filter(|(_, held, room)| held > room);
+        crowded.flat_map(|(group, held, room)| self.oldest_of_most(samples, group, held - room)).collect()
+    }
+
+    /// So many samples of a group, one after the other.
+    fn oldest_of_most(self, samples: &HeldSamples, group: Option<usize>, n: usize) -> Vec<u64> {
+        let theirs = |class: ClassId| {
+            let of_class = samples.with_keys(samples.class_keys(class));
+            of_class.filter(|sample| self.of(sample) == group).map(|sample| sample.key).collect()
+        };
+        let mut left: BTreeMap<ClassId, VecDeque<u64>> =
+            samples.classes().map(|class| (class, theirs(class))).collect();
+        let oldest = |_| {
+            let (_, most) = left.iter_mut().max_by_key(|(class, keys)| (keys.len(), Reverse(**class)))?;
+            most.pop_front()
+        };
+        (0..n).filter_map(oldest).collect()
     }
 }
 
@@ -45,7 +61,7 @@ impl Groups {
 mod tests {
     use std::sync::Arc;
 
-    use gestalt_protocol::{ClassId, RobotId, RoundId, SampleId};
+    use gestalt_protocol::{RobotId, RoundId, SampleId};
     use proptest::prelude::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
@@ -92,11 +108,43 @@ mod tests {
         of_others.map(|sample| (sample.round.counter, sample.class.0, sample.id.is_some())).collect()
     }
 
+    /// The first of them to go, as it reads.
+    fn first_above(samples: &HeldSamples, capacity: usize) -> Option<u64> {
+        let groups = Groups(3);
+        let of = |group| samples.iter().filter(move |sample| groups.of(sample) == group);
+        let each = capacity / 4;
+        let mut rooms = (0..3).map(|group| (Some(group), each)).chain([(None, capacity - 3 * each)]);
+        let (crowded, _) = rooms.find(|(group, room)| of(*group).count() > *room)?;
+        let theirs = |class: ClassId| of(crowded).filter(move |sample| sample.class == class);
+        let most = samples.classes().max_by_key(|class| (theirs(*class).count(), Reverse(*class)))?;
+        theirs(most).next().map(|sample| sample.key)
+    }
+
     fn coming() -> impl Strategy<Value = Vec<Coming>> {
         prop::collection::vec((1..9_u32, 1..9_u32, 0..4_u32), 1..60)
     }
 
     proptest! {
+        #[test]
+        fn at_once_goes_what_would_go_one_by_one(coming in coming(), capacity in 4..60_usize) {
+            let mut samples = HeldSamples::default();
+            let each = coming.iter().flat_map(|(author, count, class)| (0..*count).map(|_| (*author, *class)));
+            for (key, (author, class)) in (1..).zip(each) {
+                let id = SampleId { author: RobotId(author), life: 1, number: key };
+                let part = if author == ME.0 { SetPart::Shared } else { SetPart::External };
+                let (key, round) = (u64::from(key), RoundId { counter: 1, opener: ME, life: 0 });
+                let (class, vector) = (ClassId(class), [0.0].into());
+                samples.insert(HeldSample { key, part, id: Some(id), class, round, vector });
+            }
+            let at_once = Groups(3).above(&samples, capacity);
+            let mut one_by_one = Vec::new();
+            while let Some(key) = first_above(&samples, capacity) {
+                samples.remove(key);
+                one_by_one.push(key);
+            }
+            prop_assert_eq!(at_once, one_by_one);
+        }
+
         #[test]
         fn what_is_held_of_one_group_and_of_oneself_is_the_same_whatever_another_sends(
             honest in coming(), lies in coming(), capacity in 4..60_usize, lying in 0..3_usize,

@@ -304,12 +304,8 @@ impl TrainingSet {
     pub fn trim(&mut self, rng: &mut dyn Rng) -> Vec<SetChange> {
         let mut changes = Vec::new();
         if let Some(groups) = self.groups {
-            while let Some(victim) = groups.above(&self.samples, self.capacity)
-                && let Some(victim) = self.remove(victim)
-            {
-                changes.push(SetChange::Removed(victim));
-            }
-            return changes;
+            let victims = groups.above(&self.samples, self.capacity).into_iter();
+            return victims.filter_map(|victim| self.remove(victim)).map(SetChange::Removed).collect();
         }
         while self.samples.len() > self.capacity {
             let gone = match self.shares.above(&self.samples, self.capacity) {

@@ -138,6 +138,15 @@ impl Learning {
         number
     }
 
+    /// Lets go of what there is no room for, where it was stored when there was more.
+    pub(super) fn trim(&mut self) {
+        let gone = self.set.trim(&mut *self.rng);
+        self.absorb(gone);
+        for (number, aside) in self.aside.trim() {
+            self.note_not_aside(number, &aside);
+        }
+    }
+
     /// Notes that a sample is aside no longer.
     fn note_not_aside(&mut self, number: u64, aside: &UnresolvedSample) {
         self.dirty.insert(Item::Aside(number));

@@ -196,6 +196,7 @@ impl Learning {
             unsent: VecDeque::new(),
         };
         learning.let_go_aside();
+        learning.trim();
         learning.gestures = learning.all_gestures();
         learning.judge_from_the_start();
         learning.training = learning.training_anew();

@@ -76,6 +76,11 @@ impl Unresolved {
         let number = self.next;
         self.next += 1;
         self.insert(number, aside);
+        (number, self.trim())
+    }
+
+    /// Takes out those that are more than there is room for: after one came, and of what was stored where there was more room.
+    pub fn trim(&mut self) -> Vec<(u64, UnresolvedSample)> {
         let mut gone = Vec::new();
         while self.samples.len() > self.capacity
             && let Some(first) = self.first_to_go()
@@ -85,7 +90,7 @@ impl Unresolved {
         for (number, _) in &gone {
             self.earned.remove(number);
         }
-        (number, gone)
+        gone
     }
 
     fn first_to_go(&self) -> Option<u64> {
@@ -210,5 +215,7 @@ mod tests {
         assert_eq!((number, gone), (10, vec![(7, of(3, 1))]));
         let mut none = Unresolved::new(stored.to_vec(), 2, 0);
         assert_eq!((none.put(of(0, 2)).1.len(), none.len(), none.next()), (4, 0, 11));
+        let mut less = Unresolved::new(stored.to_vec(), 2, 2);
+        assert_eq!((less.trim(), less.trim(), less.len()), (vec![(7, of(3, 1))], vec![], 2));
     }
 }

@@ -4,7 +4,7 @@ use gestalt_protocol::Signature;
 use gestalt_rounds::Sign;
 
 use super::*;
-use crate::forgetting::Forgetting;
+use crate::forgetting::{Forgetting, ForgettingRule};
 use crate::sample::HeldSamples;
 use crate::selection::Selection;
 use crate::training_set::TrainingSet;
@@ -228,6 +228,34 @@ fn rules_of_ones_own_choose_what_is_shared_and_what_goes() {
         assert_eq!((set.len(), set.class_count(ClassId(3))), (4, 3), "what came first is kept");
     }
     swarm.check();
+}
+
+#[test]
+fn a_robot_that_starts_with_less_room_holds_and_remembers_no_more_than_that() {
+    for rule in ForgettingRule::ALL {
+        let mut swarm = Swarm::new(2, LearningConfig { forgetting: rule, ..config(4, 0.5) }, 18);
+        for class in 0..CLASSES {
+            let round = swarm.show(class);
+            swarm.was(round, class);
+        }
+        let round = swarm.show(3);
+        swarm.say("ada", Instruction::Wrong { round, of: Gesture::Class(ClassId(3)) });
+        let held = |swarm: &Swarm| {
+            let [held, aside] = [2, 5].map(|kind| swarm.disks[0].keys().filter(|key| key[0] == kind).count());
+            let known = (swarm.sizes(0).iter().sum::<usize>(), swarm.minds[0].learned().unwrap().aside);
+            assert_eq!((held, aside), known, "{rule}: the disk holds the same");
+            known
+        };
+        assert_eq!(held(&swarm), (36, 4));
+        swarm.config = LearningConfig { capacity: 7, aside: 3, ..swarm.config.clone() };
+        swarm.restart(0);
+        assert_eq!(held(&swarm), (7, 3), "{rule}");
+        swarm.check();
+        swarm.config = LearningConfig { aside: 0, ..swarm.config.clone() };
+        swarm.restart(0);
+        assert_eq!(held(&swarm), (7, 0), "{rule}");
+        swarm.check();
+    }
 }
 
 #[test]
