@@ -32,14 +32,27 @@ fn files(config: &Config) -> Vec<ConfigError> {
         found.push(ConfigError::value("camera.source", error));
     }
     match model::load(&config.model) {
-        Ok(Some(model)) => {
-            let tried = memory(config, &model);
-            found.extend(tried.err().map(|error| ConfigError::value("learning.memory", said(&error))));
-        }
+        Ok(Some(model)) => match share_bytes(config, &model) {
+            Ok(()) => {
+                let tried = memory(config, &model);
+                found.extend(tried.err().map(|error| ConfigError::value("learning.memory", said(&error))));
+            }
+            Err(error) => found.push(error),
+        },
         Ok(None) => {}
         Err(error) => found.push(ConfigError::value("model", error)),
     }
     found
+}
+
+/// Whether the robot may share as many bytes in a round as one sample of its model takes. What is wrong with its parameters by themselves is said already.
+pub(crate) fn share_bytes(config: &Config, model: &RobotModel) -> Result<(), ConfigError> {
+    let samples = &config.learning.samples;
+    if !config.learning.enabled || samples.validate().is_err() {
+        return Ok(());
+    }
+    let checked = samples.check_share_bytes(model.classifier.space(), config.trust.keys.is_some());
+    checked.map_err(|error| ConfigError::value("learning.samples", error))
 }
 
 /// Whether the robot's memory is its own, and fits its model.
@@ -106,6 +119,19 @@ mod tests {
             assert!(found.iter().any(|it| it.starts_with(&start) && it.contains(cause)), "{key}: {found:?}");
         }
         assert_eq!(found.len(), 5, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_too_little_for_one_sample_of_the_model_is_named_once() {
+        let samples = "samples: {share_bytes: 128, precision: 'f32'}";
+        let with =
+            |enabled| found(&format!("{{model: 'rendered', learning: {{enabled: {enabled}, {samples}}}}}"));
+        let short = with(true);
+        assert!(
+            short.len() == 1 && short[0].starts_with("learning.samples: share_bytes is 128"),
+            "{short:?}"
+        );
+        assert_eq!(with(false), Vec::<String>::new());
     }
 
     #[test]

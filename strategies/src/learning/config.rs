@@ -58,7 +58,7 @@ pub enum LearningConfigError {
     },
     /// Fewer bytes than one sample takes.
     #[error(
-        "share_bytes is {0}: one sample takes up to 128 bytes and more; choose at least 128, or leave it out"
+        "share_bytes is {0}: choose at least 128, and as many as one sample of the model takes, or null for no bound"
     )]
     Bytes(u32),
     /// A weight in the defence against poison that is none.
@@ -93,7 +93,7 @@ pub enum LearningConfigError {
 /// | `share_samples` | none | n: the most samples shared per round | ≥ 0 |
 /// | `share_fraction` | 1.0 | B: the most samples shared, as a part of those newly acquired | 0–1 |
 /// | `share_per_round` | 100 | the most samples that the whole swarm shares per round | ≥ 0 |
-/// | `share_bytes` | 512 | the most bytes of samples per round, with their envelopes and, where robots sign, 64 for each signature | ≥ 128 |
+/// | `share_bytes` | 512 | the most bytes of samples per round, with their envelopes and, where robots sign, 64 for each signature | ≥ 128, and what [one sample](Self::check_share_bytes) takes |
 /// | `precision` | i8 | how shared vectors travel | |
 /// | `selection` | k_center | which samples are shared | |
 /// | `forgetting` | redundancy | which samples go when there are more than T | |

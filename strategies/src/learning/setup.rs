@@ -42,6 +42,16 @@ pub enum LearningError {
     /// Its parameters.
     #[error(transparent)]
     Config(#[from] LearningConfigError),
+    /// Fewer bytes for what a round shares than one sample takes.
+    #[error(
+        "share_bytes is {given}, and one sample of this model takes up to {least} in its envelope: nothing would ever be shared; choose at least {least}, a shorter precision, or null for no bound"
+    )]
+    ShareBytes {
+        /// The bytes that a round may share.
+        given: u32,
+        /// How many one sample takes.
+        least: usize,
+    },
     /// What it remembers is not its own.
     #[error(transparent)]
     Memory(#[from] MemoryError),

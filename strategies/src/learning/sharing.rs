@@ -3,18 +3,21 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use gestalt_protocol::{
-    Batches as BatchesTold, ClassId, Envelope, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message, RobotId,
-    RoundId, SampleId, Samples, SharedSample, Signature, Stamp,
+    Batches as BatchesTold, ClassId, Envelope, FeatureSpaceId, HeldBatch, MAX_BATCHES, MAX_SAMPLES, Message,
+    RobotId, RoundId, SampleId, Samples, SharedSample, Signature, Stamp,
 };
 use gestalt_rounds::Classify;
+use gestalt_svm::FeatureSpace;
 
+use super::config::LearningConfig;
 use super::memory::Item;
 #[cfg(test)]
 use super::memory::RobotMemory;
+use super::setup::LearningError;
 use super::state::{Learning, MAX_UNSENT};
 use crate::sample::SetPart;
 use crate::training_set::SetChange;
-use crate::vector_codec::decode_vector;
+use crate::vector_codec::{Precision, decode_vector};
 
 /// About how many bytes of vectors one batch takes, so that a vote never waits long behind it.
 const BATCH_BYTES: usize = 16 * 1024;
@@ -93,22 +96,10 @@ impl Learning {
             round.life = round.life.max(sample.round.life);
             class = class.max(sample.class);
         }
-        let vector = vec![0.0; self.space.components()];
         let beyond = u32::try_from(n.max(64)).unwrap_or(u32::MAX);
-        let sample = SharedSample {
-            id: self.set.series().sample(self.set.next_number().saturating_add(beyond)),
-            class,
-            round,
-            vector: self.config.precision.encode(&vector, &self.space),
-        };
-        let length = |samples: Vec<SharedSample>| {
-            let message = Message::Samples(Samples { space: self.space_id, samples });
-            let stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
-            Envelope { author: self.me, stamp, message, signature: None }.encode().len()
-        };
-        let unsigned = length(Vec::new());
-        let each = (length(vec![sample]) - unsigned).max(1);
-        let empty = unsigned + if signs { Signature::LENGTH } else { 0 };
+        let id = self.set.series().sample(self.set.next_number().saturating_add(beyond));
+        let sample = (id, class, round);
+        let (empty, each) = lengths((self.me, signs), self.config.precision, &self.space, sample);
         let (most, left) = (self.most_of_batch(), self.shared.bytes_left(bytes));
         let full = empty + most * each;
         n.min(left / full * most + most.min((left % full).saturating_sub(empty) / each))
@@ -221,6 +212,47 @@ impl Learning {
     fn may_tell(&self, first: SampleId) -> bool {
         !self.unsent.iter().any(|(revision, unsent)| *revision > self.remembered && *unsent == first)
     }
+}
+
+impl LearningConfig {
+    /// Whether what a round may share is enough for one sample of that space, whatever it is called and where robots sign, with its signature: below that nothing would
+    /// be shared, ever.
+    ///
+    /// # Errors
+    /// [`LearningError::ShareBytes`] names the least that is enough.
+    pub fn check_share_bytes(&self, space: &FeatureSpace, signs: bool) -> Result<(), LearningError> {
+        let Some(given) = self.share_bytes else { return Ok(()) };
+        // What is never to be shared need not fit.
+        if self.share_fraction == 0.0 || self.share_samples == Some(0) || self.share_per_round == Some(0) {
+            return Ok(());
+        }
+        // Greater numbers take more bytes.
+        let robot = RobotId(u32::MAX);
+        let id = SampleId { author: robot, life: u32::MAX, number: u32::MAX };
+        let round = RoundId { counter: u32::MAX, opener: robot, life: u32::MAX };
+        let (empty, each) = lengths((robot, signs), self.precision, space, (id, ClassId(u32::MAX), round));
+        let least = empty + each;
+        if given as usize >= least { Ok(()) } else { Err(LearningError::ShareBytes { given, least }) }
+    }
+}
+
+/// How many bytes an envelope of that robot takes without the samples of its batch, and how many one of them does that is called so, at most. Every space is named by
+/// as many.
+fn lengths(
+    (author, signs): (RobotId, bool),
+    precision: Precision,
+    space: &FeatureSpace,
+    (id, class, round): (SampleId, ClassId, RoundId),
+) -> (usize, usize) {
+    let vector = precision.encode(&vec![0.0; space.components()], space);
+    let length = |samples: Vec<SharedSample>| {
+        let message = Message::Samples(Samples { space: FeatureSpaceId(0), samples });
+        let stamp = Stamp { boot: u32::MAX, sequence: u32::MAX };
+        Envelope { author, stamp, message, signature: None }.encode().len()
+    };
+    let unsigned = length(Vec::new());
+    let each = (length(vec![SharedSample { id, class, round, vector }]) - unsigned).max(1);
+    (unsigned + if signs { Signature::LENGTH } else { 0 }, each)
 }
 
 /// About how many bytes a batch takes.

@@ -123,10 +123,11 @@ impl fmt::Debug for Learning {
 }
 
 impl Learning {
-    /// What that robot learned so far, in the life that drew this number.
-    pub fn new(me: RobotId, life: u32, setup: LearningSetup) -> Result<Self, LearningError> {
+    /// What that robot learned so far, in the life that drew this number; whether it signs what it shares takes room of that.
+    pub fn new(me: RobotId, life: u32, signs: bool, setup: LearningSetup) -> Result<Self, LearningError> {
         let LearningSetup { config, space, vocabulary, rng, memory, rules } = setup;
         config.validate()?;
+        config.check_share_bytes(&space, signs)?;
         let durable = memory.is_some();
         let memory = memory.unwrap_or_default();
         let newest = memory.newest_counter();

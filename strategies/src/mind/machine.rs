@@ -106,7 +106,8 @@ impl Mind {
         self.rounds.held_aloud()
     }
 
-    /// The same mind, that signs what it stands by, see [`Rounds::signed_by`].
+    /// The same mind, that signs what it stands by, see [`Rounds::signed_by`]. One that learns is told so before it is [set up](Self::learning) to: what it may share has
+    /// to be enough for a signature as well.
     #[must_use]
     pub fn signed_by(mut self, signer: Arc<dyn Sign>) -> Self {
         self.rounds = self.rounds.signed_by(signer);
@@ -128,7 +129,7 @@ impl Mind {
         let counter = setup.memory.as_ref().and_then(RobotMemory::newest_counter);
         let starts_again = setup.memory.as_ref().is_some_and(|memory| !memory.is_empty());
         let vocabulary = setup.vocabulary.clone();
-        self.learning = Some(Learning::new(self.me(), self.nonce, setup)?);
+        self.learning = Some(Learning::new(self.me(), self.nonce, self.rounds.signs(), setup)?);
         self.rounds = self.rounds.counting_from(counter).naming(vocabulary);
         self.call_by_names();
         Ok(if starts_again { self.started_again() } else { self })

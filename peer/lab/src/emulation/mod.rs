@@ -42,7 +42,7 @@ pub use teaching::{Feedback, Teaching};
 pub use trace::{Brief, Happening, Trace};
 
 use gestalt_protocol::Heeded;
-use gestalt_strategies::{Classifier, Mind, Refusals, TrainingSet, Vocabulary};
+use gestalt_strategies::{Classifier, LearningError, Mind, Refusals, TrainingSet, Vocabulary};
 
 use swarm::Swarm;
 
@@ -144,6 +144,15 @@ impl<'a> Emulation<'a> {
         if school.is_some() != scenario.learning.is_some() {
             let mend = "robots learn with a school, and only then: give both or none".to_owned();
             return Err(ScenarioError::Value { key: "learning", mend });
+        }
+        if let (Some(teaching), Some(school)) = (&scenario.learning, &school) {
+            // Nobody signs here.
+            let checked = teaching.robots.check_share_bytes(school.space(), false);
+            let wrong = |error: LearningError| {
+                let mend = error.to_string();
+                ScenarioError::Value { key: "learning.robots", mend }
+            };
+            checked.map_err(wrong)?;
         }
         Ok(Self {
             swarm: Swarm::new(scenario, seed, observers, (school, rules), trace),

@@ -239,6 +239,14 @@ fn another_number_of_eyes_than_robots_is_refused() {
     assert!(matches!(error, Err(ScenarioError::Value { key: "robots", .. })));
 }
 
+#[test]
+fn robots_that_could_share_nothing_are_refused() {
+    let mut scenario = Scenario { classes: 30, ..learning(2, 1.0, NetworkShape::Line) };
+    scenario.learning.as_mut().unwrap().robots.share_bytes = Some(128);
+    let error = run(&scenario, 1).unwrap_err().to_string();
+    assert!(error.starts_with("learning.robots: share_bytes is 128"), "{error}");
+}
+
 /// Robots on a ring that are shown each gesture once, see five looks of it and learn from nothing.
 pub(super) fn learning(robots: usize, fraction: f64, topology: NetworkShape) -> Scenario {
     let json = "{ keep: 5, share_bytes: null, precision: 'f32' }";

@@ -55,6 +55,10 @@ fn judge(config: &Config, facts: &mut RobotFacts, mine: &mut Status) {
         let space = model.classifier.space().id().to_string();
         mine.learning = Some(LearningStatus { space, ..LearningStatus::default() });
     }
+    if let Err(error) = crate::config::check::share_bytes(config, &model) {
+        facts.problems.push(error.to_string());
+        return;
+    }
     // What another process writes to may be read half-written.
     if let Some(memory) = facts.memory.as_mut().filter(|memory| !memory.held && memory.room == Room::Enough) {
         match crate::config::check::memory(config, &model) {

@@ -56,7 +56,7 @@ fn a_memory_of_another_robot_or_space_is_refused() {
         memory: Some(memory.clone()),
         rules: OwnRules::default(),
     };
-    let new = |me, setup| Learning::new(RobotId(me), 1, setup).map(|_| ());
+    let new = |me, setup| Learning::new(RobotId(me), 1, false, setup).map(|_| ());
     assert_eq!(new(1, setup(space(), vocabulary())), Ok(()));
     let robot = new(2, setup(space(), vocabulary())).unwrap_err();
     assert!(matches!(robot, LearningError::Memory(MemoryError::Robot { .. })));
@@ -94,7 +94,7 @@ fn records_without_a_head_are_refused_whichever_they_are() {
             memory: Some(memory),
             rules: OwnRules::default(),
         };
-        let refused = Learning::new(RobotId(1), 1, setup).map(|_| ()).unwrap_err();
+        let refused = Learning::new(RobotId(1), 1, false, setup).map(|_| ()).unwrap_err();
         assert!(matches!(refused, LearningError::Memory(MemoryError::Damaged(_))), "{key:?}: {refused}");
     }
 }

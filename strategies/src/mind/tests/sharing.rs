@@ -115,6 +115,54 @@ fn bytes_bound_what_a_round_shares_signed_or_not_and_whatever_it_is_called() {
 }
 
 #[test]
+fn what_is_too_little_for_one_sample_is_refused_and_what_is_said_to_be_enough_is() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let rows: Vec<Vec<f32>> = (0..90).map(|_| (0..80).map(|_| rng.random::<f32>()).collect()).collect();
+    let all = rows.iter().map(Vec::as_slice);
+    let (method, keep) = (ScalingMethod::PerComponent, Components::Count(80));
+    let space = Arc::new(FeatureSpace::fit("wide", all, method, keep, &mut rng));
+    for (precision, signs) in Precision::ALL.into_iter().flat_map(|it| [(it, false), (it, true)]) {
+        let waken = |share_bytes, share_fraction| {
+            let share_bytes = Some(share_bytes);
+            let config =
+                LearningConfig { precision, share_bytes, share_fraction, ..LearningConfig::default() };
+            let setup = LearningSetup {
+                config,
+                space: space.clone(),
+                vocabulary: vocabulary(),
+                rng: Box::new(ChaCha8Rng::seed_from_u64(1)),
+                memory: None,
+                rules: OwnRules::default(),
+            };
+            let life = Life { boot: 1, nonce: u32::MAX };
+            let mind = Mind::new(RobotId(u32::MAX - 1), life, RoundsConfig::default()).unwrap();
+            let mind = if signs { mind.signed_by(Arc::new(Scribe)) } else { mind };
+            mind.learning(setup)
+        };
+        let Err(LearningError::ShareBytes { least, .. }) = waken(128, 1.0) else { panic!("{precision:?}") };
+        let enough = least as u32;
+        let refused = waken(enough - 1, 1.0).map(|_| ()).unwrap_err();
+        assert_eq!(refused, LearningError::ShareBytes { given: enough - 1, least });
+        assert!(waken(128, 0.0).is_ok(), "nothing is to be shared");
+        let mut mind = waken(enough, 1.0).unwrap();
+        let now = Duration::from_secs(1);
+        mind.handle(now, Input::Learned(Arc::new(ByFirst)));
+        mind.handle(now, Input::Open);
+        mind.handle(now, Input::Observed(Observation { features: rows[0].clone(), quality: 1.0 }));
+        let (round, class) = (mind.round().unwrap(), Gesture::Class(ClassId(1)));
+        let instruction = Instruction::Was { round, class };
+        let told = Instructed { by: "ada".parse().unwrap(), at: 1, instruction, said: None };
+        let out = mind.handle(now, Input::Instructed(told));
+        let lengths = out.iter().filter_map(|out| match out {
+            Output::Broadcast(said) if kind(&said.message) == "samples" => Some(said.encode().len()),
+            _ => None,
+        });
+        let lengths: Vec<usize> = lengths.collect();
+        assert!(lengths.len() == 1 && lengths[0] <= least, "{precision:?}: {lengths:?} of {least}");
+    }
+}
+
+#[test]
 fn what_one_round_may_share_it_shares_once_however_many_words_come_in_it() {
     for (samples, bytes) in [(Some(2), None), (None, Some(128))] {
         let config = LearningConfig { share_samples: samples, share_bytes: bytes, ..config(8, 1.0) };
