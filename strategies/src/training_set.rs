@@ -10,7 +10,10 @@ mod changes;
 mod lives;
 mod restore_error;
 mod room;
+#[cfg(test)]
+mod tests;
 
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -28,6 +31,9 @@ use crate::groups::Groups;
 use crate::sample::{HeldSample, HeldSamples, SeenSamples, SetPart};
 use crate::selection::Selection;
 use crate::shares::Shares;
+
+/// Among so many samples more than there is room for the rule of forgetting chooses: what some rules do for a first one takes time by the square of how many there are.
+const MOST_CHOSEN: usize = 10_000;
 
 /// No key read from a store is greater.
 const LAST_KEY: u64 = u64::MAX / 2;
@@ -300,7 +306,8 @@ impl TrainingSet {
     /// Forgets while there are more samples than the capacity: only after a set was taken up that was stored under a
     /// greater one.
     ///
-    /// The bound stands whatever the rule says: if it names no sample that is held, the oldest goes.
+    /// The bound stands whatever the rule says: if it names no sample that is held, the oldest goes. It is asked for the last 10,000 to go; before these, the oldest of the
+    /// gesture that there are most of.
     pub fn trim(&mut self, rng: &mut dyn Rng) -> Vec<SetChange> {
         let mut changes = Vec::new();
         if let Some(groups) = self.groups {
@@ -311,12 +318,20 @@ impl TrainingSet {
             let gone = match self.shares.above(&self.samples, self.capacity) {
                 // It counts as never come: whoever floods a robot changes little of what its rule goes by.
                 Some(excess) => self.remove(excess),
+                None if self.samples.len() - self.capacity > MOST_CHOSEN => {
+                    self.oldest_of_most().and_then(|oldest| self.forget(oldest))
+                }
                 None => self.victim(rng).and_then(|victim| self.forget(victim)),
             };
             let Some(gone) = gone else { break };
             changes.push(SetChange::Removed(gone));
         }
         changes
+    }
+
+    fn oldest_of_most(&self) -> Option<u64> {
+        let order = |class: &ClassId| (self.samples.class_count(*class), Reverse(*class));
+        self.samples.class_keys(self.samples.classes().max_by_key(order)?).first().copied()
     }
 
     /// The sample to forget where no author has more than its share.
