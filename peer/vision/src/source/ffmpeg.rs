@@ -168,8 +168,10 @@ impl Ffmpeg {
 
 /// A video, and the size of its pictures, by its own word.
 fn open(path: &Path) -> Result<(VideoCapture, Size), SourceError> {
+    // To FFmpeg what stands before a colon is a protocol, unless a slash comes first. What begins at the root stays as it is.
+    let file = Path::new(".").join(path);
     // Named explicitly, since OpenCV would otherwise try every backend it was built with.
-    let capture = VideoCapture::from_file(path, videoio::CAP_FFMPEG)?;
+    let capture = VideoCapture::from_file(file, videoio::CAP_FFMPEG)?;
     if !capture.is_opened()? {
         return Err(SourceError::NotAVideo(path.into()));
     }

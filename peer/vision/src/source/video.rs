@@ -197,6 +197,25 @@ mod tests {
     }
 
     #[test]
+    fn a_name_with_a_colon_is_a_name() {
+        // Named alone, and so in the folder that the test runs in.
+        let file = tempfile::Builder::new()
+            .prefix("2026-11-30T15:50:00-")
+            .suffix(".avi")
+            .tempfile_in(".")
+            .unwrap()
+            .into_temp_path();
+        record(&file, 2);
+        let name = Path::new(file.file_name().unwrap());
+        let mut video = Video::open(name, true).unwrap();
+        // The last is of another pass through it.
+        for _ in 0..3 {
+            next(&mut video).unwrap();
+        }
+        assert_eq!(video.describe(), format!("video {}", name.display()));
+    }
+
+    #[test]
     fn what_is_no_video_is_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
         let open = |name: &str, bytes: &[u8]| {
