@@ -211,6 +211,12 @@ impl CameraReport {
         }
     }
 
+    /// Whether a robot that has been silent for so long has left, where one has after that time: never before it is frozen.
+    #[must_use]
+    pub fn is_gone(&self, silent: Duration, after: Duration) -> bool {
+        silent >= after && silent > self.patience()
+    }
+
     /// Frames per second, lately.
     #[must_use]
     pub fn fps(&self) -> Option<f32> {

@@ -104,6 +104,7 @@ fn main() -> std::process::ExitCode {
         [Waits] stream::one_frame_is_under_way_and_who_is_not_answered_asks_once_a_second.await,
         [Waits] stream::of_two_cameras_that_stream_as_one_robot_the_later_is_looked_at.await,
         [Waits] paced::a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_frames_count.await,
+        [Waits] paced::a_camera_that_is_slower_than_a_centre_is_patient_keeps_its_seat.await,
         [Waits] paced::a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_waiting.await,
         [Waits] stream::a_peer_looks_through_a_camera_that_is_elsewhere.await,
         [Waits] stream::nonsense_on_the_keys_of_frames_is_counted_and_nothing_breaks.await,

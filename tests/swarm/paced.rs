@@ -100,9 +100,10 @@ pub async fn a_camera_is_asked_seldom_between_rounds_and_in_one_as_often_as_its_
     center.stop().await;
 }
 
-/// A camera that sends when it may, and hears nothing while it is `deaf`.
+/// A camera of so many frames per second that sends when it may, and hears nothing while it is `deaf`.
 async fn camera(
     id: u32,
+    fps: f32,
     swarm: String,
     locators: Vec<String>,
     pictures: Vec<Vec<u8>>,
@@ -128,25 +129,42 @@ async fn camera(
         }
         let sequence = credit.sent(Instant::now());
         let (encoding, camera) = (ImageEncoding::Jpeg, "parrot".to_owned());
-        let header = FrameHeader { nonce, sequence, age_us: 0, encoding, fps: 30.0, camera };
+        let header = FrameHeader { nonce, sequence, age_us: 0, encoding, fps, camera };
         sender.send(&header, picture.clone()).await.unwrap();
-        tokio::time::sleep(Duration::from_millis(33)).await;
+        tokio::time::sleep(Duration::from_secs_f32(1.0 / fps)).await;
     }
+}
+
+fn pictures(hands: &Hands) -> Vec<Vec<u8>> {
+    let files = std::fs::read_dir(hands.encoded()).unwrap();
+    files.map(|entry| std::fs::read(entry.unwrap().path()).unwrap()).collect()
+}
+
+pub async fn a_camera_that_is_slower_than_a_centre_is_patient_keeps_its_seat() {
+    let hands = Hands::new(2);
+    let swarm = unique("rare");
+    // Who is silent for four seconds is let go.
+    let center = center(&swarm, &hands).await;
+    let locators = center.robot().locators().to_vec();
+    let playing = tokio::spawn(camera(1, 0.2, swarm, locators, pictures(&hands), Arc::default()));
+    wait_live(&center, 1).await;
+    tokio::time::sleep(Duration::from_secs(11)).await;
+    assert_eq!(center.robot().status().counters.get("robots_gone"), None);
+    assert_eq!(center.served().len(), 1);
+    playing.abort();
+    center.stop().await;
 }
 
 pub async fn a_camera_that_loses_acknowledgements_sends_seldom_and_keeps_nobody_waiting() {
     let hands = Hands::new(2);
     let swarm = unique("deaf");
     let center = center(&swarm, &hands).await;
-    let pictures: Vec<Vec<u8>> = std::fs::read_dir(hands.encoded())
-        .unwrap()
-        .map(|entry| std::fs::read(entry.unwrap().path()).unwrap())
-        .collect();
+    let pictures = pictures(&hands);
     let deaf = Arc::new(AtomicBool::new(false));
     let mut playing = tokio::task::JoinSet::new();
     for (id, deaf) in [(1, deaf.clone()), (2, Arc::default())] {
         let locators = center.robot().locators().to_vec();
-        playing.spawn(camera(id, swarm.clone(), locators, pictures.clone(), deaf));
+        playing.spawn(camera(id, 30.0, swarm.clone(), locators, pictures.clone(), deaf));
     }
     wait_live(&center, 2).await;
     wait_round(&center).await;

@@ -83,6 +83,23 @@ fn a_slow_camera_has_the_time_of_three_of_its_frames_from_the_first_on() {
 }
 
 #[test]
+fn a_streaming_robot_has_never_left_before_it_is_frozen() {
+    // A frame every 2.5 s, seven of them, and no more.
+    let mut report = CameraReport::of_stream(Duration::from_millis(7500), Duration::ZERO);
+    let (soon, late) = (Duration::from_secs(2), Duration::from_secs(10));
+    let mut heard = 0;
+    for at in (0..30_000).step_by(100) {
+        if at % 2500 == 0 && at <= 15_000 {
+            deliver(&mut report, 1.0, at);
+            heard = at;
+        }
+        let silent = Duration::from_millis(at - heard);
+        assert_eq!(report.is_gone(silent, soon), state(&report, at) == CameraState::Frozen, "{at}");
+        assert_eq!(report.is_gone(silent, late), silent >= late, "{at}");
+    }
+}
+
+#[test]
 fn a_camera_that_nobody_looks_through_is_not_frozen() {
     let mut report = CameraReport::of_camera(false, PERIOD);
     report.expect(Duration::ZERO);

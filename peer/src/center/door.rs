@@ -224,13 +224,13 @@ impl Door {
     /// Reports how each robot is served, and lets those go that have been silent for too long.
     async fn look_after(&self) {
         let now = Instant::now();
-        let center = &self.config.center;
+        let gone_after = self.config.center.gone_after;
         let seats = self.queue.seats();
         self.robot.set("robots_served", seats.len() as u64);
         for (robot, seat) in seats {
-            let silent = seat.report(now, self.queue.count(robot));
+            let is_gone = seat.report(now, self.queue.count(robot), gone_after);
             // Who was expelled or has another key comes again as what it is by then.
-            if silent >= center.gone_after || !seat.is_enrolled() {
+            if is_gone || !seat.is_enrolled() {
                 self.robot.count("robots_gone");
                 drop(self.queue.dismiss(robot));
                 seat.leave().await;

@@ -137,8 +137,8 @@ impl Seat {
         pace.counts(taken, period)
     }
 
-    /// Puts how it goes into the robot's status. Says for how long nothing was heard of it.
-    pub fn report(&self, now: Instant, count: Count) -> Duration {
+    /// Puts how it goes into the robot's status. Says whether it has left: it was silent for `gone_after`, and for longer than its camera may be.
+    pub fn report(&self, now: Instant, count: Count, gone_after: Duration) -> bool {
         let mut record = self.record();
         let record = &mut *record;
         let Lately { fps_received, delay } = record.service.lately(now, count.received);
@@ -154,7 +154,7 @@ impl Seat {
         ] {
             self.robot.set(name, value);
         }
-        now.saturating_duration_since(record.heard)
+        record.camera.is_gone(now.saturating_duration_since(record.heard), gone_after)
     }
 
     /// The robot's account of itself.

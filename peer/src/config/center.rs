@@ -21,10 +21,10 @@ pub struct CenterSection {
     /// Into how many of a robot's frames one look (`rounds.decorrelation`) is divided; no more are asked for. `None`: every frame
     /// that its camera takes. Range `1..=32`.
     pub frames_per_look: Option<u32>,
-    /// A robot silent for this long counts as frozen.
+    /// A robot silent for this long counts as frozen; one with a slow camera has the time of three frames.
     #[serde(with = "humantime_serde")]
     pub frozen_after: Duration,
-    /// A robot silent for this long has left the swarm, and no round waits for it. At least `frozen_after`.
+    /// A robot silent for this long has left the swarm, and no round waits for it; never before it counts as frozen. At least `frozen_after`.
     #[serde(with = "humantime_serde")]
     pub gone_after: Duration,
     /// What is known of single robots, by id.
