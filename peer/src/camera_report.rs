@@ -25,15 +25,15 @@ const FRAMES: std::ops::RangeInclusive<usize> = 3..=256;
 /// those that came lately, or, until some have, of its model.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// After this many errors in a row a file fails.
+/// After this many errors in a row a file fails, and any camera after as many pictures that are none.
 const ERRORS: u32 = 3;
 
 /// Follows one camera, here or at the other end of a stream: its frames, its failures, and when neither comes. All times
 /// since the same moment.
 #[derive(Debug)]
 pub struct CameraReport {
-    /// The same picture over and over is a fault.
-    changes: bool,
+    /// It runs by itself: the same picture over and over is a fault, and so is any error but that of one picture.
+    live: bool,
     /// After this many errors in a row it fails.
     errors_allowed: u32,
     patience: Duration,
@@ -73,13 +73,13 @@ pub struct News {
 }
 
 impl CameraReport {
-    /// A camera of this machine that nobody looks through yet. `live`: it runs by itself, so that any error, and the same
+    /// A camera of this machine that nobody looks through yet. `live`: it runs by itself, so that any error but that of one picture, and the same
     /// picture over and over, is a fault. `period`: the time between two frames that its model says.
     #[must_use]
     pub fn of_camera(live: bool, period: Duration) -> Self {
         Self {
-            changes: live,
-            errors_allowed: if live { 1 } else { ERRORS },
+            live,
+            errors_allowed: ERRORS,
             patience: PATIENCE,
             period,
             if_silent: "check the camera, its cable and its driver",
@@ -130,7 +130,7 @@ impl CameraReport {
     /// The camera delivered a picture at that time. Says whether it is worth looking at: a frozen one is not.
     pub fn note_frame(&mut self, image: &Mat, at: Duration) -> bool {
         self.note_size(Size::new(image.cols(), image.rows()), at);
-        if !self.changes {
+        if !self.live {
             return true;
         }
         self.picture.note(checksum(image), at);
@@ -168,7 +168,8 @@ impl CameraReport {
     /// The camera failed.
     pub fn note_error(&mut self, error: &SourceError) {
         // What panicked is closed, if it were a file or not.
-        let errors = if matches!(error, SourceError::Panicked(_)) { self.errors_allowed } else { 1 };
+        let is_closed = matches!(error, SourceError::Panicked(_)) || self.live && !error.is_of_one_picture();
+        let errors = if is_closed { self.errors_allowed } else { 1 };
         self.errors = self.errors.saturating_add(errors);
         self.error = Some(error.to_string());
         self.ended = error.is_the_end();
@@ -306,7 +307,7 @@ impl CameraReport {
     }
 
     fn is_same_picture(&self, at: Duration) -> bool {
-        self.changes && self.picture.lasted(at) > self.patience()
+        self.live && self.picture.lasted(at) > self.patience()
     }
 }
 

@@ -106,25 +106,61 @@ impl Source for RosCamera {
             ))
         })?;
         // As late as it was waited for.
-        let at = now + asked.elapsed();
-        let no_picture =
-            |cause: String| SourceError::Own(format!("what is published on {topic} is no picture: {cause}"));
-        match picture.map_err(no_picture)? {
-            Picture::Encoded(bytes) => {
-                let mut image = Mat::default();
-                decode(&bytes, MAX_MEGAPIXELS, &mut image).map_err(|cause| no_picture(cause.to_string()))?;
-                Ok(Frame { image, at })
+        frame(topic, picture, now + asked.elapsed())
+    }
+}
+
+/// What was published on that topic, as a frame of that time. What is no picture costs itself alone: the topic is as good as before.
+fn frame(topic: &str, picture: Result<Picture, String>, at: Duration) -> Result<Frame, SourceError> {
+    let no_picture = |cause: String| {
+        SourceError::Own(format!("what is published on {topic} is no picture: {cause}")).of_one_file()
+    };
+    match picture.map_err(no_picture)? {
+        Picture::Encoded(bytes) => {
+            let mut image = Mat::default();
+            decode(&bytes, MAX_MEGAPIXELS, &mut image).map_err(|cause| no_picture(cause.to_string()))?;
+            Ok(Frame { image, at })
+        }
+        Picture::Pixels(image) => {
+            let megapixels = f64::from(image.width) * f64::from(image.height) / 1e6;
+            if megapixels > MAX_MEGAPIXELS {
+                return Err(no_picture(format!(
+                    "{megapixels:.1} million pixels, at most {MAX_MEGAPIXELS} are looked at"
+                )));
             }
-            Picture::Pixels(image) => {
-                let megapixels = f64::from(image.width) * f64::from(image.height) / 1e6;
-                if megapixels > MAX_MEGAPIXELS {
-                    return Err(no_picture(format!(
-                        "{megapixels:.1} million pixels, at most {MAX_MEGAPIXELS} are looked at"
-                    )));
-                }
-                let pixels = image.to_bgr().map_err(|cause| no_picture(cause.to_string()))?;
-                Frame::from_bgr(image.width, image.height, &pixels, at)
-            }
+            let pixels = image.to_bgr().map_err(|cause| no_picture(cause.to_string()))?;
+            Frame::from_bgr(image.width, image.height, &pixels, at).map_err(SourceError::of_one_file)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_ros::message::Header;
+    use opencv::prelude::*;
+
+    use super::*;
+
+    fn pixels(encoding: &str, width: u32, height: u32, data: Vec<u8>) -> Picture {
+        let (header, encoding) = (Header::default(), encoding.to_owned());
+        Picture::Pixels(Image { header, height, width, encoding, big_endian: false, step: 3 * width, data })
+    }
+
+    #[test]
+    fn what_is_no_picture_says_nothing_of_the_next() {
+        let frame = |picture| frame("/camera", picture, Duration::ZERO);
+        let good = frame(Ok(pixels("bgr8", 3, 2, vec![7; 18]))).unwrap();
+        assert_eq!((good.image.cols(), good.image.rows()), (3, 2));
+        for bad in [
+            Err("a message of 3 bytes".to_owned()),
+            Ok(Picture::Encoded(Vec::new())),
+            Ok(Picture::Encoded(b"a shopping list".to_vec())),
+            Ok(pixels("yuv422", 3, 2, vec![7; 18])),
+            Ok(pixels("bgr8", 3, 2, vec![7; 17])),
+            Ok(pixels("bgr8", 60_000, 60_000, Vec::new())),
+        ] {
+            let error = frame(bad).unwrap_err();
+            assert!(error.is_of_one_picture() && error.to_string().contains("/camera"), "{error}");
         }
     }
 }

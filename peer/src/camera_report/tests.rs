@@ -128,6 +128,26 @@ fn errors_in_a_row_are_a_failing_camera_and_the_end_is_the_end() {
 }
 
 #[test]
+fn one_bad_picture_of_a_live_camera_costs_itself_alone() {
+    let mut report = CameraReport::of_camera(true, PERIOD);
+    let bad = || SourceError::Own("rubbish".to_owned()).of_one_file();
+    for at in [100, 200, 300, 400, 500] {
+        deliver(&mut report, at as f64 / 4.0, at);
+        report.note_error(&bad());
+        assert_eq!(news(&mut report, at).1.blind, None, "{at}");
+    }
+    // Where all are bad, or the camera itself is, nothing is to be seen.
+    for _ in 0..2 {
+        report.note_error(&bad());
+    }
+    assert_eq!(news(&mut report, 600), (CameraState::Failing, News { blind: Some(true), state: true }));
+    deliver(&mut report, 1.0, 700);
+    assert_eq!(news(&mut report, 700).1.blind, Some(false));
+    report.note_error(&SourceError::NoFrame("/dev/video9".into()));
+    assert_eq!(news(&mut report, 800).1.blind, Some(true));
+}
+
+#[test]
 fn a_stream_is_blind_until_its_first_frame_and_from_its_first_bad_one_on() {
     let mut report = CameraReport::of_stream(Duration::from_secs(2), Duration::from_secs(60));
     assert_eq!(news(&mut report, 60_000), (CameraState::Opening, News { blind: None, state: true }));

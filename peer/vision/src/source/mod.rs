@@ -122,7 +122,7 @@ pub enum SourceError {
         /// What is wrong with the picture.
         cause: String,
     },
-    /// One file of a folder that cannot be read; others may.
+    /// One file of a folder, or one picture of a camera, that cannot be read; others may.
     #[error("{0}")]
     OneFile(Box<Self>),
     /// The file or folder is not there.
@@ -233,7 +233,7 @@ impl SourceError {
         matches!(self, Self::Ended(_) | Self::CutShort { .. })
     }
 
-    /// The same of one file among others.
+    /// The same of one file, or one picture, among others.
     #[must_use]
     pub fn of_one_file(self) -> Self {
         if self.is_of_one_picture() { self } else { Self::OneFile(Box::new(self)) }
