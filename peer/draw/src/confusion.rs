@@ -10,6 +10,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::error::DrawError;
 use crate::file::{check, write};
+use crate::text::{fitting, text_width};
+
 /// A row per true gesture: how often it was judged to be which, its recall and its precision.
 #[must_use]
 pub fn table(evaluation: &Evaluation, vocabulary: &Vocabulary) -> String {
@@ -62,30 +64,67 @@ pub fn draw(evaluation: &Evaluation, vocabulary: &Vocabulary, path: &Path) -> Re
 const CELL: i32 = 48;
 const MARGIN: i32 = 110;
 
+/// The size of letters in plotters' measure, and their height in pixels.
+const LETTERS: f64 = 14.0;
+const HEIGHT: f64 = LETTERS / 1.24;
+
+/// What is left free beside a heading.
+const GAP: i32 = 10;
+
+/// A row's heading is no wider, in pixels.
+const WIDEST: f64 = 300.0;
+
+/// What stands beside the rows and above the columns.
+struct Headings {
+    rows: Vec<String>,
+    columns: Vec<String>,
+    /// Where the columns begin, to the right of the rows' headings.
+    left: i32,
+}
+
+impl Headings {
+    /// The gestures by name, or, where a name is wider than its column, by number, and the names beside the rows alone.
+    fn of(labels: &[String]) -> Self {
+        let fits = |label: &String| text_width(label, HEIGHT) <= f64::from(CELL - GAP / 2);
+        let (rows, columns) = if labels.iter().all(fits) {
+            (labels.to_vec(), labels.to_vec())
+        } else {
+            let numbered = |(number, label)| {
+                (fitting(&format!("#{number} {label}"), HEIGHT, WIDEST), format!("#{number}"))
+            };
+            (1..).zip(labels).map(numbered).unzip()
+        };
+        let widest = rows.iter().map(|row| text_width(row, HEIGHT)).fold(0.0, f64::max);
+        let left = MARGIN.max(widest.ceil() as i32 + 2 * GAP);
+        Self { rows, columns, left }
+    }
+}
+
 fn svg(evaluation: &Evaluation, vocabulary: &Vocabulary) -> Result<String, Box<dyn std::error::Error>> {
-    let side = MARGIN + CELL * vocabulary.classes() as i32 + 20;
+    let Headings { rows, columns, left } = Headings::of(vocabulary.labels());
+    let side = CELL * vocabulary.classes() as i32 + 20;
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, (side as u32, side as u32)).into_drawing_area();
+        let size = ((left + side) as u32, (MARGIN + side) as u32);
+        let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
         area.fill(&WHITE)?;
-        let style = |size: i32, colour: RGBColor, horizontal: HPos| {
+        let style = |size: f64, colour: RGBColor, horizontal: HPos| {
             ("sans-serif", size).into_font().color(&colour).pos(Pos::new(horizontal, VPos::Center))
         };
         let accuracy = evaluation.accuracy().map_or(0.0, |p| p.value);
         let title = format!("{} images, accuracy {accuracy:.3}", evaluation.count());
-        area.draw_text(&title, &style(18, BLACK, HPos::Left), (20, 24))?;
-        area.draw_text("truth ↓  judged →", &style(13, BLACK, HPos::Left), (20, 50))?;
-        for (i, label) in (0..).zip(vocabulary.labels()) {
-            let middle = MARGIN + CELL * i + CELL / 2;
-            let short: String = label.chars().take(12).collect();
-            area.draw_text(&short, &style(14, BLACK, HPos::Right), (MARGIN - 10, middle))?;
-            area.draw_text(&short, &style(14, BLACK, HPos::Center), (middle, MARGIN - 16))?;
+        area.draw_text(&title, &style(18.0, BLACK, HPos::Left), (20, 24))?;
+        area.draw_text("truth ↓  judged →", &style(13.0, BLACK, HPos::Left), (20, 50))?;
+        for (i, (row, column)) in (0..).zip(rows.iter().zip(&columns)) {
+            let middle = CELL * i + CELL / 2;
+            area.draw_text(row, &style(LETTERS, BLACK, HPos::Right), (left - GAP, MARGIN + middle))?;
+            area.draw_text(column, &style(LETTERS, BLACK, HPos::Center), (left + middle, MARGIN - 16))?;
         }
         for (i, row) in (0..).zip(evaluation.confusion()) {
             let total: u64 = row.iter().sum();
             for (j, &count) in (0..).zip(row) {
                 let part = if total == 0 { 0.0 } else { count as f64 / total as f64 };
-                let (x, y) = (MARGIN + CELL * j, MARGIN + CELL * i);
+                let (x, y) = (left + CELL * j, MARGIN + CELL * i);
                 // Right answers in blue, wrong ones in red, both darker with their part of the row.
                 let full = if i == j { (31, 78, 140) } else { (190, 40, 40) };
                 let mix = |c: u8| (255.0 - (255.0 - f64::from(c)) * part.sqrt()) as u8;
@@ -96,7 +135,7 @@ fn svg(evaluation: &Evaluation, vocabulary: &Vocabulary) -> Result<String, Box<d
                 if count > 0 {
                     let ink = if part > 0.3 { WHITE } else { BLACK };
                     let centre = (x + CELL / 2, y + CELL / 2);
-                    area.draw_text(&count.to_string(), &style(14, ink, HPos::Center), centre)?;
+                    area.draw_text(&count.to_string(), &style(LETTERS, ink, HPos::Center), centre)?;
                 }
             }
         }
@@ -128,6 +167,32 @@ mod tests {
                         \u{20}  palm │    ·    1    · │  1.000     1.000\n\
                         \u{20}   one │    ·    ·    0 │      –     0.000\n";
         assert_eq!(table(&evaluation, &vocabulary), expected);
+    }
+
+    #[test]
+    fn each_gesture_has_headings_of_its_own_that_have_room() {
+        // Alike for longer than anything that is written.
+        let [left, right] = ["left", "right"].map(|hand| format!("{}{hand}", "on and ".repeat(14)));
+        for labels in [
+            ["0", "1", "2"],
+            ["fist", "palm", "thumb_index_middle"],
+            ["thumb_and_index_apart", "thumb_and_index_together", "1"],
+            ["三三三三三三三三三三三三一", "三三三三三三三三三三三三二", "三"],
+            [left.as_str(), right.as_str(), "1"],
+        ] {
+            let labels = labels.map(str::to_owned);
+            let Headings { rows, columns, left } = Headings::of(&labels);
+            for headings in [&rows, &columns] {
+                let different: std::collections::BTreeSet<_> = headings.iter().collect();
+                assert_eq!(different.len(), labels.len(), "{headings:?}");
+            }
+            assert!(rows.iter().all(|row| text_width(row, HEIGHT) <= f64::from(left - 2 * GAP)), "{rows:?}");
+            assert!(columns.iter().all(|head| text_width(head, HEIGHT) < f64::from(CELL)), "{columns:?}");
+            assert!((MARGIN..=WIDEST as i32 + 2 * GAP).contains(&left), "{left}");
+            // What is short stays whole.
+            let whole = |(row, label): (&String, &String)| label.len() > 50 || row.ends_with(label.as_str());
+            assert!(rows.iter().zip(&labels).all(whole), "{rows:?}");
+        }
     }
 
     #[test]
