@@ -8,8 +8,8 @@ use gestalt_vision::network::{Counter, FeatureMap};
 use gestalt_vision::perception::NoObservation;
 use opencv::imgcodecs::{IMREAD_COLOR, imread};
 
-use crate::FILES;
 use crate::counting::{self, Shown};
+use crate::folder;
 use crate::frames::{crop_at, mask_at};
 use crate::look::{Found, corrected, largest, shown};
 use crate::photos::{Photo, Photos};
@@ -50,8 +50,7 @@ fn highest(values: &[f32; 6]) -> u8 {
 
 /// Prints a row for each set. `folder`: of the weights.
 pub fn print(folder: &Path, sets: &Sets, photos: &Photos) -> Result<(), Box<dyn Error>> {
-    let read = |name: &str| std::fs::read(folder.join(name));
-    let [finder, refiner, counter] = [read(FILES[0])?, read(FILES[1])?, read(FILES[2])?];
+    let [finder, refiner, counter] = folder::weights(folder)?;
     let (mut eyes, mut counter) = (Eyes::new(&finder, &refiner, &counter)?, Counter::decode(&counter)?);
     let mut robot = Weights::new(finder, refiner).robot()?;
     println!(

@@ -6,6 +6,7 @@ mod counting;
 mod course;
 mod diagnosis;
 mod drawn;
+mod folder;
 mod frames;
 mod image;
 mod judge;
@@ -26,19 +27,15 @@ mod surfaces;
 mod train;
 
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Parser;
-use gestalt_vision::model_file::Model;
 
-use course::{Course, Taught};
+use course::Course;
 use judge::Table;
 use photos::Photos;
 use sets::Sets;
-
-/// The names of the weights' files, as the program embeds them.
-const FILES: [&str; 3] = ["finder.net", "refiner.net", "counter.net"];
 
 /// Trains the networks of Gestalt's eyes
 #[derive(Parser)]
@@ -98,15 +95,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     if args.show {
         return course.show(photos(&args.leave_out)?, &args.out);
     }
+    if let Some(file) = &args.looks {
+        folder::check_file(file)?;
+    }
     let mut table = Table::default();
     if args.judge_only {
-        let taught = read(&args.out)?;
+        let taught = folder::read(&args.out)?;
         for set in &args.judge {
             table.judge(&taught, &sets, set)?;
         }
     } else if args.classifier_only {
-        let taught = course.classify(photos(&[])?, read(&args.out)?.weights)?;
-        write(&taught, &args.out)?;
+        folder::check(&args.out)?;
+        let taught = course.classify(photos(&[])?, folder::read(&args.out)?.weights)?;
+        folder::write(&taught, &args.out)?;
         for set in &args.judge {
             table.judge(&taught, &sets, set)?;
         }
@@ -116,31 +117,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             table.judge(&course.take(photos(&left_out)?)?, &sets, set)?;
         }
     } else {
+        folder::check(&args.out)?;
         let taught = course.take(photos(&args.leave_out)?)?;
-        write(&taught, &args.out)?;
+        folder::write(&taught, &args.out)?;
         for set in args.leave_out.iter().chain(&args.judge) {
             table.judge(&taught, &sets, set)?;
         }
     }
     print!("{table}");
     if let Some(file) = args.looks {
-        std::fs::write(file, &table.looks)?;
+        folder::write_file(&file, table.looks.as_bytes())?;
     }
     Ok(())
-}
-
-/// The name of the classifier's file.
-const MODEL: &str = "hands.gestalt";
-
-fn write(taught: &Taught, out: &Path) -> Result<(), Box<dyn Error>> {
-    for (name, bytes) in FILES.iter().zip(&taught.weights) {
-        std::fs::write(out.join(name), bytes)?;
-    }
-    taught.model.write(&out.join(MODEL))?;
-    Ok(())
-}
-
-fn read(out: &Path) -> Result<Taught, Box<dyn Error>> {
-    let [finder, refiner, counter] = FILES.map(|name| std::fs::read(out.join(name)));
-    Ok(Taught { weights: [finder?, refiner?, counter?], model: Model::read(&out.join(MODEL))? })
 }

@@ -213,22 +213,13 @@ fn photo(sets: &Sets, cache: &Path, text: &str) -> Result<Option<Photo>, PhotoEr
     let joints: Joints = std::array::from_fn(joint);
     let picture = read(&sets.picture(path))?;
     let place = place(&joints);
-    let kept = cache.join(format!("{:08x}.mask", crc32fast::hash(text.as_bytes())));
-    let masks = match std::fs::read(&kept) {
-        Ok(bytes) if bytes.is_empty() => None,
-        Ok(bytes) if bytes.len() == 2 * MASK * MASK => {
-            let (hand, arm) = bytes.split_at(MASK * MASK);
-            Some([hand, arm].map(|mask| Pyramid::new(MASK, MASK, 1, mask.to_vec())).into())
-        }
-        _ => {
-            let made = masks(&picture, &joints, &place)?;
-            let bytes = made
-                .iter()
-                .flat_map(|(hand, arm)| [hand.pixels(), arm.pixels()].concat())
-                .collect::<Vec<_>>();
-            // Without the copy it takes longer the next time, no more.
-            let _ = std::fs::write(&kept, bytes);
-            made
+    let copy = cache.join(format!("{:08x}.mask", crc32fast::hash(text.as_bytes())));
+    let masks = match kept(&copy) {
+        Some(masks) => masks,
+        None => {
+            let masks = masks(&picture, &joints, &place)?;
+            keep(&copy, &masks);
+            masks
         }
     };
     let Some((mask, arm)) = masks else {
@@ -237,6 +228,31 @@ fn photo(sets: &Sets, cache: &Path, text: &str) -> Result<Option<Photo>, PhotoEr
     let folder = path.split('/').nth(1).unwrap_or_default();
     let (count, fingers) = sets.meaning(&set, folder);
     Ok(Some(Photo { set, origin, path: path.to_owned(), picture, place, joints, mask, arm, count, fingers }))
+}
+
+/// The hand's pixels and those of hand and arm; `None` where they cannot be had.
+type Masks = Option<(Pyramid, Pyramid)>;
+
+/// What a copy of masks holds that cannot be had. Where nothing is in it, it could not be written.
+const NO_MASKS: [u8; 1] = [0];
+
+/// The masks of a copy; `None` where they are to be made anew.
+fn kept(copy: &Path) -> Option<Masks> {
+    let bytes = std::fs::read(copy).ok()?;
+    if bytes == NO_MASKS {
+        return Some(None);
+    }
+    let (hand, arm) = (bytes.len() == 2 * MASK * MASK).then(|| bytes.split_at(MASK * MASK))?;
+    Some(Some([hand, arm].map(|mask| Pyramid::new(MASK, MASK, 1, mask.to_vec())).into()))
+}
+
+fn keep(copy: &Path, masks: &Masks) {
+    let bytes = match masks {
+        Some((hand, arm)) => [hand.pixels(), arm.pixels()].concat(),
+        None => NO_MASKS.into(),
+    };
+    // Without the copy it takes longer the next time, no more.
+    let _ = gestalt_file::replace(copy, &bytes);
 }
 
 const BONES: [(usize, usize); 23] = [
@@ -265,12 +281,8 @@ const BONES: [(usize, usize); 23] = [
     (13, 17),
 ];
 
-/// The hand's pixels and those of hand and arm, by GrabCut that starts from the joints.
-fn masks(
-    picture: &Pyramid,
-    joints: &[(f32, f32)],
-    place: &Place,
-) -> Result<Option<(Pyramid, Pyramid)>, opencv::Error> {
+/// By GrabCut that starts from the joints.
+fn masks(picture: &Pyramid, joints: &[(f32, f32)], place: &Place) -> Result<Masks, opencv::Error> {
     let map = onto_mask(place);
     let crop = picture.warp(&map, MASK, MASK, Outside::Nearest);
     let size = MASK as i32;
@@ -330,4 +342,28 @@ fn masks(
     }
     let soft = |mask: Vec<u8>| Pyramid::new(MASK, MASK, 1, mask);
     Ok(Some((soft(hand), soft(arm))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_kept_or_known_not_to_be_had_and_else_made_anew() {
+        let cache = tempfile::tempdir().unwrap();
+        let copy = cache.path().join("0123abcd.mask");
+        assert!(kept(&copy).is_none());
+        keep(&copy, &None);
+        assert!(matches!(kept(&copy), Some(None)));
+        let mask = |value: u8| Pyramid::new(MASK, MASK, 1, vec![value; MASK * MASK]);
+        keep(&copy, &Some((mask(7), mask(9))));
+        let (hand, arm) = kept(&copy).flatten().unwrap();
+        assert_eq!((hand.pixels()[0], arm.pixels()[0]), (7, 9));
+        // What a disk without room leaves.
+        let whole = std::fs::read(&copy).unwrap();
+        for part in [0, 4096] {
+            std::fs::write(&copy, &whole[..part]).unwrap();
+            assert!(kept(&copy).is_none(), "{part} bytes");
+        }
+    }
 }
