@@ -1,5 +1,6 @@
 //! The course that the networks take: each is taught with what those before it get wrong.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
@@ -105,10 +106,16 @@ impl Course {
         Ok(Taught { weights, model })
     }
 
-    /// Only the classifier: with networks that are as they are, of pictures that they may never have seen.
-    pub fn classify(&self, photos: Photos, weights: [Vec<u8>; 3]) -> Result<Taught, Box<dyn Error>> {
+    /// Only the classifier: with networks that are as they are, of pictures that they may never have seen. `seen`: fingerprints of those that
+    /// they were made with.
+    pub fn classify(
+        &self,
+        photos: Photos,
+        weights: [Vec<u8>; 3],
+        seen: Vec<u64>,
+    ) -> Result<Taught, Box<dyn Error>> {
         let Self { seed, .. } = *self;
-        let images = photos.fingerprints()?;
+        let images = of_both(seen, photos.fingerprints()?);
         let scenery = self.scenery(photos);
         let mut counter = Counter::decode(&weights[2])?;
         let robots = Weights::new(weights[0].clone(), weights[1].clone());
@@ -127,8 +134,24 @@ impl Course {
     }
 }
 
+/// The fingerprints of the networks' pictures and of the classifier's, ascending, each once.
+fn of_both(networks: Vec<u64>, classifier: Vec<u64>) -> Vec<u64> {
+    let all: BTreeSet<u64> = networks.into_iter().chain(classifier).collect();
+    all.into_iter().collect()
+}
+
 /// The name of the feature space of these weights.
-fn name(weights: &[Vec<u8>; 3]) -> String {
+pub fn name(weights: &[Vec<u8>; 3]) -> String {
     let [finder, refiner, counter] = weights;
     gestalt_vision::perception::embedding_name(gestalt_vision::network::checksum([finder, refiner, counter]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_classifier_made_anew_forgets_no_picture_of_its_networks() {
+        assert_eq!(of_both(vec![2, 7, 9], vec![1, 7]), [1, 2, 7, 9]);
+    }
 }

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use gestalt_protocol::ClassId;
 use gestalt_strategies::{Classify, Evaluation, Proportion, Vocabulary};
-use gestalt_vision::dataset::{Dataset, DatasetError, Naming};
+use gestalt_vision::dataset::{Dataset, DatasetError, LabelledImage, Naming};
 use gestalt_vision::eyes::{Eyes, EyesError};
+use gestalt_vision::model_file::{Model, Origin};
 use gestalt_vision::perception::{NoHand, NoObservation};
 use opencv::imgcodecs::{IMREAD_COLOR, imread};
 use rayon::prelude::*;
@@ -33,19 +34,37 @@ struct Row {
     alarms: u64,
 }
 
-/// The pictures of a set, and the count each shows: `None` for no hand. Folders of other gestures do not count.
-fn pictures(folder: &Path, vocabulary: &Vocabulary) -> Result<Vec<(PathBuf, Option<ClassId>)>, DatasetError> {
+/// A picture, and the count that it shows: `None` for no hand.
+type Shown = (PathBuf, Option<ClassId>);
+
+/// The pictures of a set, without those that the eyes were made with, and how many are left out. Folders of other gestures do not count.
+fn unseen(
+    folder: &Path,
+    vocabulary: &Vocabulary,
+    eyes: &Origin,
+) -> Result<(Vec<Shown>, usize), DatasetError> {
     let Dataset { images, none, .. } = Dataset::list_known(folder, Naming::Counts, vocabulary)?;
-    let counted = images.into_iter().map(|image| (image.path, Some(image.class)));
-    Ok(counted.chain(none.into_iter().map(|path| (path, None))).collect())
+    let all = images.len() + none.len();
+    let nobodys = |path| LabelledImage { path, class: ClassId(0), person: None };
+    let none = eyes.unseen(none.into_iter().map(nobodys).collect());
+    let counted = eyes.unseen(images).into_iter().map(|image| (image.path, Some(image.class)));
+    let kept: Vec<_> = counted.chain(none.into_iter().map(|image| (image.path, None))).collect();
+    let left_out = all - kept.len();
+    Ok((kept, left_out))
 }
 
 impl Table {
-    /// Looks at all pictures of a set.
+    /// Looks at all pictures of a set but those that the eyes were made with.
     pub fn judge(&mut self, taught: &Taught, sets: &Sets, set: &str) -> Result<(), Box<dyn Error>> {
         let [finder, refiner, counter] = &taught.weights;
         let eyes = || Eyes::new(finder, refiner, counter);
-        let pictures = pictures(&sets.picture(set), taught.model.classifier.vocabulary())?;
+        let Model { classifier, origin } = &taught.model;
+        let (pictures, left_out) = unseen(&sets.picture(set), classifier.vocabulary(), origin)?;
+        if left_out > 0 {
+            println!(
+                "{set}: left out {left_out} pictures that these eyes were made with, or of people in such"
+            );
+        }
         let looks = pictures
             .par_iter()
             .map_init(eyes, |eyes: &mut Result<Eyes, EyesError>, (path, _)| {
@@ -69,8 +88,7 @@ impl Table {
                 Ok(look) => (look.confidence, Some(look)),
                 Err(confidence) => (confidence, None),
             };
-            let classified = &taught.model.classifier;
-            let p = look.map(|look| classified.probabilities(&look.embedding)).transpose()?;
+            let p = look.map(|look| classifier.probabilities(&look.embedding)).transpose()?;
             let shown = count.map_or("none".to_owned(), |count| count.index().to_string());
             let likely: String = p.iter().flatten().map(|p| format!(",{p:.3}")).collect();
             self.looks += &format!("{},{shown},{confidence:.3}{likely}\n", path.display());
@@ -138,5 +156,34 @@ impl fmt::Display for Table {
             writeln!(f, "mean {mean:.1} %, least {least:.1} %")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_judged_by_pictures_that_the_eyes_were_made_with() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |file: &str| {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, file).unwrap();
+            LabelledImage { path, class: ClassId(0), person: None }.fingerprint().unwrap()
+        };
+        let mut images = ["3/seen.jpg", "none/seen.jpg"].map(write).to_vec();
+        images.sort_unstable();
+        let known = Origin { images, ..Origin::default() };
+        for new in ["3/new.jpg", "0/new.jpg", "none/new.jpg"] {
+            write(new);
+        }
+        let vocabulary = Vocabulary::new(["0", "1", "2", "3"]).unwrap();
+        let judged = |eyes: &Origin| unseen(folder.path(), &vocabulary, eyes).unwrap();
+        let (kept, left_out) = judged(&known);
+        assert!(kept.iter().all(|(path, _)| path.ends_with("new.jpg")), "{kept:?}");
+        let shown: Vec<_> = kept.into_iter().map(|(_, count)| count).collect();
+        assert_eq!((shown, left_out), (vec![Some(ClassId(0)), Some(ClassId(3)), None], 2));
+        assert_eq!(judged(&Origin::default()).1, 0);
     }
 }

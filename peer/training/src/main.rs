@@ -55,7 +55,7 @@ struct Args {
     /// Train without a set, and judge it; repeatable
     #[arg(long, value_name = "SET")]
     leave_out: Vec<String>,
-    /// A set to be judged besides; repeatable
+    /// A set to be judged besides; repeatable. Pictures that the eyes were made with are left out of what is judged
     #[arg(long, value_name = "SET")]
     judge: Vec<String>,
     /// A file for a line about each picture that is judged: path, what it shows (`none`: no hand), how sure a hand is found there, and
@@ -78,7 +78,7 @@ struct Args {
     #[arg(long, requires = "judge", conflicts_with_all = ["leave_out", "leave_one_out"])]
     judge_only: bool,
     /// Train only the classifier, for the networks that are in the folder
-    #[arg(long, conflicts_with_all = ["leave_out", "leave_one_out", "judge_only"])]
+    #[arg(long, conflicts_with_all = ["leave_one_out", "judge_only"])]
     classifier_only: bool,
 }
 
@@ -106,9 +106,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     } else if args.classifier_only {
         folder::check(&args.out)?;
-        let taught = course.classify(photos(&[])?, folder::read(&args.out)?.weights)?;
+        let (weights, seen) = (folder::weights(&args.out)?, folder::images(&args.out)?);
+        let taught = course.classify(photos(&args.leave_out)?, weights, seen)?;
         folder::write(&taught, &args.out)?;
-        for set in &args.judge {
+        for set in args.leave_out.iter().chain(&args.judge) {
             table.judge(&taught, &sets, set)?;
         }
     } else if args.leave_one_out {
