@@ -34,8 +34,8 @@ pub(crate) fn count(
     let contributors = counted.iter().map(|counted| counted.robot);
     let decides = config.suffice_of(counter, reached, contributors, robots)
         && config.convinces(ballot.withstands(rule, config, scale, &fusion));
-    let known = fusion.top.index() < scale.classes;
-    let class = (decides && known).then_some(fusion.top);
+    // At the place behind all gestures stands "unknown", which is none.
+    let class = ballot.columns(scale).class(fusion.top.index()).filter(|_| decides);
     Count { fusion: Some(fusion), counted, class }
 }
 
@@ -47,12 +47,10 @@ pub(crate) fn votes(certificate: &Certificate) -> impl Iterator<Item = HeldVote>
 /// The scale that the author of a certificate counted on; `None` where no vote was on it.
 pub(crate) fn scale(certificate: &Certificate) -> Option<Scale> {
     let vocabulary = certificate.vocabulary;
-    let on_it = votes(certificate)
-        .find(|held| held.vote.vocabulary == vocabulary && !held.vote.evidence.is_empty())?;
-    let classes = match certificate.votes.first() {
-        Some(counted) => counted.vote.evidence.len(),
-        None => on_it.vote.evidence.len(),
-    };
+    let on_it =
+        votes(certificate).find(|held| held.vote.vocabulary == vocabulary && held.vote.listed() > 0)?;
+    // What was named since stands beside the list, and not all who vote on one scale know of it.
+    let classes = certificate.votes.first().map_or(on_it.vote.listed(), |counted| counted.vote.listed());
     Some(Scale { vocabulary, classes })
 }
 

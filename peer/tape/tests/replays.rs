@@ -9,7 +9,7 @@ use std::time::Duration;
 use gestalt_protocol::{Announcement, ClassId, FusionRule, Gesture, Instruction, RobotId, RoundId, Topic};
 use gestalt_rounds::{Quorum, RoundsConfig};
 use gestalt_tape::{Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
-use made::{BEGIN, SECOND, decisions, json, keys, round, run, said};
+use made::{BEGIN, SECOND, Seer, decisions, json, keys, knowing, named, round, round_of, run, said};
 use proptest::prelude::*;
 
 /// The rule by which the rounds here were made: what it takes to decide is plain to see.
@@ -40,6 +40,39 @@ fn every_decision_is_drawn_again_bit_for_bit() {
     let classes: Vec<_> = run.showings.iter().map(|showing| showing.decision().unwrap().class).collect();
     assert_eq!(classes[0], Some(ClassId(2)));
     assert_eq!(classes[2], None, "one of four has seen something, and is not sure");
+}
+
+/// Robots vote by one list, whatever each of them knows beside it.
+#[test]
+fn what_was_named_since_is_drawn_again_whoever_knows_of_it() {
+    let robot = |labels: &[&str], sees: &[f32]| Seer { knows: knowing(labels), sees: Some(sees.to_vec()) };
+    let of_the_list = [
+        robot(&["circle"], &[0.05, 0.05, 0.8, 0.1]),
+        robot(&[], &[0.1, 0.1, 0.8]),
+        robot(&["loop", "circle"], &[0.05, 0.05, 0.7, 0.1, 0.1]),
+    ];
+    let named_since = [
+        robot(&["circle"], &[0.05, 0.05, 0.05, 0.85]),
+        robot(&["loop", "circle"], &[0.05, 0.05, 0.05, 0.05, 0.8]),
+        robot(&[], &[0.3, 0.3, 0.4]),
+    ];
+    let of_no_gesture = [
+        robot(&["circle"], &[0.25, 0.25, 0.25, 0.25, 40.0]),
+        robot(&[], &[0.3, 0.3, 0.4, 40.0]),
+        robot(&["circle"], &[0.25, 0.25, 0.25, 0.25, 40.0]),
+    ];
+    for (robots, class) in
+        [(of_the_list, Some(ClassId(2))), (named_since, Some(named("circle"))), (of_no_gesture, None)]
+    {
+        let run = replayed(&round_of(&log_pool(), &robots, BEGIN));
+        let decision = run.showings[0].decision().unwrap();
+        assert_eq!(decision.class, class);
+        assert!(decision.certificate.named.contains(&named("circle")));
+        let proof = prove(&run.showings, &log_pool());
+        assert_eq!((proof.reproduced, proof.differences), (1, vec![]));
+        let would = outcomes(&run, &WhatIf::default(), &log_pool());
+        assert_eq!(would[0].would, class, "as it was");
+    }
 }
 
 /// What is changed in the first decision is found, and named.
@@ -174,18 +207,37 @@ fn a_count_that_begins_anew_is_another_showing() {
     }
 }
 
+/// What a robot knows beside the list, and sees of all that: shares, of which those of the gestures that it knows are taken, and what it finds unknown.
+fn seer(knows: [bool; 2], sees: Option<[f32; 5]>, unknown: Option<f32>) -> Seer {
+    let labels: Vec<&str> =
+        ["circle", "loop"].into_iter().zip(knows).filter(|it| it.1).map(|it| it.0).collect();
+    let knows = knowing(&labels);
+    let sees = sees.map(|shares| {
+        let shares = &shares[..knows.classes()];
+        let sum: f32 = shares.iter().sum();
+        shares.iter().map(|share| share / sum).chain(unknown).collect()
+    });
+    Seer { knows, sees }
+}
+
+/// One that may be blind, and may tell what is unknown.
+fn seers() -> impl Strategy<Value = Vec<Seer>> {
+    let share = || 0.01f32..1.0;
+    let sees = prop::option::weighted(0.8, [share(), share(), share(), share(), share()]);
+    let one = (any::<[bool; 2]>(), sees, prop::option::of(0.01f32..4.0));
+    prop::collection::vec(one.prop_map(|(knows, sees, unknown)| seer(knows, sees, unknown)), 1..7)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn whatever_robots_see_and_however_they_count_their_decisions_are_drawn_again(
-        sees in prop::collection::vec(prop::option::weighted(0.8, [0.01f32..1.0, 0.01f32..1.0, 0.01f32..1.0]), 1..7),
+    fn whatever_robots_know_and_see_and_however_they_count_their_decisions_are_drawn_again(
+        robots in seers(),
         rule in 0..4usize, liars in 0..2u32, alpha in prop::option::of(0.01f64..0.49),
     ) {
         let config = RoundsConfig { rule: FusionRule::ALL[rule], liars, alpha, ..log_pool() };
-        let normed = |values: [f32; 3]| values.map(|value| value / values.iter().sum::<f32>());
-        let sees: Vec<_> = sees.into_iter().map(|seen| seen.map(normed)).collect();
-        let run = replayed(&round(&config, &sees, BEGIN));
+        let run = replayed(&round_of(&config, &robots, BEGIN));
         let proof = prove(&run.showings, &config);
         prop_assert_eq!((proof.reproduced, proof.differences), (1, vec![]));
         let same = outcomes(&run, &WhatIf::default(), &config);

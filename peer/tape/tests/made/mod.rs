@@ -31,7 +31,7 @@ pub fn json(value: &impl serde::Serialize) -> Vec<u8> {
     serde_json::to_vec(value).unwrap()
 }
 
-/// Takes the features for the probabilities.
+/// Takes the features for the probabilities; one more of them is for what it was never taught.
 #[derive(Debug)]
 struct Verbatim(Vocabulary);
 
@@ -41,8 +41,31 @@ impl Classify for Verbatim {
     }
 
     fn probabilities(&self, features: &[f32]) -> Result<Vec<f64>, ClassifyError> {
-        Ok(features.iter().map(|p| f64::from(*p)).collect())
+        Ok(features.iter().take(self.0.classes()).map(|p| f64::from(*p)).collect())
     }
+
+    fn unknown(&self, features: &[f32]) -> Option<f64> {
+        features.get(self.0.classes()).map(|p| f64::from(*p))
+    }
+}
+
+/// A robot: the gestures that it knows, and what it sees; nothing where it is blind.
+#[derive(Clone, Debug)]
+pub struct Seer {
+    pub knows: Vocabulary,
+    pub sees: Option<Vec<f32>>,
+}
+
+/// A gesture that ada named.
+pub fn named(label: &str) -> ClassId {
+    ClassId::named(&"ada".parse().unwrap(), label)
+}
+
+/// The list, and these that ada named.
+pub fn knowing(labels: &[&str]) -> Vocabulary {
+    let mut knows = vocabulary();
+    assert!(labels.iter().all(|label| knows.meet(named(label))));
+    knows
 }
 
 pub fn vocabulary() -> Vocabulary {
@@ -52,33 +75,40 @@ pub fn vocabulary() -> Vocabulary {
 /// What robots that see this say to each other until one of them announces a decision, and for how long: every message as it passes.
 /// Robots are numbered from 1; one that sees nothing is blind.
 pub fn round(config: &RoundsConfig, sees: &[Option<[f32; 3]>], at: u64) -> Vec<Passing> {
-    let all: std::collections::BTreeSet<RobotId> = (1..).map(RobotId).take(sees.len()).collect();
+    let robot = |sees: &Option<[f32; 3]>| Seer { knows: vocabulary(), sees: sees.map(Vec::from) };
+    round_of(config, &sees.iter().map(robot).collect::<Vec<_>>(), at)
+}
+
+/// The same of robots that may know other gestures.
+pub fn round_of(config: &RoundsConfig, robots: &[Seer], at: u64) -> Vec<Passing> {
+    let all: std::collections::BTreeSet<RobotId> = (1..).map(RobotId).take(robots.len()).collect();
     let mut swarm: Vec<Rounds> = all
         .iter()
         .map(|robot| Rounds::new(*robot, Life { boot: 1, nonce: at as u32 }, config.clone()).unwrap())
         .collect();
     let mut due: Vec<(usize, Input)> = Vec::new();
-    for (k, seen) in sees.iter().enumerate() {
-        due.push((k, Input::Learned(Arc::new(Verbatim(vocabulary())))));
+    for (k, robot) in robots.iter().enumerate() {
+        due.push((k, Input::Learned(Arc::new(Verbatim(robot.knows.clone())))));
         due.push((k, Input::Alive(Arc::new(all.clone()))));
-        due.push((k, Input::Blind(seen.is_none())));
+        due.push((k, Input::Blind(robot.sees.is_none())));
     }
     let mut passed = Vec::new();
     due.push((0, Input::Open));
     for ms in 1..20_000 {
         if ms == 50 {
-            for (k, features) in sees.iter().enumerate().filter_map(|(k, seen)| Some((k, (*seen)?))) {
-                let observation = Observation { features: features.to_vec(), quality: 1.0 };
+            let seeing = robots.iter().enumerate();
+            for (k, features) in seeing.filter_map(|(k, robot)| Some((k, robot.sees.clone()?))) {
+                let observation = Observation { features, quality: 1.0 };
                 due.push((k, Input::Observed(observation)));
             }
         }
-        let ticks = (0..sees.len()).map(|k| (k, Input::Tick));
+        let ticks = (0..robots.len()).map(|k| (k, Input::Tick));
         for (k, input) in std::mem::take(&mut due).into_iter().chain(ticks) {
             let me = RobotId(k as u32 + 1);
             for output in swarm[k].handle(Duration::from_millis(ms), input) {
                 let at = at + ms * SECOND / 1000;
                 let mut to_all = |input: &dyn Fn() -> Input| {
-                    due.extend((0..sees.len()).filter(|other| *other != k).map(|other| (other, input())));
+                    due.extend((0..robots.len()).filter(|other| *other != k).map(|other| (other, input())));
                 };
                 match output {
                     Output::Broadcast(envelope) => {
