@@ -122,7 +122,10 @@ impl Run {
             Topic::Status(_) => {
                 let status: Status = decode_json(&payload).ok()?;
                 // A robot without a classifier reports no vocabulary.
-                if let Some(vocabulary) = Vocabulary::of_status(&status) {
+                let Some(vocabulary) = Vocabulary::of_status(&status) else { return Some(()) };
+                // Those that do not learn have heard of nothing that was named.
+                let known = self.vocabularies.get(&vocabulary.id().0);
+                if known.is_none_or(|known| known.titles() <= vocabulary.titles()) {
                     self.vocabularies.insert(vocabulary.id().0, vocabulary);
                 }
             }

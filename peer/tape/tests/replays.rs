@@ -6,10 +6,13 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::time::Duration;
 
-use gestalt_protocol::{Announcement, ClassId, FusionRule, Gesture, Instruction, RobotId, RoundId, Topic};
+use gestalt_protocol::{
+    Announcement, ClassId, FusionRule, Gesture, Instruction, LearningStatus, NamedGesture, RobotId, RoundId,
+    Status, Topic,
+};
 use gestalt_rounds::{Quorum, RoundsConfig};
 use gestalt_tape::{Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
-use made::{BEGIN, SECOND, Seer, decisions, json, keys, knowing, named, round, round_of, run, said};
+use made::{BEGIN, SECOND, Seer, decisions, json, keys, knowing, named, round, round_of, run, said, status};
 use proptest::prelude::*;
 
 /// The rule by which the rounds here were made: what it takes to decide is plain to see.
@@ -188,6 +191,24 @@ fn the_last_word_of_each_person_counts_and_contradiction_is_no_truth() {
     assert_eq!(truth(&[("ada", wrong.clone())]), Some(Truth::IsNot(ClassId(2))));
     assert_eq!(truth(&[("ada", right), ("bob", wrong.clone())]), None);
     assert_eq!(truth(&[("ada", wrong), ("bob", was("fist"))]), Some(Truth::Is(ClassId(0))));
+}
+
+/// Of a swarm in which not all learn: only those that do have heard of what was named.
+#[test]
+fn a_gesture_that_was_named_is_called_so_whoever_reports_last() {
+    let circle = NamedGesture { class: named("circle"), label: "circle".to_owned(), samples: 3 };
+    let learner = || {
+        let learning = LearningStatus { named: vec![circle.clone()], ..LearningStatus::default() };
+        Status { learning: Some(learning), ..status() }
+    };
+    let other = || Status { robot: RobotId(2), ..status() };
+    for statuses in [[learner(), other()], [other(), learner()]] {
+        let told = |status: &Status| said(Topic::Status(status.robot), json(status), BEGIN);
+        let run = replayed(&statuses.iter().map(told).collect::<Vec<_>>());
+        let id = knowing(&[]).id();
+        assert_eq!(run.label(id, named("circle")), Some("circle"));
+        assert_eq!(run.label(id, ClassId(2)), Some("palm"));
+    }
 }
 
 /// After an hour, and also where all robots started again within seconds.

@@ -206,7 +206,11 @@ impl View {
         decided.or_else(|| {
             let mut known: BTreeMap<&[String], (usize, &Vocabulary)> = BTreeMap::new();
             for vocabulary in self.present().filter_map(|(_, robot)| robot.vocabulary()) {
-                known.entry(vocabulary.labels()).or_insert((0, vocabulary)).0 += 1;
+                let (robots, fullest) = known.entry(vocabulary.labels()).or_insert((0, vocabulary));
+                *robots += 1;
+                if vocabulary.titles() > fullest.titles() {
+                    *fullest = vocabulary;
+                }
             }
             known.into_values().max_by_key(|(robots, _)| *robots).map(|(_, vocabulary)| vocabulary)
         })
@@ -218,8 +222,11 @@ impl View {
         self.known_vocabulary(id).or_else(|| self.vocabulary().filter(|_| id == VocabularyId::NONE))
     }
 
+    /// Robots of one list do not all know what was named beside it: who does not learn has heard of nothing.
     fn known_vocabulary(&self, id: VocabularyId) -> Option<&Vocabulary> {
-        self.robots.values().find(|robot| robot.vocabulary_id() == Some(id))?.vocabulary()
+        let of_list = self.robots.values().filter(|robot| robot.vocabulary_id() == Some(id));
+        // Reversed, because of equal maxima the last one is returned.
+        of_list.rev().filter_map(Robot::vocabulary).max_by_key(|vocabulary| vocabulary.titles())
     }
 
     fn trouble(&self, now: Duration) -> Option<String> {

@@ -1,8 +1,10 @@
 //! One sentence of the view each, and that order and repetition change nothing.
 
+mod names;
+
 use gestalt_protocol::{
-    Certificate, ClassId, CountedVote, Decision, FusionRule, Heeded, Instruction, LearningStatus,
-    NamedGesture, Outcome, Reported, RoundOutcome, Stamp, Terms, Vote,
+    Certificate, ClassId, CountedVote, Decision, FusionRule, Heeded, Instruction, LearningStatus, Outcome,
+    Reported, RoundOutcome, Stamp, Terms, Vote,
 };
 use proptest::prelude::*;
 
@@ -271,18 +273,6 @@ fn a_round_says_what_it_came_to_also_without_a_gesture() {
     let mut unlike = decided(3, None, &[2, 2, 1]);
     unlike.decision.certificate.unknown = Some(0.99);
     assert_eq!(after([decision(unlike)]).rounds()[0].outcome, RoundOutcome::Unknown);
-}
-
-#[test]
-fn what_was_named_is_meant_by_its_number_and_what_is_listed_by_its_label() {
-    let circle = ClassId::named(&"ana".parse().unwrap(), "circle");
-    let named = vec![NamedGesture { class: circle, label: "circle".to_owned(), samples: 0 }];
-    let learning = LearningStatus { named, ..LearningStatus::default() };
-    let view = after([Input::Came(RobotId(1)), reported(Status { learning: Some(learning), ..status(1) })]);
-    let swarm = view.swarm(NOW);
-    assert_eq!(swarm.vocabulary, ["fist", "one", "palm", "circle"]);
-    let listed = labels().into_iter().map(Gesture::Label);
-    assert_eq!(swarm.gestures, listed.chain([Gesture::Class(circle)]).collect::<Vec<_>>());
 }
 
 #[test]
