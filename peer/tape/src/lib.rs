@@ -27,6 +27,7 @@ mod score;
 mod sink;
 mod view;
 mod what_if;
+mod words;
 mod writer;
 
 pub use definition::definition;
@@ -44,4 +45,5 @@ pub use score::{PairedDifference, Score};
 pub use sink::{Sink, WriteError};
 pub use view::{Alive, unreadable, view, wire};
 pub use what_if::{Outcome, WhatIf, outcomes};
+pub use words::Words;
 pub use writer::TapeWriter;

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, ClassId, Decision, Envelope, Gesture, HeldVote, Instruction, InstructorId, Keys, Message,
-    RobotId, RoundId, Status, Topic, VocabularyId, decode_json,
+    Announcement, Answer, ClassId, Decision, Envelope, Gesture, HeldVote, Instruction, InstructorId, Keys,
+    Message, RobotId, RoundId, Status, Topic, VocabularyId, decode_json,
 };
 use gestalt_rounds::{Quorum, RoundsConfig, Vocabulary};
 use serde_json::Value;
@@ -14,6 +14,7 @@ use crate::kind::Kind;
 use crate::ledger::Tally;
 use crate::reader::Recorded;
 use crate::view::wire;
+use crate::words::Words;
 
 /// The key of the metadata that names the swarm.
 pub const SWARM: &str = "swarm";
@@ -51,8 +52,8 @@ pub struct Showing {
     pub votes: Vec<(u64, HeldVote)>,
     /// What was announced.
     pub announced: Vec<Decision>,
-    /// What each instructor said last of it.
-    pub words: BTreeMap<InstructorId, Instruction>,
+    /// What each instructor said of it.
+    pub words: BTreeMap<InstructorId, Words>,
 }
 
 /// What people said that a gesture was.
@@ -82,7 +83,11 @@ impl Run {
     /// Takes in one message of a recording; those of a second swarm count as strange.
     pub fn add(&mut self, recorded: &Recorded<'_>) {
         *self.messages.entry(recorded.kind).or_default() += 1;
-        if !matches!(recorded.kind, Kind::Vote | Kind::Decision | Kind::Feedback | Kind::Status) {
+        let matters = matches!(
+            recorded.kind,
+            Kind::Vote | Kind::Decision | Kind::Feedback | Kind::Answer | Kind::Status
+        );
+        if !matters {
             return;
         }
         if self.take(recorded).is_none() {
@@ -116,7 +121,15 @@ impl Run {
             Topic::Feedback(instructor) => {
                 let word: Instruction = decode_json(&payload).ok()?;
                 if let Some(round) = word.round() {
-                    self.showing(round, recorded.at).words.insert(instructor, word);
+                    let words = &mut self.showing(round, recorded.at).words;
+                    words.entry(instructor).or_default().hear(word, recorded.published);
+                }
+            }
+            Topic::Answer(instructor) => {
+                let answer: Answer = decode_json(&payload).ok()?;
+                if let Some(round) = answer.to.round() {
+                    let words = &mut self.showing(round, recorded.at).words;
+                    words.entry(instructor).or_default().answer(&answer);
                 }
             }
             Topic::Status(_) => {
@@ -159,7 +172,8 @@ impl Run {
         self.vocabularies.get(&vocabulary.0)?.label(class)
     }
 
-    /// What people said that the gesture of a showing was; `None` where they said nothing, took it back, or contradict each other.
+    /// What people said that the gesture of a showing was; `None` where they said nothing, took it back, or contradict each other. What robots refused was
+    /// not said, nor what names a gesture that none of them has.
     #[must_use]
     pub fn truth(&self, showing: &Showing) -> Option<Truth> {
         let vocabulary = showing.decision()?.certificate.vocabulary;
@@ -168,23 +182,25 @@ impl Run {
             Gesture::Label(label) => self.vocabularies.get(&vocabulary.0)?.class(label),
         };
         let mut truth = None;
-        for (by, word) in &showing.words {
+        for (by, words) in &showing.words {
+            let Some(word) = words.last() else { continue };
             let said = match word {
                 Instruction::Was { class: gesture, .. } | Instruction::Right { of: gesture, .. } => {
-                    Truth::Is(class(gesture)?)
+                    class(gesture).map(Truth::Is)
                 }
-                Instruction::Wrong { of, .. } => Truth::IsNot(class(of)?),
+                Instruction::Wrong { of, .. } => class(of).map(Truth::IsNot),
                 // As robots take it: a gesture that is listed needs no new name.
                 Instruction::New { label, .. } => {
                     let listed = self.vocabularies.get(&vocabulary.0).and_then(|listed| listed.class(label));
-                    Truth::Is(listed.unwrap_or_else(|| ClassId::named(by, label)))
+                    Some(Truth::Is(listed.unwrap_or_else(|| ClassId::named(by, label))))
                 }
                 Instruction::Open
                 | Instruction::Retract { .. }
                 | Instruction::Same { .. }
                 | Instruction::Retire { .. }
-                | Instruction::Restore { .. } => continue,
+                | Instruction::Restore { .. } => None,
             };
+            let Some(said) = said else { continue };
             truth = Some(match (truth, said) {
                 (None, said) => said,
                 (Some(Truth::Is(known)), Truth::IsNot(other))

@@ -7,8 +7,8 @@ use std::io::Cursor;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    Announcement, ClassId, FusionRule, Gesture, Instruction, LearningStatus, NamedGesture, RobotId, RoundId,
-    Status, Topic,
+    Announcement, Answer, ClassId, FusionRule, Gesture, Instruction, InstructorId, LearningStatus,
+    NamedGesture, Outcome, RobotId, RoundId, Status, Topic,
 };
 use gestalt_rounds::{Quorum, RoundsConfig};
 use gestalt_tape::{Passing, Run, Score, TapeWriter, Truth, WhatIf, outcomes, prove, read};
@@ -191,6 +191,41 @@ fn the_last_word_of_each_person_counts_and_contradiction_is_no_truth() {
     assert_eq!(truth(&[("ada", wrong.clone())]), Some(Truth::IsNot(ClassId(2))));
     assert_eq!(truth(&[("ada", right), ("bob", wrong.clone())]), None);
     assert_eq!(truth(&[("ada", wrong), ("bob", was("fist"))]), Some(Truth::Is(ClassId(0))));
+}
+
+#[test]
+fn words_that_robots_refused_are_no_truth_and_one_unheard_of_gesture_silences_nobody() {
+    let name = decisions(&run())[0].round;
+    let was = |label: &str| Instruction::Was { round: name, class: Gesture::Label(label.to_owned()) };
+    let truth = |words: &[(&str, &str, Option<Outcome>)]| {
+        let mut passed = run();
+        passed.retain(|passing| !matches!(passing.topic, Topic::Feedback(_)));
+        for (i, (by, label, answered)) in (0..).zip(words) {
+            let (by, at, word): (InstructorId, _, _) =
+                (by.parse().unwrap(), BEGIN + 2 * SECOND + i, was(label));
+            passed.push(said(Topic::Feedback(by.clone()), json(&word), at));
+            if let Some(outcome) = *answered {
+                let (robot, class, samples) = (RobotId(1), None, 0);
+                let answer = Answer { robot, at, to: word, outcome, class, samples, looks_like: None };
+                passed.push(said(Topic::Answer(by), json(&answer), at));
+            }
+        }
+        let run = replayed(&passed);
+        run.truth(&run.showings[0])
+    };
+    let palm = Some(Truth::Is(ClassId(2)));
+    let (learned, slip) = (Some(Outcome::Learned), Some(Outcome::UnknownGesture));
+    assert_eq!(truth(&[("ada", "palm", learned), ("ada", "plam", slip)]), palm);
+    let forged = Some(Outcome::NotAllowed);
+    assert_eq!(
+        truth(&[("ada", "palm", learned), ("ada", "fist", forged)]),
+        palm,
+        "in her name, without her key"
+    );
+    assert_eq!(truth(&[("ada", "palm", Some(Outcome::NotLearning))]), palm, "nobody learns there");
+    for answered in [None, slip] {
+        assert_eq!(truth(&[("ada", "plam", answered), ("bob", "palm", learned)]), palm);
+    }
 }
 
 /// Of a swarm in which not all learn: only those that do have heard of what was named.
