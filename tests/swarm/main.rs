@@ -45,6 +45,7 @@ mod stranger;
 mod stream;
 mod talking;
 mod trouble;
+mod unprinted;
 mod wall;
 
 fn main() -> std::process::ExitCode {
@@ -88,6 +89,7 @@ fn main() -> std::process::ExitCode {
         [Waits, Mount] doctor::a_disk_without_room_and_one_that_is_read_only_are_told_apart.await,
         [Waits] cameras::a_robot_whose_camera_is_missing_relays_and_agrees.await,
         [Waits] cameras::a_camera_that_hangs_keeps_nobody.await,
+        [Waits] unprinted::a_full_disk_under_the_output_takes_no_robot_and_no_centre_out_of_its_swarm.await,
         [Waits] cameras::a_streamed_camera_that_hangs_is_not_looked_at_until_it_goes_on.await,
         [Waits] cameras::pictures_that_vanish_and_come_back_are_taken_up_again.await,
         [Waits, Namespaces] line::the_eighth_in_a_line_decides_what_the_first_two_see,

@@ -9,6 +9,7 @@ use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::ConfigArgs;
 use super::peer::{lagged, report};
+use super::printing::Printing;
 use super::robot_args::{IdentityArgs, ModelArgs};
 use super::show::{Names, line};
 use super::{Failure, interrupted};
@@ -59,16 +60,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         };
         let mut events = center.robot().events();
         let locators = center.robot().locators();
-        line(
+        let mut printing = Printing::default();
+        printing.note(line(
             args.json,
             &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "fuse": config.center.fuse, "locators": locators}),
             &format!("fusion centre {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
-        )?;
+        ));
         let ended = loop {
             tokio::select! {
                 () = &mut interrupted => break Ok(()),
                 event = events.recv() => match event {
-                    Ok(event) => report(args.json, &event, &names)?,
+                    Ok(event) => printing.note(report(args.json, &event, &names)),
                     Err(RecvError::Lagged(missed)) => lagged(missed),
                     Err(RecvError::Closed) => break Err("the fusion centre has ended".into()),
                 },

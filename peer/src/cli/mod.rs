@@ -19,6 +19,8 @@ mod look;
 mod manual;
 #[cfg(feature = "opencv")]
 mod peer;
+#[cfg(feature = "opencv")]
+mod printing;
 mod progress;
 mod record;
 mod replay;

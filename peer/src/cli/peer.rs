@@ -8,9 +8,10 @@ use serde_json::json;
 use tokio::sync::broadcast::error::RecvError;
 
 use super::config_args::{ConfigArgs, Setting};
+use super::printing::Printing;
 use super::robot_args::{CameraArgs, IdentityArgs, ModelArgs};
 use super::show::{self, Names, line};
-use super::web::WebArgs;
+use super::web::{self, WebArgs};
 use super::{Failure, interrupted};
 use crate::body::Body;
 use crate::config::Config;
@@ -91,11 +92,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         };
         let mut events = body.robot().events();
         let locators = body.robot().locators();
-        line(
+        let mut printing = Printing::default();
+        printing.note(line(
             args.json,
             &json!({"event": "started", "robot": config.robot.id, "name": config.name(), "locators": locators}),
             &format!("robot {} \"{}\" of swarm \"{}\" is listening on {}", config.robot.id, config.name(), config.swarm.0, locators.join(" ")),
-        )?;
+        ));
         // The page is a client of this robot, as others are.
         let endpoint = body.robot().for_clients();
         let credentials = match endpoint {
@@ -108,13 +110,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             ..LinkConfig::default()
         };
         let web = args.web.or(config.web.listen.as_ref());
-        let page = match web.open(&config.swarm.0, &link, args.json).await {
+        let page = match web.open(&config.swarm.0, &link).await {
             Ok(page) => page,
             Err(error) => {
                 body.stop().await;
                 return Err(error);
             }
         };
+        printing.note(web::say_where(page.as_ref(), args.json));
         manager.ready(&format!("robot {} of swarm {} listens on {}", config.robot.id, config.swarm.0, locators.join(" ")));
         let mut schedule = args.open_every.map(every);
         let mut watchdog = manager.watchdog_period().map(every);
@@ -133,7 +136,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 }
                 event = events.recv() => match event {
                     Ok(event) => {
-                        report(args.json, &event, &names)?;
+                        printing.note(report(args.json, &event, &names));
                         // Where nobody starts it again, whoever works with a robot alone is better off with it.
                         if let Some(failure) = outdated(&event).filter(|_| manager.is_there()) {
                             break Err(failure.to_string().into());

@@ -6,6 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde_json::json;
 
 use super::config_args::ConfigArgs;
+use super::printing::Printing;
 use super::robot_args::{CameraArgs, IdentityArgs};
 use super::show::{self, Names, line};
 use super::{Failure, interrupted};
@@ -62,22 +63,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             SenderConfig { swarm: swarm.clone(), link, robot, camera, quality: args.quality, signer },
             feed,
         )?;
-        line(
+        let mut printing = Printing::default();
+        printing.note(line(
             args.json,
             &json!({"event": "started", "robot": robot, "name": config.name(), "source": source}),
             &format!("robot {robot} \"{}\" of swarm \"{swarm}\" is streaming {source}", config.name()),
-        )?;
-        let mut failed = None;
-        let sending = sender.run(|event| {
-            if failed.is_none() {
-                failed = report(args.json, &event).err();
-            }
-        });
+        ));
+        let sending = sender.run(|event| printing.note(report(args.json, &event)));
         tokio::select! {
             () = &mut interrupted => {}
             ended = sending => ended?,
         }
-        failed.map_or(Ok(()), Err)
+        Ok(())
     })
 }
 

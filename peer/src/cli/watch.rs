@@ -11,7 +11,7 @@ use super::config_args::ConfigArgs;
 use super::foxglove::FoxgloveArgs;
 use super::robots::table;
 use super::show::{self, Names, clean, line};
-use super::web::WebArgs;
+use super::web::{self, WebArgs};
 use super::{Failure, interrupted};
 use crate::doctor::swarm::NOBODY_ANSWERS;
 use gestalt_desk::{Event, View};
@@ -70,7 +70,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             }
         } else {
             let mut news = client.news().await?;
-            let page = args.web.open(&swarm, &link, args.json).await?;
+            let page = args.web.open(&swarm, &link).await?;
+            web::say_where(page.as_ref(), args.json)?;
             let foxglove = args.foxglove.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}

@@ -29,21 +29,19 @@ impl WebArgs {
         Self { web: self.web.as_ref().or(other).cloned() }
     }
 
-    /// Serves the page that was asked for, if any, of a swarm that is reached like that, and says where.
-    pub(super) async fn open(
-        &self,
-        swarm: &str,
-        link: &LinkConfig,
-        as_json: bool,
-    ) -> Result<Option<Desk>, Failure> {
+    /// Serves the page that was asked for, if any, of a swarm that is reached like that.
+    pub(super) async fn open(&self, swarm: &str, link: &LinkConfig) -> Result<Option<Desk>, Failure> {
         let Some(address) = &self.web else { return Ok(None) };
         let door = Door { token: chosen_token()?, ..Door::at(address.clone()) };
-        let desk = Desk::open(Client::open(swarm, link).await?, swarm, door).await?;
-        let url = desk.url();
-        let hint = from_elsewhere(desk.address());
-        line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{hint}"))?;
-        Ok(Some(desk))
+        Ok(Some(Desk::open(Client::open(swarm, link).await?, swarm, door).await?))
     }
+}
+
+/// Says where a page is served, if one is.
+pub(super) fn say_where(page: Option<&Desk>, as_json: bool) -> Result<(), Failure> {
+    let Some(page) = page else { return Ok(()) };
+    let (url, hint) = (page.url(), from_elsewhere(page.address()));
+    line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{hint}"))
 }
 
 /// The token that the environment chooses, if it does.

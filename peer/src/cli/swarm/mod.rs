@@ -20,7 +20,7 @@ use super::progress::bar;
 use super::record;
 use super::show::{Names, counted, line};
 use super::trust::Authority;
-use super::web::WebArgs;
+use super::web::{self, WebArgs};
 use super::{Failure, interrupted};
 use crate::config::{Config, LearnFrom, ModelSection, Schedule};
 use crate::recording::{Recording, RecordingPlan};
@@ -246,7 +246,8 @@ async fn start(
             endpoints.first().map_or("no endpoint", String::as_str)
         ),
     )?;
-    let page = args.web.open(&args.swarm, &link, args.json).await?;
+    let page = args.web.open(&args.swarm, &link).await?;
+    web::say_where(page.as_ref(), args.json)?;
     Ok(Swarm { members, client, news, page, recording, _folder: folder })
 }
 
