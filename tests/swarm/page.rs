@@ -69,14 +69,14 @@ pub async fn desk(swarm: &str, link: &LinkConfig, port: u16) -> Desk {
 }
 
 /// Whoever reads the page's events, by a plain connection.
-struct Reader {
+pub struct Reader {
     stream: TcpStream,
     read: String,
     host: String,
 }
 
 impl Reader {
-    async fn open(desk: &Desk) -> Self {
+    pub async fn open(desk: &Desk) -> Self {
         let host = desk.address().to_string();
         let mut stream = TcpStream::connect(&host).await.unwrap();
         let request = format!("GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n");
@@ -103,7 +103,7 @@ impl Reader {
         }
     }
 
-    async fn say(&self, word: &Value) -> Value {
+    pub async fn say(&self, word: &Value) -> Value {
         let (mut stream, body) = (TcpStream::connect(&self.host).await.unwrap(), word.to_string());
         let request = format!(
             "POST /say HTTP/1.1\r\nHost: {}\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{body}",

@@ -16,6 +16,7 @@ use zenoh::Wait;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::Locality;
 
+use crate::page;
 use crate::stranger::star;
 use crate::trouble::{counted, invented};
 
@@ -172,6 +173,14 @@ pub async fn clients_with_a_key_are_let_in_and_do_what_they_may_and_no_more() {
     let was = Instruction::Was { round: first.round, class: Gesture::Class(ClassId(3)) };
     let answer = eve.teach(&name("eve"), &was, PATIENCE).await.unwrap().expect("an answer");
     assert_eq!(answer.outcome, Outcome::NotAllowed);
+    // Her page says so too, also of the word that has no answer but a refusal.
+    let credentials = credentials(&members, Bearer::Client(name("eve")), key(666));
+    let link = LinkConfig { connect: tls, credentials: Some(credentials), ..LinkConfig::default() };
+    let desk = page::desk(&swarm, &link, 0).await;
+    let told = page::Reader::open(&desk).await.say(&json!({"say": "open"})).await;
+    assert_eq!(told["answer"]["outcome"], "not_allowed", "{told}");
+    assert_eq!(told["words"], Outcome::NotAllowed.describe());
+    desk.close().await;
     let answer = local.teach(&name("console"), &was, PATIENCE).await.unwrap().expect("an answer");
     assert_eq!(answer.outcome, Outcome::NotAllowed);
     // Without a key nobody speaks for one who has one, and hears that.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use gestalt_link::{Answers, Client, LinkError, News};
-use gestalt_protocol::{Announcement, Answer, Instruction, InstructorId, Status};
+use gestalt_protocol::{Announcement, Instruction, InstructorId, Status};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 
@@ -23,6 +23,9 @@ const TOGETHER: Duration = Duration::from_millis(60);
 
 /// How long the swarm has to answer an instructor.
 const ANSWER: Duration = Duration::from_secs(5);
+
+/// How long it has to say that somebody may open no round: nothing else answers that.
+const REFUSED: Duration = Duration::from_millis(500);
 
 /// What is shown of a view, wherever that is.
 pub(crate) trait Show {
@@ -115,11 +118,14 @@ async fn ask(client: Arc<Client>, first: bool) -> Result<(Vec<Status>, Option<An
     }
 }
 
-/// Says to the swarm what a reader said, and brings the answer back.
+/// Says to the swarm what a reader said, and brings the answer back: of a request to open a round, a refusal.
 async fn pass_on(client: Arc<Client>, instructor: InstructorId, ask: Ask) {
     let Ask { instruction, answer } = ask;
-    let said: Result<Option<Answer>, LinkError> = match instruction {
-        Instruction::Open => client.instruct(&instructor, &instruction).await.map(|()| None),
+    let said = match instruction {
+        Instruction::Open => {
+            let answer = client.teach(&instructor, &instruction, REFUSED).await;
+            answer.map(|answer| answer.filter(|answer| answer.outcome.is_refusal()))
+        }
         _ => client.teach(&instructor, &instruction, ANSWER).await,
     };
     // An error says that the reader has gone, which is the reader's own business.

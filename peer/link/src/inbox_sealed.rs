@@ -39,11 +39,12 @@ impl Inbox {
         }
         let mut words = sealed.words.lock().unwrap_or_else(PoisonError::into_inner);
         let vouched = words.vouch(&by, payload(sample, MAX_WORD)?.into_owned());
-        let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
-        let said = Instructed { by, at: vouched.count, instruction, said: Some(signed) };
+        let said = Instructed { by, at: vouched.count, instruction, said: None };
         if !roles.permit(&said.instruction) {
             return self.queue_word(Input::Disallowed(said), sample);
         }
+        let signed = SignedWord { word: vouched.word.clone(), attachment: vouched.attachment.clone() };
+        let said = Instructed { said: Some(signed), ..said };
         let mut state = self.lock();
         if state.waiting.is_full() || state.vouched.len() >= MAX_VOUCHED {
             return Err(Refusal::Full);

@@ -27,7 +27,7 @@ pub enum Input {
     Blind(bool),
     /// A human says something.
     Instructed(Instructed),
-    /// A human says something that they may not: it is answered, and changes nothing.
+    /// A human says something that they may not: it is answered, and changes nothing. One that nobody signed was said to this robot alone.
     Disallowed(Instructed),
     /// That robot has answered what that instructor said at that time.
     Answered(InstructorId, u64, RobotId),

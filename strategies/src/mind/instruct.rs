@@ -27,7 +27,7 @@ impl Mind {
             return AboutRounds::Tick;
         }
         if self.is_preceded(&instructed) {
-            return self.on_disallowed(now, instructed);
+            return self.disallow(now, instructed, self.rounds.turn());
         }
         // Somebody is there who says what is shown.
         if instructed.instruction.round().is_some() {
@@ -35,7 +35,7 @@ impl Mind {
         }
         let (outcome, named) = self.heed(&instructed);
         self.share();
-        self.prepare_answer(now, instructed, outcome, named);
+        self.prepare_answer(now, instructed, outcome, named, self.rounds.turn());
         AboutRounds::Tick
     }
 
@@ -70,10 +70,16 @@ impl Mind {
         AboutRounds::Tick
     }
 
-    /// One robot says so for all, as it does of a word that is heeded.
+    /// One robot says so for all that heard it, as it does of a word that is heeded.
     pub(super) fn on_disallowed(&mut self, now: Duration, instructed: Instructed) -> AboutRounds {
+        // One that nobody signed was said to this robot alone: there is nobody to wait for.
+        let turn = if instructed.said.is_some() { self.rounds.turn() } else { Duration::ZERO };
+        self.disallow(now, instructed, turn)
+    }
+
+    fn disallow(&mut self, now: Duration, instructed: Instructed, turn: Duration) -> AboutRounds {
         self.rounds.note_refusal(Refusal::WordNotAllowed);
-        self.prepare_answer(now, instructed, Outcome::NotAllowed, None);
+        self.prepare_answer(now, instructed, Outcome::NotAllowed, None, turn);
         AboutRounds::Tick
     }
 
@@ -144,6 +150,7 @@ impl Mind {
         instructed: Instructed,
         outcome: Outcome,
         named: Option<ClassId>,
+        turn: Duration,
     ) {
         let Instructed { by, at, instruction, .. } = instructed;
         if self.answers.needs_none(&by, at) {
@@ -174,7 +181,7 @@ impl Mind {
             revision = learning.pending_revision();
         }
         let answer = Answer { robot: self.me(), at, to: instruction, outcome, class, samples, looks_like };
-        let due = now + wait + self.rounds.turn();
+        let due = now + wait + turn;
         self.answers.wait(Waiting { due, revision, by, answer });
     }
 

@@ -1,5 +1,7 @@
 //! What instructors say, and what comes of it.
 
+use gestalt_protocol::SignedWord;
+
 use super::*;
 
 #[test]
@@ -150,6 +152,25 @@ fn every_word_is_answered_once() {
     }
     let at = swarm.say("bob", was(round, "1"));
     assert_eq!(swarm.outcome(at), Outcome::Learned, "another instructor's word is a new one");
+}
+
+/// What is signed all robots hear, and one says for all that it is not allowed.
+#[test]
+fn what_was_said_to_one_robot_alone_and_is_not_allowed_it_answers_at_once() {
+    let refused = |said: Option<SignedWord>| {
+        let mut mind = Mind::new(RobotId(3), Life { boot: 1, nonce: 7 }, RoundsConfig::default()).unwrap();
+        mind.handle(Duration::ZERO, Input::Alive(Arc::new([1, 2, 3].map(RobotId).into())));
+        let (by, instruction) = ("ada".parse().unwrap(), Instruction::Open);
+        let now = Duration::from_secs(1);
+        let mut out = mind.handle(now, Input::Disallowed(Instructed { by, at: 1, instruction, said }));
+        out.extend(mind.handle(now, Input::Tick));
+        out.iter().any(|it| matches!(it, Output::Answer(_, answer) if answer.outcome == Outcome::NotAllowed))
+    };
+    assert!(refused(None));
+    assert!(
+        !refused(Some(SignedWord { word: vec![], attachment: vec![] })),
+        "it leaves that to the others first"
+    );
 }
 
 #[test]
