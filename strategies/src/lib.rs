@@ -50,7 +50,7 @@ pub use gestalt_svm::{
 pub use gestalt_svm::{Folding, MIN_SAMPLES, TrainError, TrainOptions, TrainProgress, Trained, train};
 pub use learning::{
     LearningConfig, LearningConfigError, LearningError, LearningSetup, MemoryError, OwnRules, RecordChange,
-    RobotMemory, Shelf, TrainingChange,
+    RobotMemory, Shelf, ToTrain, TrainingChange, Untrained,
 };
 pub use lessons::{LessonBook, LessonReceipt, Verdict};
 pub use mind::{Input, Instructed, Mind, MindConfig, MindConfigError, Output};

@@ -9,8 +9,8 @@ use gestalt_protocol::{
     RobotId, Topic, decode_json,
 };
 use gestalt_strategies::{
-    Classifier, Classify, ClassifyError, Input, Instructed, LearnError, Learner, LearningSetup, Mind,
-    Observation, Output, OwnRules, TrainingChange, Vocabulary, outcome,
+    Classifier, Classify, ClassifyError, Input, Instructed, Learner, LearningSetup, Mind, Observation,
+    Output, OwnRules, Untrained, Vocabulary, outcome,
 };
 use serde::Serialize;
 use serde_json::json;
@@ -51,8 +51,8 @@ pub struct PortableMind {
     sight: Sight,
     /// Of a mind that learns, once it has its model.
     learner: Option<Learner>,
-    /// What the classifier has not followed yet.
-    untrained: Vec<TrainingChange>,
+    /// What the classifier has not followed yet: the host trains when it likes, or never.
+    untrained: Untrained,
     outbox: Outbox,
     /// Whether anything was told to the mind, but what it judges with.
     begun: bool,
@@ -85,7 +85,7 @@ impl PortableMind {
             mind: Mind::new(somebody(settings.robot)?, settings.life(), settings.rounds.clone())?,
             sight: Sight::Nothing,
             learner: None,
-            untrained: Vec::new(),
+            untrained: Untrained::default(),
             outbox: Outbox::default(),
             begun: false,
             rules,
@@ -333,7 +333,7 @@ impl PortableMind {
             Output::Answer(instructor, answer) => self.say_json(&Topic::Answer(instructor), &answer),
             // The host asks what it holds, and whether a round is open.
             Output::Hold(_) | Output::Opened(_) | Output::Closed(_) => {}
-            Output::Train(changes) => self.untrained.extend(changes),
+            Output::Train(changes) => changes.into_iter().for_each(|change| self.untrained.add(change)),
             // A mind without a memory is owed nothing for it.
             Output::Remember { .. } => {}
         }
@@ -388,12 +388,11 @@ impl PortableMind {
         let Some(learner) = self.learner.as_mut().filter(|_| !self.untrained.is_empty()) else {
             return Ok(false);
         };
-        let changes = std::mem::take(&mut self.untrained);
-        let failed: Vec<LearnError> =
-            changes.iter().filter_map(|change| change.apply_to(learner).err()).collect();
+        let mut first = None;
+        self.untrained.take().teach(learner, |error| first = first.take().or(Some(error)));
         let classifier = learner.learn()?;
         self.judge_by(now, classifier);
-        failed.into_iter().next().map_or(Ok(true), |error| Err(error.into()))
+        first.map_or(Ok(true), |error| Err(error.into()))
     }
 
     /// The decision held for the newest round, as JSON as it is announced; whether it is final is only known of one that was

@@ -19,6 +19,7 @@ mod sharing;
 mod shelf;
 mod state;
 mod unresolved;
+mod untrained;
 mod weighed;
 
 pub use changes::TrainingChange;
@@ -30,3 +31,4 @@ pub use shelf::Shelf;
 pub(crate) use state::{Declined, Learning};
 #[cfg(test)]
 pub(crate) use unresolved::training_key;
+pub use untrained::{ToTrain, Untrained};
