@@ -1,9 +1,11 @@
 //! What came of a run, gathered while it runs.
 
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use gestalt_protocol::{ClassId, Decision, Gesture, Instruction};
+use gestalt_protocol::{ClassId, Decision, Gesture, Instruction, RoundId};
 
 /// So many different decisions are compared with each that a robot comes to hold.
 const DIFFERENT: usize = 16;
@@ -13,8 +15,8 @@ const DIFFERENT: usize = 16;
 pub(super) struct Showing {
     pub at: Duration,
     pub shown: ClassId,
-    /// The counter of its round; none when no robot opened one.
-    pub counter: Option<u32>,
+    /// Whether a robot opened a round for it.
+    pub opened: bool,
     /// Whether the instructor said of it that it was the gesture shown.
     pub named_rightly: bool,
     pub announcements: u32,
@@ -47,6 +49,9 @@ pub(super) struct Record {
     /// Who does not lie.
     pub honest: Vec<bool>,
     pub showings: Vec<Showing>,
+    /// The showing during which each round was first opened, by anybody: the parts of a swarm that is cut count alike for different showings, and
+    /// who opened one under a count that was used opens another.
+    rounds: BTreeMap<RoundId, usize>,
     /// The newest decision each robot holds.
     pub holds: Vec<Option<Arc<Decision>>>,
     /// The latest of them that differ: most robots come to hold the same.
@@ -67,6 +72,7 @@ impl Record {
         Self {
             honest,
             showings: Vec::new(),
+            rounds: BTreeMap::new(),
             holds: vec![None; robots],
             latest: Vec::new(),
             frames: 0,
@@ -77,12 +83,12 @@ impl Record {
         }
     }
 
-    pub fn show(&mut self, at: Duration, shown: ClassId, counter: Option<u32>) {
+    pub fn show(&mut self, at: Duration, shown: ClassId) {
         self.told = false;
         self.showings.push(Showing {
             at,
             shown,
-            counter,
+            opened: false,
             named_rightly: false,
             announcements: 0,
             finally_right: false,
@@ -102,16 +108,15 @@ impl Record {
                 self.opened[robot] = Some(now);
             }
         }
-        let Some(showing) = self.showings.last_mut() else { return };
-        let held = up.iter().map(|robot| {
-            self.holds[*robot].as_deref().filter(|held| Some(held.round.counter) == showing.counter)
-        });
-        let decisions: Vec<&Decision> = held.clone().flatten().collect();
-        let conflict = decisions.windows(2).any(|pair| pair[0].class != pair[1].class);
-        showing.outcome = Some(Outcome {
+        let Some(newest) = self.showings.len().checked_sub(1) else { return };
+        let held = up.iter().filter_map(|robot| self.holds[*robot].as_deref());
+        let decisions: Vec<&Decision> =
+            held.filter(|held| self.rounds.get(&held.round) == Some(&newest)).collect();
+        let classes: BTreeSet<Option<ClassId>> = decisions.iter().map(|decision| decision.class).collect();
+        self.showings[newest].outcome = Some(Outcome {
             decision: decisions.iter().max_by_key(|decision| decision.rank()).map(|d| (*d).clone()),
-            conflict,
-            unanimous: !conflict && !up.is_empty() && decisions.len() == up.len(),
+            conflict: classes.iter().flatten().count() > 1,
+            unanimous: classes.len() == 1 && decisions.len() == up.len(),
         });
     }
 
@@ -120,7 +125,7 @@ impl Record {
         self.told = true;
         if let Instruction::Was { round, class: Gesture::Class(named) }
         | Instruction::Right { round, of: Gesture::Class(named) } = instruction
-            && let Some(showing) = self.showing(round.counter)
+            && let Some(showing) = self.showing(*round)
         {
             showing.named_rightly |= *named == showing.shown;
         }
@@ -136,7 +141,7 @@ impl Record {
     }
 
     pub fn hold(&mut self, now: Duration, robot: usize, decision: &Decision) {
-        if let Some(showing) = self.showing(decision.round.counter) {
+        if let Some(showing) = self.showing(decision.round) {
             if decision.class.is_some() {
                 showing.first_held.get_or_insert(now);
             }
@@ -154,7 +159,7 @@ impl Record {
     }
 
     pub fn announce(&mut self, decision: &Decision) {
-        if let Some(showing) = self.showing(decision.round.counter) {
+        if let Some(showing) = self.showing(decision.round) {
             showing.announcements += 1;
             if decision.is_final && decision.class.is_some() {
                 let right = decision.class == Some(showing.shown);
@@ -166,13 +171,20 @@ impl Record {
 
     /// Liars made a decision that robots believe.
     pub fn forge(&mut self, decision: &Decision) {
-        if let Some(showing) = self.showing(decision.round.counter) {
+        if let Some(showing) = self.showing(decision.round) {
             showing.forged |= decision.class != Some(showing.shown);
         }
     }
 
-    pub fn open(&mut self, now: Duration, robot: usize) {
+    /// A robot takes part in a round.
+    pub fn open(&mut self, now: Duration, robot: usize, round: RoundId) {
         self.opened[robot] = Some(now);
+        if let Some(newest) = self.showings.len().checked_sub(1)
+            && let Entry::Vacant(new) = self.rounds.entry(round)
+        {
+            new.insert(newest);
+            self.showings[newest].opened = true;
+        }
     }
 
     pub fn close(&mut self, now: Duration, robot: usize) {
@@ -187,7 +199,94 @@ impl Record {
         self.opened[robot] = None;
     }
 
-    fn showing(&mut self, counter: u32) -> Option<&mut Showing> {
-        self.showings.iter_mut().rev().find(|showing| showing.counter == Some(counter))
+    /// The showing that a round was for: of two that robots took for one, that of the name under which they go on.
+    fn showing(&mut self, round: RoundId) -> Option<&mut Showing> {
+        self.rounds.get(&round).map(|showing| &mut self.showings[*showing])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{Certificate, FusionRule, RobotId, VocabularyId};
+    use gestalt_strategies::MindConfig;
+
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    fn round(counter: u32, opener: u32) -> RoundId {
+        RoundId { counter, opener: RobotId(opener), life: 7 }
+    }
+
+    fn decision(round: RoundId, class: Option<u32>) -> Decision {
+        Decision {
+            round,
+            class: class.map(ClassId),
+            confidence: 0.9,
+            author: RobotId(1),
+            is_final: true,
+            certificate: Certificate {
+                vocabulary: VocabularyId::NONE,
+                rule: FusionRule::LogPool,
+                pool: None,
+                probabilities: vec![],
+                unknown: None,
+                votes: vec![],
+                others: vec![],
+                robots: 2,
+                quorum: 1,
+                elapsed_ms: 0,
+                named: vec![],
+                terms: MindConfig::default().terms(),
+            },
+        }
+    }
+
+    /// Two robots that are apart count alike: the first opens a round for gesture 0, the second one for gesture 1.
+    fn apart() -> Record {
+        let mut record = Record::new(vec![true; 2]);
+        record.show(SECOND, ClassId(0));
+        record.open(SECOND, 0, round(2, 1));
+        record.hold(SECOND, 0, &decision(round(2, 1), Some(0)));
+        record.end_showing(2 * SECOND, &[0, 1]);
+        record.show(2 * SECOND, ClassId(1));
+        record.open(2 * SECOND, 1, round(2, 2));
+        record
+    }
+
+    #[test]
+    fn a_decision_is_of_the_showing_for_which_its_round_was_opened() {
+        let mut record = apart();
+        record.announce(&decision(round(2, 1), Some(0)));
+        record.end_showing(3 * SECOND, &[0, 1]);
+        let [first, second] = &record.showings[..] else { panic!("two were shown") };
+        assert_eq!((first.announcements, first.finally_right, first.finally_wrong), (1, true, false));
+        let none = Outcome { decision: None, conflict: false, unanimous: false };
+        assert_eq!((second.announcements, second.outcome.as_ref()), (0, Some(&none)));
+    }
+
+    #[test]
+    fn all_rounds_that_are_opened_for_a_showing_are_its_own() {
+        let mut record = apart();
+        // Who hears that the count was used opens another; who comes late to that of the first showing opens none for the second.
+        record.open(2 * SECOND, 1, round(3, 2));
+        record.open(2 * SECOND, 1, round(2, 1));
+        (0..2).for_each(|robot| record.hold(3 * SECOND, robot, &decision(round(3, 2), Some(1))));
+        record.end_showing(3 * SECOND, &[0, 1]);
+        let outcome = record.showings[1].outcome.as_ref().unwrap();
+        assert_eq!(outcome.decision.as_ref().and_then(|held| held.class), Some(ClassId(1)));
+        assert!(outcome.unanimous && !outcome.conflict);
+    }
+
+    #[test]
+    fn who_holds_that_nothing_was_decided_contradicts_nobody_and_is_not_of_one_mind_with_who_decided() {
+        let mut record = apart();
+        for (class, conflict) in [(None, false), (Some(1), false), (Some(2), true)] {
+            record.hold(2 * SECOND, 0, &decision(round(2, 2), class));
+            record.hold(2 * SECOND, 1, &decision(round(2, 2), Some(1)));
+            record.end_showing(3 * SECOND, &[0, 1]);
+            let outcome = record.showings[1].outcome.as_ref().unwrap();
+            assert_eq!((outcome.conflict, outcome.unanimous), (conflict, class == Some(1)), "{class:?}");
+        }
     }
 }

@@ -96,7 +96,7 @@ pub struct Learned {
 
 impl Report {
     pub(super) fn new(seed: u64, record: &Record, network: &Network, learned: Option<Learned>) -> Self {
-        let opened: Vec<&Showing> = record.showings.iter().filter(|s| s.counter.is_some()).collect();
+        let opened: Vec<&Showing> = record.showings.iter().filter(|s| s.opened).collect();
         let rounds = opened.len() as u64;
         let count = |holds: &dyn Fn(&Showing) -> bool| opened.iter().filter(|s| holds(s)).count() as u64;
         let decision = |showing: &Showing| showing.outcome.as_ref().and_then(|o| o.decision.clone());
@@ -124,8 +124,7 @@ impl Report {
             let (showing, before) = (&record.showings[n], &record.showings[..n]);
             learned.is_none() || before.iter().any(|b| b.named_rightly && b.shown == showing.shown)
         };
-        let heard: Vec<usize> =
-            (0..record.showings.len()).filter(|n| record.showings[*n].counter.is_some()).collect();
+        let heard: Vec<usize> = (0..record.showings.len()).filter(|n| record.showings[*n].opened).collect();
         let said = heard.iter().filter_map(|n| {
             let showing = &record.showings[*n];
             let made = decision(showing).filter(|made| made.class.is_some())?;

@@ -48,7 +48,7 @@ impl Swarm<'_> {
                 Deed::Wakes(at) => self.at(at, Due::Wake(i)),
                 Deed::Looks(round, first, n) => {
                     self.note(&Happening::Opened { robot, round });
-                    self.record.open(self.now, i);
+                    self.record.open(self.now, i, round);
                     self.at(first, Due::Frame(i, n));
                 }
                 Deed::LooksOn(at, n) => self.at(at, Due::Frame(i, n)),

@@ -40,12 +40,12 @@ impl Swarm<'_> {
         let opener = up[(luck % up.len() as u64) as usize];
         let happening = Happening::Shown { class: self.shown, opener: self.robots[opener].id };
         self.note(&happening);
+        self.record.show(self.now, self.shown);
         let before = self.robots[opener].mind.as_ref().and_then(Mind::round);
         self.tell_mind(opener, Input::Open);
         let after = self.robots[opener].mind.as_ref().and_then(Mind::round);
         // A robot that is still busy with the round before does not open another.
         let opened = after.filter(|round| Some(*round) != before);
-        self.record.show(self.now, self.shown, opened.map(|round| round.counter));
         if let Some(round) = opened {
             self.train_voters(round.counter, opener);
         }

@@ -43,3 +43,20 @@ fn no_part_of_a_swarm_that_rested_decides_alone() {
         }
     }
 }
+
+/// Both parts count their rounds alike, for different showings: what one holds of its own is no outcome of the other's.
+#[test]
+fn parts_that_stay_apart_and_see_well_are_never_wrong_and_contradict_nobody() {
+    let cut = [(1, 9), (4, 5)].map(|(a, b)| Event::Cut(RobotId(a), RobotId(b)));
+    let faults = cut.map(|event| Fault { at: Duration::from_secs(10), event });
+    let mut scenario = Scenario { faults: faults.into(), ..calm(9, 0, NetworkShape::Ring, 12) };
+    scenario.robots[0].view = Some(View { fps: 4.0, signal: 8.0, persistence: 0.0, likeness: 0.0 });
+    for seed in 0..20 {
+        let report = run(&scenario, seed).unwrap();
+        let wrong = [report.wrong, report.finally_wrong].map(|share| share.hits);
+        assert_eq!((wrong, report.conflicts), ([0, 0], 0), "seed {seed}: {report:?}");
+        // Each showing but the first is met by one part alone, and the part of five decides.
+        assert_eq!((report.unanimous.hits, report.announcements.mean), (1, 1.0), "seed {seed}: {report:?}");
+        assert!(report.right.hits > 1 && report.undecided.hits > 0, "seed {seed}: {report:?}");
+    }
+}
