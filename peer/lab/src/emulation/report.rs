@@ -51,7 +51,7 @@ pub struct Report {
     pub settled_ms: Mean,
     /// How often a decision was announced, per round.
     pub announcements: Mean,
-    /// Bytes of votes a robot says per second of an open round, to each of its next hops.
+    /// Bytes of votes a robot that does not lie says per second of an open round, to each of its next hops.
     pub vote_bytes_per_open_second: f64,
     /// Bytes that a robot puts on its links over the whole run, on average, by purpose.
     pub bytes_per_robot: BytesPerRobot,
@@ -119,6 +119,9 @@ impl Report {
             Mean::of(&opened.iter().filter_map(|s| Some(ms(s, at(s)?))).collect::<Vec<_>>())
         };
         let open = record.open.as_secs_f64();
+        // Liars have no round open.
+        let of_honest = network.traffic.iter().zip(&record.honest).filter(|(_, honest)| **honest);
+        let votes = of_honest.map(|(traffic, _)| traffic.votes).sum::<u64>();
         // Robots that do not learn know all gestures; those that do know what somebody named, and rightly.
         let taught = |n: usize| {
             let (showing, before) = (&record.showings[n], &record.showings[..n]);
@@ -160,7 +163,7 @@ impl Report {
             decided_ms: times(&|s| s.first_held),
             settled_ms: times(&|s| s.last_held),
             announcements: Mean::of(&opened.iter().map(|s| f64::from(s.announcements)).collect::<Vec<_>>()),
-            vote_bytes_per_open_second: if open > 0.0 { total.votes as f64 / open } else { 0.0 },
+            vote_bytes_per_open_second: if open > 0.0 { votes as f64 / open } else { 0.0 },
             bytes_per_robot: BytesPerRobot {
                 votes: share(total.votes),
                 repair: share(total.repair),
@@ -356,5 +359,29 @@ impl fmt::Display for Table<'_> {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gestalt_protocol::{ClassId, RobotId, RoundId};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::emulation::network::Kind;
+    use crate::emulation::scenario::LinkModel;
+
+    #[test]
+    fn votes_of_liars_who_have_no_round_open_are_not_what_robots_say_in_one() {
+        let mut network = Network::new(2, vec![(0, 1)], LinkModel::default(), ChaCha8Rng::seed_from_u64(1));
+        let mut record = Record::new(vec![false, true]);
+        record.show(Duration::ZERO, ClassId(0));
+        record.open(Duration::ZERO, 1, RoundId { counter: 1, opener: RobotId(2), life: 7 });
+        record.close(Duration::from_secs(2), 1);
+        network.broadcast(0, 1000, Kind::Vote);
+        network.broadcast(1, 30, Kind::Vote);
+        let report = Report::new(0, &record, &network, None);
+        assert_eq!((report.vote_bytes_per_open_second, report.bytes_per_robot.votes), (15.0, 515.0));
     }
 }

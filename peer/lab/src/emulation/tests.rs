@@ -4,6 +4,7 @@ mod ahead;
 mod answering;
 mod certified;
 mod forgetting;
+mod lying;
 mod partition;
 
 use std::collections::{BTreeMap, BTreeSet};

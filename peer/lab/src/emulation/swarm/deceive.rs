@@ -38,8 +38,9 @@ impl Swarm<'_> {
         }
     }
 
+    /// All of them that are up do.
     fn lie(&mut self) {
-        let liars: Vec<usize> = (0..self.robots.len()).filter(|i| self.robots[*i].lies.is_some()).collect();
+        let liars: Vec<usize> = self.network.up().filter(|i| self.robots[*i].lies.is_some()).collect();
         let Some(lies) = liars.first().and_then(|i| self.robots[*i].lies) else { return };
         let ids: Vec<RobotId> = liars.iter().map(|i| self.robots[*i].id).collect();
         let (classes, robots) = (self.scenario.classes, self.robots.len());
