@@ -44,12 +44,10 @@ impl Ledger {
     /// Adds the rows of a run that has ended; they are on the disk when this returns.
     ///
     /// # Errors
-    /// [`ExperimentError::Write`].
+    /// [`ExperimentError::Write`]; the table is as it was.
     pub fn add<R: Serialize>(&mut self, rows: &[R]) -> Result<(), ExperimentError> {
-        let begins = self.file.metadata().is_ok_and(|metadata| metadata.len() == 0);
-        let written = written(rows, begins)
-            .and_then(|text| self.file.write_all(&text).and_then(|()| self.file.sync_data()));
-        written.map_err(|source| ExperimentError::Write { path: self.path.clone(), source })
+        let added = all_or_nothing(&self.file, |mut file, begins| file.write_all(&written(rows, begins)?));
+        added.map_err(|source| ExperimentError::Write { path: self.path.clone(), source })
     }
 
     /// Writes the whole table anew: its rows in the order that they are given in.
@@ -59,6 +57,13 @@ impl Ledger {
     pub fn finish<R: Serialize>(self, rows: &[R]) -> Result<(), ExperimentError> {
         write_anew(&self.path, rows).map(drop)
     }
+}
+
+/// Adds to a file what `write` writes, which is told whether that begins it. Where the disk is full in the midst of a row, another thread's rows would be
+/// added behind that half, and nothing of the table could be read any more.
+fn all_or_nothing(file: &File, write: impl FnOnce(&File, bool) -> io::Result<()>) -> io::Result<()> {
+    let before = file.metadata()?.len();
+    write(file, before == 0).and_then(|()| file.sync_data()).inspect_err(|_| drop(file.set_len(before)))
 }
 
 fn write_anew<R: Serialize>(path: &Path, rows: &[R]) -> Result<File, ExperimentError> {
@@ -126,6 +131,20 @@ mod tests {
             again.add(&[row("b, c", 2)]).unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), whole, "{end}");
         }
+    }
+
+    #[test]
+    fn of_rows_for_which_there_was_no_room_nothing_is_left_before_those_of_the_next_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut ledger, _) = open(folder.path());
+        ledger.add(&[row("a", 0)]).unwrap();
+        let full = all_or_nothing(&ledger.file, |mut file, _| {
+            file.write_all(b"\"b, c\",1,0.3")?;
+            Err(io::ErrorKind::StorageFull.into())
+        });
+        assert_eq!(full.unwrap_err().kind(), io::ErrorKind::StorageFull);
+        ledger.add(&[row("d", 2)]).unwrap();
+        assert_eq!(open(folder.path()).1, [row("a", 0), row("d", 2)]);
     }
 
     #[test]
