@@ -74,6 +74,9 @@ pub enum ExperimentError {
         /// Why.
         cause: csv::Error,
     },
+    /// Another run is under way in the folder.
+    #[error("another gestalt works in {}: wait for it, or choose another folder", .0.display())]
+    Busy(PathBuf),
     /// The folder holds the results of something else.
     #[error("{} holds the results of another experiment or dataset: choose another folder", .0.display())]
     Other(PathBuf),

@@ -1,8 +1,9 @@
 //! The folder that results go into: one experiment's, measured by one program.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::Path;
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
@@ -22,10 +23,10 @@ struct RunFile {
 }
 
 /// Makes the folder and writes down what is run in it: the experiment as given (`experiment.json5`), seeds, datasets, what is in them, and
-/// program (`run.json`).
+/// program (`run.json`). Keeps others that ask for the same out of it, until what is returned is dropped; `None` where folders cannot be locked.
 ///
 /// # Errors
-/// [`ExperimentError::Other`], [`ExperimentError::OtherPictures`] and [`ExperimentError::OtherProgram`] where something else was run in it;
+/// [`ExperimentError::Busy`] where another run is under way in it; [`ExperimentError::Other`], [`ExperimentError::OtherPictures`] and [`ExperimentError::OtherProgram`] where something else was run in it;
 /// [`ExperimentError::Read`] and [`ExperimentError::Write`].
 pub fn claim(
     folder: &Path,
@@ -33,9 +34,10 @@ pub fn claim(
     materials: &Materials,
     seeds: u32,
     program: &Program,
-) -> Result<(), ExperimentError> {
+) -> Result<Option<File>, ExperimentError> {
     fs::create_dir_all(folder)
         .map_err(|source| ExperimentError::Write { path: folder.to_owned(), source })?;
+    let alone = alone(folder)?;
     let (experiment, run) = (folder.join("experiment.json5"), folder.join("run.json"));
     let other = || ExperimentError::Other(folder.to_owned());
     if let Some(before) = read(&run)? {
@@ -62,7 +64,15 @@ pub fn claim(
         gestalt_file::write(&path, text.as_bytes())
             .map_err(|source| ExperimentError::Write { path, source })?;
     }
-    Ok(())
+    Ok(alone)
+}
+
+/// The folder itself is locked: a file in it would be one more that is no result.
+fn alone(folder: &Path) -> Result<Option<File>, ExperimentError> {
+    let Ok(held) = File::open(folder) else { return Ok(None) };
+    let is_held =
+        gestalt_file::hold(&held, Duration::ZERO).map_err(|_| ExperimentError::Busy(folder.to_owned()))?;
+    Ok(is_held.then_some(held))
 }
 
 fn read(path: &Path) -> Result<Option<String>, ExperimentError> {
@@ -99,6 +109,21 @@ mod tests {
         );
         std::fs::write(path.join("run.json"), "{").unwrap();
         assert!(matches!(claim("{}", &none, program(1)), Err(ExperimentError::Other(_))));
+    }
+
+    #[test]
+    fn one_run_at_a_time_works_in_a_folder_and_nothing_is_left_of_that() {
+        let folder = tempfile::tempdir().unwrap();
+        let claim = || claim(folder.path(), "{}", &Materials::default(), 2, &program(1));
+        let first = claim().unwrap();
+        assert!(first.is_some());
+        let files = || std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(files(), 2);
+        let refused = claim().unwrap_err();
+        assert!(matches!(refused, ExperimentError::Busy(_)), "{refused}");
+        drop(first);
+        claim().unwrap();
+        assert_eq!(files(), 2);
     }
 
     #[test]

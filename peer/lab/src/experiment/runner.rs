@@ -79,7 +79,7 @@ pub fn conduct_by(
         ));
     }
     let program = this_program(hands.features)?;
-    folder::claim(folder, text, materials, seeds, &program)?;
+    let _alone = folder::claim(folder, text, materials, seeds, &program)?;
     let looked = |done, total| progress(Progress::Looked(done, total));
     let pool = Pool::look(&experiment, materials.dataset.as_deref(), folder, program.eyes, looked)?;
     let pool = Arc::new(pool);

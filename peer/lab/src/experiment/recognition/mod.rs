@@ -55,7 +55,8 @@ pub fn conduct(
 ) -> Result<String, ExperimentError> {
     let plan = Recognition::parse(text, origin)?;
     let seeds = seeds.unwrap_or(plan.seeds);
-    folder::claim(folder, text, &Materials::default(), seeds, &this_program(FeatureSet::Shape)?)?;
+    let _alone =
+        folder::claim(folder, text, &Materials::default(), seeds, &this_program(FeatureSet::Shape)?)?;
     let results = RecognitionResults::open(folder, &plan)?;
     let runs = run_what_is_left(&plan, results, seeds, &progress)?.finish()?;
 
