@@ -105,6 +105,8 @@ pub(super) struct Network {
     rng: ChaCha8Rng,
     /// Every link there is, and whether it carries anything now.
     links: BTreeMap<Link, bool>,
+    /// Those that the scenario cut by name: chance leaves them alone.
+    cut: BTreeSet<Link>,
     /// Who has a link to whom, working or not.
     adjacent: Vec<Vec<usize>>,
     presence: Vec<Presence>,
@@ -130,6 +132,7 @@ impl Network {
             rng,
             adjacent,
             links: links.iter().map(|link| (*link, true)).collect(),
+            cut: BTreeSet::new(),
             presence: vec![Presence::Up; size],
             believed_links: links.into_iter().collect(),
             believed_robots: vec![true; size],
@@ -156,22 +159,36 @@ impl Network {
         self.presence[robot] = presence;
     }
 
-    /// Cuts or heals a link; says whether that changed anything.
+    /// Cuts a link until it is healed by name, or heals it; says whether that changed anything.
     pub fn set_link(&mut self, link: Link, up: bool) -> bool {
-        self.links.get_mut(&link).is_some_and(|state| std::mem::replace(state, up) != up)
+        let Some(state) = self.links.get_mut(&link) else { return false };
+        if up {
+            self.cut.remove(&link);
+        } else {
+            self.cut.insert(link);
+        }
+        std::mem::replace(state, up) != up
     }
 
     /// Cuts or heals the link that the chance falls on.
     pub fn flip_any_link(&mut self) -> Option<(Link, bool)> {
-        let n = self.rng.random_range(0..self.links.len().max(1) as u64) as usize;
-        let (link, up) = self.links.iter_mut().nth(n)?;
+        let left_to_chance = (self.links.len() - self.cut.len()).max(1) as u64;
+        let n = self.rng.random_range(0..left_to_chance) as usize;
+        let Self { links, cut, .. } = self;
+        let (link, up) = links.iter_mut().filter(|(link, _)| !cut.contains(link)).nth(n)?;
         *up = !*up;
         Some((*link, *up))
     }
 
-    /// The links that carry nothing now.
-    pub fn cut_links(&self) -> Vec<Link> {
-        self.links.iter().filter(|(_, up)| !**up).map(|(link, _)| *link).collect()
+    /// Heals the links that chance cut, and says which.
+    pub fn heal_flipped_links(&mut self) -> Vec<Link> {
+        let mut healed = Vec::new();
+        for (link, up) in self.links.iter_mut().filter(|(link, _)| !self.cut.contains(link)) {
+            if !std::mem::replace(up, true) {
+                healed.push(*link);
+            }
+        }
+        healed
     }
 
     /// The robots notice a change: from now on they route by it.
@@ -341,6 +358,28 @@ mod tests {
         assert_eq!(reached(&mut ring, 0), [3], "1 and, on the way of routing, 2 lie behind the cut");
         ring.notice(Change::Link((0, 1), false));
         assert_eq!(reached(&mut ring, 0), [3, 2, 1], "round the other way");
+    }
+
+    #[test]
+    fn chance_leaves_alone_what_was_cut_by_name() {
+        let mut ring = network(NetworkShape::Ring, 6, 0.0);
+        assert!(ring.set_link((2, 3), false) && !ring.set_link((2, 3), false));
+        let flipped: BTreeSet<Link> =
+            (0..200).filter_map(|_| ring.flip_any_link()).map(|(link, _)| link).collect();
+        assert_eq!(flipped.into_iter().collect::<Vec<_>>(), [(0, 1), (0, 5), (1, 2), (3, 4), (4, 5)]);
+        ring.heal_flipped_links();
+        assert_eq!(
+            ring.links.iter().filter(|(_, up)| !**up).map(|(link, _)| *link).collect::<Vec<_>>(),
+            [(2, 3)]
+        );
+        assert!(ring.set_link((2, 3), true));
+        assert!(
+            (0..200).filter_map(|_| ring.flip_any_link()).any(|(link, _)| link == (2, 3)),
+            "it is well again"
+        );
+        let mut pair = network(NetworkShape::Line, 2, 0.0);
+        pair.set_link((0, 1), false);
+        assert_eq!(pair.flip_any_link(), None);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod ahead;
 mod answering;
 mod certified;
+mod faults;
 mod forgetting;
 mod lying;
 mod partition;

@@ -34,14 +34,14 @@ pub enum Event {
     Thaw(RobotId),
 }
 
-/// Links that fail and heal at random; at the end all are healed.
+/// Links that fail and heal at random, but for those that `faults` cut, as long as they are; at the end all that failed are healed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Churn {
     /// From when.
     #[serde(with = "humantime_serde")]
     pub from: Duration,
-    /// Until when.
+    /// Until when: before the end of the run.
     #[serde(with = "humantime_serde")]
     pub until: Duration,
     /// The time between two changes: each cuts a link or heals one, whichever link the chance falls on.

@@ -175,6 +175,11 @@ mod tests {
             ("\"line\"", "mind.settle", "\"line\", mind: { settle: 3 }"),
             ("\"line\"", "alpha", "\"line\", mind: { alpha: 0.7 }"),
             ("\"line\"", "link.loss", "\"line\", link: { loss: 1 }"),
+            (
+                "\"line\"",
+                "churn.until",
+                "\"line\", rounds: 4, churn: { from: '1s', until: '35s', period: '1s' }",
+            ),
             ("\"line\"", "robot 9", "\"line\", faults: [{ at: \"1s\", event: { kill: 9 } }]"),
         ]
         .map(|(from, key, to)| (SMALL.replace(from, to), key))

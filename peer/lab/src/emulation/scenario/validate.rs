@@ -103,6 +103,11 @@ impl Scenario {
         {
             return wrong("churn", "choose a period above 0 and an end after the beginning".to_owned());
         }
+        let end = self.showing_at(self.rounds);
+        if self.churn.is_some_and(|churn| churn.until >= end) {
+            let mend = format!("the run ends at {end:?}: choose an earlier end of the churn, or more rounds");
+            return wrong("churn.until", mend);
+        }
         let known = |robot: RobotId| (1..=size).contains(&(robot.0 as usize));
         for fault in &self.faults {
             let robots = fault.event.robots();

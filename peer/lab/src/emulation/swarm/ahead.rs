@@ -53,6 +53,7 @@ impl Swarm<'_> {
                 Due::Show(_)
                 | Due::Fault(_)
                 | Due::Churn
+                | Due::Calm
                 | Due::Notice(_)
                 | Due::Teach(..)
                 | Due::Reply(..) => {}

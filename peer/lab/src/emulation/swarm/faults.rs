@@ -53,20 +53,29 @@ impl Swarm<'_> {
         self.at(self.now + self.scenario.link.detection, Due::Notice(change));
     }
 
+    /// Chance cuts or heals a link, and goes on until it is calm.
     pub(super) fn churn(&mut self) {
         let Some(churn) = self.scenario.churn else { return };
-        let changed: Vec<_> = if self.now >= churn.until {
-            self.network.cut_links().into_iter().map(|link| (link, true)).collect()
-        } else {
-            self.at(self.now + churn.period, Due::Churn);
-            self.network.flip_any_link().into_iter().collect()
-        };
-        for ((a, b), up) in changed {
-            let (robot_a, robot_b) = (self.robots[a].id, self.robots[b].id);
-            let event = if up { Event::Heal(robot_a, robot_b) } else { Event::Cut(robot_a, robot_b) };
-            self.note(&Happening::Fault { event: &event });
-            self.network.set_link((a, b), up);
-            self.at(self.now + self.scenario.link.detection, Due::Notice(Change::Link((a, b), up)));
+        let next = self.now + churn.period;
+        if next < churn.until {
+            self.at(next, Due::Churn);
         }
+        if let Some((link, up)) = self.network.flip_any_link() {
+            self.link_flipped(link, up);
+        }
+    }
+
+    /// All that chance cut is well again.
+    pub(super) fn calm(&mut self) {
+        for link in self.network.heal_flipped_links() {
+            self.link_flipped(link, true);
+        }
+    }
+
+    fn link_flipped(&mut self, link: Link, up: bool) {
+        let (a, b) = (self.robots[link.0].id, self.robots[link.1].id);
+        let event = if up { Event::Heal(a, b) } else { Event::Cut(a, b) };
+        self.note(&Happening::Fault { event: &event });
+        self.at(self.now + self.scenario.link.detection, Due::Notice(Change::Link(link, up)));
     }
 }

@@ -149,6 +149,7 @@ impl<'a> Swarm<'a> {
         scenario.faults.iter().for_each(|fault| swarm.at(fault.at, Due::Fault(fault.event)));
         if let Some(churn) = scenario.churn {
             swarm.at(churn.from, Due::Churn);
+            swarm.at(churn.until, Due::Calm);
         }
         swarm
     }
@@ -207,6 +208,7 @@ impl<'a> Swarm<'a> {
             Due::Show(n) => self.show(n),
             Due::Fault(event) => self.fault(event),
             Due::Churn => self.churn(),
+            Due::Calm => self.calm(),
             Due::Notice(change) => {
                 self.network.notice(change);
                 self.tell_who_is_there();

@@ -14,6 +14,8 @@ pub(super) enum Due {
     Show(u32),
     Fault(Event),
     Churn,
+    /// Links fail and heal at random no more.
+    Calm,
     Notice(Change),
     Wake(usize),
     /// The next frame of that robot, as long as it looks for the `n`th time.
@@ -36,6 +38,7 @@ impl Due {
             Self::Show(_)
             | Self::Fault(_)
             | Self::Churn
+            | Self::Calm
             | Self::Notice(_)
             | Self::Teach(..)
             | Self::Reply(..) => true,
