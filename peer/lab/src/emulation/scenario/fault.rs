@@ -5,7 +5,9 @@ use std::time::Duration;
 use gestalt_protocol::RobotId;
 use serde::{Deserialize, Serialize};
 
-/// One thing that happens to the swarm.
+use crate::emulation::network::Presence;
+
+/// One thing that happens to the swarm, if it can: a random network may lack the link.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
@@ -55,6 +57,27 @@ impl Event {
         match self {
             Self::Cut(a, b) | Self::Heal(a, b) => vec![a, b],
             Self::Kill(robot) | Self::Restart(robot) | Self::Freeze(robot) | Self::Thaw(robot) => vec![robot],
+        }
+    }
+
+    /// The robot that it befalls, and how that is from then on; nothing where it befalls a link.
+    pub(in crate::emulation) fn makes(self) -> Option<(RobotId, Presence)> {
+        match self {
+            Self::Cut(..) | Self::Heal(..) => None,
+            Self::Kill(robot) => Some((robot, Presence::Down)),
+            Self::Restart(robot) | Self::Thaw(robot) => Some((robot, Presence::Up)),
+            Self::Freeze(robot) => Some((robot, Presence::Frozen)),
+        }
+    }
+
+    /// Whether it can befall a robot that is so.
+    pub(in crate::emulation) fn can_befall(self, presence: Presence) -> bool {
+        match self {
+            Self::Cut(..) | Self::Heal(..) => false,
+            Self::Kill(_) => presence != Presence::Down,
+            Self::Restart(_) => presence == Presence::Down,
+            Self::Freeze(_) => presence == Presence::Up,
+            Self::Thaw(_) => presence == Presence::Frozen,
         }
     }
 }

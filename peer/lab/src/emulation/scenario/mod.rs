@@ -4,6 +4,7 @@ mod error;
 mod fault;
 mod group;
 mod link_model;
+mod possible;
 mod validate;
 
 use std::path::Path;

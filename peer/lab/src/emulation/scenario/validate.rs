@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use gestalt_protocol::{MAX_CLASSES, RobotId};
+use gestalt_protocol::MAX_CLASSES;
 
 use super::Scenario;
 use super::error::ScenarioError;
-use super::fault::Event;
 use super::link_model::LinkModel;
 
 /// The most robots: more do not fit into the memory of any machine that this runs on.
@@ -108,17 +107,7 @@ impl Scenario {
             let mend = format!("the run ends at {end:?}: choose an earlier end of the churn, or more rounds");
             return wrong("churn.until", mend);
         }
-        let known = |robot: RobotId| (1..=size).contains(&(robot.0 as usize));
-        for fault in &self.faults {
-            let robots = fault.event.robots();
-            if let Some(robot) = robots.into_iter().find(|robot| !known(*robot)) {
-                return wrong("faults", format!("there is no robot {robot}: choose 1 to {size}"));
-            }
-            if matches!(fault.event, Event::Cut(a, b) | Event::Heal(a, b) if a == b) {
-                return wrong("faults", "a link has two ends: name two robots".to_owned());
-            }
-        }
-        Ok(())
+        self.check_faults()
     }
 
     /// How long things take, by key.

@@ -11,40 +11,45 @@ use crate::emulation::scenario::Event;
 use crate::emulation::trace::Happening;
 
 impl Swarm<'_> {
+    /// Makes something go wrong, or mends it. Where that changes nothing, as a random network lacks the link, it does not happen.
     pub(super) fn fault(&mut self, event: Event) {
-        self.note(&Happening::Fault { event: &event });
-        let index = |robot: RobotId| robot.0 as usize - 1;
         match event {
-            Event::Cut(a, b) => self.change_link(link(index(a), index(b)), false),
-            Event::Heal(a, b) => self.change_link(link(index(a), index(b)), true),
-            Event::Kill(robot) => {
-                let i = index(robot);
+            Event::Cut(a, b) | Event::Heal(a, b) => {
+                let (link, up) = (link(index(a), index(b)), matches!(event, Event::Heal(..)));
+                if self.network.set_link(link, up) {
+                    self.link_changed(event, link, up);
+                }
+            }
+            Event::Kill(robot) | Event::Restart(robot) | Event::Freeze(robot) | Event::Thaw(robot) => {
+                if event.can_befall(self.network.presence(index(robot))) {
+                    self.note(&Happening::Fault { event: &event });
+                    self.befall(event, index(robot));
+                }
+            }
+        }
+    }
+
+    fn befall(&mut self, event: Event, i: usize) {
+        if let Some((_, presence)) = event.makes() {
+            self.change_presence(i, presence);
+        }
+        match event {
+            Event::Kill(_) => {
                 self.robots[i].mind = None;
                 self.robots[i].waiting.clear();
                 self.robots[i].unread.clear();
                 self.robots[i].pupil.iter_mut().for_each(Pupil::stop);
                 self.record.forget(i);
-                self.change_presence(i, Presence::Down);
             }
-            Event::Restart(robot) if self.network.presence(index(robot)) == Presence::Down => {
-                self.change_presence(index(robot), Presence::Up);
-                self.start(index(robot));
-            }
-            Event::Freeze(robot) if self.network.presence(index(robot)) == Presence::Up => {
-                self.change_presence(index(robot), Presence::Frozen);
-            }
-            Event::Thaw(robot) if self.network.presence(index(robot)) == Presence::Frozen => {
-                self.change_presence(index(robot), Presence::Up);
-                self.thaw(index(robot));
-            }
-            Event::Restart(_) | Event::Freeze(_) | Event::Thaw(_) => {}
+            Event::Restart(_) => self.start(i),
+            Event::Thaw(_) => self.thaw(i),
+            Event::Freeze(_) | Event::Cut(..) | Event::Heal(..) => {}
         }
     }
 
-    fn change_link(&mut self, link: Link, up: bool) {
-        if self.network.set_link(link, up) {
-            self.at(self.now + self.scenario.link.detection, Due::Notice(Change::Link(link, up)));
-        }
+    fn link_changed(&mut self, event: Event, link: Link, up: bool) {
+        self.note(&Happening::Fault { event: &event });
+        self.at(self.now + self.scenario.link.detection, Due::Notice(Change::Link(link, up)));
     }
 
     fn change_presence(&mut self, robot: usize, presence: Presence) {
@@ -75,7 +80,10 @@ impl Swarm<'_> {
     fn link_flipped(&mut self, link: Link, up: bool) {
         let (a, b) = (self.robots[link.0].id, self.robots[link.1].id);
         let event = if up { Event::Heal(a, b) } else { Event::Cut(a, b) };
-        self.note(&Happening::Fault { event: &event });
-        self.at(self.now + self.scenario.link.detection, Due::Notice(Change::Link(link, up)));
+        self.link_changed(event, link, up);
     }
+}
+
+fn index(robot: RobotId) -> usize {
+    robot.0 as usize - 1
 }

@@ -26,3 +26,16 @@ fn what_failed_at_random_is_well_when_it_is_to_be_and_what_was_cut_by_name_is_no
         assert_eq!(cut, ["[1,2]".to_owned()].into(), "seed {seed}");
     }
 }
+
+#[test]
+fn a_fault_that_changes_nothing_did_not_happen() {
+    // Each seed draws other links.
+    let all = (1..9).flat_map(|a| (a + 1..10).map(move |b| (a, b)));
+    let cut = |(a, b)| Fault { at: Duration::from_secs(8), event: Event::Cut(RobotId(a), RobotId(b)) };
+    let scenario = Scenario { faults: all.map(cut).collect(), ..calm(9, 0, NetworkShape::Random, 1) };
+    for seed in 0..3 {
+        let trace = String::from_utf8(traced(&scenario, seed)).unwrap();
+        let cut = trace.lines().filter(|line| line.contains("\"what\":\"fault\"")).count();
+        assert!((8..=12).contains(&cut), "seed {seed}: a tree of nine and four links more, not {cut}");
+    }
+}
