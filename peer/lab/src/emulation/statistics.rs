@@ -114,16 +114,25 @@ impl Mean {
         }
     }
 
-    /// The mean of shares of that many trials each, in percent, with an interval that stays within 0 and 100 and has a width where all are alike: the
-    /// score interval with Student's t, of as many independent trials as the scatter of the shares lets there be.
+    /// The interval of the mean of shares of that many trials each, which stays within 0 and 1 and has a width where all are alike: the score interval with
+    /// Student's t, of as many independent trials as the scatter of the shares lets there be. Of a single share it has none.
+    #[must_use]
+    pub fn interval_of(self, trials: usize) -> (f64, f64) {
+        if self.n < 2 {
+            return (self.mean, self.mean);
+        }
+        let t = student((self.n - 1) as f64);
+        let (all, found) = ((self.n * trials.max(1)) as f64, (self.half_width / t).powi(2));
+        score_interval(self.mean, all, found, t)
+    }
+
+    /// The mean of shares of that many trials each, in percent, with that interval.
     #[must_use]
     pub fn percent_of(self, trials: usize) -> String {
         if self.n < 2 {
             return self.percent();
         }
-        let t = student((self.n - 1) as f64);
-        let (all, found) = ((self.n * trials.max(1)) as f64, (self.half_width / t).powi(2));
-        let (low, high) = score_interval(self.mean, all, found, t);
+        let (low, high) = self.interval_of(trials);
         format!("{:.1} [{:.1}, {:.1}]", 100.0 * self.mean, 100.0 * low, 100.0 * high)
     }
 

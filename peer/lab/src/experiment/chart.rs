@@ -41,6 +41,8 @@ pub struct Figure {
     pub marks: Option<Vec<f64>>,
     /// Whether x grows by factors.
     pub logarithmic: bool,
+    /// How many trials each share is of, in each seed.
+    pub trials: usize,
     /// Side by side.
     pub panels: Vec<Panel>,
 }
@@ -152,7 +154,8 @@ fn draw_panel(area: &Area<'_>, figure: &Figure, panel: &Panel) -> Drawn {
     let xs = all().map(|(x, _)| figure.place(*x));
     let (left, right) = xs.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
     let margin = if right > left { 0.03 * (right - left) } else { 0.5 };
-    let lowest = all().map(|(_, mean)| mean.mean - mean.half_width).fold(1.0, f64::min);
+    let interval = |mean: &Mean| mean.interval_of(figure.trials);
+    let lowest = all().map(|(_, mean)| interval(mean).0).fold(1.0, f64::min);
     let floor = ((10.0 * lowest.max(0.0)).floor() * 10.0).min(90.0);
     let marks = match &figure.marks {
         Some(marks) => marks.iter().map(|x| figure.place(*x)).collect(),
@@ -178,10 +181,8 @@ fn draw_panel(area: &Area<'_>, figure: &Figure, panel: &Panel) -> Drawn {
         .draw()?;
     let percent = |value: f64| 100.0 * value.clamp(0.0, 1.0);
     for (n, line) in panel.lines.iter().enumerate() {
-        let upper =
-            line.points.iter().map(|(x, mean)| (figure.place(*x), percent(mean.mean + mean.half_width)));
-        let lower =
-            line.points.iter().map(|(x, mean)| (figure.place(*x), percent(mean.mean - mean.half_width)));
+        let upper = line.points.iter().map(|(x, mean)| (figure.place(*x), percent(interval(mean).1)));
+        let lower = line.points.iter().map(|(x, mean)| (figure.place(*x), percent(interval(mean).0)));
         let band: Vec<(f64, f64)> = upper.chain(lower.rev()).map(|(x, y)| (x, y.max(floor))).collect();
         chart.draw_series([Polygon::new(band, colour(n).mix(0.16))])?;
     }
@@ -256,6 +257,7 @@ mod tests {
             x: "interaction rounds".to_owned(),
             marks: None,
             logarithmic: false,
+            trials: 60,
             panels: vec![Panel { y: "one", lines: lines() }, Panel { y: "swarm", lines: lines() }],
         }
     }
@@ -267,6 +269,29 @@ mod tests {
             ["A test", "interaction rounds", "swarm", "alone", "together", "#0072B2", "#D55E00", "polygon"]
         {
             assert!(text.contains(part), "{part}");
+        }
+    }
+
+    #[test]
+    fn where_all_seeds_agree_a_band_has_a_width() {
+        let line = |_| Line {
+            name: String::new(),
+            points: vec![(0.0, Mean::of(&[1.0; 20])), (1.0, Mean::of(&[1.0; 20]))],
+        };
+        let panels = [0, 1].map(|n| Panel { y: "one", lines: vec![line(n)] }).into();
+        let text = svg(&Figure { panels, ..figure() }).unwrap();
+        let bands: Vec<&str> = text.lines().filter(|line| line.starts_with("<polygon")).collect();
+        assert_eq!(bands.len(), 2);
+        for band in bands {
+            let points = band.split_once("points=\"").unwrap().1;
+            let heights: std::collections::BTreeSet<&str> = points
+                .split_once('"')
+                .unwrap()
+                .0
+                .split_whitespace()
+                .map(|point| point.split_once(',').unwrap().1)
+                .collect();
+            assert_eq!(heights.len(), 2, "{band}");
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::chart::{Figure, Line, MOST_LINES, Panel};
 use super::plan::Cell;
+use super::setting::Start;
 use super::summary::{Curves, Summary};
 use crate::emulation::Mean;
 
@@ -13,9 +14,9 @@ const PANELS: [(&str, Measure); 2] = [
     ("accuracy of the swarm, %", |curves| &curves.swarm),
 ];
 
-/// The figures of an experiment, by their names.
+/// The figures of an experiment, by their names. `judged`: how many hands are judged in each seed.
 #[must_use]
-pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
+pub fn figures(summary: &Summary, judged: usize) -> Vec<(&'static str, Figure)> {
     // To Rust `inf` and `nan` are numbers; a name may be one.
     let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite());
     let numbers: Option<Vec<f64>> = summary.cells.iter().map(|(cell, _)| number(&cell.value)).collect();
@@ -26,10 +27,16 @@ pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
         x: x.to_owned(),
         marks: None,
         logarithmic: false,
+        trials: judged,
         panels,
     };
     let bytes = "samples published per robot, kB";
     let mut figures = Vec::new();
+
+    // Who knows nothing guesses, and that is not measured.
+    let measured = |cell: &Cell, n: usize, mean: Mean| {
+        if n == 0 && cell.setting.start == Start::Nothing { Mean::of(&[mean.mean]) } else { mean }
+    };
 
     // A cell a line, over the rounds.
     let name = |cell: &Cell| {
@@ -41,7 +48,11 @@ pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
         let rounds = |measure: Measure, x: &dyn Fn(&Curves, usize) -> f64| -> Vec<Line> {
             let line = |(cell, curves): &(Cell, Curves)| Line {
                 name: name(cell),
-                points: measure(curves).iter().enumerate().map(|(n, mean)| (x(curves, n), *mean)).collect(),
+                points: measure(curves)
+                    .iter()
+                    .enumerate()
+                    .map(|(n, mean)| (x(curves, n), measured(cell, n, *mean)))
+                    .collect(),
             };
             summary.cells.iter().map(line).collect()
         };
@@ -59,7 +70,10 @@ pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
         let by = |measure: Measure, x: &dyn Fn(usize, &Curves) -> f64| -> Vec<Line> {
             let points = |line: &String| {
                 let cells = summary.cells.iter().enumerate().filter(|(_, (cell, _))| cell.line == *line);
-                cells.map(|(n, (_, curves))| (x(n, curves), last(measure(curves)))).collect()
+                let mut points: Vec<(f64, Mean)> =
+                    cells.map(|(n, (_, curves))| (x(n, curves), last(measure(curves)))).collect();
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                points
             };
             names.iter().map(|line| Line { name: (*line).clone(), points: points(line) }).collect()
         };
@@ -78,4 +92,62 @@ pub fn figures(summary: &Summary) -> Vec<(&'static str, Figure)> {
         }
     }
     figures
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::Path;
+
+    use super::super::plan::Experiment;
+    use super::super::standing::Standing;
+    use super::*;
+
+    /// Each value is a number, and the more it is the less is published.
+    fn shown(values: &[u32]) -> Vec<(&'static str, Figure)> {
+        let named: Vec<String> =
+            values.iter().map(|value| format!("{{ name: '{value}', set: {{}} }}")).collect();
+        let text = format!(
+            "{{ title: 't', base: {{ rounds: 1 }}, axis: {{ name: 'x', values: [{}] }} }}",
+            named.join(", ")
+        );
+        let experiment = Experiment::parse(&text, Path::new("test")).unwrap();
+        let cells = experiment.cells().unwrap();
+        let mut runs = BTreeMap::new();
+        for (cell, value) in cells.iter().zip(values) {
+            let standing = |round| Standing {
+                round,
+                published: f64::from(round * 1000) / f64::from(*value),
+                ..Standing::default()
+            };
+            for seed in 0..2 {
+                runs.insert(cell.run(seed), vec![standing(0), standing(1)]);
+            }
+        }
+        figures(&Summary::of(&experiment, &cells, &runs, 2), 60)
+    }
+
+    #[test]
+    fn lines_run_along_x_whatever_the_order_in_the_file() {
+        for (values, names) in [
+            (&[10, 1, 5][..], &["rounds", "bytes", "values"][..]),
+            (&[10, 1, 5, 2, 9, 3, 8, 4, 7, 6], &["values", "bytes"]),
+        ] {
+            let figures = shown(values);
+            assert_eq!(figures.iter().map(|(name, _)| *name).collect::<Vec<_>>(), names);
+            for (name, figure) in figures {
+                for line in figure.panels.iter().flat_map(|panel| &panel.lines) {
+                    let xs: Vec<f64> = line.points.iter().map(|(x, _)| *x).collect();
+                    assert!(xs.len() > 1 && xs.is_sorted_by(|one, next| one < next), "{name}: {xs:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_guessed_before_anything_was_taught_has_no_interval() {
+        let rounds = shown(&[1, 2]).remove(0).1;
+        let line = &rounds.panels[0].lines[0].points;
+        assert_eq!(line.iter().map(|(_, mean)| mean.n).collect::<Vec<_>>(), [1, 2]);
+    }
 }

@@ -214,9 +214,8 @@ impl Experiment {
         if names.len() < cells.len() {
             return wrong("two values of the same name: name them apart");
         }
-        if names.iter().any(|(line, value)| {
-            [line, value].iter().any(|name| name.contains(|sign: char| sign == '|' || sign.is_control()))
-        }) {
+        let mut named = names.iter().flat_map(|(line, value)| [*line, *value]).chain([&self.axis.name]);
+        if named.any(|name| name.contains(|sign: char| sign == '|' || sign.is_control())) {
             return wrong("a name with a bar or a line break: write it without");
         }
         let drifts = cells.iter().map(|cell| cell.setting.drift).filter(|drift| *drift != Drift::None);
@@ -323,6 +322,8 @@ mod tests {
             ("'learning.share_fraction': 0", "'learning.share_fraction': 2", "share_fraction"),
             ("robots: 2", "robots: 0", "robots"),
             ("name: '1'", "name: '0'", "same name"),
+            ("name: 'B'", "name: 'a|b'", "with a bar"),
+            ("name: '1'", "name: 'a|b'", "with a bar"),
             ("title: 't'", "titel: 't'", "titel"),
             ("title: 't'", "title: 't', hands: { vocabulary: 'semaphore' }", "spatial, rescue"),
             (

@@ -103,7 +103,7 @@ pub fn conduct_by(
         + &drift(&experiment, &cells, &runs, (seeds, &split)).unwrap_or_default();
     let path = folder.join("results.md");
     gestalt_file::write(&path, table.as_bytes()).map_err(|source| ExperimentError::Write { path, source })?;
-    chart::draw_into(folder, &figures(&summary))?;
+    chart::draw_into(folder, &figures(&summary, split.judged()))?;
     Ok(table)
 }
 

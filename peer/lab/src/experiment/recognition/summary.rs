@@ -118,6 +118,7 @@ impl Summary {
             x: "robots".to_owned(),
             marks: Some(marks),
             logarithmic: false,
+            trials: self.showings,
             panels: vec![
                 Panel { y: "decided rightly, %", lines: lines(|row| row.right) },
                 Panel { y: "decided wrongly, %", lines: lines(|row| row.wrong) },
