@@ -34,8 +34,11 @@ pub(crate) fn whiten(whitening: &[f32], vector: &[f32]) -> Vec<f64> {
 }
 
 /// The mean that rests on this much, without one that weighs so much of it.
-pub(crate) fn mean_without((mean, all): (&[f64], f64), (own, weight): (&[f64], f64)) -> Vec<f64> {
-    mean.iter().zip(own).map(|(mean, own)| (mean * all - weight * own) / (all - weight)).collect()
+pub(crate) fn mean_without<'a>(
+    (mean, all): (&'a [f64], f64),
+    (own, weight): (&'a [f64], f64),
+) -> impl Iterator<Item = f64> + 'a {
+    mean.iter().zip(own).map(move |(mean, own)| (mean * all - weight * own) / (all - weight))
 }
 
 /// The covariance about the classes, shrunk towards what is believed of it: the more, the less is known.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Score, Shown};
-use crate::head::{Discriminant, Spot, margin_of};
+use crate::head::{Discriminant, Room, margin_of};
 use crate::scatter::{Covariance, mean_without, whiten};
 
 /// The mean of a showing, and its samples, each with its place among all.
@@ -132,20 +132,19 @@ impl Scatter {
             .iter()
             .scan(0, |next, class| Some(std::mem::replace(next, *next + class.showings.len())))
             .collect();
-        let halfway = self.samples.iter().filter_map(|seen| {
+        let (mut white, mut room) = (Vec::with_capacity(self.width), Room::default());
+        let score = |seen: &Seen| {
             // Showings lie here by class: some fifths of the way round is seldom the same one.
             let (place, count) = (firsts[seen.class] + seen.showing, showings.len());
-            let others = (1..=4).map(|step| showings[(place + count * step / 5) % count]);
-            let (_, other) = others.into_iter().find(|(class, _)| *class != seen.class)?;
-            let white = seen.white.iter().zip(other).map(|(a, b)| f64::midpoint(*a, *b));
-            Some((seen.weight, white.collect::<Vec<f64>>()))
-        });
-        let score = |(weight, white): (f64, Vec<f64>)| {
+            let mut others = (1..=4).map(|step| showings[(place + count * step / 5) % count]);
+            let (_, other) = others.find(|(class, _)| *class != seen.class)?;
+            white.clear();
+            white.extend(seen.white.iter().zip(other).map(|(a, b)| f64::midpoint(*a, *b)));
             let to = |of: &OfClass| a_coordinate(squared(&of.mean, &white), self.width, of.weight);
             let score = Score::of(self.classes.iter().map(to))?;
-            Some((Score { margin: margin_of(&plain.logs_at(&plain.spot(&white))), ..score }, weight))
+            Some((Score { margin: margin_of(plain.logs_of(&white, &mut room)), ..score }, seen.weight))
         };
-        halfway.filter_map(score).collect()
+        self.samples.iter().filter_map(score).collect()
     }
 
     /// The means of the classes, one after the other, and how many showings each rests on.
@@ -165,13 +164,15 @@ impl Scatter {
 
     /// What a discriminant says of each sample that is not all of its class, without its showing: by its place here.
     pub fn logs_left_out(&self, plain: &Discriminant) -> LogsLeftOut {
-        let spots = |class: &OfClass| {
-            class.showings.iter().map(|(mean, weight)| (plain.spot(mean), *weight)).collect()
+        let without = |class: &OfClass| -> Vec<_> {
+            let showings = class.showings.iter();
+            showings.map(|(mean, weight)| plain.class_without(class.name, mean, *weight)).collect()
         };
-        let showings: Vec<Vec<(Spot, f64)>> = self.classes.iter().map(spots).collect();
+        let left: Vec<_> = self.classes.iter().map(without).collect();
+        let mut room = Room::default();
         let logs = |seen: &Seen| {
-            let (own, weight) = &showings[seen.class][seen.showing];
-            plain.logs_without(&plain.spot(&seen.white), self.classes[seen.class].name, (own, *weight))
+            let class = left[seen.class][seen.showing].as_ref()?;
+            Some(plain.logs_with(&seen.white, (self.classes[seen.class].name, class), &mut room))
         };
         self.samples.iter().map(logs).collect()
     }
@@ -179,6 +180,7 @@ impl Scatter {
     /// What views of known gestures score, each without its showing, and views of unknown ones, each without its class; with what each weighs.
     pub fn left_out(&self, plain: Option<(&Discriminant, &LogsLeftOut)>) -> (Scores, Scores) {
         let (mut known, mut unknown) = (Vec::new(), Vec::new());
+        let (mut distances, mut room) = (Vec::<(usize, f64)>::new(), Room::default());
         for (place, Seen { class, showing, weight, white, .. }) in self.samples.iter().enumerate() {
             let to = |(k, of_class): (usize, &OfClass)| {
                 let all = of_class.weight;
@@ -189,21 +191,23 @@ impl Scatter {
                 let (own, weight) = &of_class.showings[*showing];
                 (all > *weight).then(|| {
                     let mean = mean_without((&of_class.mean, all), (own, *weight));
-                    (k, a_coordinate(squared(&mean, white), self.width, all - weight))
+                    let squared = mean.zip(white).map(|(a, b)| (a - b) * (a - b)).sum();
+                    (k, a_coordinate(squared, self.width, all - weight))
                 })
             };
-            let distances: Vec<(usize, f64)> = self.classes.iter().enumerate().filter_map(to).collect();
+            distances.clear();
+            distances.extend(self.classes.iter().enumerate().filter_map(to));
             let others = distances.iter().filter(|(k, _)| k != class).map(|(_, distance)| *distance);
             let without = plain.and_then(|(_, left_out)| left_out[place].as_ref());
             let margin = plain.and_then(|(plain, _)| {
                 // Of the other classes it says the same either way.
-                let mut logs = without.cloned().unwrap_or_else(|| plain.logs_at(&plain.spot(white)));
-                logs[self.classes[*class].name] = f64::NEG_INFINITY;
-                margin_of(&logs)
+                let logs = without.map_or_else(|| plain.logs_of(white, &mut room), Vec::as_slice);
+                let name = self.classes[*class].name;
+                margin_of(logs.iter().enumerate().filter(|(k, _)| *k != name).map(|(_, log)| log))
             });
             unknown.extend(Score::of(others).map(|score| (Score { margin, ..score }, *weight)));
             if distances.len() == self.classes.len() {
-                let margin = without.and_then(|logs| margin_of(logs));
+                let margin = without.and_then(margin_of);
                 let score = Score::of(distances.iter().map(|(_, d)| *d));
                 known.extend(score.map(|score| (Score { margin, ..score }, *weight)));
             }

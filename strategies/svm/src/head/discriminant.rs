@@ -39,7 +39,7 @@ pub struct Discriminant {
 
 /// A class.
 #[derive(Clone, Debug, PartialEq)]
-struct Class {
+pub(crate) struct Class {
     /// The mean of its showings along the directions, from the centre.
     mean: Vec<f64>,
     showings: f64,
@@ -52,11 +52,20 @@ struct Class {
 }
 
 /// Where a view lies.
+#[derive(Default)]
 pub(crate) struct Spot {
     /// Along the directions, from the centre.
     along: Vec<f64>,
     /// The squared distance from the centre in all other directions.
     beside: f64,
+}
+
+/// Room for what is found of one view after the other.
+#[derive(Default)]
+pub(crate) struct Room {
+    away: Vec<f64>,
+    spot: Spot,
+    logs: Vec<f64>,
 }
 
 impl Discriminant {
@@ -130,10 +139,17 @@ impl Discriminant {
 
     /// Where a whitened view lies.
     pub(crate) fn spot(&self, white: &[f64]) -> Spot {
-        let away: Vec<f64> = white.iter().zip(&self.center).map(|(x, c)| x - c).collect();
-        let along: Vec<f64> = along(&self.directions, &away).collect();
-        let beside = (dot(&away, &away) - dot(&along, &along)).max(0.0);
-        Spot { along, beside }
+        let (mut away, mut spot) = Default::default();
+        self.find(white, &mut away, &mut spot);
+        spot
+    }
+
+    fn find(&self, white: &[f64], away: &mut Vec<f64>, spot: &mut Spot) {
+        away.clear();
+        away.extend(white.iter().zip(&self.center).map(|(x, c)| x - c));
+        spot.along.clear();
+        spot.along.extend(along(&self.directions, away));
+        spot.beside = (dot(away, away) - dot(&spot.along, &spot.along)).max(0.0);
     }
 
     /// What is known of a class by the mean of so many showings.
@@ -161,23 +177,42 @@ impl Discriminant {
 
     /// What each class says of a view there.
     pub(crate) fn logs_at(&self, spot: &Spot) -> Vec<f64> {
-        let log =
-            |class: &Option<Class>| class.as_ref().map_or(f64::NEG_INFINITY, |class| self.log(spot, class));
-        self.classes.iter().map(log).collect()
+        self.all_logs(spot).collect()
     }
 
-    /// The same with one showing of a class left out, that has its whitened mean there and weighs so much; `None` where it is the only one.
-    pub(crate) fn logs_without(
-        &self,
-        spot: &Spot,
-        class: usize,
-        (showing, weight): (&Spot, f64),
-    ) -> Option<Vec<f64>> {
+    fn all_logs(&self, spot: &Spot) -> impl Iterator<Item = f64> {
+        let log =
+            |class: &Option<Class>| class.as_ref().map_or(f64::NEG_INFINITY, |class| self.log(spot, class));
+        self.classes.iter().map(log)
+    }
+
+    /// The same of a whitened view.
+    pub(crate) fn logs_of<'a>(&self, white: &[f64], room: &'a mut Room) -> &'a [f64] {
+        let Room { away, spot, logs } = room;
+        self.find(white, away, spot);
+        logs.clear();
+        logs.extend(self.all_logs(spot));
+        logs
+    }
+
+    /// What is left of a class without one showing, that has its whitened mean there and weighs so much; `None` where it is the only one.
+    pub(crate) fn class_without(&self, class: usize, showing: &[f64], weight: f64) -> Option<Class> {
         let left = self.classes.get(class)?.as_ref().filter(|class| class.showings > weight)?;
+        let showing = self.spot(showing);
         let mean = mean_without((&left.mean, left.showings), (&showing.along, weight));
-        let mut logs = self.logs_at(spot);
-        logs[class] = self.log(spot, &self.class(mean, left.showings - weight));
-        Some(logs)
+        Some(self.class(mean.collect(), left.showings - weight))
+    }
+
+    /// What each class says of a whitened view, with this in place of one of them.
+    pub(crate) fn logs_with(
+        &self,
+        white: &[f64],
+        (place, class): (usize, &Class),
+        room: &mut Room,
+    ) -> Vec<f64> {
+        let mut logs = self.logs_of(white, room).to_vec();
+        logs[place] = self.log(&room.spot, class);
+        logs
     }
 }
 

@@ -17,7 +17,7 @@ use std::fmt::Debug;
 
 pub(crate) use blend::{Blend, Few, Losses, YOUNG, blended};
 pub use discriminant::Discriminant;
-pub(crate) use discriminant::Spot;
+pub(crate) use discriminant::Room;
 pub use discriminant_sums::DiscriminantSums;
 pub(crate) use sharpness::sharpness;
 pub(crate) use sums::Sums;
@@ -43,7 +43,7 @@ pub trait Head: Debug + Send + Sync {
 }
 
 /// By how much the greatest of logarithms exceeds the second; `None` of fewer than two.
-pub(crate) fn margin_of(logs: &[f64]) -> Option<f64> {
+pub(crate) fn margin_of<'a>(logs: impl IntoIterator<Item = &'a f64>) -> Option<f64> {
     let (mut first, mut second) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     for log in logs {
         if *log > first {
