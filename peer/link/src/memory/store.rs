@@ -58,16 +58,15 @@ pub(crate) struct Store {
 impl Store {
     /// Opens a robot's memory, or makes a new one, and counts this start. The first start has number `first_boot`. Says
     /// whether it is new.
-    ///
-    /// # Errors
-    /// See [`StoreError`].
+    #[cfg(test)]
     pub fn open(place: Arc<dyn Place>, robot: RobotId, first_boot: u32) -> Result<(Self, bool), StoreError> {
         let (mut store, new) = Self::look(place, robot)?;
         store.count(first_boot)?;
         Ok((store, new))
     }
 
-    /// The same, before this start is counted: a memory that is refused counts none, and one that cannot be written can be read.
+    /// Opens a robot's memory, or makes a new one; says whether it is new. This start is not counted yet: a memory that is refused counts none, and one that
+    /// cannot be written can be read.
     ///
     /// # Errors
     /// See [`StoreError`].
