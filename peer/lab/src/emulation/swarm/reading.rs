@@ -15,7 +15,7 @@ use super::robot::Robot;
 use crate::emulation::pupil::Pupil;
 
 /// How much waits for a robot, on the average, when all are told.
-pub(super) const MANY: usize = 8;
+pub(super) const MANY: usize = 32;
 
 impl Swarm<'_> {
     /// One more thing waits to be told.
