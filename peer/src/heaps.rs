@@ -1,7 +1,34 @@
-//! Into how many heaps the process's memory is divided.
+//! Into how many heaps the process's memory is divided, and what it keeps of memory that it has let go of.
 //!
-//! glibc makes a heap for each thread, up to eight for each core, and what is free in one is of no use to the others. A sealed robot at whose door
-//! strangers knock holds 13 MB in some dozen of them, that grow for hours.
+//! Rust's memory is mimalloc's, in small pages, and goes back to the system when nobody wants it for a moment. OpenCV's is glibc's, which makes a heap for
+//! each thread, up to eight for each core, and what is free in one is of no use to the others.
+
+use std::ffi::c_long;
+
+use libmimalloc_sys::{mi_option_set, mi_option_t};
+
+/// mimalloc's own number for it, `mi_option_purge_delay`, which its crate does not name: how long it keeps what was let go of, in milliseconds.
+const KEEP: mi_option_t = 15;
+
+/// What a thousand robots let go of they want again within a round.
+const LONG: c_long = 500;
+
+/// From now on memory that was let go of is kept for long, and in huge pages where the system has them: for an emulation, which is over soon. To be called before
+/// there is a second thread.
+pub fn keep() {
+    #[expect(
+        unsafe_code,
+        reason = "mimalloc has no other way to say it but the environment, which is read before `main`"
+    )]
+    // SAFETY: it takes two numbers and no pointer, and no other thread is there to read them.
+    unsafe {
+        mi_option_set(KEEP, LONG);
+    }
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::thread::disable_transparent_huge_pages(false) {
+        tracing::debug!("small pages remain: {error}");
+    }
+}
 
 /// As many as a robot's few busy threads hardly wait for.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
@@ -28,6 +55,28 @@ mod tests {
     use std::process::Command;
     use std::sync::Barrier;
 
+    /// What mimalloc is told by a number that its crate does not name.
+    #[test]
+    fn memory_is_kept_for_long_where_that_is_said() {
+        if std::env::var_os(ALONE).is_none() {
+            return alone("heaps::tests::memory_is_kept_for_long_where_that_is_said");
+        }
+        #[expect(unsafe_code, reason = "as above")]
+        // SAFETY: it takes and gives a number.
+        let kept = || unsafe { libmimalloc_sys::mi_option_get(super::KEEP) };
+        assert_eq!(kept(), 10, "mimalloc's own time");
+        super::keep();
+        assert_eq!(kept(), super::LONG);
+    }
+
+    /// Runs that test in a process of its own.
+    fn alone(test: &str) {
+        let mut alone = Command::new(std::env::current_exe().unwrap());
+        let alone = alone.args(["--exact", test]).env(ALONE, "1").env_remove("MALLOC_ARENA_MAX");
+        let alone = alone.env_remove("MIMALLOC_PURGE_DELAY").output().unwrap();
+        assert!(alone.status.success(), "{}", String::from_utf8_lossy(&alone.stdout));
+    }
+
     /// Set in a process in which no other test has heaps.
     const ALONE: &str = "GESTALT_HEAPS_ALONE";
 
@@ -52,11 +101,7 @@ mod tests {
     #[test]
     fn many_threads_share_two_heaps() {
         if std::env::var_os(ALONE).is_none() {
-            let mut alone = Command::new(std::env::current_exe().unwrap());
-            alone.args(["--exact", "heaps::tests::many_threads_share_two_heaps"]);
-            let alone = alone.env(ALONE, "1").env_remove("MALLOC_ARENA_MAX").output().unwrap();
-            assert!(alone.status.success(), "{}", String::from_utf8_lossy(&alone.stdout));
-            return;
+            return alone("heaps::tests::many_threads_share_two_heaps");
         }
         super::share();
         let (began, counted) = (Barrier::new(17), Barrier::new(17));

@@ -3,6 +3,10 @@
 use std::process::ExitCode;
 
 use gestalt_peer::{cli, open_files};
+use mimalloc::MiMalloc;
+
+#[global_allocator]
+static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
     let command = cli::Command::of_this_process();

@@ -92,6 +92,7 @@ fn is_experiment(path: &std::path::Path) -> bool {
 /// # Errors
 /// See [`EmulateError`]; and when stdout is closed to the results.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    crate::heaps::keep();
     if args.out.is_some() && args.trace.is_some() {
         return Err("--trace is of a scenario: an experiment leaves its rows in --out".into());
     }

@@ -78,7 +78,7 @@ impl Args {
 /// # Errors
 /// Whatever keeps the robot from starting, and what ends it before its time.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    // Few threads of one robot, for months: emulations have as many heaps as threads.
+    // Few threads of one robot, for months.
     crate::heaps::share();
     let config = args.config()?;
     let model = crate::model::load(&config.model)?;
