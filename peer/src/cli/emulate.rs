@@ -44,6 +44,9 @@ pub struct Args {
     trace: Option<PathBuf>,
 }
 
+/// Of more robots than this an emulation takes as little memory as it can: 10,000 that learn take near 4 GiB.
+const MANY: usize = 4000;
+
 /// Why an emulation gave no result.
 #[derive(Debug, Error)]
 pub enum EmulateError {
@@ -92,7 +95,6 @@ fn is_experiment(path: &std::path::Path) -> bool {
 /// # Errors
 /// See [`EmulateError`]; and when stdout is closed to the results.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    crate::heaps::keep();
     if args.out.is_some() && args.trace.is_some() {
         return Err("--trace is of a scenario: an experiment leaves its rows in --out".into());
     }
@@ -117,6 +119,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(EmulateError::NoOut(args.scenario.clone()).into());
     }
     let scenario = Scenario::load(&args.scenario)?;
+    keep_memory_of(scenario.swarm_size());
     if let Some(path) = &args.trace {
         let failed = |source| EmulateError::Trace { path: path.display().to_string(), source };
         let mut file = BufWriter::new(File::create(path).map_err(failed)?);
@@ -137,6 +140,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Ok(())
     } else {
         super::say(&Table(&summaries).to_string())
+    }
+}
+
+/// Speed for memory, unless there are so many robots that it is the memory that is short.
+fn keep_memory_of(robots: usize) {
+    if robots <= MANY {
+        crate::heaps::keep();
     }
 }
 
@@ -164,6 +174,7 @@ fn conduct(args: &Args, folder: &Path) -> Result<(), Failure> {
         }
         recognition::conduct((&text, path), folder, args.seeds, report)?
     } else if Experiment::is_one(&text) {
+        keep_memory_of(Experiment::parse(&text, path)?.most_robots()?);
         let materials = Materials { dataset: args.dataset.clone(), start: args.start_dataset.clone() };
         experiment::conduct((&text, path), &materials, folder, args.seeds, report)?
     } else {

@@ -264,6 +264,14 @@ impl Experiment {
         Ok(cells)
     }
 
+    /// How many robots the largest swarm has.
+    ///
+    /// # Errors
+    /// See [`Self::cells`].
+    pub fn most_robots(&self) -> Result<usize, ExperimentError> {
+        Ok(self.cells()?.iter().map(|cell| cell.setting.robots).max().unwrap_or(0))
+    }
+
     /// The drift of those settings that have one.
     #[must_use]
     pub fn drift(&self) -> Drift {
