@@ -44,7 +44,7 @@ pub struct Args {
     trace: Option<PathBuf>,
 }
 
-/// Of more robots than this an emulation takes as little memory as it can: 10,000 that learn take near 4 GiB.
+/// Of more robots than this an emulation takes as little memory as it can: 10,000 that learn take more than 4 GiB.
 const MANY: usize = 4000;
 
 /// Why an emulation gave no result.
