@@ -1,28 +1,34 @@
-//! Into how many heaps the process's memory is divided, and what it keeps of memory that it has let go of.
+//! Where the program's memory comes from, into how many heaps it is divided, and what is kept of memory that was let go of.
 //!
-//! Rust's memory is mimalloc's, in small pages, and goes back to the system when nobody wants it for a moment. OpenCV's is glibc's, which makes a heap for
-//! each thread, up to eight for each core, and what is free in one is of no use to the others.
+//! Rust's memory is mimalloc's, in small pages, and goes back to the system when nobody wants it for a moment; without OpenCV, where the program needs no compiler
+//! but Rust's, it is the system's. OpenCV's is glibc's, which makes a heap for each thread, up to eight for each core, and what is free in one is of no use to
+//! the others.
 
-use std::ffi::c_long;
-
-use libmimalloc_sys::{mi_option_set, mi_option_t};
+// The allocator of the program `gestalt`.
+#[cfg(feature = "opencv")]
+pub use mimalloc::MiMalloc as Allocator;
+#[cfg(not(feature = "opencv"))]
+pub use std::alloc::System as Allocator;
 
 /// mimalloc's own number for it, `mi_option_purge_delay`, which its crate does not name: how long it keeps what was let go of, in milliseconds.
-const KEEP: mi_option_t = 15;
+#[cfg(feature = "opencv")]
+const KEEP: libmimalloc_sys::mi_option_t = 15;
 
 /// What a thousand robots let go of they want again within a round.
-const LONG: c_long = 500;
+#[cfg(feature = "opencv")]
+const LONG: std::ffi::c_long = 500;
 
 /// From now on memory that was let go of is kept for long, and in huge pages where the system has them: for an emulation, which is over soon. To be called before
 /// there is a second thread.
 pub fn keep() {
+    #[cfg(feature = "opencv")]
     #[expect(
         unsafe_code,
         reason = "mimalloc has no other way to say it but the environment, which is read before `main`"
     )]
     // SAFETY: it takes two numbers and no pointer, and no other thread is there to read them.
     unsafe {
-        mi_option_set(KEEP, LONG);
+        libmimalloc_sys::mi_option_set(KEEP, LONG);
     }
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::thread::disable_transparent_huge_pages(false) {
@@ -56,6 +62,7 @@ mod tests {
     use std::sync::Barrier;
 
     /// What mimalloc is told by a number that its crate does not name.
+    #[cfg(feature = "opencv")]
     #[test]
     fn memory_is_kept_for_long_where_that_is_said() {
         if std::env::var_os(ALONE).is_none() {

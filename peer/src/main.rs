@@ -2,11 +2,11 @@
 
 use std::process::ExitCode;
 
+use gestalt_peer::heaps::Allocator;
 use gestalt_peer::{cli, open_files};
-use mimalloc::MiMalloc;
 
 #[global_allocator]
-static ALLOCATOR: MiMalloc = MiMalloc;
+static ALLOCATOR: Allocator = Allocator;
 
 fn main() -> ExitCode {
     let command = cli::Command::of_this_process();

@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 return Err(error);
             }
         };
-        printing.note(web::say_where(page.as_ref(), args.json));
+        printing.note(page.as_ref().map(|page| web::say_where(Some(page), args.json)));
         manager.ready(&format!("robot {} of swarm {} listens on {}", config.robot.id, config.swarm.0, locators.join(" ")));
         let mut schedule = args.open_every.map(every);
         let mut watchdog = manager.watchdog_period().map(every);
@@ -187,7 +187,7 @@ pub(super) fn lagged(missed: u64) {
 }
 
 /// Prints what happened to a robot.
-pub(super) fn report(as_json: bool, event: &Event, names: &Names) -> Result<(), Failure> {
+pub(super) fn report(as_json: bool, event: &Event, names: &Names) -> Option<Result<(), Failure>> {
     let (object, words) = match event {
         Event::Opened(round) => (
             json!({"event": "opened", "round": round}),
@@ -234,8 +234,8 @@ pub(super) fn report(as_json: bool, event: &Event, names: &Names) -> Result<(), 
             json!({"event": "failed", "part": part.name(), "cause": cause}),
             format!("{part} failed: {}", show::clean(cause)),
         ),
-        // What a later release may have to tell.
-        _ => return Ok(()),
+        // What is for its guests, or what a later release may have to tell.
+        _ => return None,
     };
-    line(as_json, &object, &words)
+    Some(line(as_json, &object, &words))
 }

@@ -9,9 +9,9 @@ pub(super) struct Printing {
 }
 
 impl Printing {
-    /// Takes in what became of something that was printed.
-    pub(super) fn note(&mut self, printed: Result<(), Failure>) {
-        if let Some(warning) = self.warning(printed) {
+    /// Takes in what became of something that was printed, if anything was.
+    pub(super) fn note(&mut self, printed: impl Into<Option<Result<(), Failure>>>) {
+        if let Some(warning) = printed.into().and_then(|printed| self.warning(printed)) {
             tracing::warn!("{warning}");
         }
     }
