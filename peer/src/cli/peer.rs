@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
                 return Err(error);
             }
         };
-        printing.note(page.as_ref().map(|page| web::say_where(Some(page), args.json)));
+        printing.note(page.as_ref().map(|page| web::say_where(page, args.json)));
         manager.ready(&format!("robot {} of swarm {} listens on {}", config.robot.id, config.swarm.0, locators.join(" ")));
         let mut schedule = args.open_every.map(every);
         let mut watchdog = manager.watchdog_period().map(every);

@@ -71,7 +71,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         } else {
             let mut news = client.news().await?;
             let page = args.web.open(&swarm, &link).await?;
-            web::say_where(page.as_ref(), args.json)?;
+            if let Some(page) = &page {
+                web::say_where(page, args.json)?;
+            }
             let foxglove = args.foxglove.open(&swarm, &link, args.json).await?;
             tokio::select! {
                 () = interrupted() => {}

@@ -37,9 +37,8 @@ impl WebArgs {
     }
 }
 
-/// Says where a page is served, if one is.
-pub(super) fn say_where(page: Option<&Desk>, as_json: bool) -> Result<(), Failure> {
-    let Some(page) = page else { return Ok(()) };
+/// Says where a page is served.
+pub(super) fn say_where(page: &Desk, as_json: bool) -> Result<(), Failure> {
     let (url, hint) = (page.url(), from_elsewhere(page.address()));
     line(as_json, &json!({"event": "page", "url": url}), &format!("page: {url}{hint}"))
 }

@@ -57,9 +57,7 @@ impl Mind {
                 NamingReceipt::New => news = true,
                 NamingReceipt::Unproven if unproven.len() == MAX_UNPROVEN => return ControlFlow::Break(()),
                 NamingReceipt::Unproven => unproven.push(naming),
-                NamingReceipt::Known => {}
-                NamingReceipt::Full => self.rounds.note_refusal(Refusal::NamingFull),
-                NamingReceipt::FarAhead => self.rounds.note_refusal(Refusal::NamingFarAhead),
+                other => refusal(other).into_iter().for_each(|cause| self.rounds.note_refusal(cause)),
             }
             ControlFlow::Continue(())
         });
@@ -67,10 +65,7 @@ impl Mind {
         learning.hear_namings(unproven, |_, receipt| {
             match receipt {
                 NamingReceipt::New => news = true,
-                NamingReceipt::Unproven => self.rounds.note_refusal(Refusal::NamingUnproven),
-                NamingReceipt::Known => {}
-                NamingReceipt::Full => self.rounds.note_refusal(Refusal::NamingFull),
-                NamingReceipt::FarAhead => self.rounds.note_refusal(Refusal::NamingFarAhead),
+                other => refusal(other).into_iter().for_each(|cause| self.rounds.note_refusal(cause)),
             }
             ControlFlow::Continue(())
         });
@@ -177,5 +172,15 @@ impl Learning {
             NamingReceipt::Unproven => (Outcome::NotAllowed, None),
             NamingReceipt::Full | NamingReceipt::FarAhead => (Outcome::NoRoom, None),
         }
+    }
+}
+
+/// What a word on a gesture's name was refused for, if it was.
+fn refusal(receipt: NamingReceipt) -> Option<Refusal> {
+    match receipt {
+        NamingReceipt::New | NamingReceipt::Known => None,
+        NamingReceipt::Unproven => Some(Refusal::NamingUnproven),
+        NamingReceipt::Full => Some(Refusal::NamingFull),
+        NamingReceipt::FarAhead => Some(Refusal::NamingFarAhead),
     }
 }

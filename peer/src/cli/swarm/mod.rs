@@ -247,7 +247,9 @@ async fn start(
         ),
     )?;
     let page = args.web.open(&args.swarm, &link).await?;
-    web::say_where(page.as_ref(), args.json)?;
+    if let Some(page) = &page {
+        web::say_where(page, args.json)?;
+    }
     Ok(Swarm { members, client, news, page, recording, _folder: folder })
 }
 

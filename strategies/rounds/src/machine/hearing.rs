@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 use std::time::Duration;
 
 use gestalt_protocol::{
-    ClassId, Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp,
+    ClassId, Decision, Envelope, Give, HeldVote, Holder, Holding, Message, RobotId, Stamp, Vote,
 };
 
 use super::members::expected;
@@ -147,8 +147,7 @@ impl Rounds {
             self.refusals.add(Refusal::Impossible);
             return false;
         }
-        let scale = Scale { vocabulary: vote.vocabulary, classes: vote.listed() };
-        if !vote.evidence.is_empty() && self.is_foreign(scale) {
+        if is_of_another_list(vote, self.own_scale()) {
             self.refusals.add(Refusal::Vocabulary);
             self.hear_of(robot);
             return false;
@@ -324,10 +323,8 @@ impl Rounds {
                 round.agreement.note_restart(robot);
                 earlier.extend((known.stamp < stamp).then(|| known.clone()));
             }
-            let scale = Scale { vocabulary: vote.vocabulary, classes: vote.listed() };
             // Who judges by another list of gestures counts for nothing, and is there.
-            let is_foreign = !vote.evidence.is_empty() && own.is_some_and(|own| own != scale);
-            let is_news = is_foreign || round.ballot.cast(held) == Cast::Counted;
+            let is_news = is_of_another_list(vote, own) || round.ballot.cast(held) == Cast::Counted;
             if is_news && self.alive.contains(robot) {
                 self.electorate.hear(robot, self.now);
             }
@@ -368,11 +365,6 @@ impl Rounds {
             && round.agreement.is_held_by(most, class, |robot| self.counts(robot))
     }
 
-    /// Whether that is another scale than this robot's own, if it has one.
-    fn is_foreign(&self, scale: Scale) -> bool {
-        self.own_scale().is_some_and(|own| own != scale)
-    }
-
     /// Whether this robot would decide so itself on the votes that the decision rests on. `this`: where it is of the newest
     /// round, votes held here must be in it as their robots said them, and none of a round that is over.
     fn judge(&self, decision: &Decision, this: bool) -> Result<(), Refusal> {
@@ -382,7 +374,8 @@ impl Rounds {
             return if somebody && is_consistent(decision) { Ok(()) } else { Err(Refusal::Unfounded) };
         }
         let certificate = &decision.certificate;
-        if self.is_foreign(Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() }) {
+        let scale = Scale { vocabulary: certificate.vocabulary, classes: certificate.listed() };
+        if self.own_scale().is_some_and(|own| own != scale) {
             return Err(Refusal::Vocabulary);
         }
         let ballot = self.round.as_ref().filter(|_| this).map(|round| &round.ballot);
@@ -402,6 +395,11 @@ impl Rounds {
         self.refusals.add(Refusal::DuplicateId);
         self.duplicate = Some(stamp);
     }
+}
+
+/// Whether a robot of that scale, if it has one, cannot count what that vote says, as it judges by another list of gestures.
+fn is_of_another_list(vote: &Vote, own: Option<Scale>) -> bool {
+    !vote.evidence.is_empty() && own.is_some_and(|own| !own.is_of(vote))
 }
 
 /// What became of a decision that was heard.
